@@ -10,7 +10,7 @@
 #include "server/access/caller.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
 #include "server/settings/config.h"
 #include "server/shards/body_resolution.h"
 #include "server/wire/decode.h"

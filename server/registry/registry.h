@@ -3,92 +3,82 @@
 
 #include <absl/status/statusor.h>
 
-#include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/body.h"
-#include "server/registry/body_table.h"
-#include "server/registry/change_feed.h"
+#include "server/registry/bodies/body_registry.h"
+#include "server/registry/catalog/catalog.h"
+#include "server/registry/catalog/change_feed.h"
+#include "server/registry/catalog/known_hulls.h"
+#include "server/registry/catalog/registry_types.h"
+#include "server/registry/changes/hull_appender.h"
+#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/hull_lifecycle.h"
+#include "server/registry/changes/takeover.h"
 #include "server/registry/commit/committer.h"
-#include "server/registry/hull_state.h"
-#include "server/registry/hull_table.h"
-#include "server/registry/known_hulls.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
+#include "server/registry/others/after_others.h"
+#include "server/registry/others/freshness_gate.h"
+#include "server/registry/read/hull_reader.h"
+#include "server/registry/read/preparer.h"
+#include "server/registry/records/record_gate.h"
+#include "server/registry/records/record_lister.h"
+#include "server/registry/records/record_reader.h"
+#include "server/registry/watch/watches.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-struct PendingChunk;
-
-// Keeps hulls by ID, and bodies, whose IDs are of the same namespace: of a body all that is known,
-// which is its pieces (registry_bodies.cc). Keeps for each hull its record, and, while it is in use
-// or memory allows, a builder and its points as a LiveHull, of which readers are given versions.
-// What is not in memory is read back from the store at first use.
+// Keeps hulls by ID, and bodies, whose IDs are of the same namespace, and answers from one revision
+// at a time. This class puts its parts together and passes each call to the one whose job it is:
 //
-// Where the store finds records, hulls are not read when a server starts: the table holds records
-// of those that were asked for lately, and what is not in it is not known until it is read
-// (records/registry_records.cc). So whatever depends on what there is under an ID first makes that
-// known, and looks again when it is done with waiting. So it is with bodies, which have a table of
-// their own; an ID of which it is known that there is neither is in that of hulls.
+//   Catalog        what is known: tables of hulls and bodies, the revision, how many there are
+//   RecordReader   makes known what is under an ID, where the store finds records; RecordLister
+//                  lists what is not known; RecordGate keeps both from mixing revisions
+//   FreshnessGate  lets a call go on once what is here is as fresh as it asks
+//   HullReader     gives readers hulls of one moment; Preparer makes what is asked often faster
+//   HullLifecycle  begins and ends hulls; HullAppender lets them grow; HullChanges brings both to
+//   the
+//                  Committer, in order
+//   BodyRegistry   puts, deletes, finds and lists bodies
+//   Takeover       puts what other servers committed in the place of what was known
+//   Watches        tells watches what is there, and what changes, as ChangeFeed notes it
+//   MemoryBudget   says what is dropped
 //
-// The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
-// see. HullState says what a hull can be in, the Committer brings changes to the store, and the
-// MemoryBudget says what is dropped.
+// A change is made in two steps. It is decided, or built, and submitted to the committer; only when
+// the store has kept it does it become visible, as a whole and in the order of submission, and is
+// answered. Chunks of one hull may be in flight together, each built on those before it. Creation,
+// deletion, replacement and chunks with a condition on the revision wait until no change of their
+// hull is in flight, since what they find must be committed. Where another server was first, a
+// change is made anew of what there is by then, so callers do not hear of it.
 //
-// Changes are made in two steps. A chunk is built first; the change that it makes is then submitted
-// to the committer. Only when that is kept does a change become visible, as a whole and in the
-// order of submission, and is answered. Meanwhile the next chunk of the same hull may be built on
-// it: if the batch fails, so do all changes that follow it, and the hull returns to its last
-// committed state. Creation, deletion, replacement and chunks with a condition on the revision wait
-// until no change of their hull is in flight, since what they find must be committed.
+// Readers and writers never wait for each other. A writer appends to a LiveHull, without the mutex;
+// a mark says up to where that is committed, and readers get the version at the mark. What is not
+// in memory is read back from the store at first use. Where the store finds records, not even the
+// records are read when a server starts: a call that depends on what there is under an ID first
+// makes that known, and looks again when it is done with waiting.
 //
-// Readers and writers never wait for each other. One mutex guards all records and is held for
-// moments only: a reader of many hulls looks up kMostLookupsPerHold at a time, lets others pass,
-// and at the end looks again for those that changed meanwhile, so that all are of one revision.
-// A chunk is built without it, by the one thread that owns the builder, which then
-// appends what became vertices to the LiveHull. How far that is committed is a mark in the record;
-// the first reader after a commit makes the version at that mark, in O(1) under the mutex, and it
-// is served until the next commit. A reader waits for the store at most, when the hull is not in
-// memory, and then many read it once. A refused batch puts in its place a copy of the LiveHull up
-// to the mark; whoever still builds on the former one drops it. Chunks of one hull queue up and
-// occupy no thread meanwhile.
+// One mutex, of this class, guards the state of all parts and is held for moments only
+// (kMostLookupsPerHold). A Locked, which is passed along, shows that it is held.
 //
-// Once questions about a hull have paid for preparing it (LiveHull::WantsPreparing), that is done
-// by a thread of its own, or by a reader that expects to ask that much. The same thread prepares
-// hulls that would otherwise come to hold many points that are no vertices any more. The canonical
-// snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
-//
-// Where other servers commit to the same store, changes first learn what those did, and reads that
-// are to be fresher than what is known here; it takes the place of that, and a hull in memory that
-// only grew is given the points that came. A change that another one preceded is refused by the
-// committer, and made anew of what there is by then, so callers do not hear of it
-// (registry_others.cc). A chunk is kept for that until it is committed.
-//
-// Lock order: first the mutex of the records; then that of the committer's queue, of the budget, of
-// a pool or within a LiveHull. None of the latter is held while another lock is taken. Callbacks
-// run without any. The committer completes each batch under the mutex of the records (its header
-// says why); the budget evicts under it, since what it drops belongs to the records; a MemoryCharge
-// takes the budget's mutex alone.
+// Lock order: first that mutex; then that of the committer's queue, of the budget, of a pool or
+// within a LiveHull. None of the latter is held while another lock is taken. Callbacks run without
+// any. The committer completes each batch under the mutex (its header says why); the budget evicts
+// under it, since what it drops belongs to hulls; a MemoryCharge takes the budget's mutex alone.
+// Thread-safe.
 class Registry {
  public:
-  // Some 50 us.
-  static constexpr uint64_t kMostLookupsPerHold = 128;
-
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
   // no chunk be pending when it is destroyed. preparers, loaders: where to report what waits to be
   // prepared, and to be read from the store.
@@ -102,11 +92,12 @@ class Registry {
   // Reads the records of all hulls and bodies that the store holds, unless it finds records; before
   // any other call. Damaged ones are logged, and answered with DATA_LOSS later.
   absl::Status Load();
-  // Of a store that finds records, how many of hulls, and small ones of bodies, are kept in memory
-  // while nobody uses them, instead of what a part of --memory-limit holds. Before Load; for tests.
+  // How many records of hulls, and small ones of bodies, a registry over a store that finds them
+  // keeps in memory while nobody uses them, instead of what a part of --memory-limit holds. Before
+  // Load; for tests.
   void KeepRecords(size_t most) {
-    hulls_.KeepAtMost(most);
-    bodies_.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+    catalog_.hulls().KeepAtMost(most);
+    catalog_.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
   }
 
   const Store& store() const { return store_; }
@@ -118,42 +109,59 @@ class Registry {
   // thread. Requires a valid ID (unchecked: CheckHullId checks it where the call arrives).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
-  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done);
+  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
+    lifecycle_.Create(id, if_absent, std::move(done));
+  }
 
   // Removes a hull; its sessions hear of it. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done) {
+    lifecycle_.Delete(id, if_revision, std::move(done));
+  }
 
   // Puts a hull in the place of another, at once for all readers. It is a new incarnation: sessions
   // of the former one end. Replies as above. Requires a builder. Copies the vertices, hence not for
   // gRPC's threads.
   // NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, or the disk is full; UNAVAILABLE: as above.
-  void Replace(Replacement replacement, Reply<ReplaceResult> done);
+  void Replace(Replacement replacement, Reply<ReplaceResult> done) {
+    lifecycle_.Replace(std::move(replacement), std::move(done));
+  }
 
   // Puts a body in the place of another or of none, at once for all readers; its revisions are
   // given here. Replies as above. Requires valid IDs and poses (unchecked), and pieces, at most
   // --max-pieces-per-body. The hulls of the pieces need not exist.
   // ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: as above.
-  void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
+  void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done) {
+    bodies_.Put(std::move(body), if_revision, std::move(done));
+  }
   // Removes a body. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
+                  Reply<uint64_t> done) {
+    bodies_.Delete(id, if_revision, std::move(done));
+  }
   // As List. A page may hold less than page_size although there are more.
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
                                       size_t page_size,
-                                      const std::function<bool()>& should_stop = {});
+                                      const std::function<bool()>& should_stop = {}) {
+    return bodies_.List(prefix, after, page_size, should_stop);
+  }
   // What is not known is read from the store, hence not for gRPC's threads. The status:
   // UNAVAILABLE: it cannot be read; CANCELLED: should_stop said so; RESOURCE_EXHAUSTED: it would
   // have to be, and readers hold more than their share of --memory-limit. Cost: O(log n) each, and
   // a question to the store for each kMostLookupsPerHold; others pass in between.
   FoundBodies FindBodies(std::span<const std::string> ids,
-                         const std::function<bool()>& should_stop = {});
+                         const std::function<bool()>& should_stop = {}) {
+    return bodies_.Find(ids, should_stop);
+  }
   // The same, but nullopt, at once, where the store would have to be read.
-  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids);
+  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids) {
+    return bodies_.TryFind(ids);
+  }
   // Whether there may be a body. Takes no lock.
-  bool has_bodies() const { return BodyCount() > 0; }
+  bool has_bodies() const { return catalog_.BodyCount() > 0; }
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
   // Where the store finds records, it is asked, hence not for gRPC's threads then. UNAVAILABLE: it
@@ -164,21 +172,31 @@ class Registry {
   // Where the store is shared, waits until all that other servers had committed by the time of the
   // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
   // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
-  // question to the store, one for all who wait; nothing where it is not shared.
-  absl::Status AwaitOthers(const std::function<bool()>& should_stop);
+  // question to the store, one for all that wait; nothing where it is not shared.
+  absl::Status AwaitOthers(const std::function<bool()>& should_stop) {
+    return freshness_.AwaitOthers(should_stop);
+  }
   // Waits until what is here is as fresh as this, in the same way, and tells how stale it may be:
   // before what does not do so itself. FAILED_PRECONDITION: the store has not given that revision.
   // Otherwise as AwaitOthers. Cost: a question to the store only where it is not.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
-                                                      const std::function<bool()>& should_stop);
+                                                      const std::function<bool()>& should_stop) {
+    return freshness_.AwaitFresh(freshness, should_stop);
+  }
   // The same, but nullopt, at once, where it would have to wait.
-  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
+  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness) {
+    return freshness_.TryFresh(freshness);
+  }
   // Has what other servers had committed by now taken over, and calls `done` then, once, on this
-  // or another thread, without any lock: for who asks several registries at once. UNAVAILABLE: as
-  // AwaitOthers. Cost: as that, but nobody waits.
-  void StartFollow(std::function<void(const absl::Status&)> done);
+  // or another thread, without any lock: for a caller that asks several registries at once.
+  // UNAVAILABLE: as AwaitOthers. Cost: as that, but nobody waits.
+  void StartFollow(std::function<void(const absl::Status&)> done) {
+    freshness_.StartFollow(std::move(done));
+  }
   // The same where what is here is not as fresh as this; false, and nothing, where it is.
-  bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done);
+  bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done) {
+    return freshness_.StartFresh(freshness, std::move(done));
+  }
 
   // Has nothing committed here for a while (Committer::Hold). What is resolved meanwhile of what is
   // here (Freshness::OfWhatIsHere) is what the store holds all the while.
@@ -187,10 +205,10 @@ class Registry {
   // Hulls and bodies of other registries, which count against --max-hulls with those that are here.
   // Called under the mutex, and takes none. Before any other call.
   void CountAlso(std::function<uint64_t()> held_elsewhere) {
-    held_elsewhere_ = std::move(held_elsewhere);
+    catalog_.CountAlso(std::move(held_elsewhere));
   }
   // How many hulls and bodies are here. Takes no lock.
-  uint64_t held() const { return HullCount() + BodyCount(); }
+  uint64_t held() const { return catalog_.HullCount() + catalog_.BodyCount(); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -199,7 +217,7 @@ class Registry {
   CommitStatistics Commits() const { return committer_.Statistics(); }
   // Where each batch is timed and counted; set before the first change, and outlives this.
   void SetMetrics(StoreMetrics& metrics) {
-    snapshot_seconds_ = &metrics.snapshot_seconds;
+    reader_.SetMetrics(metrics.snapshot_seconds);
     committer_.SetMetrics(metrics);
   }
   // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
@@ -215,12 +233,16 @@ class Registry {
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
   // The same, but nullopt, at once, where it would have to ask or read the store, or to prepare.
-  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
-  // As Resolve, for who asks for the same hulls again and again: `known` is kept in between, and
-  // only what changed since is looked up.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {}) {
+    return reader_.TryResolve(ids, plan);
+  }
+  // As Resolve, for a caller that asks for the same hulls again and again: `known` is kept in
+  // between, and only what changed since is looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,
-                                   const ReadPlan& plan = {});
+                                   const ReadPlan& plan = {}) {
+    return reader_.Refresh(ids, known, should_stop, plan);
+  }
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
   absl::StatusOr<std::pair<AsOf, HullView>> Resolve(const std::string& id,
                                                     const std::function<bool()>& should_stop,
@@ -231,17 +253,22 @@ class Registry {
   // said so. RESOURCE_EXHAUSTED: it is not made yet, and readers hold more than their share of
   // --memory-limit. Cost: that of building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
-                                        const std::function<bool()>& should_stop);
+                                        const std::function<bool()>& should_stop) {
+    return reader_.Canonical(view, should_stop);
+  }
 
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
   // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: who takes turns with others for a thread.
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: takes turns with others for a thread.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
-                  ClientId client = kNoClient);
+                  ClientId client = kNoClient) {
+    appender_.OpenAppend(id, writer_id, create_if_absent, std::move(on_gone), std::move(done),
+                         client);
+  }
 
-  void CloseAppend(const AppendSession& session);
+  void CloseAppend(const AppendSession& session) { appender_.CloseAppend(session); }
 
   // Queues a chunk. `on_built`, which may be empty, is called once its points are no longer held:
   // the next one may be queued then. `done` is called once it is committed or refused. Both come
@@ -253,280 +280,65 @@ class Registry {
   // --memory-limit, or the disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the
   // store is damaged; CANCELLED: should_stop said so.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
-              std::function<void()> on_built, Reply<ChunkResult> done);
+              std::function<void()> on_built, Reply<ChunkResult> done) {
+    appender_.Append(session, std::move(chunk), std::move(should_stop), std::move(on_built),
+                     std::move(done));
+  }
 
   // Begins to tell of changes (ChangeFeed). `on_ready` is called on the feed's thread, once after
   // each piece that waits. RESOURCE_EXHAUSTED: --memory-limit.
   absl::StatusOr<std::shared_ptr<ChangeWatch>> OpenWatch(const WatchTarget& target,
                                                          const WatchStart& start,
-                                                         std::function<void()> on_ready);
+                                                         std::function<void()> on_ready) {
+    return watches_.Open(target, start, std::move(on_ready));
+  }
   // What is to be told next; may be nothing. UNAVAILABLE once EndWatches was called. Requires that
   // the watch does not wait. Cost: O(kMostPerPiece).
-  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch);
+  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch) { return watches_.Take(watch); }
   // What changes of `added` from now on is told, too, and what changes of `dropped`, which were
   // added before, no more. Requires a target that varies. Cost: a hash for each ID.
   void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
-                 std::span<const std::string> dropped);
+                 std::span<const std::string> dropped) {
+    watches_.Extend(watch, added, dropped);
+  }
   // The watch waits no more than until its on_ready is called, although nothing changed.
-  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch);
+  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Nudge(watch); }
   // An on_ready that is due by then still comes.
-  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch);
+  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Close(watch); }
   // Every watch is to end: nudges them all.
-  void EndWatches();
+  void EndWatches() { watches_.EndAll(); }
 
  private:
-  struct OpenRequest;
-  struct BuiltChunk;
-  enum class Verdict;
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-  using Refusal = std::function<void(const absl::Status&)>;
-
-  // The hull, which must be known (IsKnown), as in HullTable.
-  HullPointer Find(const std::string& id);
-  HullPointer FindVisible(const std::string& id);
-  void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
-  absl::Status CheckHullCount() const;
-  // Those whose creation is in flight included. Takes no lock.
-  uint64_t HullCount() const {
-    return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
-                           creating_.load(std::memory_order_relaxed)
-                     : hulls_.size();
-  }
-  // The revision that the store gave the last change becomes visible.
-  void Publish(uint64_t revision);
-
-  void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
-                    const Reply<CreateResult>& done);
-  void CreateNew(Locked& locked, const std::string& id,
-                 const std::function<void(Locked&, absl::StatusOr<HullPointer>)>& done);
-  void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                    const Reply<uint64_t>& done);
-  void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
-                     const Reply<ReplaceResult>& done);
-  absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
-  Change MakeChange(const RegisteredHull* former, Replacement& replacement);
-  void CommitReplacement(Locked& locked, const HullPointer& former,
-                         const std::shared_ptr<Replacement>& replacement,
-                         const Reply<ReplaceResult>& done);
-  absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
-                                                  const HullPointer& hull,
-                                                  const absl::Status& status, const Change& change);
-  static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
-
-  absl::Status NoSuchHull(const std::string& id) const;
-  // Those whose creation is in flight included. Takes no lock.
-  uint64_t BodyCount() const {
-    return kept_bodies_.load(std::memory_order_relaxed) +
-           creating_bodies_.load(std::memory_order_relaxed);
-  }
-  absl::Status LoadBodies(Locked& locked);
-  // The committed body; null when there is none. The ID must be known.
-  std::shared_ptr<const Body> FindBody(const std::string& id);
-  // Null where no change of it is submitted. Otherwise what is under the ID is not known before
-  // that is committed or refused, so who depends on it waits.
-  BodyTable::Entry* BodyInFlight(const std::string& id);
-  void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  void EraseBody(Locked& locked, const std::string& id);
-  FoundBodies FindBodies(Locked& locked, std::span<const std::string> ids,
-                         const std::function<bool()>& should_stop, bool may_wait);
-  void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
-                     std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
-  absl::Status CheckBody(Locked& locked, const std::string& id,
-                         std::optional<uint64_t> if_revision);
-  void DeleteBodyLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                        const Reply<uint64_t>& done);
-  void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
-
-  // Whether what is here needs no comparing with what others did.
-  bool IsAlwaysFresh(const Freshness& freshness) const {
-    return !store_.is_shared() && freshness.at_least_revision == 0;
-  }
-  std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
-  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
-                                                      const std::function<bool()>& should_stop);
-  void AskAhead(Locked& locked);
-
-  // Other servers (registry_others.cc).
-  absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
-  void WhenFresh(Refusal refuse, std::function<void(Locked&)> next);
-  void Again(Locked& locked, std::function<void(Locked&)> task);
-  void AdvanceLater(const HullPointer& hull);
-  // Hulls that are advanced at a time by what other servers added, and the points of all of them:
-  // some milliseconds under the mutex.
-  static constexpr size_t kMostGrownHulls = 1 << 10;
-  static constexpr uint64_t kMostGrowth = 1 << 16;
-  std::vector<HullGrowth> GrownHulls(const OtherChanges& others) const;
-  void TakeOver(Locked& locked, const OtherChanges& others);
-  void TakeOver(Locked& locked, const std::string& id, const OtherChange& other, uint64_t since);
-  bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
-                       bool is_news);
-  void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
-  std::optional<BodyRecord> FormerBody(const std::string& id, const OtherChange& other,
-                                       uint64_t since);
-
-  void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
-  void Advance(Locked& locked, const HullPointer& hull);
-
-  void RunOpen(const std::shared_ptr<OpenRequest>& request);
-  void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
-  void OpenSession(Locked& locked, const HullPointer& hull,
-                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
-  absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                             const std::string& writer_id);
-  void RunNextChunk(const HullPointer& hull);
-  void RefuseChunks(const HullPointer& hull);
-  void ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending);
-  absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
-                                     const PendingChunk& pending);
-  absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
-  absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
-  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, const LiveHull::Mark& committed,
-                                        std::span<const Vector> builder_lacks, LiveHull& live,
-                                        std::unique_ptr<HullBuilder>& builder, BuiltChunk& built);
-  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
-  void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
-  void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                   BuiltChunk built);
-  void CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
-                   const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
-  void Revert(Locked& locked, RegisteredHull& hull);
-
-  struct HullsRead;
-  absl::Status LookUpDue(Locked& locked, const HullsRead& read);
-  absl::Status LookUpAll(Locked& locked, const HullsRead& read);
-  absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                   RegisteredHull& hull, bool& was_missing);
-  absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
-  static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
-  void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
-                bool was_missing);
-  void LoadMany(Locked& locked, const HullsRead& read, uint32_t k);
-  bool BeginLoading(Locked& locked, const HullsRead& read);
-  void EndLoading(Locked& locked, const HullsRead& read);
-  void EndAllLoading(Locked& locked, const HullsRead& read);
-  absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
-  absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
-                              const std::function<bool()>& should_stop);
-  static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
-  void Prepare(Locked& locked, RegisteredHull& hull);
-  void SchedulePreparing(const HullPointer& hull);
-  void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
-  void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
-  // Readers are given something else of it from now on.
-  void NoteChange(const RegisteredHull& hull);
-
-  void TakePresent(ChangeWatch& watch, WatchPiece* piece);
-
-  // Records of a store that finds them (records/registry_records.cc).
-  //
-  // IDs whose record is being read from the store, which one thread at a time does for each. Who
-  // depends on one waits until it is over; what was read is in the table then, or was and is
-  // dropped again.
-  struct Reading {
-    std::string id;
-    bool is_over = false;
-    // Why it could not be read.
-    absl::Status status;
-    ConditionVariable over;
-    std::vector<std::pair<Refusal, std::function<void(Locked&)>>> waiting;
-  };
-  using Readings = std::vector<std::shared_ptr<Reading>>;
-  // Told with the mutex held, once what was found is of no later moment than what is known here.
-  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
-
-  // For whom a body that was read is held.
-  MemoryUse UseOfRead() const { return is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting; }
-  // Whether it is known what there is under an ID. Cost: O(log n).
-  bool IsKnown(const std::string& id) const { return hulls_.Knows(id) || bodies_.contains(id); }
-  // Has the record of an ID that is not known read, and goes on with `next`, which must look anew
-  // whether it is known then; or refuses.
-  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
-                 std::function<void(Locked&)> next);
-  absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
-                          const std::function<bool()>& should_stop);
-  absl::Status ReadMissing(Locked& locked, std::span<const std::string> ids,
-                           const std::function<bool()>& should_stop, bool may_wait);
-  void ReadDue();
-  void ReadRecords(Locked& locked, const Readings& readings);
-  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
-                   FoundTaker take);
-  void TakeRecords(Locked& locked, const Readings& readings,
-                   const absl::StatusOr<FoundRecords>& found);
-  void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
-  void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
-  // What other servers did of it is in the table, in the place of what is being read.
-  void EndReadingOf(const std::string& id);
-  absl::StatusOr<FoundRecords> ListFound(const std::string& prefix, const std::string& after,
-                                         size_t page_size, RecordKinds kinds,
-                                         const std::function<bool()>& should_stop);
-  absl::StatusOr<HullPage> ListFoundHulls(const std::string& prefix, const std::string& after,
-                                          size_t page_size,
-                                          const std::function<bool()>& should_stop);
-  absl::StatusOr<BodyPage> ListFoundBodies(const std::string& prefix, const std::string& after,
-                                           size_t page_size,
-                                           const std::function<bool()>& should_stop);
-  HullChange DescribeFound(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  static void LetOthersPass(Locked& locked);
-  bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  bool IsBehind(const FoundRecords& found) const;
-  void ReadPresent(Locked& locked, ChangeWatch& watch);
-  absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
-
   Store& store_;
-  // Whether the table is a cache of what the store finds.
-  const bool is_cache_;
-  // Where the making of canonical snapshots is timed, if anywhere.
-  prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
   const Limits limits_;
-  WorkerPool& writers_;
   MemoryBudget memory_;
 
-  // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
-  // builder that a thread owns.
+  // Guards the rest, but what is thread-safe by itself (the budget, the committer, pools), and all
+  // of a RegisteredHull but a builder that a thread owns.
   mutable FairMutex mutex_;
-  // The last one that is committed and visible.
-  uint64_t revision_ = 0;
-  uint64_t vertex_count_ = 0;
-  uint64_t last_watch_ = 0;
-  HullTable hulls_;
-  // No ID is in both.
-  BodyTable bodies_;
-  // What goes on once all that other servers did is taken over.
-  std::vector<std::function<void(Locked&)>> after_others_;
-  // May be empty.
-  std::function<uint64_t()> held_elsewhere_;
-  // How many bodies the store holds at revision_, and those whose creation is not committed yet.
-  // Changed under the mutex.
-  std::atomic<uint64_t> kept_bodies_ = 0;
-  std::atomic<uint64_t> creating_bodies_ = 0;
-  // Those of hulls_ whose creation is not committed yet. Changed under the mutex.
-  std::atomic<uint64_t> creating_ = 0;
-  // Where hulls_ is a cache: how many the store holds at revision_. Changed under the mutex.
-  std::atomic<uint64_t> kept_hulls_ = 0;
-  // Those that are not over, by ID; of these the ones that no thread has taken yet; and threads
-  // that take them.
-  std::map<std::string, std::shared_ptr<Reading>> readings_;
-  Readings due_readings_;
-  size_t reading_threads_ = 0;
-  // For readers that look up hulls in slices, or again.
-  RecentChanges recent_changes_;
-  // Hits, misses, loads and damaged; the rest is the budget's.
-  CacheStatistics cache_;
-  // Nothing more is prepared.
-  bool ending_ = false;
-  // The store is being asked for reads to come.
-  bool is_asking_ahead_ = false;
+  Catalog catalog_;
+  AfterOthers after_others_;
   ChangeFeed feed_;
 
-  // Last, as their threads use the rest.
+  // Their threads use all the rest, so they end before anything else does (~Registry).
   Committer committer_;
-  // One thread: what it does is in nobody's way, and nobody waits for it.
-  std::optional<WorkerPool> preparers_;
-  // These help readers that read many hulls from the store.
+  Preparer preparer_;
+  // These read records, and help readers that read many hulls from the store.
   std::optional<WorkerPool> loaders_;
+
+  // In the order in which they build on each other.
+  FreshnessGate freshness_;
+  RecordGate gate_;
+  RecordReader records_;
+  RecordLister lister_;
+  HullReader reader_;
+  BodyRegistry bodies_;
+  HullChanges changes_;
+  HullLifecycle lifecycle_;
+  HullAppender appender_;
+  Takeover takeover_;
+  Watches watches_;
 };
 
 }  // namespace hulld::server

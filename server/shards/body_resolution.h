@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "server/registry/bodies/served_body.h"
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
 #include "server/shards/known_in_shards.h"
 #include "server/shards/shards.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/registry/known_hulls.h"
+#include "server/registry/catalog/known_hulls.h"
 
 namespace hulld::server {
 

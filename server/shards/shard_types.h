@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/registry/registry_types.h"
+#include "server/registry/catalog/registry_types.h"
 
 // What is asked of hulls in several shards, and what is answered: as registry_types.h, with a
 // revision for each shard.

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/query/body/query_body.h"
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
 
 namespace hulld::server {
 

@@ -14,8 +14,8 @@
 namespace hulld::server {
 
 // A short time during which nothing is committed to one store, by this server or by others, so that
-// a reader finds what several stores hold at one instant (Committer::Hold). Between the reader, who
-// waits for it and ends it, and the committer's thread, which has it begin and lasts as long.
+// a reader finds what several stores hold at one instant (Committer::Hold). Between the reader,
+// which waits for it and ends it, and the committer's thread, which has it begin and lasts as long.
 // Thread-safe.
 class CommitHold {
  public:

@@ -32,6 +32,7 @@ void Committer::Submit(const Locked& locked, Change change, Completion done) {
   HULLD_CHECK(locked.Holds(order_));
   {
     const std::lock_guard lock(mutex_);
+    HULLD_CHECK(!has_ended_);
     queue_.push_back({std::move(change), std::move(done)});
   }
   ready_.notify_one();
@@ -68,7 +69,7 @@ void Committer::FollowNow(Locked& locked, Follower follower) {
   }
 }
 
-// Those who come meanwhile are told of the next question.
+// Followers that come meanwhile are told of the next question.
 void Committer::AskNow() {
   {
     const std::lock_guard lock(mutex_);
@@ -113,7 +114,7 @@ void Committer::NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked
 void Committer::Run() {
   while (true) {
     Round round = WaitForRound();
-    if (round.batch.empty() && round.followers.empty() && round.holds.empty()) return;
+    if (round.IsEmpty()) return;
     std::vector<std::shared_ptr<CommitHold>> holds = std::exchange(round.holds, {});
     if (!round.batch.empty() || !round.followers.empty()) CommitAndFollow(std::move(round));
     if (!holds.empty()) HoldFor(std::move(holds));
@@ -138,15 +139,15 @@ void Committer::CommitAndFollow(Round round) {
   // A commit has followed the others.
   absl::Status followed;
   if (round.batch.empty()) {
-    // Who waits to know all that the store holds must not wait for the next change to find out
-    // what became of the last.
+    // A follower that waits to know all that the store holds must not wait for the next change to
+    // find out what became of the last.
     if (!store_.is_shared()) followed = RecoverIfFailing();
     if (followed.ok()) followed = store_.Follow();
   }
   Settle(round, status, followed, asked);
 }
 
-// For who does not commit next: what is committed next tells for itself whether it fails.
+// Before a question without a commit: what is committed next tells for itself whether it fails.
 absl::Status Committer::RecoverIfFailing() {
   if (!Statistics().failing) return absl::OkStatus();
   absl::Status status = store_.Recover();
@@ -155,7 +156,7 @@ absl::Status Committer::RecoverIfFailing() {
   return status;
 }
 
-// One time for all who want one by now.
+// One hold for all readers that want one by now.
 void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
   std::erase_if(holds, [](const auto& hold) { return !hold->is_wanted(); });
   if (holds.empty()) return;
@@ -186,7 +187,10 @@ Committer::Round Committer::WaitForRound() {
   });
   is_idle_ = false;
   if (asked_.asked.has_value()) return std::exchange(asked_, {});
-  return {std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {}), {}};
+  Round round = {
+      std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {}), {}};
+  has_ended_ = round.IsEmpty();
+  return round;
 }
 
 absl::Status Committer::Write(std::vector<Pending>& batch) {
@@ -205,8 +209,8 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   return status;
 }
 
-// What other servers did, with what hulls that are in memory grew by. status: of asking what they
-// did; who could not be asked that is asked no more.
+// What other servers did, with what hulls that are in memory grew by. status: that of asking what
+// they did; a store that could not be asked that is asked no more.
 OtherChanges Committer::TakeOthers(const absl::Status& status) {
   OtherChanges others = store_.TakeOthers();
   if (!status.ok() || others.revision == 0 || grown_ == nullptr) return others;

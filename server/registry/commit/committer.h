@@ -75,12 +75,12 @@ class Committer {
   Committer& operator=(const Committer&) = delete;
   ~Committer() { End(); }
 
-  // Commits what is queued, then ends its thread: nobody is told anything afterwards. Requires that
-  // nothing is submitted any more.
+  // Commits what is queued, and what is submitted as that completes, then ends its thread: nobody
+  // is told anything afterwards, and Submit must not be called.
   void End();
 
   // Queues a change that follows all changes submitted before. Requires that `locked` holds
-  // `order`. Cost: O(1).
+  // `order`, and that the thread has not ended. Cost: O(1).
   void Submit(const Locked& locked, Change change, Completion done);
 
   // For a store that is shared. Before the first change and the first follower.
@@ -89,15 +89,15 @@ class Committer {
     others_ = std::move(others);
     grown_ = std::move(grown);
   }
-  // Requires that `locked` holds `order`. Cost: a question to the store, one for all who wait.
+  // Requires that `locked` holds `order`. Cost: a question to the store, one for all that wait.
   void Follow(const Locked& locked, Follower follower);
-  // The same for who waits: where nothing else is under way, the question is sent on this thread as
-  // soon as `order` is let go of, and not once the committer's thread has woken up.
+  // The same for a thread that waits: where nothing else is under way, the question is sent on this
+  // thread as soon as `order` is released, and not once the committer's thread has woken up.
   void FollowNow(Locked& locked, Follower follower);
   // Holds the store still from when Others was told of all that other servers had committed; what
   // was submitted before is committed or refused by then, and what is submitted later waits until
   // the hold ends. Requires that `locked` holds `order`. Cost: two round trips to a store that is
-  // shared, for all who wait; what needs this thread waits meanwhile, at most
+  // shared, for all that wait; what needs this thread waits meanwhile, at most
   // CommitHold::kLongestOfSeveral.
   void Hold(const Locked& locked, std::shared_ptr<CommitHold> hold);
   // Others is to be told soon, if there is anything to tell. Takes no lock but the queue's.
@@ -106,7 +106,7 @@ class Committer {
   // was sent the last question that it answered. None: it was not asked yet. Requires that `locked`
   // holds `order`.
   std::optional<SteadyClock::time_point> caught_up(const Locked& locked) const;
-  // For who asked the store itself, at this time, and told Others. Requires the same.
+  // For a caller that asked the store itself, at this time, and told Others. Requires the same.
   void NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked);
 
   CommitStatistics Statistics() const;
@@ -126,6 +126,8 @@ class Committer {
     std::vector<std::shared_ptr<CommitHold>> holds;
     // Set: the store was asked for the followers at this time, and nothing else is to be done.
     std::optional<SteadyClock::time_point> asked;
+
+    bool IsEmpty() const { return batch.empty() && followers.empty() && holds.empty(); }
   };
 
   void Run();
@@ -162,6 +164,8 @@ class Committer {
   // What AskNow left.
   Round asked_;
   bool ending_ = false;
+  // The thread takes nothing any more.
+  bool has_ended_ = false;
   Thread thread_;
 };
 

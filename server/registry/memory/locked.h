@@ -16,6 +16,9 @@
 
 namespace hulld::server {
 
+// Hulls and bodies that are looked up within one hold of the registry's mutex, at most: some 50 us.
+inline constexpr uint64_t kMostLookupsPerHold = 128;
+
 // How long a mutex was held at once, and for how much work.
 struct HoldStatistics {
   // The longest hold within this minute and the one before. Waiting on a condition is none.
@@ -24,10 +27,12 @@ struct HoldStatistics {
   uint64_t most_lookups = 0;
 };
 
-// A mutex that whoever waits for it gets before who lets go of it and wants it again: work that is
-// cut in slices lets others pass between them. It knows how long it was held.
+// A mutex without barging: a waiting thread gets it before the thread that releases it can take it
+// again. So work that is cut in slices lets others pass between them. It knows how long it was
+// held.
 //
-// Who waits holds `entry_`. So who comes again waits until the first of the others has the mutex.
+// The next thread in line holds `entry_` while it waits. A thread that comes again waits for that,
+// and so until the next one has the mutex.
 class FairMutex {
  public:
   FairMutex() = default;
@@ -50,7 +55,7 @@ class FairMutex {
   // Whether a thread is the next to have it.
   bool is_wanted() const { return is_wanted_; }
 
-  // Requires that it is held.
+  // Requires that it is held (unchecked: it does not tell which thread holds it).
   HoldStatistics Statistics() const {
     const int64_t age = MinuteOf(Clock::now()) - minute_;
     const auto longest = age == 0   ? std::max(longest_, longest_before_)
@@ -83,7 +88,7 @@ class FairMutex {
 
   Mutex entry_;
   Mutex mutex_;
-  // Written by who holds entry_.
+  // Written by the thread that holds entry_.
   std::atomic<bool> is_wanted_ = false;
   // The rest is guarded by mutex_.
   Clock::time_point since_;
@@ -109,7 +114,7 @@ class Locked {
   // Whether it is this mutex that is held.
   bool Holds(const FairMutex& mutex) const { return is_held_ && &mutex_ == &mutex; }
 
-  // Lets go of the mutex, and does what is due, in the order in which it was given.
+  // Releases the mutex, and does what is due, in the order in which it was given.
   void Unlock() {
     HULLD_CHECK(is_held_);
     const std::vector<std::function<void()>> due = std::exchange(afterwards_, {});
@@ -122,7 +127,7 @@ class Locked {
     mutex_.lock();
     is_held_ = true;
   }
-  // For condition variables: wait(lock) lets go of the mutex while it waits.
+  // For condition variables: wait(lock) releases the mutex while it waits.
   template <typename Wait>
   void WaitOn(const Wait& wait) {
     HULLD_CHECK(is_held_);
@@ -137,7 +142,24 @@ class Locked {
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
 
+  // Before a lookup that is one of many: counts it, and lets others have the mutex after
+  // kMostLookupsPerHold of them.
+  void LetOthersPass() {
+    if (lookups() == kMostLookupsPerHold) {
+      Unlock();
+      Lock();
+    }
+    NoteLookup();
+  }
+
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
+  // The same for a task that needs the mutex, which is taken anew for it.
+  void AfterwardsLocked(std::function<void(Locked&)> task) {
+    Afterwards([&mutex = mutex_, task = std::move(task)] {
+      Locked again(mutex);
+      task(again);
+    });
+  }
   template <typename T>
   void Discard(std::unique_ptr<T> object) {
     if (object != nullptr) Discard(std::shared_ptr<T>(std::move(object)));
@@ -152,6 +174,9 @@ class Locked {
   bool is_held_ = false;
   std::vector<std::function<void()>> afterwards_;
 };
+
+// Something that is done with the mutex held.
+using LockedTask = std::function<void(Locked&)>;
 
 }  // namespace hulld::server
 

@@ -39,7 +39,7 @@ struct MemoryStatistics {
 
 class MemoryPart;
 
-// Who holds how much memory, and who lets go first once the limit is exceeded.
+// Counts how much memory each use holds, and says what lets go first once the limit is exceeded.
 //
 // There are three kinds of memory. What is held for readers and what is held for writers stays
 // until they are done; each of the two has a share of the limit, and Check refuses more to the one
@@ -153,8 +153,8 @@ class MemoryBudget {
   uint64_t evictions_ = 0;
 };
 
-// Something that a hull holds and that readers may hold for longer: counted once, whoever holds it,
-// until nobody does. Thread-safe; may outlive the budget.
+// Something that a hull holds and that readers may hold for longer: counted once, however many hold
+// it, until nobody does. Thread-safe; may outlive the budget.
 class MemoryPart {
  public:
   // what: tells parts of one account from each other; never followed.

@@ -32,6 +32,7 @@ absl::StatusOr<Hull> MakeSnapshot(const QueryHull& version, const HullRecord& re
 CanonicalHull::CanonicalHull(Hull hull) { Keep(std::move(hull)); }
 
 void CanonicalHull::Keep(Hull hull) {
+  HULLD_CHECK(!is_made());
   hull_.emplace(std::move(hull));
   hull_bytes_.store(hull_->MemoryBytes(), std::memory_order_release);
   Count();

@@ -53,7 +53,8 @@ class CanonicalHull {
 
  private:
   bool is_made() const { return hull_bytes_.load(std::memory_order_acquire) > 0; }
-  // Requires that is_made() is false, and that no other thread makes it.
+  // Requires that is_made() is false, and that no other thread makes it (unchecked: that is what
+  // making_ ensures).
   void Keep(Hull hull);
   void Count() const;
 

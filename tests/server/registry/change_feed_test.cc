@@ -1,5 +1,5 @@
 // What a registry tells its watches.
-#include "server/registry/change_feed.h"
+#include "server/registry/catalog/change_feed.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "server/registry/hull_table.h"
+#include "server/registry/catalog/hull_table.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>
 
 #include <string>
 
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 namespace {

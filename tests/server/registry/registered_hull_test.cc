@@ -1,5 +1,5 @@
 // What another server makes of a hull that is in memory here.
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

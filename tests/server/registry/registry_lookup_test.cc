@@ -15,7 +15,7 @@
 namespace hulld::server {
 namespace {
 
-constexpr uint64_t kMost = Registry::kMostLookupsPerHold;
+constexpr uint64_t kMost = kMostLookupsPerHold;
 
 class RegistryLookup : public ::testing::Test {
  protected:

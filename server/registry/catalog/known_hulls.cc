@@ -1,4 +1,4 @@
-#include "server/registry/known_hulls.h"
+#include "server/registry/catalog/known_hulls.h"
 
 #include <absl/status/status.h>
 

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
-#define HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -14,14 +14,15 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
-#include "server/registry/hull_state.h"
+#include "server/registry/catalog/hull_state.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
-#include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -62,7 +63,10 @@ struct RegisteredHull {
                  MemoryBudget& budget);
 
   // What the store keeps of it, as of its first change. Requires that nothing else was kept before.
-  void SetStored(const StoredHull& stored) { committed = head = stored; }
+  void SetStored(const StoredHull& stored) {
+    HULLD_CHECK(committed.record.revision == 0);
+    committed = head = stored;
+  }
   // Whether most points of `live` are no vertices any more: preparing drops them, and keeps memory
   // bounded where points take each other in and nobody asks. It costs a part of what appending
   // those points did.
@@ -114,8 +118,8 @@ struct RegisteredHull {
   StoredHull committed;
   // With the changes in flight, whose revisions are not known: those in it are of `committed`.
   StoredHull head;
-  // Of `committed`, while chunks are in flight: what each of them builds on once those before it
-  // are committed. Written by their completions alone.
+  // Those of `committed`, while chunks are in flight: what each of them builds on once those before
+  // it are committed. Written by their completions alone.
   std::shared_ptr<HullRevisions> revisions;
   // The points of the hull in the order in which they came, with those of the changes in flight and
   // of the chunk that is being built.
@@ -153,8 +157,8 @@ struct RegisteredHull {
   std::unique_ptr<HullBuilder> builder;
   // What it holds, also while a thread owns it.
   uint64_t builder_bytes = 0;
-  // Points of the committed hull that other servers added and that `builder` lacks; who builds next
-  // adds them. None without `builder`.
+  // Points of the committed hull that other servers added and that `builder` lacks; the next chunk
+  // to be built adds them. None without `builder`.
   std::vector<Vector> builder_lacks;
   // Told of each step of `state`, and when points were read from the store.
   ConditionVariable changed;
@@ -207,4 +211,4 @@ absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_HULL_STATE_H_
-#define HULLD_SERVER_REGISTRY_HULL_STATE_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_HULL_STATE_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_HULL_STATE_H_
 
 #include <absl/status/status.h>
 
@@ -112,4 +112,4 @@ class HullState {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_HULL_STATE_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_HULL_STATE_H_

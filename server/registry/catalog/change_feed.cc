@@ -1,11 +1,11 @@
-#include "server/registry/change_feed.h"
+#include "server/registry/catalog/change_feed.h"
 
 #include <algorithm>
 #include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 namespace {
@@ -17,7 +17,7 @@ struct Changed {
   std::shared_ptr<RegisteredHull> hull;
   std::shared_ptr<const Body> body;
   bool is_body = false;
-  // Of the incarnation that is there, or that went.
+  // When the incarnation began that is there, or that went.
   uint64_t create_revision = 0;
   // When the incarnation before that ended; 0 where all watches were told of that already.
   uint64_t former_end = 0;
@@ -55,7 +55,7 @@ struct WatchInterest {
   // Those of `changes` that went.
   size_t deletions = 0;
   uint64_t bytes = 0;
-  // Of the last change, whether it is kept or not. Watches whose cursors are before it are behind.
+  // The last change, whether it is kept or not. Watches whose cursors are before it are behind.
   uint64_t last_revision = 0;
   size_t behind = 0;
   // What changed up to this one is known no more.
@@ -481,7 +481,7 @@ void ChangeFeed::Run() {
   }
 }
 
-// Of nothing that those who wait watch did anything change, or they would have been told.
+// Nothing changed of what the waiting watches are about, or they would have been told.
 void ChangeFeed::NudgeForMarks() {
   for (const auto& watch : watches_) {
     if (!watch->is_armed || watch->told == revision_) continue;

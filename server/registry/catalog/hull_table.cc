@@ -1,9 +1,9 @@
-#include "server/registry/hull_table.h"
+#include "server/registry/catalog/hull_table.h"
 
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 

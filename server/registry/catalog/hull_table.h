@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_HULL_TABLE_H_
-#define HULLD_SERVER_REGISTRY_HULL_TABLE_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_HULL_TABLE_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_HULL_TABLE_H_
 
 #include <atomic>
 #include <cstddef>
@@ -9,9 +9,9 @@
 #include <optional>
 #include <string>
 
-#include "server/registry/hull_state.h"
+#include "server/registry/catalog/hull_state.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -136,4 +136,4 @@ class HullTable {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_HULL_TABLE_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_HULL_TABLE_H_

@@ -1,4 +1,4 @@
-#include "server/registry/body_table.h"
+#include "server/registry/catalog/body_table.h"
 
 #include <utility>
 

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_BODY_TABLE_H_
-#define HULLD_SERVER_REGISTRY_BODY_TABLE_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_BODY_TABLE_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_BODY_TABLE_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include <optional>
 #include <string>
 
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
 #include "server/registry/memory/locked.h"
 
 namespace hulld::server {
@@ -83,4 +83,4 @@ class BodyTable {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_BODY_TABLE_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_BODY_TABLE_H_

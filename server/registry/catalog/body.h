@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_BODY_H_
-#define HULLD_SERVER_REGISTRY_BODY_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_BODY_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_BODY_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -13,8 +13,8 @@
 
 #include "core/query/body/query_body.h"
 #include "server/process/synchronization.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
 #include "server/store/body_record.h"
 
 namespace hulld::server {
@@ -71,4 +71,4 @@ std::string QuotedBody(const std::string& id);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_BODY_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_BODY_H_

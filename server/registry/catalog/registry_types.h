@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
-#define HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_
 
 #include <absl/status/statusor.h>
 
@@ -44,14 +44,14 @@ struct Freshness {
   uint64_t at_least_revision = 0;
   // What was committed up to this long before the read began is to be seen; none: however old.
   std::optional<std::chrono::nanoseconds> max_staleness = std::chrono::nanoseconds(0);
-  // When the read began; none: when it is made. Who waits for a thread meanwhile gives it, and is
-  // content with what others asked in between.
+  // When the read began; none: when it is made. A call that waits for a thread meanwhile gives it,
+  // and is content with what others asked in between.
   std::optional<SteadyClock::time_point> began;
 };
 
 // What the answer to a read is of.
 struct AsOf {
-  // Of the store.
+  // The revision of the store.
   uint64_t revision = 0;
   // Everything that was committed up to this long before the read began is seen; at least.
   std::chrono::nanoseconds staleness{0};
@@ -230,10 +230,10 @@ enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
 // All that happened to a hull, or to a body, since a watch was told of it, as one change.
 struct HullChange {
   ChangeKind kind = ChangeKind::kPresent;
-  // kDeleted: the ID alone, and in `revision` that of the deletion. Of a body, ID and revisions.
+  // kDeleted: the ID alone, and in `revision` that of the deletion. For a body: ID and revisions.
   HullRecord record;
   bool is_body = false;
-  // Of a body.
+  // For a body.
   uint64_t piece_count = 0;
   // The store cannot read it.
   bool damaged = false;
@@ -268,7 +268,9 @@ struct WatchStart {
 // Called once with the answer.
 template <typename T>
 using Reply = std::function<void(absl::StatusOr<T>)>;
+// Called once with why there is none. A Reply is one.
+using Refusal = std::function<void(const absl::Status&)>;
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_

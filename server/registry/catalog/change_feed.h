@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
-#define HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_
 
 #include <chrono>
 #include <cstdint>
@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 #include "server/store/store.h"
 
@@ -28,7 +28,7 @@ namespace hulld::server {
 
 struct WatchInterest;
 
-// One who wants to be told of changes. Guarded by the mutex of the feed.
+// A client of the feed that wants to be told of changes. Guarded by the mutex of the feed.
 struct ChangeWatch : std::enable_shared_from_this<ChangeWatch> {
   enum class Stage {
     // Resumes: is told what went since.
@@ -177,9 +177,9 @@ class ChangeFeed {
   enum class Life { kBegan, kChanged, kReplaced, kEnded };
   // What is committed now of an ID.
   struct State {
-    // Of the change.
+    // The revision of the change.
     uint64_t revision;
-    // Of the incarnation that is there, or that went.
+    // When the incarnation began that is there, or that went.
     uint64_t create_revision;
     Life life;
     bool is_body = false;
@@ -223,8 +223,8 @@ class ChangeFeed {
   // In the order of revisions. What went up to deletions_begin_ is not remembered.
   std::deque<Deletion> deletions_;
   uint64_t deletions_begin_ = 0;
-  // Of these the last of each ID, where no hull began under the ID since: its revision, and whether
-  // a body did; by the ID in `deletions_`.
+  // The last of these for each ID, where no hull began under the ID since: its revision, and
+  // whether a body did; by the ID in `deletions_`.
   struct Gone {
     uint64_t revision;
     bool is_body_now = false;
@@ -253,4 +253,4 @@ class ChangeFeed {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_

@@ -1,4 +1,4 @@
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,25 +1,24 @@
-// Watches: what is there, then what changes.
-#include <absl/status/status.h>
+#include "server/registry/watch/watches.h"
 
 #include <algorithm>
 #include <mutex>
 #include <utility>
 
 #include "server/contract/error_info.h"
-#include "server/registry/registered_hull.h"
-#include "server/registry/registry.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 
-absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarget& target,
-                                                                 const WatchStart& start,
-                                                                 std::function<void()> on_ready) {
+absl::StatusOr<std::shared_ptr<ChangeWatch>> Watches::Open(const WatchTarget& target,
+                                                           const WatchStart& start,
+                                                           std::function<void()> on_ready) {
   Locked locked(mutex_);
   if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::shared_ptr<ChangeWatch> watch = feed_.Open(target, std::move(on_ready));
   if (!start.tell_present) return watch;
   const bool resumes = start.after_revision > 0;
-  const bool can_resume = start.store_id == store_.id() && start.after_revision <= revision_ &&
+  const bool can_resume = start.store_id == store_.id() &&
+                          start.after_revision <= catalog_.revision() &&
                           feed_.Remembers(start.after_revision);
   watch->stage = ChangeWatch::Stage::kPresent;
   watch->is_exact = false;
@@ -31,7 +30,7 @@ absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarg
   return watch;
 }
 
-absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
+absl::StatusOr<WatchPiece> Watches::Take(ChangeWatch& watch) {
   Locked locked(mutex_);
   if (feed_.has_ended()) return Draining();
   if (feed_.IsLost(watch)) {
@@ -44,17 +43,18 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   piece.revision = watch.after_revision;
   const bool tells_bodies = ChangeFeed::TargetOf(watch).bodies;
   const auto is_there = [this, tells_bodies](const std::string& id) {
-    if (bodies_.contains(id)) return tells_bodies && FindBody(id) != nullptr;
-    return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id, tells_bodies);
+    if (catalog_.bodies().contains(id)) return tells_bodies && catalog_.FindBody(id) != nullptr;
+    return catalog_.hulls().Knows(id) ? catalog_.hulls().IsVisible(id)
+                                      : feed_.BeganAnew(id, tells_bodies);
   };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
       if (!feed_.TakeDeletions(watch, is_there, &piece)) watch.stage = ChangeWatch::Stage::kPresent;
       break;
     case ChangeWatch::Stage::kPresent:
-      if (!is_cache_) {
+      if (!catalog_.is_cache()) {
         TakePresent(watch, &piece);
-      } else if (absl::Status s = TakePresentFound(locked, watch, &piece); !s.ok()) {
+      } else if (absl::Status s = lister_.TakePresent(locked, watch, &piece); !s.ok()) {
         return s;
       }
       break;
@@ -66,7 +66,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
 }
 
 // Some of what is there. What changes behind the walk is told after it.
-void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
+void Watches::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   // What changed before the first step need not be told twice.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = ChangeFeed::TargetOf(watch);
@@ -81,10 +81,10 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   const auto begin_of = [&](const auto& all) {
     return watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
   };
-  auto hull = begin_of(hulls_.entries());
-  const auto hulls_end = hulls_.entries().end();
-  const auto bodies_end = bodies_.entries().end();
-  auto body = target.bodies ? begin_of(bodies_.entries()) : bodies_end;
+  auto hull = begin_of(catalog_.hulls().entries());
+  const auto hulls_end = catalog_.hulls().entries().end();
+  const auto bodies_end = catalog_.bodies().entries().end();
+  auto body = target.bodies ? begin_of(catalog_.bodies().entries()) : bodies_end;
   for (size_t looked_at = 0;; ++looked_at) {
     const bool has_hull = hull != hulls_end && is_watched(hull->first);
     const bool has_body = body != bodies_end && is_watched(body->first);
@@ -106,11 +106,11 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
     }
   }
   watch.stage = ChangeWatch::Stage::kChanges;
-  watch.synced_at = revision_;
+  watch.synced_at = catalog_.revision();
 }
 
-void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
-                         std::span<const std::string> dropped) {
+void Watches::Extend(ChangeWatch& watch, std::span<const std::string> added,
+                     std::span<const std::string> dropped) {
   // Others pass in between.
   const auto in_slices = [this](std::span<const std::string> ids, const auto& take) {
     while (!ids.empty()) {
@@ -124,17 +124,17 @@ void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
   in_slices(dropped, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, {}, ids); });
 }
 
-void Registry::NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) {
+void Watches::Nudge(const std::shared_ptr<ChangeWatch>& watch) {
   Locked locked(mutex_);
   feed_.Nudge(locked, watch);
 }
 
-void Registry::CloseWatch(const std::shared_ptr<ChangeWatch>& watch) {
+void Watches::Close(const std::shared_ptr<ChangeWatch>& watch) {
   const std::lock_guard lock(mutex_);
   feed_.Close(watch);
 }
 
-void Registry::EndWatches() {
+void Watches::EndAll() {
   Locked locked(mutex_);
   feed_.End(locked);
 }

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
-#define HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
 
 #include <absl/status/statusor.h>
 
@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registry_types.h"
 
 namespace hulld::server {
 
@@ -51,8 +51,8 @@ class RecentChanges {
 };
 
 // What a reader knows of the hulls that it asks for: each once, however often it is named, and
-// which of them must be looked up because they changed since. Who asks again and again keeps it
-// (Registry::Resolve). Not thread-safe.
+// which of them must be looked up because they changed since. A reader that asks again and again
+// keeps it (Registry::Resolve). Not thread-safe.
 class KnownHulls {
  public:
   KnownHulls() = default;
@@ -68,7 +68,7 @@ class KnownHulls {
   uint64_t lookups() const { return lookups_; }
 
  private:
-  friend class Registry;
+  friend class HullReader;
 
   struct Known {
     // Where the ID is among those asked for.
@@ -123,7 +123,7 @@ class KnownHulls {
   std::vector<uint32_t> due_;
   // What is read from the store, in the order in which it is due; none between lookups.
   std::deque<Loading> ahead_;
-  // Of due_, those from here on were looked through for what is to be read.
+  // The hulls of due_ from here on were looked through for what is to be read.
   size_t ahead_end_ = 0;
   // Changes before this one were taken into account; none at first.
   std::optional<uint64_t> next_change_;
@@ -131,4 +131,4 @@ class KnownHulls {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_

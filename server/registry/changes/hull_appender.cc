@@ -1,5 +1,5 @@
-// Sessions and their chunks: how hulls grow.
-#include <absl/status/status.h>
+#include "server/registry/changes/hull_appender.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <utility>
@@ -9,13 +9,12 @@
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/contract/stopped_call.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registered_hull.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-struct Registry::OpenRequest {
+struct HullAppender::OpenRequest {
   std::string hull_id;
   std::string writer_id;
   bool create_if_absent = false;
@@ -28,10 +27,10 @@ struct Registry::OpenRequest {
 };
 
 // What the rules say of a chunk that they allow.
-enum class Registry::Verdict { kNew, kAlreadyApplied };
+enum class HullAppender::Verdict { kNew, kAlreadyApplied };
 
 // A chunk that is in the builder, and the change that makes it durable.
-struct Registry::BuiltChunk {
+struct HullAppender::BuiltChunk {
   Change change;
   PointCounts counts;
   // The moment of the LiveHull with this chunk.
@@ -94,17 +93,38 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 
 }  // namespace
 
-void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
-                          bool create_if_absent, std::function<void(const absl::Status&)> on_gone,
-                          Reply<OpenResult> done, ClientId client) {
+HullAppender::HullAppender(Store& store, const Limits& limits, WorkerPool& writers,
+                           FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
+                           ChangeFeed& feed, FreshnessGate& freshness, RecordReader& records,
+                           Preparer& preparer, HullLifecycle& lifecycle, HullChanges& changes)
+    : store_(store),
+      limits_(limits),
+      writers_(writers),
+      mutex_(mutex),
+      catalog_(catalog),
+      memory_(memory),
+      feed_(feed),
+      freshness_(freshness),
+      records_(records),
+      preparer_(preparer),
+      lifecycle_(lifecycle),
+      changes_(changes) {
+  changes_.SetChunkTasks([this](const HullPointer& hull) { RunNextChunk(hull); },
+                         [this](const HullPointer& hull) { RefuseChunks(hull); });
+}
+
+void HullAppender::OpenAppend(const std::string& id, const std::string& writer_id,
+                              bool create_if_absent,
+                              std::function<void(const absl::Status&)> on_gone,
+                              Reply<OpenResult> done, ClientId client) {
   const auto request = std::make_shared<OpenRequest>(OpenRequest{
       id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
   // The store may have to be read.
   if (!store_.is_shared()) return RunOpen(request);
-  WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
+  freshness_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
 
-void Registry::RunOpen(const std::shared_ptr<OpenRequest>& request) {
+void HullAppender::RunOpen(const std::shared_ptr<OpenRequest>& request) {
   writers_.Submit(
       [this, request] {
         Locked locked(mutex_);
@@ -114,30 +134,30 @@ void Registry::RunOpen(const std::shared_ptr<OpenRequest>& request) {
 }
 
 // On a thread of `writers_`. May release the mutex to ask the store.
-void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
+void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
   };
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
-  if (!IsKnown(id)) {
-    return WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = IsKnown(request->hull_id);
-      if (is_known) request->known = Find(request->hull_id);
+  if (!catalog_.IsKnown(id)) {
+    return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
+      const bool is_known = catalog_.IsKnown(request->hull_id);
+      if (is_known) request->known = catalog_.Find(request->hull_id);
       // Where there is none, nothing of the store is to be read any more.
       if (is_known && request->known == nullptr) return OpenLocked(later, request);
       RunOpen(request);
     });
   }
-  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+  if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([this, request](Locked&) { RunOpen(request); });
     return;
   }
-  const HullPointer hull = Find(id);
+  const HullPointer hull = catalog_.Find(id);
   if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
+    if (!request->create_if_absent) return refuse(locked, catalog_.NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
-    return CreateNew(
+    return lifecycle_.CreateNew(
         locked, request->hull_id,
         [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
           if (Committer::IsSuperseded(created.status())) return RunOpen(request);
@@ -161,12 +181,13 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   OpenSession(locked, hull, request, *last);
 }
 
-void Registry::OpenSession(Locked& locked, const HullPointer& hull,
-                           const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
+void HullAppender::OpenSession(Locked& locked, const HullPointer& hull,
+                               const std::shared_ptr<OpenRequest>& request,
+                               uint64_t last_sequence) {
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
-  result.store_revision = revision_;
+  result.store_revision = catalog_.revision();
   result.hull = hull->committed.record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
@@ -174,8 +195,8 @@ void Registry::OpenSession(Locked& locked, const HullPointer& hull,
 }
 
 // The last committed sequence of a writer. May release the mutex to ask the store.
-absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                                     const std::string& writer_id) {
+absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, RegisteredHull& hull,
+                                                         const std::string& writer_id) {
   auto writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
   if (!store_.keeps_hulls() || hull.committed.writer_count == 0) return 0;
@@ -187,8 +208,8 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   locked.Lock();
   --hull.sequence_readers;
   if (absl::IsAborted(sequence.status())) {
-    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
-    // Who asks sees that.
+    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
+    // Each caller looks for that.
     if (hull.state.gone()) return 0;
     if (hull.supersessions == supersessions && hull.committed.record == record) {
       return StoreDisagrees(record);
@@ -208,7 +229,7 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   return *sequence;
 }
 
-void Registry::CloseAppend(const AppendSession& session) {
+void HullAppender::CloseAppend(const AppendSession& session) {
   const std::lock_guard lock(mutex_);
   RegisteredHull& hull = *session.hull;
   hull.watches.erase(session.watch);
@@ -217,17 +238,18 @@ void Registry::CloseAppend(const AppendSession& session) {
   if (unused && store_.keeps_hulls()) hull.writers.clear();
 }
 
-void Registry::Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
-                      std::function<void()> on_built, Reply<ChunkResult> done) {
+void HullAppender::Append(const AppendSession& session, Chunk chunk,
+                          std::function<bool()> should_stop, std::function<void()> on_built,
+                          Reply<ChunkResult> done) {
   Locked locked(mutex_);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
   session.hull->chunks.push_back(
       {session, std::move(chunk), std::move(should_stop), std::move(on_built), std::move(done),
        MemoryCharge(memory_, MemoryUse::kWriting, bytes), ++session.hull->last_place});
-  Advance(locked, session.hull);
+  changes_.Advance(locked, session.hull);
 }
 
-void Registry::RunNextChunk(const HullPointer& hull) {
+void HullAppender::RunNextChunk(const HullPointer& hull) {
   Locked locked(mutex_);
   HULLD_CHECK(hull->state.work() == HullState::Work::kScheduled && !hull->chunks.empty());
   PendingChunk pending = std::move(hull->chunks.front());
@@ -239,11 +261,11 @@ void Registry::RunNextChunk(const HullPointer& hull) {
   hull->state.EndWork();
   hull->NoteUse();
   memory_.Evict(locked);
-  Advance(locked, hull);
+  changes_.Advance(locked, hull);
 }
 
 // Refuses the chunks of a hull that cannot grow any more.
-void Registry::RefuseChunks(const HullPointer& hull) {
+void HullAppender::RefuseChunks(const HullPointer& hull) {
   Locked locked(mutex_);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
   const absl::Status reason =
@@ -256,13 +278,13 @@ void Registry::RefuseChunks(const HullPointer& hull) {
 
 // Answers a chunk, or submits the change that it makes, whose end answers it. Releases the mutex
 // meanwhile.
-void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
+void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
   // What is not committed now is compared by the store.
   const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
   if (!is_new && store_.is_shared()) {
-    const absl::Status fresh = AwaitOthers(locked, pending.should_stop);
+    const absl::Status fresh = freshness_.AwaitOthers(locked, pending.should_stop);
     verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // One that was sent before it has to be made anew meanwhile.
     if (hull->IsQueuedBefore(pending)) {
@@ -273,8 +295,9 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
   if (*verdict == Verdict::kAlreadyApplied) {
     const HullRecord& record = hull->committed.record;
-    return AnswerChunk(locked, pending.done, sequence,
-                       ChunkResult{revision_, true, record.revision, record.vertex_count, {}});
+    return AnswerChunk(
+        locked, pending.done, sequence,
+        ChunkResult{catalog_.revision(), true, record.revision, record.vertex_count, {}});
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
@@ -290,8 +313,8 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
 }
 
 // What the rules say before anything is built. May release the mutex to ask the store.
-absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, RegisteredHull& hull,
-                                                       const PendingChunk& pending) {
+absl::StatusOr<HullAppender::Verdict> HullAppender::CheckChunk(Locked& locked, RegisteredHull& hull,
+                                                               const PendingChunk& pending) {
   if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
@@ -321,8 +344,8 @@ absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, Registere
 
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
 // sequence include it.
-absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredHull& hull,
-                                                     PendingChunk& pending) {
+absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, RegisteredHull& hull,
+                                                             PendingChunk& pending) {
   // A reader may have found that meanwhile.
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
@@ -376,8 +399,8 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
 // What a chunk is to be appended to. Releases the mutex to read it from the store where it is not
 // in memory: a writer does not wait for a reader that does the same, and whichever is first
 // decides.
-absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked,
-                                                                  RegisteredHull& hull) {
+absl::StatusOr<std::shared_ptr<LiveHull>> HullAppender::LiveForWriter(Locked& locked,
+                                                                      RegisteredHull& hull) {
   if (hull.live != nullptr) return hull.live;
   HULLD_CHECK(hull.state.in_flight() == 0);
   const StoredHull stored = hull.committed;
@@ -389,7 +412,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
-    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
+    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
     const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
                           hull.state.changing_life();
     return is_known ? Superseded() : StoreDisagrees(stored.record);
@@ -398,7 +421,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   if (hull.live != nullptr) return hull.live;
   if (!loaded.ok()) return loaded.status();
   hull.SetLive(*std::move(loaded));
-  ++cache_.loads;
+  ++catalog_.statistics().loads;
   hull.NoteUse();
   hull.changed.notify_all();
   return hull.live;
@@ -407,7 +430,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
 // The points of a chunk go into its hull's builder, which first gets what other servers added, and
 // is made of the committed points where there is none; what became vertices goes into the LiveHull,
 // and what the store is to keep of it into the change. Without the mutex.
-absl::StatusOr<PointCounts> Registry::AddPoints(
+absl::StatusOr<PointCounts> HullAppender::AddPoints(
     PendingChunk& pending, const LiveHull::Mark& committed, std::span<const Vector> builder_lacks,
     LiveHull& live, std::unique_ptr<HullBuilder>& builder, BuiltChunk& built) {
   Change& change = built.change;
@@ -441,8 +464,8 @@ absl::StatusOr<PointCounts> Registry::AddPoints(
 }
 
 // What a writer is told when AddPoints failed.
-absl::Status Registry::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
-  if (absl::IsDataLoss(cause)) MarkDamaged(hull, cause);
+absl::Status HullAppender::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+  if (absl::IsDataLoss(cause)) catalog_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
       absl::StrCat(QuotedHull(hull.head.record.hull_id), " would hold too many vertices"),
@@ -450,7 +473,8 @@ absl::Status Registry::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cau
 }
 
 // The record and the layout of the hull as it is with the points that were added.
-void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change) {
+void HullAppender::FillChange(const RegisteredHull& hull, const PointCounts& added,
+                              Change& change) {
   HullRecord& record = change.hull.record;
   VertexLayout& layout = change.hull.layout;
   record.counts += added;
@@ -467,8 +491,8 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
   }
 }
 
-void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                           BuiltChunk built) {
+void HullAppender::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
+                               BuiltChunk built) {
   // Where another server may be first, the chunk is kept until that is decided.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
@@ -491,27 +515,28 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk
     }
     CommitChunk(later, hull, change.hull, mark, writer_id, sequence);
     hull->points_since_prepared += counts.outside;
-    if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
+    preparer_.ScheduleIfWorn(hull);
     const HullRecord& record = change.hull.record;
-    AnswerChunk(later, done, sequence,
-                ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
+    AnswerChunk(
+        later, done, sequence,
+        ChunkResult{catalog_.revision(), false, record.revision, record.vertex_count, counts});
   };
   hull->state.Submit();
-  Submit(locked, hull, std::move(built.change), finish);
+  changes_.Submit(locked, hull, std::move(built.change), finish);
 }
 
 // after, mark: the hull with this chunk.
-void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
-                           const LiveHull::Mark& mark, const std::string& writer_id,
-                           uint64_t sequence) {
+void HullAppender::CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
+                               const LiveHull::Mark& mark, const std::string& writer_id,
+                               uint64_t sequence) {
   const HullRecord before = std::exchange(hull->committed, after).record;
   *hull->revisions = RevisionsOf(after);
   SetRevisions(*hull->revisions, &hull->head);
   hull->SetCommittedMark(locked, mark);
-  NoteChange(*hull);
+  catalog_.NoteChange(*hull);
   if (after.record.revision != before.revision) {
-    Publish(after.record.revision);
-    vertex_count_ += after.record.vertex_count - before.vertex_count;
+    catalog_.Publish(after.record.revision);
+    catalog_.NoteVertices(before.vertex_count, after.record.vertex_count);
     hull->DiscardServed(locked);
     locked.Discard(std::exchange(hull->canonical, nullptr));
     feed_.NoteChanged(locked, hull);
@@ -525,7 +550,7 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
 // A chunk in flight was refused, and with it all that follow: the hull returns to what is
 // committed. The first of them does it, the others find it done. A thread that is building on them
 // drops the builder itself, as its state says.
-void Registry::Revert(Locked& locked, RegisteredHull& hull) {
+void HullAppender::Revert(Locked& locked, RegisteredHull& hull) {
   hull.head = hull.committed;
   for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;
   hull.DiscardBuilder(locked);

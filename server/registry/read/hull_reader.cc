@@ -1,5 +1,5 @@
-// Readers: hulls that are ready to be served, all current at one revision.
-#include <absl/status/status.h>
+#include "server/registry/read/hull_reader.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -8,32 +8,15 @@
 #include <vector>
 
 #include "core/base/check.h"
-#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/stopped_call.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registered_hull.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
-namespace {
-
-absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          "freshness.at_least_revision is ", wanted, ", but the store is at revision ", current,
-          " and nobody was told of a later one; give the revision of an answer's header")),
-      v1::ERROR_REASON_FUTURE_REVISION,
-      {{"at_least_revision", wanted}, {"current_revision", current}});
-}
-
-// Nobody is told.
-absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"); }
-
-}  // namespace
 
 // A read of several hulls.
-struct Registry::HullsRead {
+struct HullReader::HullsRead {
   std::span<const std::string> ids;
   KnownHulls& known;
   const std::function<bool()>& should_stop;
@@ -42,94 +25,44 @@ struct Registry::HullsRead {
   bool may_wait = true;
 };
 
-// Where what is here is as fresh as this: how stale it may be. Otherwise a question to the store
-// decides. A read that is content, but would soon not be, has that asked for those to come, so that
-// none of them waits.
-std::optional<std::chrono::nanoseconds> Registry::TryFresh(Locked& locked,
-                                                           const Freshness& freshness) {
-  using std::chrono::nanoseconds;
-  if (revision_ < freshness.at_least_revision) return std::nullopt;
-  if (!store_.is_shared()) return nanoseconds(0);
-  const std::optional<SteadyClock::time_point> caught_up = committer_.caught_up(locked);
-  if (!caught_up.has_value()) return std::nullopt;
-  const SteadyClock::time_point began =
-      freshness.began.has_value() ? *freshness.began : SteadyClock::now();
-  const nanoseconds staleness = std::max<nanoseconds>(began - *caught_up, nanoseconds(0));
-  if (!freshness.max_staleness.has_value()) return staleness;
-  if (staleness > *freshness.max_staleness) return std::nullopt;
-  if (staleness > *freshness.max_staleness / 2) AskAhead(locked);
-  return staleness;
-}
-
-void Registry::AskAhead(Locked& locked) {
-  if (std::exchange(is_asking_ahead_, true)) return;
-  committer_.Follow(locked, [this](Locked&, const absl::Status&) { is_asking_ahead_ = false; });
-}
-
-absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
-    Locked& locked, const Freshness& freshness, const std::function<bool()>& should_stop) {
-  if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
-  if (store_.is_shared()) {
-    if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
-  }
-  if (revision_ >= freshness.at_least_revision) return std::chrono::nanoseconds(0);
-  return FutureRevision(freshness.at_least_revision, revision_);
-}
-
-std::optional<std::chrono::nanoseconds> Registry::TryFresh(const Freshness& freshness) {
-  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
-  Locked locked(mutex_);
-  return TryFresh(locked, freshness);
-}
-
-absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
-    const Freshness& freshness, const std::function<bool()>& should_stop) {
-  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
-  Locked locked(mutex_);
-  return AwaitFresh(locked, freshness, should_stop);
-}
-
-// Brings what is known of each hull up to this moment. The mutex is let go of after a number of
-// lookups; what changed by then is looked up again, so at the end all is of one moment. That comes
-// to an end, since a commit takes longer than a lookup. Releases the mutex also to read from the
-// store and to prepare; where it may not, UNAVAILABLE says that it would have to. CANCELLED:
-// should_stop said so.
-absl::Status Registry::LookUpDue(Locked& locked, const HullsRead& read) {
-  absl::Status status = LookUpAll(locked, read);
-  // Nothing is left where that is OK, so that the mutex is held all the while.
-  if (!status.ok()) {
+// Brings what is known of each hull up to this moment. Releases the mutex after a number of
+// lookups, and to read from the store and to prepare, where it may. CANCELLED: should_stop said so.
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
+  const absl::StatusOr<LookUpEnd> end = LookUpAll(locked, read);
+  // Nothing is left where it is done, so that the mutex is held all the while.
+  if (!end.ok() || *end != LookUpEnd::kDone) {
     KnownHulls& known = read.known;
     const std::function<bool()> stop = [] { return true; };
     EndAllLoading(locked, {read.ids, known, stop, read.plan});
     const size_t first = std::min(known.ahead_end_, known.due_.size());
     for (const uint32_t k : std::span(known.due_).subspan(first)) known.hulls_[k].found = nullptr;
   }
-  return status;
+  return end;
 }
 
-absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
-  if (!known.next_change_.has_value()) known.next_change_ = recent_changes_.end();
+  if (!known.next_change_.has_value()) known.next_change_ = catalog_.recent_changes().end();
   while (true) {
     uint64_t& next = *known.next_change_;
-    if (!recent_changes_.Knows(next)) {
-      next = recent_changes_.end();
+    if (!catalog_.recent_changes().Knows(next)) {
+      next = catalog_.recent_changes().end();
       locked.Unlock();
       known.ForgetAll();
       locked.Lock();
-    } else if (next < recent_changes_.end()) {
-      known.NoteChange(recent_changes_.at(next++));
+    } else if (next < catalog_.recent_changes().end()) {
+      known.NoteChange(catalog_.recent_changes().at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      const absl::Status status = LookUp(locked, read, known.due_.back());
-      if (!status.ok()) return status;
+      const absl::StatusOr<LookUpEnd> end = LookUp(locked, read, known.due_.back());
+      if (!end.ok() || *end != LookUpEnd::kDone) return end;
       due.is_due = false;
       known.due_.pop_back();
       ++known.lookups_;
     } else if (!known.ahead_.empty()) {
       EndAllLoading(locked, read);
     } else {
-      return absl::OkStatus();
+      return LookUpEnd::kDone;
     }
     locked.NoteLookup();
     if (locked.lookups() < kMostLookupsPerHold) continue;
@@ -142,10 +75,10 @@ absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
 }
 
 // Whether readers may hold more.
-absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
+absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
   const uint64_t share = memory_.share(MemoryUse::kReading);
-  // Trying again does not help who holds most of it.
+  // Trying again does not help a read that holds most of it.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
     return LimitExceeded(
         absl::StrCat("the hulls that the call names take ", bytes,
@@ -157,57 +90,61 @@ absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
 }
 
 // What readers are given of one hull now, or why there is nothing.
-absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k) {
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const HullsRead& read,
+                                                         uint32_t k) {
   KnownHulls::Known& known = read.known.hulls_[k];
   const std::string& id = read.ids[known.first];
   const ReadPlan& plan = read.plan;
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
-    if (*found == nullptr || (*found)->state.gone()) found = hulls_.Ask(id);
-    if (!found.has_value() && !bodies_.contains(id)) {
+    if (*found == nullptr || (*found)->state.gone()) found = catalog_.hulls().Ask(id);
+    if (!found.has_value() && !catalog_.bodies().contains(id)) {
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
-      if (!is_over.ok() || *is_over) return is_over.status();
+      if (!is_over.ok()) return is_over.status();
+      if (*is_over) return LookUpEnd::kDone;
       continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
-      known.view = NoSuchHull(id);
-      return absl::OkStatus();
+      known.view = catalog_.NoSuchHull(id);
+      return LookUpEnd::kDone;
     }
     if (hull->state.damaged()) {
       known.view = hull->state.damage();
-      return absl::OkStatus();
+      return LookUpEnd::kDone;
     }
     if (!hull->IsReady()) {
       // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
       // drop another one of the same read, and so on for ever.
       if (IsHeld(known, *hull)) {
-        ++cache_.hits;
-        return absl::OkStatus();
+        ++catalog_.statistics().hits;
+        return LookUpEnd::kDone;
       }
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
-      if (!is_over.ok() || *is_over) return is_over.status();
+      if (!is_over.ok()) return is_over.status();
+      if (*is_over) return LookUpEnd::kDone;
       continue;
     }
-    const bool prepare = WantsPreparing(*hull, plan.expected_questions);
+    const bool prepare = Preparer::IsWanted(*hull, plan.expected_questions);
     if (prepare && plan.prepare_first) {
-      if (!read.may_wait) return WouldWait();
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       if (!std::exchange(known.is_prepared, true)) {
         if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
         continue;
       }
     }
-    if (prepare) SchedulePreparing(hull);
+    if (prepare) preparer_.Schedule(hull);
     NoteView(locked, hull, read.known, k, was_missing);
-    return absl::OkStatus();
+    return LookUpEnd::kDone;
   }
 }
 
 // Finds out from the store whether there is this hull, and some of those that are due next. False:
 // look again; true: it could not be found out, which is noted. Releases the mutex.
-absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
-  if (!read.may_wait) return WouldWait();
+absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   if (!hulls.ahead_.empty()) {
     EndAllLoading(locked, read);
@@ -218,7 +155,7 @@ absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read
   for (const uint32_t due : std::span(hulls.due_).last(count)) {
     if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
   }
-  const absl::Status asked = AwaitKnown(locked, wanted, read.should_stop);
+  const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
   if (Stopped(read.should_stop)) return Cancelled();
   if (asked.ok()) return false;
   hulls.hulls_[k].view = asked;
@@ -227,13 +164,12 @@ absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read
 
 // Reads the points of this hull, and at first of those that are due next as well. False: look
 // again; true: they cannot be read, which is noted. Releases the mutex.
-absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                           RegisteredHull& hull, bool& was_missing) {
-  if (!read.may_wait) return WouldWait();
+absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
+                                             RegisteredHull& hull, bool& was_missing) {
   KnownHulls& hulls = read.known;
   if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
   if (!std::exchange(was_missing, true)) {
-    ++cache_.misses;
+    ++catalog_.statistics().misses;
     LoadMany(locked, read, k);
     if (Stopped(read.should_stop)) return Cancelled();
     return false;
@@ -242,7 +178,7 @@ absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read
     EndAllLoading(locked, read);
     return false;
   }
-  const absl::Status loaded = LoadForReaders(locked, hull, read.should_stop);
+  const absl::Status loaded = LoadOne(locked, hull, read.should_stop);
   if (Stopped(read.should_stop) || absl::IsCancelled(loaded)) return Cancelled();
   if (loaded.ok() || hull.state.gone()) return false;
   hulls.hulls_[k].view = loaded;
@@ -250,42 +186,42 @@ absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read
 }
 
 // Prepares what questions look through, before the first of them. Releases the mutex.
-absl::Status Registry::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
+absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
   if (!read.known.ahead_.empty()) {
     EndAllLoading(locked, read);
-    if (!WantsPreparing(hull, read.plan.expected_questions)) return absl::OkStatus();
+    if (!Preparer::IsWanted(hull, read.plan.expected_questions)) return absl::OkStatus();
   }
-  Prepare(locked, hull);
+  preparer_.Prepare(locked, hull);
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
 // Whether a reader holds what is committed of a hull.
-bool Registry::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
+bool HullReader::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
   return known.view.ok() && known.view->record == hull.committed.record;
 }
 
 // Notes what readers are given of a hull that is ready. was_missing: its points were read for that.
-void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
-                        bool was_missing) {
+void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
+                          bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
   const bool was_loaded = std::exchange(known.is_loaded, false);
-  if (!was_missing) ++(was_loaded ? cache_.misses : cache_.hits);
+  if (!was_missing) ++(was_loaded ? catalog_.statistics().misses : catalog_.statistics().hits);
   known.view = HullView{hull->committed.record, hull->Serve()};
   known.bytes = hull->SharedBytes();
   // One that was just loaded was noted then, and Serve counted the rest.
   if (!was_loaded) hull->NoteUse();
   if (was_missing || was_loaded) {
     memory_.Evict(locked);
-    hulls_.RestSome();
+    catalog_.hulls().RestSome();
   }
 }
 
 // Reads the points of this hull, which is due, and of those that are due next from the store, as
 // far as they are missing and nobody else reads them, by several threads at a time. While these
-// hulls are looked up, others read the next. Who waits for others meanwhile ends all that first,
-// since others may wait for it. Releases the mutex. What cannot be read, or was left behind by a
-// writer, stays missing.
-void Registry::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
+// hulls are looked up, others read the next. A read that waits for others meanwhile
+// ends all that first, since others may wait for it. Releases the mutex. What cannot be read, or
+// was left behind by a writer, stays missing.
+void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   const bool& is_ahead = hulls.hulls_[k].is_ahead;
   if (!is_ahead) hulls.ahead_end_ = hulls.due_.size();
@@ -294,7 +230,7 @@ void Registry::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
 }
 
 // Whether there are some that are worth it.
-bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
+bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
   // asks whether readers hold too much.
@@ -318,7 +254,7 @@ bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
     locked.NoteLookup();
     const KnownHulls::Known& known = hulls.hulls_[k];
     const std::string& id = read.ids[known.first];
-    const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
+    const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
       --end;
@@ -338,13 +274,13 @@ bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
     next.found[i]->loading = true;
     hulls.hulls_[next.hulls[i]].is_ahead = true;
   }
-  next.job = LoadJob::Start(store_, std::move(stored), *loaders_);
+  next.job = LoadJob::Start(store_, std::move(stored), loaders_);
   hulls.ahead_.push_back(std::move(next));
   return true;
 }
 
 // Waits for the first of those that are read.
-void Registry::EndLoading(Locked& locked, const HullsRead& read) {
+void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
   hulls.ahead_.pop_front();
@@ -361,77 +297,66 @@ void Registry::EndLoading(Locked& locked, const HullsRead& read) {
     const bool is_current = hull.committed.record.revision == revision;
     if (!loaded[i].ok() || !is_current || hull.live != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
-    ++cache_.loads;
+    ++catalog_.statistics().loads;
     hull.NoteUse();
     known.is_loaded = true;
     known.found = loading.found[i];
   }
 }
 
-void Registry::EndAllLoading(Locked& locked, const HullsRead& read) {
+void HullReader::EndAllLoading(Locked& locked, const HullsRead& read) {
   while (!read.known.ahead_.empty()) EndLoading(locked, read);
 }
 
-absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
-                                           const std::function<bool()>& should_stop,
-                                           const ReadPlan& plan) {
-  KnownHulls known;
-  return Refresh(ids, known, should_stop, plan);
-}
-
-absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, KnownHulls& known,
-                                           const std::function<bool()>& should_stop,
-                                           const ReadPlan& plan) {
+absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, KnownHulls& known,
+                                             const std::function<bool()>& should_stop,
+                                             const ReadPlan& plan) {
   known.Begin(ids);
   known.BeginLookup();
   Resolved resolved;
   {
     Locked locked(mutex_);
-    const auto staleness = AwaitFresh(locked, plan.freshness, should_stop);
+    const auto staleness = freshness_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.staleness = *staleness;
-    const absl::Status status = LookUpDue(locked, {ids, known, should_stop, plan});
-    if (!status.ok()) return status;
-    resolved.store_revision = revision_;
+    const auto end = LookUpDue(locked, {ids, known, should_stop, plan});
+    if (!end.ok()) return end.status();
+    HULLD_CHECK(*end == LookUpEnd::kDone);
+    resolved.store_revision = catalog_.revision();
     memory_.Evict(locked);
   }
   resolved.hulls = known.Views(ids);
   return resolved;
 }
 
-std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
-                                             const ReadPlan& plan) {
+std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
+                                               const ReadPlan& plan) {
   KnownHulls known;
   known.Begin(ids);
   const std::function<bool()> should_stop;
   Resolved resolved;
   {
     Locked locked(mutex_);
-    const auto staleness = TryFresh(locked, plan.freshness);
+    const auto staleness = freshness_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
-    if (!LookUpDue(locked, read).ok()) return std::nullopt;
-    resolved.store_revision = revision_;
+    const auto end = LookUpDue(locked, read);
+    // A refusal is told by Refresh, as it may be over by then.
+    if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
+    resolved.store_revision = catalog_.revision();
   }
   resolved.hulls = known.Views(ids);
   return resolved;
 }
 
-absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
-    const std::string& id, const std::function<bool()>& should_stop, const Freshness& freshness) {
-  absl::StatusOr<Resolved> resolved =
-      Resolve(std::span(&id, 1), should_stop, {.freshness = freshness});
-  if (!resolved.ok()) return resolved.status();
-  absl::StatusOr<HullView>& hull = resolved->hulls.front();
-  if (!hull.ok()) return hull.status();
-  return std::pair(resolved->as_of(), *std::move(hull));
-}
-
-absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
-                                                const std::function<bool()>& should_stop) {
+absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
+                                                  const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
-  if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  {
+    Locked locked(mutex_);
+    if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  }
   const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
   if (snapshot_seconds_ != nullptr) {
@@ -441,10 +366,10 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
   Locked locked(mutex_);
   const std::string& id = view.record.hull_id;
   // What is not known any more has nothing to be noted of.
-  const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
+  const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed.record.revision == view.record.revision;
-  if (is_current && absl::IsDataLoss(status)) MarkDamaged(*hull, status);
+  if (is_current && absl::IsDataLoss(status)) catalog_.MarkDamaged(*hull, status);
   if (is_current) hull->NoteUse();
   memory_.Evict(locked);
   if (!status.ok()) return status;
@@ -453,8 +378,8 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
 
 // Reads a hull's points from the store, unless they are in memory or the hull is gone. Releases the
 // mutex meanwhile.
-absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
-                                      const std::function<bool()>& should_stop) {
+absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
+                                 const std::function<bool()>& should_stop) {
   bool failed = false;
   while (!hull.IsReady() && !hull.state.gone()) {
     if (hull.state.damaged()) return hull.state.damage();
@@ -478,7 +403,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     hull.loading = false;
     hull.changed.notify_all();
     if (absl::IsAborted(loaded.status())) {
-      if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+      if (absl::Status s = freshness_.AwaitOthers(locked, should_stop); !s.ok()) return s;
       const HullRecord& now = hull.committed.record;
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
@@ -492,7 +417,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     }
     if (loaded.ok()) {
       hull.SetLive(*std::move(loaded));
-      ++cache_.loads;
+      ++catalog_.statistics().loads;
       hull.NoteUse();
       return absl::OkStatus();
     }
@@ -500,69 +425,10 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     // tells whether they are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
-    if (absl::IsDataLoss(loaded.status())) MarkDamaged(hull, loaded.status());
+    if (absl::IsDataLoss(loaded.status())) catalog_.MarkDamaged(hull, loaded.status());
     return loaded.status();
   }
   return absl::OkStatus();
-}
-
-// Whether questions have paid for preparing what they look through, and nobody does it yet.
-bool Registry::WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions) {
-  return !hull.preparing && hull.live != nullptr && hull.state.visible() &&
-         hull.live->WantsPreparing(hull.committed_mark, expected_questions);
-}
-
-// Prepares what is committed of a hull. Releases the mutex meanwhile.
-void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
-  HULLD_CHECK(!hull.preparing && hull.live != nullptr);
-  hull.preparing = true;
-  hull.points_since_prepared = 0;
-  const std::shared_ptr<LiveHull> live = hull.live;
-  const LiveHull::Mark mark = hull.committed_mark;
-  locked.Unlock();
-  live->Prepare(mark);
-  locked.Lock();
-  hull.preparing = false;
-  if (hull.live != live) return;
-  // Nothing came after: the mark lets go of what there was before.
-  if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
-  hull.DiscardServed(locked);
-  NoteChange(hull);
-  hull.NoteUse();
-}
-
-// Has another thread do it.
-void Registry::SchedulePreparing(const HullPointer& hull) {
-  HULLD_CHECK(!hull->preparing);
-  hull->preparing = true;
-  preparers_->Submit([this, hull] {
-    Locked locked(mutex_);
-    hull->preparing = false;
-    if (ending_ || hull->live == nullptr) return;
-    Prepare(locked, *hull);
-    memory_.Evict(locked);
-  });
-}
-
-absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
-                                        size_t page_size,
-                                        const std::function<bool()>& should_stop) {
-  if (is_cache_) return ListFoundHulls(prefix, after, page_size, should_stop);
-  HullPage page;
-  const std::lock_guard lock(mutex_);
-  page.store_revision = revision_;
-  const HullTable::Entries& all = hulls_.entries();
-  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
-  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
-    if (!next->second.visible()) continue;
-    if (page.hulls.size() == page_size) {
-      page.more = true;
-      break;
-    }
-    HullChange hull = next->second.Describe(next->first);
-    page.hulls.push_back({std::move(hull.record), hull.damaged});
-  }
-  return page;
 }
 
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,4 +1,4 @@
-#include "server/registry/hull_state.h"
+#include "server/registry/catalog/hull_state.h"
 
 #include "core/base/check.h"
 

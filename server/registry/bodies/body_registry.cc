@@ -1,0 +1,271 @@
+#include "server/registry/bodies/body_registry.h"
+
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/contract/error_info.h"
+#include "server/contract/limit_error.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registered_hull.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status BodyMismatch(const std::string& id, uint64_t revision, uint64_t if_revision) {
+  const std::string found =
+      revision == 0 ? absl::StrCat(" does not exist, so it is not at revision ", if_revision)
+                    : absl::StrCat(" is at revision ", revision, ", not ", if_revision);
+  return WithReason(
+      absl::AbortedError(
+          absl::StrCat(QuotedBody(id), found, " (if_revision); read it again, then retry")),
+      v1::ERROR_REASON_REVISION_MISMATCH,
+      {{"body_id", id}, {"if_revision", if_revision}, {"current_revision", revision}});
+}
+
+absl::Status HullHasTheId(const std::string& id) {
+  return WithReason(absl::AlreadyExistsError(absl::StrCat(
+                        "\"", id,
+                        "\" is a hull, and hulls and bodies share their IDs; choose another ID, or "
+                        "delete the hull first")),
+                    v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}});
+}
+
+}  // namespace
+
+absl::Status BodyRegistry::Load(Locked& locked) {
+  return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
+    // Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
+    if (catalog_.hulls().contains(id)) {
+      spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
+      return;
+    }
+    catalog_.AddBody(locked, id, stored);
+    catalog_.NoteBodyFound();
+  });
+}
+
+void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
+                       Reply<PutBodyResult> done) {
+  HULLD_CHECK(!body.pieces.empty());
+  const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
+  freshness_.WhenFresh(done, [=, this](Locked& locked) {
+    // Counted by now. What waits for others is not counted twice.
+    if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
+      return Answer<PutBodyResult>(locked, done, s);
+    }
+    PutLocked(locked, shared, if_revision, done);
+  });
+}
+
+// Whether a body may be put. OK also where it takes the place of another.
+absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
+  if (catalog_.hulls().contains(id)) return HullHasTheId(id);
+  const std::shared_ptr<const Body> body = catalog_.FindBody(id);
+  const uint64_t revision = body == nullptr ? 0 : body->record().revision;
+  if (if_revision.has_value() && *if_revision != revision) {
+    return BodyMismatch(id, revision, *if_revision);
+  }
+  return body == nullptr ? catalog_.CheckHullCount() : absl::OkStatus();
+}
+
+void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
+                             std::optional<uint64_t> if_revision,
+                             const Reply<PutBodyResult>& done) {
+  const std::string& id = body->record().body_id;
+  if (BodyTable::Entry* const entry = catalog_.BodyInFlight(id); entry != nullptr) {
+    entry->waiting.push_back(
+        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
+    return;
+  }
+  if (!catalog_.IsKnown(id)) {
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
+  }
+  const Catalog::HullPointer hull = catalog_.Find(id);
+  if (hull != nullptr && hull->state.changing_life()) {
+    hull->exclusive.push_back(
+        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
+    return;
+  }
+  if (absl::Status s = CheckPut(id, if_revision); !s.ok()) {
+    return Answer<PutBodyResult>(locked, done, s);
+  }
+  const bool is_new = !catalog_.bodies().contains(id);
+  const BodyTable::Entry& entry = catalog_.bodies().Add(id);
+  catalog_.hulls().ForgetAbsent(id);
+  if (is_new) catalog_.BeginCreatingBody();
+  Change change;
+  change.body = body->stored();
+  uint64_t& created = change.body->record.create_revision;
+  created = is_new ? 0 : entry.committed()->record().create_revision;
+  // One that was damaged begins anew.
+  change.begins = created == 0;
+  change.replaces_body = change.begins && !is_new;
+  Submit(locked, std::move(change),
+         [=, this](Locked& later, const absl::Status& status, const Change&) {
+           if (is_new) catalog_.EndCreatingBody(status.ok());
+           if (Committer::IsSuperseded(status)) {
+             return later.AfterwardsLocked(
+                 [=, this](Locked& again) { PutLocked(again, body, if_revision, done); });
+           }
+           const BodyRecord& record = body->record();
+           if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
+           catalog_.bodies().Set(later, record.body_id, body);
+           Answer<PutBodyResult>(
+               later, done,
+               PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
+         });
+}
+
+void BodyRegistry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
+                          Reply<uint64_t> done) {
+  freshness_.WhenFresh(done,
+                       [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
+}
+
+void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
+                                std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
+  if (!catalog_.IsKnown(id)) {
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
+  }
+  BodyTable::Entry* const entry = catalog_.bodies().Find(id);
+  if (entry == nullptr) {
+    const absl::Status missing =
+        catalog_.hulls().contains(id)
+            ? WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
+                         v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}})
+            : BodyNotFound(id);
+    return Answer<uint64_t>(locked, done, missing);
+  }
+  if (entry->in_flight) {
+    entry->waiting.push_back(
+        [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
+    return;
+  }
+  const std::shared_ptr<const Body> body = entry->committed();
+  if (if_revision.has_value() && *if_revision != body->record().revision) {
+    return Answer<uint64_t>(locked, done, BodyMismatch(id, body->record().revision, *if_revision));
+  }
+  Change change;
+  change.deleted = true;
+  change.body = body->stored();
+  Submit(locked, std::move(change),
+         [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
+           if (Committer::IsSuperseded(status)) {
+             return later.AfterwardsLocked(
+                 [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
+           }
+           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           catalog_.NoteBodyEnded();
+           catalog_.bodies().Set(later, id, nullptr);
+           Answer<uint64_t>(later, done, deletion.revision);
+         });
+}
+
+// finish: called once the change is committed and visible, or refused, before what waits for the
+// body goes on.
+void BodyRegistry::Submit(Locked& locked, Change change, Committer::Completion finish) {
+  const std::string id = change.body->record.body_id;
+  HULLD_CHECK(!std::exchange(catalog_.bodies().Find(id)->in_flight, true));
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      Complete(later, id, finish, status, committed);
+                    });
+}
+
+void BodyRegistry::Complete(Locked& locked, const std::string& id,
+                            const Committer::Completion& finish, const absl::Status& status,
+                            Change& change) {
+  const std::shared_ptr<const Body> former = catalog_.FindBody(id);
+  if (status.ok()) catalog_.Publish(change.revision);
+  // Where readers look for a hull with this ID.
+  if (status.ok()) catalog_.recent_changes().Note(id);
+  finish(locked, status, change);
+  BodyTable::Entry& entry = *catalog_.bodies().Find(id);
+  if (status.ok() && entry.committed() != nullptr) {
+    const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
+    feed_.NoteBodyPut(locked, before, entry.committed());
+  } else if (status.ok()) {
+    feed_.NoteBodyDeleted(locked, former->record(), change.revision);
+  }
+  entry.in_flight = false;
+  std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
+  // Nothing was there before a creation that was refused, nor is after a deletion.
+  if (entry.committed() == nullptr) catalog_.EraseBody(locked, id);
+  for (LockedTask& next : waiting) {
+    if (Committer::IsSuperseded(status)) {
+      after_others_.Add(std::move(next));
+    } else {
+      next(locked);
+    }
+  }
+  catalog_.bodies().DropSome(locked);
+}
+
+absl::StatusOr<BodyPage> BodyRegistry::List(const std::string& prefix, const std::string& after,
+                                            size_t page_size,
+                                            const std::function<bool()>& should_stop) {
+  if (catalog_.is_cache()) return lister_.ListBodies(prefix, after, page_size, should_stop);
+  BodyPage page;
+  const std::lock_guard lock(mutex_);
+  page.store_revision = catalog_.revision();
+  const BodyTable::Entries& all = catalog_.bodies().entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    const std::shared_ptr<const Body>& body = next->second.committed();
+    if (body == nullptr) continue;
+    if (page.bodies.size() == page_size) {
+      page.more = true;
+      break;
+    }
+    page.bodies.push_back(body);
+  }
+  return page;
+}
+
+// kMostLookupsPerHold at a time. Of those what is not known is read, all at once; a reader of much
+// may drop it again meanwhile, so what was found before is not looked for again. nullopt: it would
+// have to wait, and may not.
+std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const std::string> ids,
+                                              const std::function<bool()>& should_stop,
+                                              bool may_wait) {
+  FoundBodies found;
+  found.bodies.resize(ids.size());
+  for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
+    if (first > 0) {
+      locked.Unlock();
+      locked.Lock();
+    }
+    const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
+    for (size_t i = first; i < end; ++i) {
+      while (found.status.ok() && !catalog_.IsKnown(ids[i])) {
+        if (!may_wait) return std::nullopt;
+        found.status = records_.AwaitMissing(locked, ids.subspan(i, end - i), should_stop);
+      }
+      // Also what could not be read may be known by now.
+      found.bodies[i] = catalog_.FindBody(ids[i]);
+      locked.NoteLookup();
+    }
+  }
+  found.store_revision = catalog_.revision();
+  return found;
+}
+
+FoundBodies BodyRegistry::Find(std::span<const std::string> ids,
+                               const std::function<bool()>& should_stop) {
+  Locked locked(mutex_);
+  return *Find(locked, ids, should_stop, true);
+}
+
+std::optional<FoundBodies> BodyRegistry::TryFind(std::span<const std::string> ids) {
+  Locked locked(mutex_);
+  return Find(locked, ids, {}, false);
+}
+
+}  // namespace hulld::server

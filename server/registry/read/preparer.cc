@@ -1,0 +1,53 @@
+#include "server/registry/read/preparer.h"
+
+#include "core/base/check.h"
+#include "core/query/placed/live_hull.h"
+#include "server/registry/catalog/registered_hull.h"
+
+namespace hulld::server {
+
+bool Preparer::IsWanted(const RegisteredHull& hull, uint64_t expected_questions) {
+  return !hull.preparing && hull.live != nullptr && hull.state.visible() &&
+         hull.live->WantsPreparing(hull.committed_mark, expected_questions);
+}
+
+void Preparer::Prepare(Locked& locked, RegisteredHull& hull) {
+  HULLD_CHECK(!hull.preparing && hull.live != nullptr);
+  hull.preparing = true;
+  hull.points_since_prepared = 0;
+  const std::shared_ptr<LiveHull> live = hull.live;
+  const LiveHull::Mark mark = hull.committed_mark;
+  locked.Unlock();
+  live->Prepare(mark);
+  locked.Lock();
+  hull.preparing = false;
+  if (hull.live != live) return;
+  // Nothing came after: the mark lets go of what there was before.
+  if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
+  hull.DiscardServed(locked);
+  catalog_.NoteChange(hull);
+  hull.NoteUse();
+}
+
+void Preparer::Schedule(const HullPointer& hull) {
+  HULLD_CHECK(!hull->preparing);
+  hull->preparing = true;
+  thread_->Submit([this, hull] {
+    Locked locked(mutex_);
+    hull->preparing = false;
+    if (is_stopped_ || hull->live == nullptr) return;
+    Prepare(locked, *hull);
+    memory_.Evict(locked);
+  });
+}
+
+void Preparer::Stop(const Locked& locked) {
+  HULLD_CHECK(locked.Holds(mutex_));
+  is_stopped_ = true;
+}
+
+void Preparer::ScheduleIfWorn(const HullPointer& hull) {
+  if (!is_stopped_ && hull->HoldsMuchElse() && !hull->preparing) Schedule(hull);
+}
+
+}  // namespace hulld::server
