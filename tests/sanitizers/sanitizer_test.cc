@@ -40,7 +40,9 @@ TEST(SanitizerDeathTest, ALibraryThatReadsPastTheEndOfWhatTheTestAllocatedIsFoun
 TEST(SanitizerDeathTest, ALibraryThatLeaksIsFound) {
   EXPECT_EXIT(
       {
-        planted::Leak(1000);
+        // The last pointer may still stand where the stack was, on some processors: then it does
+        // not count as lost. Each call writes over that of the one before.
+        for (int i = 0; i < 3; ++i) planted::Leak(1000);
         std::exit(0);
       },
       Failed, "LeakSanitizer: detected memory leaks");
