@@ -4,6 +4,7 @@
 #include <grpcpp/generic/generic_stub.h>
 
 #include <algorithm>
+#include <cmath>
 #include <future>
 #include <utility>
 
@@ -50,7 +51,7 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
   return absl::InternalError("the mesh stream holds a message of an unknown kind");
 }
 
-// Code that draws or writes the mesh relies on this.
+// Code that draws, writes or verifies the mesh relies on this.
 absl::Status CheckConsistent(const HullMesh& mesh) {
   if (mesh.xyz.size() != 3 * mesh.header.vertex_count() ||
       mesh.facet_sizes.size() != mesh.header.facet_count()) {
@@ -65,6 +66,10 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
   const auto in_range = [vertices](uint32_t index) { return index < vertices; };
   if (!std::all_of(mesh.facet_indices.begin(), mesh.facet_indices.end(), in_range)) {
     return absl::InternalError("the mesh stream names a vertex that it does not hold");
+  }
+  const auto is_finite = [](double x) { return std::isfinite(x); };
+  if (!std::all_of(mesh.xyz.begin(), mesh.xyz.end(), is_finite)) {
+    return absl::InternalError("the mesh stream holds a coordinate that is not finite");
   }
   return absl::OkStatus();
 }

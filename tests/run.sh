@@ -79,7 +79,8 @@ if command -v ccache >/dev/null; then
   export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
   # Precompiled headers have 400 MB: hashed once, not for each file, which took 0.4 s.
   export CCACHE_INODECACHE=${CCACHE_INODECACHE:-1}
-  # A clone in another folder finds what was compiled in this one.
+  # A clone in another folder finds what was compiled in this one. Debug information may then name
+  # that one's folder.
   export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
 fi
 

@@ -540,7 +540,7 @@ function summary(   one) {
   hull("hull of 100000 points on a sphere", "sphere:100000")
   one = "sphere:100000"
   # 100000 points, milliseconds: 10 ns a point for each.
-  compare("insert one point, hull of 100000 points on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
+  compare("insert a point, mean over 100000 on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
           10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
           cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
           cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "client/calls/grpc_status.h"
 #include "tests/client/fake_hulld.h"
 
@@ -182,6 +184,8 @@ TEST_F(ClientTest, AMeshThatContradictsItselfIsRefused) {
       {Header(3, 1), Vertices(xyz), Facets({4000000000u}, {0, 1, 2})},
       {Header(3, 1), Vertices(xyz), Facets({2}, {0, 1, 2})},
       {Header(3, 1), v1::GetHullMeshResponse()},
+      {Header(3, 1), Vertices({0, 0, 0, 1, 0, 0, 0, 1, NAN}), Facets({3}, {0, 1, 2})},
+      {Header(3, 1), Vertices({0, 0, 0, 1, 0, 0, 0, INFINITY, 0}), Facets({3}, {0, 1, 2})},
   };
   for (const auto& parts : wrong) {
     fake_.mesh_parts = parts;

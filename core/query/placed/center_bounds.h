@@ -76,7 +76,10 @@ class CenterBounds {
   bool coarse() const { return side_ < kLeastFineSide; }
   // At least g(d) for all d with components of at most 1; infinite where unknown. Requires that
   // this thread had a known place.
-  double largest_gauge() const { return map_->largest_gauge; }
+  double largest_gauge() const {
+    HULLD_DCHECK(map_ != nullptr);
+    return map_->largest_gauge;
+  }
 
   // With all cells. Bytes.
   size_t MemoryBytes() const {
