@@ -9,6 +9,7 @@ whose generated files lie beside the sources.
 
 import atexit
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -18,6 +19,12 @@ from setuptools.command.build_py import build_py
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROTO = HERE.parent.parent / "proto"
+
+
+def version():
+    """The version of the whole project, which CMakeLists.txt holds."""
+    text = (HERE.parent.parent / "CMakeLists.txt").read_text(encoding="utf-8")
+    return re.search(r"^project\(hulld VERSION ([0-9.]+)", text, re.MULTILINE)[1]
 
 
 def find_program(name, package):
@@ -54,7 +61,11 @@ def generate(target):
 class BuildWithContract(build_py):
     def run(self):
         super().run()
-        generate(HERE if getattr(self, "editable_mode", False) else self.build_lib)
+        target = HERE if getattr(self, "editable_mode", False) else self.build_lib
+        generate(target)
+        pathlib.Path(target, "hulld", "_version.py").write_text(
+            f'__version__ = "{version()}"\n', encoding="utf-8"
+        )
 
 
 # Several builds of one tree at a time, as tests make them, must not meet in one directory.
@@ -62,6 +73,7 @@ scratch = tempfile.mkdtemp(prefix="hulld-build-")
 atexit.register(shutil.rmtree, scratch, ignore_errors=True)
 
 setup(
+    version=version(),
     cmdclass={"build_py": BuildWithContract},
     options={"build": {"build_base": scratch}, "egg_info": {"egg_base": scratch}},
 )

@@ -11,6 +11,7 @@ collide.
 README.md beside the package shows each task.
 """
 
+from hulld._version import __version__
 from hulld.aio.appender import AsyncAppender
 from hulld.aio.client import AsyncClient
 from hulld.aio.collision_stream import AsyncCollisionStream
@@ -103,7 +104,6 @@ from hulld.retry import RetryPolicy
 from hulld.verification import VerificationError, Verifier
 from hulld.watches import CollisionWatch, HullWatch
 
-__version__ = "0.1.0"
 
 __all__ = [
     "DEFAULT_SERVER",

@@ -344,7 +344,7 @@ TEST_F(HullCalls, StatusCountsHullsAndVertices) {
   grpc::ClientContext context;
   v1::GetStatusResponse response;
   ASSERT_TRUE(status_->GetStatus(&context, {}, &response).ok());
-  EXPECT_EQ(response.version(), "0.1.0");
+  EXPECT_EQ(response.version(), HULLD_VERSION);
   EXPECT_EQ(response.store_kind(), "memory");
   EXPECT_EQ(response.hull_count(), 2);
   EXPECT_EQ(response.vertex_count(), 28);

@@ -85,7 +85,7 @@ TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
   EXPECT_THAT(reply, StartsWith("HTTP/1.1 200"));
   EXPECT_THAT(reply, HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8\r\n"));
   EXPECT_THAT(reply, HasSubstr("\nhulld_build_info{"));
-  EXPECT_THAT(reply, HasSubstr("version=\"0.1.0\"} 1"));
+  EXPECT_THAT(reply, HasSubstr("version=\"" HULLD_VERSION "\"} 1"));
   EXPECT_THAT(reply, HasSubstr("\nhulld_requests_running{rpc=\"GetHull\"} 0"));
   EXPECT_THAT(reply, HasSubstr("\nprocess_resident_memory_bytes "));
   EXPECT_THAT(reply, HasSubstr("\nhulld_queue_tasks{pool=\"readers\"} 0"));

@@ -282,7 +282,7 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));
-  EXPECT_EQ(Parse({"--version"})->print, "hulld 0.1.0\n");
+  EXPECT_EQ(Parse({"--version"})->print, "hulld " HULLD_VERSION "\n");
 }
 
 }  // namespace
