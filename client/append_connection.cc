@@ -97,7 +97,7 @@ void AppendConnection::OnReadDone(bool ok) {
 void AppendConnection::OnWriteDone(bool ok) {
   const std::lock_guard lock(mutex_);
   writing_ = nullptr;
-  // The reads end too and bring the reason.
+  // The pending reads then fail too, and OnDone reports the status.
   if (!ok) write_failed_ = true;
   changed_.notify_all();
 }

@@ -14,37 +14,37 @@
 
 namespace hulld {
 
-// One connection of AppendPoints, driven by one thread that never blocks longer than it asks to.
+// One AppendPoints stream, driven by one thread that never blocks past its deadline.
 //
-// gRPC calls On...Done from its own threads; they only record what happened and wake the driving
-// thread. A hold keeps the call from being finished while the driving thread may still start
-// writes.
+// gRPC calls On...Done on its own threads; these only record the event and wake the driving thread.
+// A hold keeps the call open while the driving thread may still start writes.
 class AppendConnection final
     : public grpc::ClientBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse> {
  public:
   explicit AppendConnection(v1::HullService::Stub* stub);
-  // Cancels the call unless it has ended, and waits for gRPC to let go of it.
+  // Cancels the call unless it has ended, and waits until gRPC releases it.
   ~AppendConnection() override;
 
-  // True when Write may be called.
+  // Returns true if Write may be called.
   bool writable();
-  // Sends `request`, which is kept until gRPC is done with it. Requires that no write is under way
-  // (checked), as writable() says.
+  // Sends `request`, which is kept until gRPC has written it. Requires writable(): no write is in
+  // flight (checked).
   void Write(std::shared_ptr<const v1::AppendPointsRequest> request);
   void WritesDone();
 
-  // The oldest response not yet taken.
+  // Removes the oldest pending response. Returns false if there is none.
   bool TakeResponse(v1::AppendPointsResponse* response);
 
-  // Waits for a response, room to write (when `to_write`) or the end of the stream. False at the
-  // deadline.
+  // Waits for a response, for room to write (if `to_write`), or for the end of the stream. Returns
+  // false at the deadline.
   bool WaitForEvent(bool to_write, Deadline deadline);
 
-  // True when no further response will come; responses not yet taken are still there.
+  // Returns true if no further response will arrive; pending responses remain available.
   bool ended();
-  // The final status. Requires ended() (checked).
+  // Returns the final status. Requires ended() (checked).
   grpc::Status Close();
-  // Holds what the server sent beside the status. Requires that Close returned (checked).
+  // Returns the context with the server's trailing metadata. Requires that Close returned
+  // (checked).
   const grpc::ClientContext& context();
 
   void OnReadDone(bool ok) override;

@@ -22,7 +22,7 @@ uint64_t PointsIn(const v1::PointBlock& block) {
   return static_cast<uint64_t>(block.xyz_size() + block.xyz_float_size()) / 3;
 }
 
-// How an ended connection ended.
+// Returns the final status of an ended connection, with the server's error details.
 absl::Status EndOf(AppendConnection* connection) {
   const grpc::Status status = connection->Close();
   return FromGrpcStatus(status, connection->context());
@@ -49,7 +49,7 @@ absl::Status Appender::Fail(absl::Status status) {
 }
 
 absl::StatusOr<v1::AppendOpened> Appender::Connect() {
-  // The old stream ends before the new one exists, so that the server sees one stream per writer.
+  // Ends the old stream before opening the new one, so that the server sees one stream per writer.
   written_ = 0;
   connection_ = nullptr;
   connection_ = std::make_unique<AppendConnection>(stub_.get());
@@ -86,16 +86,16 @@ absl::Status Appender::OpenFirst() {
   next_sequence_ = opened_.last_sequence() + 1;
   totals_.hull_revision = opened_.hull().revision();
   totals_.vertex_count = opened_.hull().vertex_count();
-  // The hull exists now. If it is gone at a reconnect, creating it again would hide that points
-  // were lost.
+  // The hull exists now. If it is missing at a reconnect, creating it again would hide the loss of
+  // points.
   open_.set_create_if_absent(false);
   return absl::OkStatus();
 }
 
 absl::Status Appender::Reconnect(absl::Status cause) {
   while (MayRetry(cause)) {
-    ++failures_;
-    if (!WaitBeforeRetry(retry_, failures_, Deadline::max(), cause)) break;
+    if (failures_++ == 0) give_up_at_ = retry_.Now() + timeout_;
+    if (!WaitBeforeRetry(retry_, failures_, give_up_at_, cause)) break;
     absl::StatusOr<v1::AppendOpened> opened = Connect();
     if (opened.ok()) {
       ++totals_.reconnects;
@@ -158,7 +158,7 @@ absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
     }
     if (unacknowledged_.empty()) return absl::OkStatus();
     if (connection_->ended()) {
-      // A response may have come between the look for one and the look for the end.
+      // A response may have arrived between the two checks.
       if (connection_->TakeResponse(&response)) {
         if (absl::Status status = TakeResponse(response); !status.ok()) return status;
         continue;
@@ -228,8 +228,8 @@ absl::Status Appender::Finish() {
     v1::AppendPointsResponse ignored;
     if (!connection_->TakeResponse(&ignored) && !connection_->WaitForEvent(false, deadline)) break;
   }
-  // Everything is acknowledged, so it does not matter that a server which drains, or is gone, did
-  // not end the stream properly.
+  // Everything is acknowledged, so a draining or lost server that did not end the stream properly
+  // does no harm.
   absl::Status status = connection_->ended() ? EndOf(connection_.get()) : absl::OkStatus();
   connection_ = nullptr;
   failed_ = absl::FailedPreconditionError("the append stream is finished");

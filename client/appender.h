@@ -19,11 +19,10 @@ namespace hulld {
 class AppendConnection;
 
 struct AppendOptions {
-  // Names the writer. Empty: a random name.
+  // Writer ID. Empty: a random one.
   std::string writer_id;
   bool create_if_absent = false;
-  // Chunks sent but not acknowledged are kept for resending; Append waits while they reach either
-  // bound.
+  // Chunks in flight are kept for resending. Append waits while they reach either bound.
   size_t max_in_flight_bytes = size_t{8} << 20;
   size_t max_in_flight_chunks = 64;
 };
@@ -32,40 +31,40 @@ struct AppendTotals {
   uint64_t chunks_sent = 0;
   uint64_t points_sent = 0;
   uint64_t points_acknowledged = 0;
-  // Chunks that the server had committed although their acknowledgement was lost with a connection:
-  // `counts` lacks them.
+  // Chunks that were committed but not acknowledged when a connection was lost. `counts` does not
+  // include them.
   uint64_t chunks_recovered = 0;
   uint64_t reconnects = 0;
   // Sums over the acknowledgements received.
   v1::PointCounts counts;
-  // The last acknowledgement; it has no fields before the first one.
+  // The last acknowledgement; without fields before the first one.
   v1::AppendAck last_ack;
   uint64_t hull_revision = 0;
   uint64_t vertex_count = 0;
 };
 
-// A stream of chunks into one hull: pipelined, with a bounded number in flight. When the connection
-// breaks, or the server ends the stream and says when to retry, it reconnects as the same writer,
-// asks for the last committed sequence and resends what is missing, so that each chunk is applied
-// once. It stops when the hull or the store is another one than before: what was acknowledged would
-// be missing there.
+// A pipelined stream of chunks into one hull, with a bounded number in flight. If the connection
+// breaks, or the server ends the stream with a retry hint, the appender reconnects as the same
+// writer, reads the last committed sequence, and resends the missing chunks. Each chunk is applied
+// exactly once. The appender fails if the hull or the store was replaced, as acknowledged points
+// would be missing.
 //
-// Only one thread may use it. Its destructor cancels what is not acknowledged.
+// Not thread-safe. The destructor cancels chunks in flight.
 class Appender {
  public:
   ~Appender();
   Appender(const Appender&) = delete;
   Appender& operator=(const Appender&) = delete;
 
-  // The server's first answer on the first connection.
+  // The server's first reply on the first connection.
   const v1::AppendOpened& opened() const { return opened_; }
   const std::string& writer_id() const { return open_.writer_id(); }
 
-  // Queues one chunk, numbered after the writer's last. Waits while too much is in flight. An
-  // error is the stream's and may concern an earlier chunk; every further call returns it again.
+  // Queues one chunk with the writer's next sequence number. Waits while too much is in flight. An
+  // error ends the stream, may concern an earlier chunk, and is returned by every further call.
   absl::Status Append(v1::PointBlock points);
 
-  // Waits until every chunk is acknowledged, and ends the stream.
+  // Waits until every chunk is acknowledged, then ends the stream.
   absl::Status Finish();
 
   const AppendTotals& totals() const { return totals_; }
@@ -87,7 +86,7 @@ class Appender {
   absl::StatusOr<v1::AppendOpened> Connect();
   absl::Status Reconnect(absl::Status cause);
   absl::Status ResumeAfter(const v1::AppendOpened& opened);
-  // Sends and receives until at most the given amounts are in flight.
+  // Sends and receives until at most `chunks` and `bytes` are in flight.
   absl::Status PumpUntil(size_t chunks, size_t bytes);
   absl::Status TakeResponse(const v1::AppendPointsResponse& response);
   void DropAcknowledged(uint64_t sequence, bool recovered);
@@ -104,10 +103,12 @@ class Appender {
   uint64_t next_sequence_ = 1;
   std::deque<Chunk> unacknowledged_;
   size_t bytes_in_flight_ = 0;
-  // How many of unacknowledged_ were written to the present connection.
+  // Number of chunks of unacknowledged_ written to the current connection.
   size_t written_ = 0;
-  // Connections lost since the last acknowledgement.
+  // Connections lost since the last acknowledgement, and the time to stop reconnecting: timeout_
+  // after the first loss.
   int failures_ = 0;
+  Deadline give_up_at_;
   absl::Status failed_;
   AppendTotals totals_;
 };

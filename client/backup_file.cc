@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr char kFirstLine[] = "hulld backup 1\n";
 constexpr size_t kFirstLineBytes = sizeof kFirstLine - 1;
-// More than any part has; a larger size is damage.
+// Exceeds the size of every valid part; a larger size means damage.
 constexpr uint32_t kMaxPartBytes = 64 << 20;
 
 uint32_t Checksum(const std::string& bytes) {
@@ -31,7 +31,7 @@ absl::Status Damaged(const std::string& what) {
   return absl::InvalidArgumentError(absl::StrCat("the backup is damaged: ", what));
 }
 
-// Whether the path is relative and has no parts that lead upwards.
+// Returns true if the path is relative and has no ".." component.
 bool IsInside(const std::string& path) {
   const fs::path parts(path);
   if (path.empty() || parts.is_absolute()) return false;
@@ -101,14 +101,14 @@ absl::Status WritePieces(std::istream& file, const std::string& directory, Backu
   return absl::OkStatus();
 }
 
-// Where a backup is unpacked: within its target directory, because we may have no right to write
-// elsewhere, and because a mounted directory cannot be replaced.
+// Staging directory of a restore. It lies within the target: the parent may not be writable, and a
+// mount point cannot be replaced.
 constexpr char kStagingName[] = "restoring";
-// The part of a data directory that makes hulld take it for a store.
+// The subdirectory by which hulld recognizes a store.
 constexpr char kDatabaseName[] = "rocksdb";
 
-// Whether the directory holds nothing but the remains of a restore that was killed, and what a file
-// system has in its root.
+// Returns true if the directory holds only the remains of a killed restore and the entries of a
+// file system root.
 bool IsFree(const fs::path& directory) {
   std::error_code error;
   bool restoring = false;
@@ -126,7 +126,7 @@ bool IsFree(const fs::path& directory) {
   return !error && (!marked || restoring);
 }
 
-// Makes a directory and the missing ones above it. Returns those that it made, the lowest first.
+// Creates a directory and its missing parents. Returns the created ones, deepest first.
 absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory) {
   std::error_code error;
   std::vector<fs::path> made;
@@ -139,8 +139,8 @@ absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory)
       absl::StrCat("cannot make ", directory.string(), ": ", error.message()));
 }
 
-// Moves what was unpacked to its place. The mark comes first and the database last, in one step: a
-// directory either holds no store yet, or all of the backup and the mark.
+// Moves the unpacked files into place. The mark comes first and the database last, in one step: the
+// directory holds either no store, or the complete backup with the mark.
 absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   const fs::path mark = directory / kRestoredMark;
   std::ofstream(mark).close();
@@ -169,7 +169,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   return absl::OkStatus();
 }
 
-// Restores from a file whose first line has been read.
+// Restores from a file after its first line was read.
 absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* check) {
   const fs::path staging = target / kStagingName;
   std::error_code error;
@@ -300,7 +300,7 @@ absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::st
   BackupCheck check;
   const absl::Status status = Restore(file, target, &check);
   if (!status.ok()) {
-    // A store must never be left without its mark.
+    // A store without its mark must never remain.
     if (!fs::exists(target / kDatabaseName, error)) fs::remove(target / kRestoredMark, error);
     fs::remove_all(target / kStagingName, error);
     if (!made->empty()) fs::remove(target, error);

@@ -12,18 +12,18 @@
 
 namespace hulld {
 
-// A backup of a store in one file: a line that says what it is, then the parts of SaveBackup,
-// each after its size and the CRC-32 of its bytes (32 bits each, little endian). The part `end` is
-// the last, which reveals a file that was cut short.
+// A backup of a store in one file: a line that identifies the format, then the parts of SaveBackup.
+// Each part follows its size and the CRC-32 of its bytes (32 bits each, little endian). `end` is
+// the last part, so truncation is detected.
 
-// Checks that parts make up a whole backup, in their order.
+// Checks that parts form a complete backup in order.
 class BackupCheck {
  public:
-  // INVALID_ARGUMENT: the part is damaged, out of place, or has a path that leads elsewhere.
+  // INVALID_ARGUMENT: the part is damaged, out of order, or has a path outside the directory.
   absl::Status Take(const v1::SaveBackupResponse& part);
-  // Whether `end` came.
+  // Returns true if `end` was received.
   bool complete() const { return complete_; }
-  // What the backup says of itself, and the sums over the parts so far.
+  // The backup's header, and the sums over the parts so far.
   const v1::BackupBegin& begin() const { return begin_; }
   const v1::BackupEnd& totals() const { return totals_; }
 
@@ -38,19 +38,19 @@ class BackupCheck {
   uint64_t file_bytes_ = 0;
 };
 
-// Writes a backup to a new file, piece by piece. The file gets its name only when it is complete
-// and on disk.
+// Writes a backup to a new file, part by part. The file gets its final name when it is complete and
+// synced to disk.
 class BackupWriter {
  public:
   explicit BackupWriter(std::string path);
-  // Removes what is not complete.
+  // Removes an incomplete file.
   ~BackupWriter();
   BackupWriter(const BackupWriter&) = delete;
   BackupWriter& operator=(const BackupWriter&) = delete;
 
   absl::Status Open();
   absl::Status Write(const v1::SaveBackupResponse& part);
-  // INVALID_ARGUMENT: the backup is not complete, or the file cannot be written.
+  // INVALID_ARGUMENT: the backup is incomplete, or the file cannot be written.
   absl::Status Finish();
   const BackupCheck& check() const { return check_; }
 
@@ -62,17 +62,15 @@ class BackupWriter {
   BackupCheck check_;
 };
 
-// A file of this name in a data directory tells hulld that the directory was made from a backup.
-// The store that the backup was taken from and the restored one give the same revisions to
-// different changes, so hulld gives the restored one an ID of its own.
+// Name of the file that marks a data directory as restored. The original and the restored store
+// assign the same revisions to different changes, so hulld gives a marked store a new ID.
 inline constexpr char kRestoredMark[] = "restored";
 
-// Makes a data directory from a backup: all of it, or no store. The directory need not exist. If it
-// does, it must be empty (but for lost+found, and for the remains of a call that was killed), and
-// nothing outside it is written. Returns what the backup said of itself; the store that hulld
-// makes of the directory has another ID. INVALID_ARGUMENT: the file is no backup, is damaged or
-// cut short; FAILED_PRECONDITION: the directory is there and not empty; UNAVAILABLE: it cannot be
-// written.
+// Creates a data directory from a backup: the complete store, or none. An existing directory must
+// be empty, except for lost+found and the remains of a killed call. Writes nothing outside the
+// directory. Returns the checked backup; the store that hulld opens there has another ID.
+// INVALID_ARGUMENT: the file is no backup, damaged, or truncated. FAILED_PRECONDITION: the
+// directory exists and is not empty. UNAVAILABLE: it cannot be written.
 absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::string& directory);
 
 }  // namespace hulld

@@ -6,8 +6,7 @@
 
 namespace hulld {
 
-// Writes "FILE:LINE: check failed: CONDITION" to the standard error and aborts. Called by the macro
-// below.
+// Writes "FILE:LINE: check failed: CONDITION" to the standard error and aborts.
 [[noreturn]] inline void ClientCheckFailed(const char* file, int line,
                                            const char* condition) noexcept {
   std::fprintf(stderr, "%s:%d: check failed: %s\n", file, line, condition);
@@ -16,9 +15,9 @@ namespace hulld {
 
 }  // namespace hulld
 
-// Ends the process unless `condition` holds: a broken invariant is a defect of the client or of the
-// program that uses it, never bad input or a bad reply (that is a Status). Always on, so keep the
-// condition cheap. The client has its own check because it includes nothing of core.
+// Aborts the process unless `condition` holds. A broken invariant is a defect of the client or of
+// its caller, never bad input or a bad reply (these return a Status). Always enabled, so keep the
+// condition cheap. Separate from core's check, as the client includes nothing of core.
 #define HULLD_CLIENT_CHECK(condition) \
   ((condition) ? (void)0 : ::hulld::ClientCheckFailed(__FILE__, __LINE__, #condition))
 

@@ -9,24 +9,26 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
-#include "client/calls/revisions.h"
 #include "client/server_address.h"
 
 namespace hulld {
 namespace {
 
-// The server cuts replies at about 1 MiB. This bounds the memory that a faulty server can claim.
+// The server splits replies at about 1 MiB. Bounds the memory that a faulty server can claim.
 constexpr int kMaxReceiveBytes = 64 << 20;
 
 std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-  // A retry must find a server that has come back meanwhile, rather than gRPC's memory of the
-  // failure.
+  // Lets a retry reach a restarted server within a second. By default gRPC resolves the name,
+  // addresses included, at most every 30 s before it reconnects.
+  arguments.SetInt(GRPC_ARG_DNS_MIN_TIME_BETWEEN_RESOLUTIONS_MS, 100);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  // Timeout of a connection attempt, TLS handshake included.
+  arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5000);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 500);
   if (options.own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // Otherwise gRPC uses the proxy of the environment even for services on this machine.
+  // By default gRPC uses the environment's proxy even for services on this machine.
   if (IsLoopback(options.server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   return OpenChannel(options.server, options.security, arguments);
 }
@@ -51,7 +53,7 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
   return absl::InternalError("the mesh stream holds a message of an unknown kind");
 }
 
-// Code that draws, writes or verifies the mesh relies on this.
+// Code that draws, writes, or verifies the mesh relies on these checks.
 absl::Status CheckConsistent(const HullMesh& mesh) {
   if (mesh.xyz.size() != 3 * mesh.header.vertex_count() ||
       mesh.facet_sizes.size() != mesh.header.facet_count()) {
@@ -74,7 +76,7 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
   return absl::OkStatus();
 }
 
-// Follows the pages of a list; `items` are those of a page.
+// Follows the pages of a list; `items` returns the items of a page.
 template <typename Request, typename Response, typename Items, typename ListPage>
 absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
                                  const std::optional<v1::Freshness>& freshness, const Items& items,
@@ -83,9 +85,8 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
   Response all;
   Request request;
   if (freshness.has_value()) *request.mutable_freshness() = *freshness;
-  const bool is_linearizable = !request.freshness().has_max_staleness() &&
-                               request.freshness().at_least_revision() == 0 &&
-                               request.freshness().at_least().empty();
+  const bool is_linearizable =
+      !request.freshness().has_max_staleness() && request.freshness().at_least_revision() == 0;
   request.set_prefix(prefix);
   const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
   do {
@@ -99,14 +100,17 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
       return absl::InternalError("the server answered a page that continues with itself");
     }
     all.set_next_page_token(page->next_page_token());
-    // Otherwise what is on no page yet could be missing on the next.
-    if (!is_linearizable) AskForAtLeast(page->header(), request.mutable_freshness());
+    // Otherwise a later page could come from an older snapshot and lack items.
+    if (!is_linearizable) {
+      request.mutable_freshness()->set_at_least_revision(page->header().revision());
+      request.mutable_freshness()->set_store_id(page->header().store_id());
+    }
     request.set_page_token(page->next_page_token());
   } while (!request.page_token().empty() && (limit == 0 || count() < limit));
   return all;
 }
 
-// HealthCheckResponse.status, field 1 of grpc.health.v1; Debian has no generated code for it.
+// HealthCheckResponse.status, field 1 of grpc.health.v1. Debian packages no generated code for it.
 enum HealthStatus { kUnknown = 0, kServing = 1 };
 
 HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
@@ -154,8 +158,8 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     context.set_deadline(options_.retry.ForCall(deadline));
     response.Clear();
     const grpc::Status status = (stub->*method)(&context, request, &response);
-    // Nobody here cancels it: gRPC ends a call like this when it reaches a server at the moment at
-    // which that goes.
+    // This client does not cancel the call. gRPC reports CANCELLED when a call reaches a server
+    // during its shutdown.
     if (status.error_code() == grpc::StatusCode::CANCELLED) {
       return absl::UnavailableError("the server ended the call, as it is going");
     }
@@ -195,7 +199,7 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
   const auto writer = hulls_->ReplaceHull(&context, &response);
   v1::ReplaceHullRequest request;
   *request.mutable_open() = open;
-  // A write that fails means that the call has ended, and Finish says why.
+  // A failed write means that the call has ended; Finish returns the status.
   bool writable = writer->Write(request);
   const absl::Status fed = feed([&](const v1::PointBlock& points) {
     *request.mutable_points() = points;
@@ -203,7 +207,7 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
     return writable ? absl::OkStatus() : absl::CancelledError("the call has ended");
   });
   if (fed.ok() && writable) {
-    // Says that nothing is missing.
+    // A message without points marks the stream as complete.
     request.mutable_points()->Clear();
     writer->Write(request);
   } else if (writable) {
@@ -404,7 +408,7 @@ absl::Status Client::CheckHealth() const {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
   context.set_deadline(options_.retry.ForCall(NextDeadline()));
-  // An empty HealthCheckRequest asks for the server as a whole.
+  // An empty HealthCheckRequest queries the server as a whole.
   const grpc::Slice empty;
   const grpc::ByteBuffer request(&empty, 1);
   grpc::ByteBuffer response;

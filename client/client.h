@@ -33,43 +33,43 @@ inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
 struct ClientOptions {
   // HOST:PORT, or several servers over one store: see server_address.h.
   std::string server = kDefaultServer;
-  // Deadline of each call, its retries included. An append stream may last longer: there it bounds
+  // Deadline of each call, retries included. For an append stream, which may last longer, it bounds
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
-  // How fresh the answers to reads must be whose request does not say so itself
-  // (proto/hulld/v1/freshness.proto). Absent: they are linearizable. Pages of a list never go back.
+  // Freshness of reads without a freshness of their own (proto/hulld/v1/freshness.proto). Absent:
+  // linearizable. The pages of a list never go back in revision.
   std::optional<v1::Freshness> freshness;
-  // Connections to one server are shared within a process unless this is set.
+  // True: opens a separate connection. By default a process shares its connections to one server.
   bool own_connection = false;
   // TLS and the token.
   ConnectionSecurity security;
 };
 
-// The canonical snapshot of a hull, put together from its stream and checked to be consistent.
+// The canonical mesh of a hull, assembled from its stream and checked for consistency.
 struct HullMesh {
   v1::MeshHeader header;
-  // Three coordinates per vertex.
+  // Vertices, n x 3.
   std::vector<double> xyz;
-  // Vertices per facet, and the vertex indices of all facets one after another.
+  // Vertices per facet, and the concatenated vertex indices of all facets.
   std::vector<uint32_t> facet_sizes;
   std::vector<uint32_t> facet_indices;
 
   size_t vertex_count() const { return xyz.size() / 3; }
 };
 
-// A connection to hulld. Connects when first used; any thread may call it.
+// A connection to hulld. Connects on first use. Thread-safe.
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
-// came. Calls that are safe to repeat (all but DeleteHull, DeleteBody, PutBody with if_revision,
-// and CreateHull without if_absent) are retried as options.retry says after UNAVAILABLE, and after
-// RESOURCE_EXHAUSTED when the server says when to retry. ReasonOf and MetadataOf (grpc_status.h)
-// tell why hulld refused a call. ValidateSecurity tells beforehand whether options.security can
-// work.
+// arrived. Calls that are safe to repeat are retried by options.retry until their deadline, after
+// UNAVAILABLE and after RESOURCE_EXHAUSTED with a retry hint. DeleteHull, DeleteBody, ReplaceHull,
+// SaveBackup, PutBody with if_revision, and CreateHull without if_absent are never retried.
+// ReasonOf and MetadataOf (grpc_status.h) return the reason of a refusal. ValidateSecurity checks
+// options.security beforehand.
 class Client {
  public:
   explicit Client(ClientOptions options = {});
-  // Over a given channel, such as one within the process.
+  // Uses a given channel, such as an in-process one.
   Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel);
 
   absl::StatusOr<v1::CreateHullResponse> CreateHull(const std::string& hull_id,
@@ -79,47 +79,46 @@ class Client {
   absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
                                                        AppendOptions options = {}) const;
 
-  // Replaces a hull: `feed` passes blocks of points to the sink that it is given. An error of
-  // either ends the call and changes nothing. Not retried. The call takes time in proportion to the
-  // points, so options.timeout does not bound it. `timeout`, when given, bounds all of it.
+  // Replaces a hull: `feed` passes blocks of points to its sink. An error of either ends the call
+  // and changes nothing. Not retried. The duration is proportional to the number of points, so
+  // options.timeout does not apply; `timeout`, if given, bounds the whole call.
   using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
   absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
       const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
       std::optional<std::chrono::milliseconds> timeout = {}) const;
 
-  // Passes each part of a backup of the store to `receive`, in order; an error of `receive` ends
+  // Passes each part of a backup of the store to `receive`, in order. An error of `receive` ends
   // the call and is returned. Not retried; `timeout` as above.
   absl::Status SaveBackup(const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
                           std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 
-  // INTERNAL: the stream contradicts itself.
+  // INTERNAL: the stream is inconsistent.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
-  // The same with all that a request can ask for, such as a simplification.
-  // `on_part`, when given, is shown what has come, its header first, after each part of it; a call
-  // that is repeated begins anew.
+  // Same as above, with every option of the request, such as a simplification. `on_part`, if set,
+  // receives the mesh so far after each part, header first; a retried call starts over.
   absl::StatusOr<HullMesh> GetHullMesh(
       const v1::GetHullMeshRequest& request,
       const std::function<void(const HullMesh&)>& on_part = {}) const;
 
-  // One page.
+  // Returns one page.
   absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;
 
-  // Follows pages until the last, or until `limit` hulls are there (0: no limit). The header is the
-  // last page's; next_page_token is empty unless the limit cut the list.
+  // Follows the pages to the last, or until `limit` hulls are read (0: no limit). The header is
+  // that of the last page; next_page_token is empty unless the limit cut the list.
   absl::StatusOr<v1::ListHullsResponse> ListAllHulls(const std::string& prefix,
                                                      uint64_t limit = 0) const;
 
-  // Never retried: a repeated delete could remove a hull that someone has created anew.
+  // Never retried: a repeated delete could remove a hull that another client has created since.
   absl::StatusOr<v1::DeleteHullResponse> DeleteHull(const std::string& hull_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
-  // Creates a body, or replaces its pieces. Retried only where if_revision is absent: putting the
-  // same again does no harm.
+  // Creates a body, or replaces its pieces. Retried only without if_revision: the call is then
+  // idempotent.
   absl::StatusOr<v1::PutBodyResponse> PutBody(const v1::PutBodyRequest& request) const;
   absl::StatusOr<v1::GetBodyResponse> GetBody(const std::string& body_id) const;
-  // One page.
+  // Returns one page.
   absl::StatusOr<v1::ListBodiesResponse> ListBodies(const v1::ListBodiesRequest& request) const;
   // As ListAllHulls.
   absl::StatusOr<v1::ListBodiesResponse> ListAllBodies(const std::string& prefix,
@@ -128,37 +127,36 @@ class Client {
   absl::StatusOr<v1::DeleteBodyResponse> DeleteBody(const std::string& body_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
-  // Tells of hulls as they come, change and go. The timeout bounds the search for a server that was
-  // lost.
+  // Watches creations, changes, and deletions of hulls. The timeout bounds the time to reconnect to
+  // a lost server.
   std::unique_ptr<HullWatch> WatchHulls(const v1::WatchHullsRequest& request) const;
 
   absl::StatusOr<v1::CheckCollisionResponse> CheckCollision(
       const v1::CheckCollisionRequest& request) const;
 
-  // Passes each message of the answer to `receive`, in order; an error of `receive` ends the call
-  // and is returned. Retried only while nothing was received.
+  // Passes each message of the answer to `receive`, in order. An error of `receive` ends the call
+  // and is returned. Retried only before the first message.
   using BatchReceiver = std::function<absl::Status(const v1::BatchCheckCollisionsResponse&)>;
   absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                     const BatchReceiver& receive) const;
 
-  // A stream of pose changes, to be opened with its first message, which gets the freshness of the
-  // options. The timeout bounds the wait for
-  // each answer.
+  // Returns a stream of pose changes. Its first message opens it and takes the freshness of the
+  // options. The timeout bounds the wait for each answer.
   std::unique_ptr<CollisionStream> OpenCollisionStream() const;
 
-  // The same as BatchCheckCollisions for all pairs of a scene.
+  // As BatchCheckCollisions, for all pairs of a scene.
   using SceneReceiver = std::function<absl::Status(const v1::FindCollisionsResponse&)>;
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
 
-  // Tells when pairs begin and end to collide. The timeout bounds the search for a server that was
-  // lost.
+  // Watches pairs begin and cease to collide. The timeout bounds the time to reconnect to a lost
+  // server.
   std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;
 
-  // What grpc.health.v1 reports about the whole server: OK when it is serving, FAILED_PRECONDITION
-  // when it is not, UNIMPLEMENTED when the server has no health service. Not retried.
+  // Returns the grpc.health.v1 status of the whole server: OK if serving, FAILED_PRECONDITION if
+  // not, UNIMPLEMENTED if the server has no health service. Not retried.
   absl::Status CheckHealth() const;
 
   const ClientOptions& options() const { return options_; }
@@ -166,16 +164,16 @@ class Client {
  private:
   Deadline NextDeadline() const;
 
-  // A call whose answer streams; `start` starts it. Retried only while nothing was received.
+  // Runs a call with a streamed answer, begun by `start`. Retried only before the first message.
   template <typename Response, typename Start>
   absl::Status Receive(const Start& start,
                        const std::function<absl::Status(const Response&)>& receive) const;
 
-  // The request, or `copy`, which is it with the freshness of the options.
+  // Returns the request, or `copy`: the request with the freshness of the options.
   template <typename Request>
   const Request& WithFreshness(const Request& request, Request* copy) const;
 
-  // One unary call; `retry` when it is safe to repeat.
+  // Runs one unary call; retries it if `retry`, which requires that it is safe to repeat.
   template <typename Response, typename Request, typename Stub>
   absl::StatusOr<Response> Call(Stub* stub,
                                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,

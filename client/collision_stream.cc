@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// Appends a piece of an answer to what came before. Problems name rows of their own piece.
+// Appends a part of an answer. Problems name rows of their own part.
 void Append(const v1::StreamCollisionsResponse& piece, v1::StreamCollisionsResponse* answer) {
   const int before = answer->pairs_size();
   const int problems = answer->columns().pair_problems_size();
@@ -79,7 +79,7 @@ absl::Status CollisionStream::Close() {
   return WaitUntilDone();
 }
 
-// Why there is no answer.
+// Returns the error that ended the stream.
 absl::Status CollisionStream::Ended() {
   const absl::Status status = WaitUntilDone();
   return status.ok() ? absl::InternalError("the server ended the stream before its answer")
@@ -98,8 +98,8 @@ void CollisionStream::ReleaseHold() {
   RemoveHold();
 }
 
-// The thread that asks is woken once, when all that it waits for is there, and not under the mutex,
-// for which it would have to wait again.
+// Wakes the waiting thread once, when its complete answer has arrived, and outside the mutex, which
+// the thread would otherwise contend for.
 void CollisionStream::OnReadDone(bool ok) {
   bool is_over = false;
   {
@@ -119,7 +119,7 @@ void CollisionStream::OnReadDone(bool ok) {
 }
 
 void CollisionStream::OnWriteDone(bool /*ok*/) {
-  // After a failed write the reads end too and bring the reason.
+  // After a failed write the pending reads fail too, and OnDone reports the status.
   bool is_over = false;
   {
     const std::lock_guard lock(mutex_);

@@ -15,24 +15,25 @@
 
 namespace hulld {
 
-// One StreamCollisions call, step by step: poses go up, the relations of the pairs that they change
-// come down. Never retried: what the server keeps of a stream ends with it. Driven by one thread.
+// One StreamCollisions call, step by step: the client sends poses, the server returns the relations
+// of the affected pairs. Never retried, as the server's state ends with the stream. Not
+// thread-safe.
 class CollisionStream final
     : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
  public:
-  // timeout: for each answer. freshness: for an `open` that has none.
+  // timeout: for each answer. freshness: for an `open` without one.
   CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
                   std::chrono::milliseconds timeout,
                   std::optional<v1::Freshness> freshness = std::nullopt);
-  // Cancels the call unless it has ended, and waits for gRPC to let go of it.
+  // Cancels the call unless it has ended, and waits until gRPC releases it.
   ~CollisionStream() override;
 
-  // Sends a message and waits for its answer, whose pieces are put together. An error ends the
-  // stream, and every later call returns it.
+  // Sends a message and waits for its complete answer. An error ends the stream, and every later
+  // call returns it.
   absl::StatusOr<v1::StreamCollisionsResponse> Open(v1::CollisionStreamOpen open);
   absl::StatusOr<v1::StreamCollisionsResponse> Update(v1::CollisionStreamUpdate update);
 
-  // Says that nothing follows; returns how the call ended.
+  // Half-closes the stream and returns its final status.
   absl::Status Close();
 
  private:
@@ -51,12 +52,12 @@ class CollisionStream final
   grpc::ClientContext context_;
   v1::StreamCollisionsRequest request_;
   v1::StreamCollisionsResponse incoming_;
-  // Keeps the call from being finished while more may be sent.
+  // Keeps the call open while more messages may be sent.
   bool held_ = true;
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  // The rest is guarded by the mutex.
+  // Guarded by the mutex, as all members below.
   v1::StreamCollisionsResponse answer_;
   bool answered_ = false;
   bool written_ = false;

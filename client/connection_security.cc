@@ -18,7 +18,7 @@
 namespace hulld {
 namespace {
 
-// In turn, and only to those that report that they serve.
+// Round robin over the servers that report SERVING.
 constexpr char kSpreadCalls[] =
     R"({"loadBalancingConfig": [{"round_robin": {}}], "healthCheckConfig": {"serviceName": ""}})";
 
@@ -28,8 +28,8 @@ using grpc::experimental::InterceptionHookPoints;
 using grpc::experimental::Interceptor;
 using grpc::experimental::InterceptorBatchMethods;
 
-// Adds the token to every call of a channel, so that no kind of call can forget it. (gRPC's call
-// credentials do not go over connections without TLS, unix sockets among them.)
+// Adds the token to every call of a channel, so that no call can omit it. (gRPC sends call
+// credentials only over TLS, so not even over unix sockets.)
 class TokenSender : public Interceptor {
  public:
   explicit TokenSender(std::string authorization) : authorization_(std::move(authorization)) {}
@@ -60,7 +60,7 @@ bool MaySendToken(const ConnectionSecurity& security, const std::string& server)
   return security.tls || security.allow_plaintext_token || IsLoopback(server);
 }
 
-// What HTTP/2 takes as a header's value.
+// Returns true if HTTP/2 allows the token as a header value.
 bool IsToken(const std::string& token) {
   return !token.empty() &&
          std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 0x7F; });

@@ -11,35 +11,35 @@
 
 namespace hulld {
 
-// How a connection is protected and who we are.
+// Protection of a connection, and the client's credentials.
 struct ConnectionSecurity {
-  // TLS; without it nothing is encrypted, and the next four are not used.
+  // Enables TLS. Without it nothing is encrypted, and the next four fields are ignored.
   bool tls = false;
-  // PEM: the authorities that the server's certificate may come from; empty: those of the system.
+  // PEM: trusted authorities for the server's certificate; empty: the system's.
   std::string authorities;
-  // PEM: our certificate and its key, for a server that asks for one; both or neither.
+  // PEM: the client's certificate and key, for a server that requires one; both or neither.
   std::string certificate;
   std::string key;
-  // The name that the server's certificate must bear, where it is not that of the address.
+  // Expected name in the server's certificate, if it differs from the address.
   std::string server_name;
 
   // Sent with each call as "authorization: Bearer TOKEN"; empty: none.
   std::string token;
-  // Lets the token go unencrypted to other machines.
+  // Allows sending the token unencrypted to another machine.
   bool allow_plaintext_token = false;
 };
 
-// INVALID_ARGUMENT: what is missing, or that the token would be readable on its way to `server`.
+// INVALID_ARGUMENT: a setting is missing, or the token would reach `server` unencrypted.
 absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server);
 
-// A channel to `server` (see server_address.h). A token that ValidateSecurity objects to is not
-// sent.
+// Returns a channel to `server` (see server_address.h). A token that ValidateSecurity rejects is
+// not sent.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const ConnectionSecurity& security,
                                            const grpc::ChannelArguments& arguments);
 
-// Reads a file that holds a token: one line. INVALID_ARGUMENT: it cannot be read, others can read
-// it too, or it holds no token. Errors never repeat its text.
+// Reads a token file: a single line. INVALID_ARGUMENT: the file cannot be read, other users can
+// read it, or it holds no token. Errors never contain its text.
 absl::StatusOr<std::string> ReadTokenFile(const std::string& path);
 
 }  // namespace hulld

@@ -47,14 +47,30 @@ expect() {
   wrong=$((wrong + 1))
 }
 
+# phase TEXT: starts a phase and prints the time since the start.
+phase() { printf '[%2d:%02d] %s\n' $((SECONDS / 60)) $((SECONDS % 60)) "$*"; }
+
+# Prints the build's percentage on a terminal; passes its output on to a log.
+show_progress() {
+  if [[ -t 1 ]]; then
+    tee "$1" | awk -F '[][/]' '/^\[[0-9]+\/[0-9]+\]/ { printf "\r        %3d %%", 100 * $2 / $3; fflush() }
+                               END { printf "\r              \r" }'
+  else
+    cat >"$1"
+  fi
+}
+
 install_and_build() {
-  heading "Installing packages and building (a few minutes the first time)"
+  phase "Installing packages (about 1 minute the first time)"
   bash docker/packages.sh install build models >"$work/packages.log" 2>&1 ||
     { cat "$work/packages.log"; exit 1; }
+  phase "Building hulld and hullctl (about 4 minutes on 2 cores the first time)"
   command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
   { cmake --preset release -B "$build" -DHULLD_BUILD_TESTS=OFF &&
-    cmake --build "$build" --target hulld hullctl --parallel "$(nproc)"; } >"$work/build.log" 2>&1 ||
+    cmake --build "$build" --target hulld hullctl --parallel "$(nproc)"; } 2>&1 |
+    show_progress "$work/build.log" ||
     { tail -n 40 "$work/build.log"; echo "The build failed: see $work/build.log"; exit 1; }
+  phase "Asking questions whose answers are known"
 }
 
 start_server() {
@@ -204,6 +220,7 @@ draw_picture() {
 }
 
 mkdir -p "$work"
+echo "This takes about 5 minutes the first time (2 cores), and seconds after that."
 install_and_build
 start_server
 mesh_scenes

@@ -11,12 +11,12 @@
 
 namespace hulld {
 
-// Points of a message of about a MiB: far below the 4 MiB that a message may have, and far above
-// what a message costs beside its points.
+// Points per message of about 1 MiB: far below the 4 MiB message limit, and large enough to
+// amortize the cost of a message.
 inline constexpr size_t kPointsPerMessage = 40000;
 
-// Passes points on, x y z each, in messages of kPointsPerMessage at most. An error of `send` ends
-// it and is returned.
+// Sends points, n x 3, in messages of at most kPointsPerMessage. Stops at an error of `send` and
+// returns it.
 absl::Status SendInMessages(std::span<const double> xyz,
                             const std::function<absl::Status(v1::PointBlock)>& send);
 

@@ -69,7 +69,7 @@ absl::Status ValidateList(const std::string& server) {
 
 bool IsLoopbackHost(const std::string& host) {
   if (host == "localhost" || host == "[::1]") return true;
-  // An address, not a name that begins like one.
+  // Must be an address, not a name with the same prefix.
   return host.starts_with("127.") && KindOf(host) == HostKind::kIpv4;
 }
 

@@ -5,27 +5,27 @@
 
 #include <string>
 
-// How a client is told where its servers are:
+// Target names of servers:
 //
 //   HOST:PORT                     one server
 //   ADDRESS:PORT,ADDRESS:PORT     several over one store: IP addresses, all v4 or all v6
-//   dns:///NAME:PORT              all that a DNS name stands for
+//   dns:///NAME:PORT              all addresses of a DNS name
 //   unix:PATH                     one on this machine
 //
-// and any other target name of gRPC.
+// and any other gRPC target name.
 namespace hulld {
 
-// INVALID_ARGUMENT: it is none of these; the message tells what to write.
+// INVALID_ARGUMENT: the name has none of these forms; the message names the valid ones.
 absl::Status ValidateServer(const std::string& server);
 
-// Whether calls are spread over several servers (a list, or dns:///), in turn, over those that are
-// reached and say that they serve.
+// Returns true if calls are spread round robin over several servers (a list, or dns:///), limited
+// to the reachable ones that report SERVING.
 bool NamesSeveral(const std::string& server);
 
-// What gRPC calls it.
+// Returns the gRPC target name.
 std::string TargetName(const std::string& server);
 
-// Whether every server that it names is on this machine. False for what only DNS can tell.
+// Returns true if every named server is on this machine. False if that depends on DNS.
 bool IsLoopback(const std::string& server);
 
 }  // namespace hulld

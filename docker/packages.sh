@@ -2,8 +2,8 @@
 # Reads docker/packages.txt.
 #
 #   packages.sh list SECTION...      prints the packages of the sections, one per line
-#   packages.sh missing SECTION...   prints those that are not installed
-#   packages.sh install SECTION...   installs those; asks apt for nothing when there are none
+#   packages.sh missing SECTION...   prints the packages that are not installed
+#   packages.sh install SECTION...   installs them; does not call apt if none is missing
 set -euo pipefail
 
 list=$(dirname "${BASH_SOURCE[0]}")/packages.txt
@@ -24,7 +24,7 @@ list_missing() {
   local packages package
   packages=$(list_packages "$@")
   for package in $packages; do
-    # A line for each architecture.
+    # One line per architecture.
     dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed ||
       echo "$package"
   done

@@ -1,19 +1,19 @@
 #!/bin/bash
-# Prints what an image holds as SPDX 2.3, in JSON: every Debian package that is installed here, and
-# for each program the packages of the shared libraries that it is linked with.
+# Prints the contents of an image as SPDX 2.3, in JSON: every Debian package installed in it and,
+# for each program, the packages of the shared libraries that it links.
 #
 #   sbom.sh [--compiled-in FILE] PROGRAM...
 #
-# FILE: lines of "package version" of what was compiled into the programs, headers and static
-# libraries; sbom.sh --versions SECTION... prints such lines for sections of packages.txt.
-# SOURCE_DATE_EPOCH, where it is set, is the time that the document gives.
+# FILE: lines of "package version" for the headers and static libraries compiled into the programs;
+# sbom.sh --versions SECTION... prints such lines for sections of packages.txt. SOURCE_DATE_EPOCH,
+# if set, is the creation time of the document.
 set -euo pipefail
 
 here=$(dirname "${BASH_SOURCE[0]}")
 
 if [[ ${1-} == --versions ]]; then
   shift
-  # One line a package, even where it is there for two architectures.
+  # One line per package, even if it is installed for two architectures.
   bash "$here/packages.sh" list "$@" | xargs dpkg-query -W -f '${Package} ${Version}\n' | sort -u
   exit
 fi
@@ -29,21 +29,22 @@ if (($# == 0)); then
 fi
 programs=("$@")
 
-# The functions below leave their result in REPLY, as an image holds many packages and starting a
-# process for each takes long.
+# The functions below return their result in REPLY: an image holds many packages, and starting a
+# process for each is slow.
 quote() {  # a JSON string
   REPLY=${1//\\/\\\\}
   REPLY=${REPLY//\"/\\\"}
   REPLY="\"${REPLY//[$'\t\r\n']/ }\""
 }
 
-# spdx_id PREFIX NAME: letters, digits, dots and dashes alone are allowed.
+# spdx_id PREFIX NAME: sets REPLY to an ID of letters, digits, dots, and dashes, the only characters
+# allowed.
 spdx_id() {
   REPLY=${2//+/.plus}
   REPLY=SPDXRef-$1-${REPLY//[^A-Za-z0-9.-]/-}
 }
 
-# The names of licences in Debian's accounts of packages, where these are in their usual form.
+# License names in Debian's copyright files, if these have the machine-readable format.
 declare -A licences_of
 read_licences() {
   local name licences
@@ -58,8 +59,8 @@ read_licences() {
     END { for (name in all) print name "\t" all[name] }' /usr/share/doc/*/copyright)
 }
 
-# The packages of the libraries that a program is linked with. The same file has a name with /usr
-# and one without, and links lead to it; dpkg knows one of these names.
+# Packages of the libraries that a program links. A file may have a name with /usr, one without, and
+# symbolic links; dpkg knows one of these names.
 packages_of_program() {
   local library real owner names=()
   local -A owner_of
@@ -81,8 +82,8 @@ packages_of_program() {
   done | sort -u
 }
 
-# package ID NAME VERSION MORE [LICENSE]: MORE, members of the JSON object that end in a comma, or
-# nothing; LICENSE, of what is ours.
+# package ID NAME VERSION MORE [LICENSE]: MORE holds members of the JSON object, each ending in a
+# comma, or nothing; LICENSE is given for the project's own packages.
 package() {
   quote "$2"
   printf '%s    {"SPDXID": "%s", "name": %s,' "$separator" "$1" "$REPLY"

@@ -14,7 +14,6 @@
 #include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
-#include "server/shards/slots.h"
 #include "server/store/postgres/conninfo.h"
 
 namespace hulld::server {
@@ -36,16 +35,7 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
   if (config.store == "rocksdb" && !config.data_dir.empty()) {
     if (absl::Status s = CheckDataDir(config.data_dir); !s.ok()) return s;
   }
-  if (config.store == "postgres" && !config.postgres_shards.empty()) {
-    const absl::StatusOr<ShardFile> file =
-        ReadShardFile(config.postgres_shards, "--postgres-shards");
-    if (!file.ok()) return file.status();
-    for (const ShardFile::Shard& shard : file->shards) {
-      const absl::Status valid = CheckConninfoFile(shard.conninfo_file, "--postgres-shards");
-      if (!valid.ok()) return valid;
-    }
-    findings.push_back(absl::StrCat(file->shards.size(), " shards"));
-  } else if (config.store == "postgres") {
+  if (config.store == "postgres") {
     if (absl::Status s = CheckConninfoFile(config.postgres_conninfo_file); !s.ok()) return s;
   }
   if (config.has_tls()) {
@@ -70,7 +60,7 @@ absl::Status CheckDataDir(const std::string& path) {
   const auto problem = [&path](const std::string& where, const std::string& what) {
     return absl::InvalidArgumentError(absl::StrCat("--data-dir ", path, ": ", where, " ", what));
   };
-  // What is not there yet will be made in what is.
+  // A missing directory will be created in its nearest existing parent.
   std::error_code error;
   std::filesystem::path nearest = std::filesystem::absolute(path, error);
   while (nearest.has_relative_path() && !std::filesystem::exists(nearest, error)) {

@@ -1,4 +1,4 @@
-// hulld: keeps 3D convex hulls by ID and answers exact collision queries. See --help.
+// hulld: stores 3D convex hulls by ID and answers exact collision queries. See --help.
 
 #include <signal.h>
 #include <spdlog/spdlog.h>
@@ -13,6 +13,7 @@
 #include "server/admin/doctor.h"
 #include "server/config_check.h"
 #include "server/migration/migrate.h"
+#include "server/process/descriptors.h"
 #include "server/process/heap.h"
 #include "server/process/log.h"
 #include "server/server.h"
@@ -36,7 +37,7 @@ void LogStore(const Config& config) {
   if (config.store == "memory") {
     spdlog::info("hulls live in memory and end with this process");
   } else if (config.store == "postgres") {
-    // The store said more when it was opened.
+    // The store logged the details when it was opened.
     spdlog::info(config.postgres_servers == "many" ? "this is an active server of its database"
                                                    : "this is the active server of its database");
   } else if (config.durability == "sync") {
@@ -47,10 +48,10 @@ void LogStore(const Config& config) {
   }
 }
 
-// Waits for SIGTERM or SIGINT. Until then it looks at the files again at each SIGHUP, and now and
-// then for memory that is no longer needed.
+// Waits for SIGTERM or SIGINT. Meanwhile checks the files again at each SIGHUP, and periodically
+// returns unused memory.
 int WaitForEnd(const sigset_t& signals, Server& server) {
-  // A choice: memory is back soon after a peak, and looking costs 0.1 ms.
+  // A choice: memory is returned soon after a peak, and a check costs 0.1 ms.
   constexpr timespec kPause = {.tv_sec = 10, .tv_nsec = 0};
   for (;;) {
     const int received = sigtimedwait(&signals, nullptr, &kPause);
@@ -65,7 +66,7 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
   }
 }
 
-// Whether a signal waits that asks the process to end.
+// Returns true if a pending signal asks the process to end.
 bool IsEndAsked() {
   sigset_t pending;
   sigpending(&pending);
@@ -96,7 +97,9 @@ void LogStart(const Config& config, const Server& server) {
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
   SetUpHeap();
-  // Blocked before any thread exists, so that every thread inherits it and this one can wait.
+  RaiseDescriptorLimit();
+  // Blocks signals before any thread exists, so that all threads inherit the mask and this one can
+  // wait.
   const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
@@ -119,7 +122,7 @@ int Run(const Config& config) {
   });
   const int received = WaitForEnd(signals, **server);
   if (store_ended) {
-    // What it has in memory may be behind from now on, so no call goes on.
+    // Memory may be stale from now on, so no call may continue.
     spdlog::error("the store is no longer this server's: ending without draining");
     return kExitFailure;
   }
@@ -132,7 +135,7 @@ int Run(const Config& config) {
   return 0;
 }
 
-// Says what the settings are and whether they can work.
+// Prints the settings and checks them.
 int Check(const CommandLine& command_line) {
   const auto findings = CheckConfig(command_line.config, std::chrono::system_clock::now());
   if (!findings.ok()) {

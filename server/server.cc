@@ -16,6 +16,7 @@
 #include "server/call/transport.h"
 #include "server/config_check.h"
 #include "server/contract/status_map.h"
+#include "server/network/guarded_reads.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/settings/cpu_limit.h"
@@ -31,7 +32,7 @@ constexpr const char* kServices[] = {
     v1::CollisionService::service_full_name(), v1::StatusService::service_full_name(),
     v1::MaintenanceService::service_full_name()};
 
-// With those of gRPC's own protocols.
+// Includes services of gRPC's own protocols.
 std::vector<std::string> AllServices() {
   std::vector<std::string> names = {
       "grpc.health.v1.Health", grpc::reflection::v1alpha::ServerReflection::service_full_name()};
@@ -39,26 +40,22 @@ std::vector<std::string> AllServices() {
   return names;
 }
 
-// At least two, so that one long task does not hold up all others.
+// At least two, so that one long task does not delay all other tasks.
 int PoolThreads() { return std::max(2, DefaultThreads()); }
 
 int AnswerThreads(const Config& config) {
   return config.threads > 0 ? config.threads : DefaultThreads();
 }
 
-// slots: which the database holds; empty: all.
 absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
-                                                    const std::string& conninfo_file,
-                                                    const char* setting, const std::string& slots,
                                                     const std::function<bool()>& should_stop) {
-  absl::StatusOr<std::string> conninfo = ReadSecretFile(conninfo_file, setting);
-  if (!conninfo.ok()) return conninfo.status();
   PostgresOptions options;
+  absl::StatusOr<std::string> conninfo =
+      ReadSecretFile(config.postgres_conninfo_file, options.setting);
+  if (!conninfo.ok()) return conninfo.status();
   options.conninfo = *std::move(conninfo);
-  options.setting = slots.empty() ? setting : absl::StrCat(setting, ", ", conninfo_file);
   options.take_over = config.take_over;
   options.shared = config.postgres_servers == "many";
-  options.slots = slots;
   options.should_stop = should_stop;
   return PostgresStore::Open(std::move(options));
 }
@@ -66,10 +63,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
                                                  const std::function<bool()>& should_stop) {
   if (config.store == "memory") return std::make_unique<MemoryStore>();
-  if (config.store == "postgres") {
-    return OpenPostgres(config, config.postgres_conninfo_file, "--postgres-conninfo-file", "",
-                        should_stop);
-  }
+  if (config.store == "postgres") return OpenPostgres(config, should_stop);
   RocksDbOptions options;
   options.data_dir = config.data_dir;
   options.durability = config.durability == "sync" ? Durability::kSync : Durability::kRelaxed;
@@ -80,61 +74,25 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
 
 }  // namespace
 
-absl::StatusOr<Server::Stores> Server::OpenStores(const Config& config,
-                                                  const std::function<bool()>& should_stop) {
-  Stores opened;
-  if (config.postgres_shards.empty()) {
-    absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, should_stop);
-    if (!store.ok()) return store.status();
-    opened.stores.push_back(*std::move(store));
-    return opened;
-  }
-  const absl::StatusOr<ShardFile> file = ReadShardFile(config.postgres_shards, "--postgres-shards");
-  if (!file.ok()) return file.status();
-  opened.shard_of_slot = file->shard_of;
-  for (const ShardFile::Shard& shard : file->shards) {
-    absl::StatusOr<std::unique_ptr<Store>> store =
-        OpenPostgres(config, shard.conninfo_file, "--postgres-shards", shard.slots, should_stop);
-    if (!store.ok()) return store.status();
-    for (const auto& other : opened.stores) {
-      if (other->id() != (*store)->id()) continue;
-      return absl::InvalidArgumentError(
-          absl::StrCat("--postgres-shards: ", shard.conninfo_file,
-                       " leads to the database of another line; each shard has one of its own"));
-    }
-    opened.stores.push_back(*std::move(store));
-  }
-  return opened;
-}
-
-namespace {
-
-std::vector<Store*> Pointers(const std::vector<std::unique_ptr<Store>>& stores) {
-  std::vector<Store*> pointers;
-  pointers.reserve(stores.size());
-  for (const auto& store : stores) pointers.push_back(store.get());
-  return pointers;
-}
-
-}  // namespace
-
-Server::Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores)
+Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
     : guard_(std::move(guard)),
+      connection_table_(config.limits.max_connections, config.limits.max_connections_per_address),
       admission_(config.limits, metrics_),
-      stores_(std::move(stores.stores)),
-      writers_(stores_.size(), PoolThreads(), metrics_.AddPool("writers")),
-      shards_(Pointers(stores_), stores.shard_of_slot, config.limits, writers_.all(),
-              metrics_.AddPool("preparers"), metrics_.AddPool("loaders")),
-      readers_(stores_.size(), PoolThreads(), metrics_.AddPool("readers")),
-      long_readers_(stores_.size(), PoolThreads(), metrics_.AddPool("long_readers")),
+      store_(std::move(store)),
+      writers_(PoolThreads(), metrics_.AddPool("writers")),
+      registry_(*store_, config.limits, writers_, metrics_.AddPool("preparers"),
+                metrics_.AddPool("loaders")),
+      readers_(PoolThreads(), metrics_.AddPool("readers")),
+      long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
       executor_(pool_.threads(), metrics_.AddPool("executor")),
-      hull_service_(shards_, admission_, writers_, readers_, long_readers_),
-      body_service_(shards_, admission_, readers_),
-      collision_service_(shards_, admission_, readers_, long_readers_, pool_, executor_),
-      status_service_(shards_, admission_),
-      maintenance_service_(*stores_.front(), shards_, admission_, long_readers_.of_several()),
+      hull_service_(registry_, admission_, writers_, readers_, long_readers_),
+      body_service_(registry_, admission_, readers_),
+      collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
+      status_service_(registry_, admission_),
+      maintenance_service_(*store_, registry_, admission_, long_readers_),
       reflection_service_(admission_, AllServices()) {
+  admission_.SetConnections(connection_table_);
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this](Rpc rpc) {
     if (UsesWriters(rpc)) return writers_.waiting();
@@ -150,19 +108,19 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores
 }
 
 void Server::AddSizesToMetrics() {
-  shards_.SetMetrics(metrics_.store());
+  registry_.SetMetrics(metrics_.store());
   metrics_.AddRefresh([this] {
     const auto advance = [](prometheus::Counter& counter, uint64_t now) {
       const double passed = static_cast<double>(now) - counter.Value();
       if (passed > 0) counter.Increment(passed);
     };
     const StoreMetrics& store = metrics_.store();
-    const CacheStatistics cache = shards_.Cache();
+    const CacheStatistics cache = registry_.Cache();
     advance(store.cache_hits, cache.hits);
     advance(store.cache_misses, cache.misses);
     advance(store.cache_evictions, cache.evictions);
     advance(store.damaged_records, cache.damaged);
-    const StoreFailures failures = shards_.failures();
+    const StoreFailures failures = store_->failures();
     advance(store.write_failures, failures.write);
     advance(store.sync_failures, failures.sync);
     advance(store.read_failures, failures.read);
@@ -170,11 +128,11 @@ void Server::AddSizesToMetrics() {
     store.cache_reading_bytes.Set(static_cast<double>(cache.reading_bytes));
     store.cache_writing_bytes.Set(static_cast<double>(cache.writing_bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
-    store.read_only.Set(shards_.Commits().failing ? 1 : 0);
-    if (const std::optional<StoreDisk> disk = shards_.disk(); disk.has_value()) {
+    store.read_only.Set(registry_.Commits().failing ? 1 : 0);
+    if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
       store.disk_bytes.Set(static_cast<double>(disk->bytes));
       store.log_bytes.Set(static_cast<double>(disk->log_bytes));
-      // NaN is not less than any number, so that no alert fires.
+      // NaN compares less than no number, so no alert fires.
       store.free_bytes.Set(disk->free_bytes.has_value() ? static_cast<double>(*disk->free_bytes)
                                                         : std::numeric_limits<double>::quiet_NaN());
       store.stalled.Set(disk->is_stalled ? 1 : 0);
@@ -182,27 +140,27 @@ void Server::AddSizesToMetrics() {
     }
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
-                    [this] { return static_cast<double>(shards_.Sizes().hull_count); });
+                    [this] { return static_cast<double>(registry_.Sizes().hull_count); });
   metrics_.AddGauge("hulld_bodies", "Bodies in the store.",
-                    [this] { return static_cast<double>(shards_.Sizes().body_count); });
+                    [this] { return static_cast<double>(registry_.Sizes().body_count); });
   metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
                     "Longest hold of the registry's lock within the last one to two minutes.",
                     [this] {
-                      const std::chrono::duration<double> longest = shards_.Holds().longest;
+                      const std::chrono::duration<double> longest = registry_.Holds().longest;
                       return longest.count();
                     });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
-                    [this] { return static_cast<double>(shards_.Sizes().vertex_count); });
+                    [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
                                                       std::function<bool()> should_stop) {
   absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
   if (!guard.ok()) return guard.status();
-  absl::StatusOr<Stores> stores = OpenStores(config, should_stop);
-  if (!stores.ok()) return stores.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(stores)));
-  if (absl::Status s = server->shards_.Load(); !s.ok()) return s;
+  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, should_stop);
+  if (!store.ok()) return store.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
+  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -214,8 +172,12 @@ absl::Status Server::Listen(const Config& config) {
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
-  int port = 0;
-  builder.AddListeningPort(config.listen, guard_->credentials(), &port);
+  auto acceptor = ConnectionAcceptor::Listen(*address, connection_table_, metrics_);
+  if (!acceptor.ok()) return acceptor.status();
+  acceptor_ = *std::move(acceptor);
+  auto connections = builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      guard_->credentials());
   SetTransport(config, builder);
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&body_service_);
@@ -224,15 +186,15 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&maintenance_service_);
   builder.RegisterService(&reflection_service_);
   grpc_server_ = builder.BuildAndStart();
-  if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
-    return ExplainBindFailure(*address);
-  }
-  address_ = address->Format(port);
+  if (grpc_server_ == nullptr) return absl::InternalError("gRPC does not start");
+  address_ = address->Format(acceptor_->port());
   AddDescriptorsToMetrics();
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* const service : kServices) {
     health->SetServingStatus(service, true);
   }
+  const FrameLimits frames;
+  acceptor_->Start(std::move(connections), config.has_tls() ? nullptr : &frames);
   if (config.metrics_address.empty()) return absl::OkStatus();
   absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
       MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics_);
@@ -247,16 +209,30 @@ void Server::AddDescriptorsToMetrics() {
   prometheus::Gauge& connections =
       metrics_.AddGauge("hulld_connections", "Connections that clients have open.");
   metrics_.AddRefresh([this, &descriptors, &connections] {
-    const OpenDescriptors open = CountDescriptors(address_);
-    descriptors.Set(static_cast<double>(open.count));
-    connections.Set(static_cast<double>(open.connections));
+    descriptors.Set(static_cast<double>(CountDescriptors()));
+    connections.Set(static_cast<double>(connection_table_.size()));
+  });
+  metrics_.AddGauge("hulld_half_open_streams",
+                    "Streams whose first message is not complete, without TLS.",
+                    [] { return static_cast<double>(HalfOpenStreams()); });
+  std::vector<prometheus::Counter*> closed;
+  for (size_t i = 1; i < FrameGuard::kVerdictCount; ++i) {
+    closed.push_back(
+        &metrics_.AddCounter("hulld_connections_closed_total", "",
+                             {{"reason", FrameGuard::Name(static_cast<FrameGuard::Verdict>(i))}}));
+  }
+  metrics_.AddRefresh([closed] {
+    const auto counts = ClosedByGuard();
+    for (size_t i = 0; i < closed.size(); ++i) {
+      closed[i]->Increment(static_cast<double>(counts[i + 1]) - closed[i]->Value());
+    }
   });
 }
 
 void Server::BeginDrain() {
   grpc_server_->GetHealthCheckService()->SetServingStatus(false);
   admission_.BeginDrain();
-  shards_.EndWatches();
+  registry_.EndWatches();
 }
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
@@ -266,6 +242,7 @@ bool Server::WaitIdle(std::chrono::milliseconds timeout) {
 bool Server::Drain(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   BeginDrain();
+  acceptor_->Stop();
   std::thread closing([this, deadline] {
     const auto left = deadline - std::chrono::steady_clock::now();
     grpc_server_->Shutdown(std::chrono::system_clock::now() + left);
@@ -280,9 +257,10 @@ bool Server::Drain(std::chrono::milliseconds timeout) {
 Server::~Server() {
   guard_->OnTokensChanged(nullptr);
   if (grpc_server_ == nullptr) return;
+  acceptor_->Stop();
   admission_.BeginDrain();
-  shards_.EndWatches();
-  // Cancels what still runs; core polls for that, so the calls end soon.
+  registry_.EndWatches();
+  // Cancels the running calls; core polls for cancellation, so they end soon.
   grpc_server_->Shutdown(std::chrono::system_clock::now());
   admission_.WaitIdle(std::chrono::steady_clock::time_point::max());
 }

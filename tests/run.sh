@@ -1,32 +1,29 @@
 #!/bin/bash
-# Builds hulld and runs its tests, as continuous integration does: presets release and asan-ubsan.
+# Builds hulld and tests it.
 #
-#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--arm64] [--tidy] [--no-install]
+#   bash tests/run.sh            release build; every test but the long ones
+#   bash tests/run.sh --quick    core, query, and one question to a server, end to end
+#   bash tests/run.sh --ci       what continuous integration checks: release and asan-ubsan with the
+#                                long tests, mutants, self-contained headers, clang-tidy over the
+#                                last change, and the Debian packages
 #
-# --tsan runs, instead, the tests of what uses threads under ThreadSanitizer (clang; preset tsan);
-# --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz);
-# --arm64 cross-compiles core and the test of digests for 64-bit ARM and runs it by qemu;
-# --tidy runs clang-tidy over what changed (tests/tidy.sh).
+# For one purpose each: --tsan (ThreadSanitizer over what uses threads without gRPC), --fuzz (each
+# fuzzer for a fixed number of inputs under libFuzzer), --arm64 (core's digests by emulation), and
+# --tidy (clang-tidy over the last change). --no-install asks apt for nothing.
 #
-# On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything
-# there it asks apt for nothing. Builds into build/. Ends with a summary; fails when any part did.
+# Installs what docker/packages.txt lists (as root, on Debian 12), builds into build/, and ends with
+# a summary of parts and times.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
 
-presets=(release asan-ubsan)
+mode=default
 install=yes
-tidy=no
-sections=(build test models)
 for option in "$@"; do
   case $option in
-    --release-only) presets=(release) ;;
-    --tsan) presets=(tsan) sections+=(tsan) ;;
-    --fuzz) presets=(fuzz) sections+=(fuzz) ;;
-    --arm64) presets=(arm64) sections+=(arm64) ;;
-    --tidy) presets=() sections+=(tidy) tidy=yes ;;
+    --quick | --ci | --tsan | --fuzz | --arm64 | --tidy) mode=${option#--} ;;
     --no-install) install=no ;;
     --help)
-      sed -n '2,12s/^# \{0,1\}//p' tests/run.sh
+      sed -n '2,16s/^# \{0,1\}//p' tests/run.sh
       exit 0
       ;;
     *)
@@ -35,36 +32,72 @@ for option in "$@"; do
       ;;
   esac
 done
+case $mode in
+  quick) sections=(build test-core) ;;
+  default) sections=(build test-core test models) ;;
+  ci) sections=(build test-core test models package tidy) ;;
+  *) sections=(build test-core test models "$mode") ;;
+esac
 
 failed=0
 summary=()
 
-# run_part NAME COMMAND...: runs one part under a heading and notes its outcome and its time.
+# run_part NAME COMMAND...: runs one part under a heading and records its outcome and time.
 run_part() {
   local name=$1 start=$SECONDS outcome=ok code=0
   shift
   printf '\n==== %s\n' "$name"
-  "$@" || { code=$?; outcome=FAILED; failed=1; }
-  summary+=("$(printf '%-24s %-6s %4d s' "$name" "$outcome" $((SECONDS - start)))")
+  "$@" || code=$?
+  case $code in
+    0) ;;
+    77) outcome=skipped ;;
+    *) outcome=FAILED failed=1 ;;
+  esac
+  summary+=("$(printf '%-28s %-7s %4d s' "$name" "$outcome" $((SECONDS - start)))")
   return $code
 }
 
 check_format() {
-  # Another version would format otherwise.
-  if ! command -v clang-format-14 >/dev/null; then
-    echo "skipped: clang-format-14 is not installed"
-    return 0
-  fi
+  # Versions of clang-format differ in their output.
+  command -v clang-format-14 >/dev/null || { echo "skipped: clang-format-14 is not installed"; return 77; }
   find core server client tests \( -name '*.cc' -o -name '*.h' -o -name '*.js' \) -print0 |
     xargs -0 -r clang-format-14 --dry-run -Werror ||
-    { echo "Please run clang-format-14 -i on the files above."; return 1; }
+    { echo "Run clang-format-14 -i on the files above."; return 1; }
 }
 
-configure_and_build() {
-  cmake --preset "$1" && cmake --build --preset "$1" --parallel "$jobs"
+# build PRESET TARGET...
+build() { cmake --build --preset "$1" --parallel "$jobs" --target "${@:2}"; }
+
+# run_tests PRESET CTEST_OPTION...: ends with the skipped tests and the ten slowest suites.
+run_tests() {
+  local preset=$1 code=0
+  shift
+  ctest --preset "$preset" --parallel "$jobs" "$@" | tee build/ctest.log || code=1
+  grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
+  echo "slowest:"
+  sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' build/ctest.log |
+    sort -rn | sed -n '1,10s/^/  /p'
+  return $code
 }
 
-# A compiler of this code may take 1.5 GiB, so memory bounds the number of jobs too.
+# Every file of core and every installed header compiles by itself: neither a unity build nor a
+# precompiled header hides a missing include.
+check_includes() {
+  cmake --preset release -B build/includes -DHULLD_BUILD_SERVICE=OFF -DHULLD_BUILD_TESTS=OFF \
+    -DCMAKE_UNITY_BUILD=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DCMAKE_CXX_FLAGS_RELEASE=-O0 >/dev/null &&
+    cmake --build build/includes --parallel "$jobs" &&
+    cmake --install build/release --component devel --prefix build/includes/prefix >/dev/null || return 1
+  local headers=$PWD/build/includes/prefix/include/hulld
+  find "$headers" -name '*.h' ! -name '*.pb.h' -printf '%P\n' | sort |
+    xargs -P "$jobs" -I{} sh -c 'echo "#include \"{}\"" |
+      c++ -std=c++20 -fsyntax-only -I "$1" -isystem /usr/include/eigen3 -x c++ - || { echo "{} includes too little"; exit 255; }' _ "$headers"
+}
+
+build_and_test_packages() {
+  bash docker/debian/build.sh && bash tests/install/packages.sh build/release/packages
+}
+
+# A compiler of this code may take 1.5 GiB, so memory bounds the number of jobs, too.
 available_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2>/dev/null || true)
 jobs=$(nproc)
 by_memory=$((${available_kib:-1572864} / 1572864))
@@ -75,21 +108,55 @@ if [[ $install == yes ]]; then
 fi
 if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache
-  # Without these it keeps nothing that starts with a precompiled header.
+  # ccache keeps nothing that uses a precompiled header without the first, and reads these headers,
+  # 400 MB, once for each file without the second.
   export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
-  # Precompiled headers have 400 MB: hashed once, not for each file, which took 0.4 s.
   export CCACHE_INODECACHE=${CCACHE_INODECACHE:-1}
-  # A clone in another folder finds what was compiled in this one. Debug information may then name
-  # that one's folder.
+  # A clone in another folder hits the same entries; its debug information may name this folder.
   export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
 fi
 
-run_part "format" check_format
-[[ $tidy == no ]] || run_part "tidy" bash tests/tidy.sh
-for preset in "${presets[@]}"; do
-  run_part "$preset: build" configure_and_build "$preset" &&
-    run_part "$preset: tests" ctest --preset "$preset" --parallel "$jobs"
-done
+# The cheap checks come first, so that most failures show within minutes.
+readonly core_labels='core|core-threads|digest-threads|proof|proto'
+core_targets=(core_test core_threads_test digest_threads_test)
+readonly rare='long|mutant'
+
+test_preset() {  # test_preset PRESET EXCLUDED_LABELS TARGET...
+  local preset=$1 excluded=$2
+  shift 2
+  run_part "$preset: configure" cmake --preset "$preset" || return
+  run_part "$preset: core build" build "$preset" "${core_targets[@]}" &&
+    run_part "$preset: core tests" run_tests "$preset" -L "^($core_labels)$" -LE "^($excluded)$"
+  run_part "$preset: build" build "$preset" "$@" &&
+    run_part "$preset: tests" run_tests "$preset" -LE "^($core_labels|$excluded)$"
+}
+
+[[ $mode == tidy ]] || run_part "format" check_format
+case $mode in
+  quick)
+    run_part "configure" cmake --preset release &&
+      run_part "build" build release "${core_targets[@]}" hulld hullctl &&
+      run_part "tests" run_tests release -L '^(core|core-threads|digest-threads|smoke)$' -LE "^(slow|$rare)$"
+    ;;
+  default)
+    core_targets+=(print_constants proto_test)
+    test_preset release "$rare" all
+    ;;
+  ci)
+    test_preset asan-ubsan none all
+    core_targets+=(print_constants proto_test)
+    test_preset release none all hulld_mutants
+    run_part "includes" check_includes
+    run_part "Debian packages" build_and_test_packages
+    run_part "tidy" bash tests/tidy.sh
+    ;;
+  tidy) run_part "tidy" bash tests/tidy.sh ;;
+  *)
+    run_part "$mode: configure" cmake --preset "$mode" &&
+      run_part "$mode: build" cmake --build --preset "$mode" --parallel "$jobs" &&
+      run_part "$mode: tests" run_tests "$mode"
+    ;;
+esac
 
 printf '\n==== summary\n'
 printf '%s\n' "${summary[@]}"

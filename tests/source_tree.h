@@ -4,12 +4,12 @@
 
 namespace hulld {
 
-// The top of the source tree that this program was built from. A function, so that all files but
-// one compile to the same bytes in every checkout.
+// Returns the top of the source tree that this program was built from. A function, so that all
+// files but one compile to the same bytes in every checkout.
 std::filesystem::path SourceTree();
 
-// The folder of real meshes: the one that the variable HULLD_DATA names, or ../shared/data beside
-// the source tree. It need not exist.
+// Returns the folder of real meshes: $HULLD_DATA, or ../shared/data relative to the source tree. It
+// need not exist.
 std::filesystem::path RealData();
 
 }  // namespace hulld

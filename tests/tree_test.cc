@@ -15,18 +15,18 @@
 
 #include "tests/source_tree.h"
 
-// Dependencies point one way, and comments are plain. Reads the source tree.
+// Reads the source tree and checks that dependencies point one way and that comments are plain.
 namespace hulld {
-namespace {
+namespace tree_test {
 
 namespace fs = std::filesystem;
 
 struct Include {
   std::string file;    // relative to the source tree
-  std::string header;  // what stands between the brackets or quotes
+  std::string header;  // the text between brackets or quotes
 };
 
-// The header of an #include line.
+// Returns the header of an #include line.
 std::optional<std::string> HeaderOf(std::string line) {
   std::erase_if(line, [](char c) { return c == ' ' || c == '\t'; });
   constexpr size_t kPrefix = std::string_view("#include").size();
@@ -69,8 +69,8 @@ TEST(Includes, CoreKnowsNoServiceLogOrFile) {
               "fmt/", "CLI/", "assimp", "fstream", "iostream", "filesystem", "cstdio", "stdio.h"});
 }
 
-// The rooms in the direction of the data: a file includes headers of its own room and of those
-// above it in this list. Tests and the parent folder of a room are no exceptions.
+// Folders in the direction of the data: a file includes headers of its own folder and of those
+// earlier in this list. Tests and parent folders are no exceptions.
 constexpr std::string_view kRooms[] = {
     "core/base",
     "core/numeric",
@@ -88,6 +88,8 @@ constexpr std::string_view kRooms[] = {
     "server/settings",
     "server/contract",
     "server/process",
+    "server/network",
+    "server/store/files",
     "server/store",
     "server/store/postgres",
     "server/registry/memory",
@@ -101,7 +103,6 @@ constexpr std::string_view kRooms[] = {
     "server/registry/watch",
     "server/registry",
     "server/access",
-    "server/shards",
     "server/migration",
     "server/call",
     "server/wire",
@@ -117,6 +118,7 @@ constexpr std::string_view kRooms[] = {
     "client",
     "client/pose",
     "client/formats",
+    "client/formats/cloud",
     "client/robot",
     "client/verify",
     "client/enclosure",
@@ -138,7 +140,7 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl",
 };
 
-// The place of a folder in kRooms; nullopt for one that is not there.
+// Returns the position of a folder in kRooms, or nullopt.
 std::optional<size_t> PlaceOf(const std::string& folder) {
   const auto* room = std::find(std::begin(kRooms), std::end(kRooms), folder);
   if (room == std::end(kRooms)) return std::nullopt;
@@ -174,7 +176,7 @@ TEST(Includes, NoRoomIsCrowded) {
   }
 }
 
-// The folders of the sources of a name, as a test is named for one: by name, without the extension.
+// Returns the folders of source files by name without extension; tests are named after sources.
 std::multimap<std::string, std::string> FoldersOfSources() {
   std::set<std::string> seen;
   std::multimap<std::string, std::string> folders;
@@ -202,7 +204,7 @@ TEST(Tests, StandWhereWhatTheyAreNamedForStands) {
       if (entry.path().extension() != ".cc" || !name.ends_with(kEnd)) continue;
       name.resize(name.size() - kEnd.size());
       const auto [first, last] = folders.equal_range(name);
-      if (first == last) continue;  // named for what it shows
+      if (first == last) continue;  // named for the behavior it shows
       const std::string folder = fs::relative(entry.path().parent_path(), root).string();
       EXPECT_TRUE(std::any_of(first, last, [&](const auto& each) { return each.second == folder; }))
           << "tests/" << folder << "/" << name << "_test.cc: the source is in " << first->second;
@@ -212,7 +214,7 @@ TEST(Tests, StandWhereWhatTheyAreNamedForStands) {
   EXPECT_GT(checked, 50);
 }
 
-// Whether a file is written by hand in a language whose comments this test knows.
+// Returns true for handwritten files in a language with comments known to this test.
 bool IsSource(const fs::path& path) {
   constexpr std::string_view kExtensions[] = {".h",  ".cc", ".proto", ".py",
                                               ".js", ".sh", ".awk",   ".g"};
@@ -221,9 +223,8 @@ bool IsSource(const fs::path& path) {
          std::end(kExtensions);
 }
 
-// The first text of a line that is not plain English: a word that names nobody, or a comment that
-// begins with what something belongs to. Empty: the line has none. The texts are put together here,
-// so that this file does not hold them.
+// Returns the first forbidden text of a line: a vague pronoun, or a comment that starts with a
+// genitive. Empty if none. The texts are concatenated, so that this file does not contain them.
 std::string OddTextIn(const std::string& line) {
   for (const std::string& word : {std::string("who") + "ever", std::string("Who") + "ever"}) {
     const auto is_letter = [&](size_t at) {
@@ -259,7 +260,7 @@ TEST(Comments, NameTheirSubject) {
   EXPECT_GT(files, 500);
 }
 
-// What follows a call of hulld_add_test in a CMakeLists.txt, word by word.
+// A call of hulld_add_test in a CMakeLists.txt, split into words.
 struct TestProgram {
   fs::path folder;
   std::vector<std::string> words;
@@ -291,7 +292,8 @@ std::vector<TestProgram> TestPrograms() {
   return programs;
 }
 
-// Whether a source of a test starts threads: itself, by a team of core's, or by what it opens.
+// Returns true if a test source starts threads: directly, by a team of core, or by a header that it
+// includes.
 bool RunsThreads(const fs::path& source) {
   constexpr std::string_view kHeaders[] = {
       "atomic",
@@ -314,7 +316,7 @@ bool RunsThreads(const fs::path& source) {
   return false;
 }
 
-// ThreadSanitizer looks at every test program that runs threads and can be looked at.
+// ThreadSanitizer covers every test program that runs threads and can be instrumented.
 TEST(Programs, ThatRunThreadsAreThoseOfThePresetTsan) {
   // gRPC is not instrumented.
   const std::string grpc[] = {"hulld_test_server", "hulld_client", "hulld_fake", "hulld_history",
@@ -322,7 +324,7 @@ TEST(Programs, ThatRunThreadsAreThoseOfThePresetTsan) {
   int marked = 0;
   for (const TestProgram& program : TestPrograms()) {
     const std::string folder = program.folder.string();
-    // The readers of files run on one thread, whatever feeds them.
+    // File readers run on one thread for any input.
     if (folder.find("/tests/client") != folder.npos) continue;
     const bool uses_grpc = std::any_of(std::begin(grpc), std::end(grpc),
                                        [&](const auto& library) { return program.Has(library); });
@@ -355,5 +357,5 @@ TEST(Includes, OracleSharesNoCodeWithCore) {
   ExpectNone("tests/oracle", {"core/", "server/", "client/", "tests/core/", "Eigen/"});
 }
 
-}  // namespace
+}  // namespace tree_test
 }  // namespace hulld

@@ -10,10 +10,10 @@
 namespace hulld {
 namespace {
 
-// Keys of the trailing metadata, and of the payloads that carry their values.
+// Trailing metadata keys; also the keys of the status payloads that carry their values.
 constexpr char kRequestId[] = "x-request-id";
 constexpr char kRetry[] = "grpc-retry-pushback-ms";
-// The type of the detail, and of the payload that carries its value.
+// Type of the error detail; also the key of the status payload that carries it.
 constexpr char kErrorInfo[] = "type.googleapis.com/google.rpc.ErrorInfo";
 constexpr char kDomain[] = "hulld";
 
@@ -80,7 +80,7 @@ std::optional<std::chrono::milliseconds> RetryHintOf(const absl::Status& status)
   if (!hint.has_value() || !absl::SimpleAtoi(std::string(*hint), &milliseconds)) {
     return std::nullopt;
   }
-  // A negative number asks not to.
+  // A negative number forbids a retry.
   if (milliseconds < 0) return std::nullopt;
   return std::chrono::milliseconds(milliseconds);
 }

@@ -13,26 +13,25 @@
 
 namespace hulld {
 
-// The same code and message, with the reason that the server gave.
+// Returns the same code and message, with the server's reason.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
-// The same with the request ID and the time to retry, too. `context` is that of the ended call.
+// Same as above, with the request ID and the retry hint. `context` is that of the ended call.
 absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContext& context);
 
-// Why hulld refused or failed. ERROR_REASON_UNSPECIFIED: hulld gave no reason, or the error is not
-// hulld's: gRPC gives errors of its own, as when it reaches no server. A reason that this version
-// of the contract does not know reads as unspecified, too.
+// Returns hulld's reason for the error. ERROR_REASON_UNSPECIFIED: hulld gave none, this version of
+// the contract does not know it, or the error is gRPC's own, as when no server is reached.
 v1::ErrorReason ReasonOf(const absl::Status& status);
 
-// A value that error.proto lists for the reason, such as "expected_sequence"; nullopt when the
-// server did not give it.
+// Returns a value that error.proto lists for the reason, such as "expected_sequence"; nullopt if
+// the server did not send it.
 std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key);
 
-// The ID under which the server's log knows the call that ended so; empty when unknown.
+// Returns the ID of the failed call in the server's log; empty if unknown.
 std::string RequestIdOf(const absl::Status& status);
 
-// How long the server asks to wait before the same call is made again; nullopt when it does not say
-// that it may be.
+// Returns the delay that the server requests before a retry; nullopt if the server does not invite
+// one.
 std::optional<std::chrono::milliseconds> RetryHintOf(const absl::Status& status);
 
 }  // namespace hulld

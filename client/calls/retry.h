@@ -5,45 +5,47 @@
 
 #include <chrono>
 #include <functional>
+#include <limits>
 
 namespace hulld {
 
-// By the monotonic clock: setting the time of day neither ends nor prolongs a wait.
+// Monotonic: setting the system clock neither ends nor prolongs a wait.
 using Deadline = std::chrono::steady_clock::time_point;
 
-// When a call that is safe to repeat is repeated: after UNAVAILABLE, which says that the server was
-// not reached or is draining, and when the server is overloaded and says when to retry.
-// Waits double from initial_backoff to max_backoff, and are at least as long as the server asks.
+// Retries calls that are safe to repeat: after UNAVAILABLE (the server is unreachable or draining),
+// and after RESOURCE_EXHAUSTED with a retry hint. Retries continue until the deadline of the call,
+// so that a call outlives a server restart. The backoff doubles from initial_backoff to max_backoff
+// and is at least the server's hint.
 struct RetryPolicy {
-  // Attempts in all; 1 turns retries off.
-  int max_attempts = 4;
+  // Total attempts; 1 disables retries. By default only the deadline bounds them.
+  int max_attempts = std::numeric_limits<int>::max();
   std::chrono::milliseconds initial_backoff{100};
   std::chrono::milliseconds max_backoff{2000};
-  // Replace the wait and the clock, for tests. Empty: sleeps, and the monotonic clock.
+  // Replacements for the wait and the clock, for tests. Empty: sleep and the monotonic clock.
   std::function<void(std::chrono::milliseconds)> wait;
   std::function<Deadline()> now;
 
   Deadline Now() const { return now ? now() : std::chrono::steady_clock::now(); }
-  // The deadline of a call, as gRPC wants it.
+  // Converts a deadline to the system clock, which gRPC expects.
   std::chrono::system_clock::time_point ForCall(Deadline deadline) const {
     return std::chrono::system_clock::now() +
            std::chrono::duration_cast<std::chrono::system_clock::duration>(deadline - Now());
   }
 };
 
-// The wait after `failures` >= 1 failed attempts.
+// Returns the backoff after `failures` >= 1 failed attempts.
 std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures);
 
-// Whether a call that ended with this status may be repeated, if it is safe to repeat.
+// Returns true if this status permits a retry of a call that is safe to repeat.
 bool MayRetry(const absl::Status& status);
 
-// Waits as the policy says after `failures` failed attempts, the last of which ended with `status`.
-// False, without waiting, when the attempts are used up or the wait would pass the deadline.
+// Waits for the backoff after `failures` failed attempts, the last of which returned `status`.
+// Returns false without waiting if the attempts are exhausted or the wait would pass the deadline.
 bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
                      const absl::Status& status = absl::OkStatus());
 
-// Calls `attempt` until it returns something that may not be retried, the attempts are used up, or
-// the deadline is near. Returns the last attempt's status. `attempt` must be safe to repeat.
+// Calls `attempt` until its status permits no retry, the attempts are exhausted, or the deadline is
+// near. Returns the last status. Requires: `attempt` is safe to repeat.
 absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
                              const std::function<absl::Status()>& attempt);
 

@@ -13,10 +13,10 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// Proven: each number of normal and offset is off by at most 2^-51 of itself, three products and
-// three sums add at most 2^-50 of the sum of all sizes; this is more than both.
+// Proven: each number of normal and offset has a relative error of at most 2^-51; three products
+// and three sums add at most 2^-50 of the sum of all magnitudes. This bound exceeds both.
 constexpr double kFilterError = 0x1p-48;
-// Within these, no product or sum of the filter overflows or loses digits to underflow.
+// Within these bounds, no product or sum of the filter overflows or loses digits to underflow.
 constexpr double kLeastSize = 0x1p-800;
 constexpr double kMostSize = 0x1p800;
 constexpr double kLeastNormal = 0x1p-500;
@@ -27,7 +27,7 @@ Point PointAt(const std::vector<double>& xyz, size_t i) {
 
 BigVector Negative(const BigVector& v) { return {-v[0], -v[1], -v[2]}; }
 
-// The half spaces of a hull, from its vertices on the grid.
+// Computes the half spaces of a hull from its vertices on the grid.
 class HalfSpaceMaker {
  public:
   HalfSpaceMaker(const std::vector<BigVector>& vertices, const CommonExponent& grid)
@@ -44,8 +44,8 @@ class HalfSpaceMaker {
     Add(Negative(normal), through);
   }
 
-  // The normal of a facet, outward where its vertices turn counter-clockwise: the first corner that
-  // is not straight tells.
+  // Returns the normal of a facet, outward if its vertices turn counter-clockwise. Determined by
+  // the first corner that is not straight.
   BigVector NormalOf(std::span<const uint32_t> facet) const {
     for (size_t i = 2; i < facet.size(); ++i) {
       const BigVector& a = vertices_[facet[0]];
@@ -88,11 +88,11 @@ class HalfSpaceMaker {
   std::vector<HalfSpace> made_;
 };
 
-// Half spaces of a hull in its own frame H as half spaces of the frame W in which it stands.
+// Converts half spaces of a hull in its own frame H to the world frame W.
 //
-// With the quaternion in integers, the rotation is M / D: M of products of two of its numbers, D
-// the sum of their squares. A point P of W is M^T (P - T) / D in H, so that n . p_H <= o is (M n) .
-// P <= D o + (M n) . T.
+// With an integer quaternion, the rotation is M / D: M consists of products of two of its numbers,
+// D is the sum of their squares. A point P of W is M^T (P - T) / D in H, so that n . p_H <= o is (M
+// n) . P <= D o + (M n) . T.
 class HalfSpaceMover {
  public:
   HalfSpaceMover(const RigidPose& X_WH, const CommonExponent& grid)
@@ -132,7 +132,7 @@ HalfSpace::HalfSpace(BigVector normal, BigInteger offset, const CommonExponent& 
   }
   for (size_t i = 0; i < 3; ++i) unit_normal_[i] = Approximate(normal_[i], -bits);
   unit_offset_ = Approximate(offset_, grid.exponent() - bits);
-  // Without an offset that is finite, the filter tells nothing.
+  // Without a finite offset, the filter decides nothing.
   for (size_t i = 0; i < 3; ++i) {
     if (normal_[i] != 0 && std::abs(unit_normal_[i]) < kLeastNormal) unit_offset_ = HUGE_VAL;
   }
@@ -210,12 +210,12 @@ absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& x
   const auto region = ConvexRegion::Make(mesh, grid);
   if (!region.ok()) return region.status();
   std::set<Point> missing;
-  // Adding 0 makes -0 the same as 0.
+  // Adding 0 turns -0 into 0.
   const auto key = [](const Point& p) { return Point{p[0] + 0, p[1] + 0, p[2] + 0}; };
   for (size_t i = 0; i < mesh.vertex_count(); ++i) missing.insert(key(PointAt(mesh.xyz, i)));
   for (size_t i = 0; i < xyz.size() / 3; ++i) {
     const Point p = PointAt(xyz, i);
-    // What is a vertex needs no test.
+    // A vertex needs no test.
     if (missing.erase(key(p)) > 0) continue;
     if (!region->Holds(p, OnGrid(p, grid))) return false;
   }

@@ -13,46 +13,47 @@
 namespace hulld {
 
 // A closed half space: the points p with normal . P <= offset, where P is p in integers of the
-// common exponent. With it, the same in floating point, for a quick answer where that is certain.
+// common exponent. Also holds a floating-point filter for quick certain answers.
 class HalfSpace {
  public:
-  // `grid` is what made the integers.
+  // `grid` is the exponent of the integers.
   HalfSpace(BigVector normal, BigInteger offset, const CommonExponent& grid);
 
   const BigVector& normal() const { return normal_; }
   const BigInteger& offset() const { return offset_; }
 
-  // The sign of normal . P - offset, exact: -1 inside, 0 on the boundary, 1 outside. `P` is p on
-  // the grid. Cost: three products, and exact ones where the filter cannot tell.
+  // Returns the exact sign of normal . P - offset: -1 inside, 0 on the boundary, 1 outside. `P` is
+  // p on the grid. Cost: three products; exact ones if the filter cannot decide.
   int Side(const std::array<double, 3>& p, const BigVector& P) const;
 
  private:
   BigVector normal_;
   BigInteger offset_;
-  // The normal and the offset, divided by a power of two so that the normal's largest number is
-  // about 1 and p can stay in its own unit; each is off by at most 2^-51 of itself.
+  // Normal and offset, divided by a power of two so that the largest number of the normal is about
+  // 1 and p keeps its own unit; each has a relative error of at most 2^-51.
   std::array<double, 3> unit_normal_;
   double unit_offset_;
 };
 
-// The points of a convex hull, as an intersection of half spaces: those of its facets where it has
-// volume; a plane and the sides of its polygon, a line and its ends, or a point, where it is flat.
-// The hull of no points holds none.
+// A convex hull as an intersection of half spaces. With volume: the half spaces of its facets.
+// Flat: a plane and the sides of its polygon, a line and its ends, or a point. The hull of no
+// points contains no point.
 class ConvexRegion {
  public:
-  // From the vertices and facets of a hull of the server. All numbers of the mesh must have been
-  // included in the grid. INTERNAL: facets that do not fit the vertices.
+  // Returns the region of a hull of the server. Requires that all numbers of the mesh were included
+  // in the grid. INTERNAL: facets that do not match the vertices.
   static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const CommonExponent& grid);
-  // The same of a hull at a pose, exact: nothing is rounded, as half spaces turn by the
-  // quaternion's products alone, without a quotient. The translation must have been included in the
-  // grid, too. Requires a quaternion that is not zero; unchecked, as the server takes no other.
+  // Returns the region of a hull at a pose, exactly: half spaces rotate by products of the
+  // quaternion alone, without a quotient. The grid must also include the translation. Requires a
+  // nonzero quaternion; unchecked, as the server rejects a zero one.
   static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const RigidPose& X_WH,
                                            const CommonExponent& grid);
 
   bool empty() const { return empty_; }
   const std::vector<HalfSpace>& half_spaces() const { return half_spaces_; }
 
-  // Whether it holds the point, its boundary included; exact. Cost: as many tests as half spaces.
+  // Returns true if the region contains the point, boundary included; exact. Cost: one test per
+  // half space.
   bool Holds(const std::array<double, 3>& p, const BigVector& P) const;
 
  private:
@@ -62,11 +63,11 @@ class ConvexRegion {
   std::vector<HalfSpace> half_spaces_;
 };
 
-// The point on the grid.
+// Returns the point on the grid.
 BigVector OnGrid(const std::array<double, 3>& p, const CommonExponent& grid);
 
-// Whether the hull is that of exactly these points (x y z each): each is in the hull, and each
-// vertex of the hull is one of them. Exact. Cost: a test for each point and facet.
+// Returns true if the hull is that of exactly these points, n x 3: each is in the hull, and each
+// vertex of the hull is one of them. Exact. Cost: one test per point and facet.
 absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& xyz);
 
 }  // namespace hulld

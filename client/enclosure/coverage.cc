@@ -14,12 +14,12 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// The point (x/w, y/w, z/w), w > 0, without common divisor.
+// The point (x/w, y/w, z/w), w > 0, without a common divisor.
 struct Corner {
   BigVector xyz;
   BigInteger w;
 };
-// A convex polygon, or a segment or a point where the triangle is one.
+// A convex polygon; a segment or a point if the triangle is degenerate.
 using Polygon = std::vector<Corner>;
 
 void Reduce(Corner* corner) {
@@ -30,22 +30,22 @@ void Reduce(Corner* corner) {
   corner->w /= divisor;
 }
 
-// w times the height of the corner over the boundary.
+// Returns w times the height of the corner above the boundary.
 BigInteger HeightOf(const HalfSpace& half, const Corner& corner) {
   return Dot(half.normal(), corner.xyz) - half.offset() * corner.w;
 }
 
-// Where the way from a, at height h < 0, to b, at height k > 0, meets the boundary.
+// Returns the point where the segment from a, at height h < 0, to b, at height k > 0, crosses the
+// boundary.
 Corner Crossing(const Corner& a, const BigInteger& h, const Corner& b, const BigInteger& k) {
   Corner crossing = {k * a.xyz - h * b.xyz, k * a.w - h * b.w};
   Reduce(&crossing);
   return crossing;
 }
 
-// The two parts of a polygon. The one outside is empty where no corner is strictly outside.
-// Otherwise the one inside is empty where no corner is strictly inside, because what is on the
-// boundary then has less than the polygon's dimension: pieces are closed, so what covers the rest
-// covers that, too.
+// The two parts of a polygon. The outer part is empty if no corner is strictly outside. Otherwise
+// the inner part is empty if no corner is strictly inside: the part on the boundary has a lower
+// dimension than the polygon, and as pieces are closed, the cover of the rest covers it too.
 struct Parts {
   Polygon inside;
   Polygon outside;
@@ -80,8 +80,8 @@ Parts Cut(const Polygon& polygon, const HalfSpace& half) {
   return parts;
 }
 
-// The distance of p from the triangle a b c. Source: Ericson 2005, Real-Time Collision Detection,
-// 5.1.5.
+// Returns the distance of p from the triangle a b c. Source: Ericson 2005, Real-Time Collision
+// Detection, 5.1.5.
 double DistanceToTriangle(const Point& p, const Point& a, const Point& b, const Point& c) {
   const auto minus = [](const Point& x, const Point& y) {
     return Point{x[0] - y[0], x[1] - y[1], x[2] - y[2]};
@@ -121,7 +121,7 @@ double DistanceToTriangle(const Point& p, const Point& a, const Point& b, const 
   return from(a, ab, vb / sum, ac, vc / sum);
 }
 
-// The vertices where they stand, rounded.
+// Returns the vertices in the world, rounded.
 std::vector<Point> VerticesOf(const PlacedHull& piece) {
   std::vector<Point> vertices;
   const std::vector<double>& xyz = piece.mesh->xyz;
@@ -132,7 +132,8 @@ std::vector<Point> VerticesOf(const PlacedHull& piece) {
   return vertices;
 }
 
-// The distance of a point outside from a piece with these vertices: that of the nearest facet.
+// Returns the distance of an outside point from a piece with these vertices: that of the nearest
+// facet.
 double DistanceTo(const HullMesh& piece, const std::vector<Point>& vertices, const Point& p) {
   double least = std::numeric_limits<double>::infinity();
   if (piece.facet_sizes.empty() && !vertices.empty()) {
@@ -150,7 +151,7 @@ double DistanceTo(const HullMesh& piece, const std::vector<Point>& vertices, con
   return least;
 }
 
-// One mesh against pieces that stand ready.
+// Covers one mesh with prepared pieces.
 class Cover {
  public:
   Cover(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh)
@@ -198,12 +199,12 @@ class Cover {
   }
 
  private:
-  // Replaces the polygons by what is outside of the region.
+  // Replaces the polygons by their parts outside of the region.
   void Subtract(const ConvexRegion& region, const std::array<uint32_t, 3>& triangle,
                 std::vector<Polygon>* left) const {
     if (region.empty()) return;
-    // Only half spaces that cut the triangle matter. One that has no corner of it strictly inside,
-    // and one outside, leaves nothing with a part inside.
+    // Only half spaces that cut the triangle matter. If one has no corner strictly inside but one
+    // outside, no part of the triangle is inside.
     std::vector<const HalfSpace*> cutting;
     for (const HalfSpace& half : region.half_spaces()) {
       int least = 1;
@@ -232,7 +233,7 @@ class Cover {
       rest = std::move(parts.inside);
       if (rest.empty()) break;
     }
-    // Nothing of it is in the region: it stays whole, not in parts.
+    // No part is in the region: the polygon stays whole.
     if (rest.empty()) {
       outside->push_back(polygon);
       return;
@@ -286,7 +287,7 @@ class Cover {
   // The vertices of each piece, for distances.
   std::vector<std::vector<Point>> vertices_;
   std::vector<BigVector> on_grid_;
-  // For each vertex, which pieces hold it.
+  // For each vertex, the pieces that contain it.
   std::vector<std::vector<bool>> holds_;
 };
 

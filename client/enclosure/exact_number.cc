@@ -23,7 +23,7 @@ double Approximate(const BigInteger& number, int exponent) {
 }
 
 double ApproximateQuotient(const BigInteger& numerator, const BigInteger& denominator) {
-  // Shifted so that the quotient has the digits of a double and some more.
+  // Shifts so that the quotient has a few digits more than a double.
   const int shift = kDigits + BitsOf(denominator) - BitsOf(numerator);
   const BigInteger quotient = shift >= 0 ? BigInteger((numerator << shift) / denominator)
                                          : BigInteger(numerator / (denominator << -shift));

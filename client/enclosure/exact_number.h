@@ -5,12 +5,12 @@
 
 namespace hulld {
 
-// number * 2^exponent as a double within two units in the last place; infinite, or 0, where no
-// double is near.
+// Returns number * 2^exponent as a double within two units in the last place; infinity or 0 beyond
+// the range of doubles.
 double Approximate(const BigInteger& number, int exponent = 0);
 
-// The same of a quotient. Requires a denominator that is not 0; unchecked, as callers divide by
-// what they compared with 0 before.
+// Returns a quotient with the same accuracy. Requires a nonzero denominator; unchecked, as callers
+// compare it with 0 before.
 double ApproximateQuotient(const BigInteger& numerator, const BigInteger& denominator);
 
 }  // namespace hulld

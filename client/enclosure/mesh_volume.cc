@@ -13,11 +13,11 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// For each vertex, one that stands for all at the same coordinates.
+// Returns for each vertex a representative of all vertices at the same coordinates.
 std::vector<uint32_t> Merged(const TriangleMesh& mesh) {
   std::vector<uint32_t> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0);
-  // -0 and 0 compare as equal, as they are the same place.
+  // -0 and 0 compare equal, as they are the same place.
   std::sort(order.begin(), order.end(),
             [&mesh](uint32_t a, uint32_t b) { return mesh.vertices[a] < mesh.vertices[b]; });
   std::vector<uint32_t> merged(order.size());
@@ -28,7 +28,7 @@ std::vector<uint32_t> Merged(const TriangleMesh& mesh) {
   return merged;
 }
 
-// Six times the volume of the tetrahedron with the origin.
+// Returns six times the volume of the tetrahedron with the origin.
 BigInteger SixfoldVolume(const BigVector& a, const BigVector& b, const BigVector& c) {
   return Dot(a, Cross(b, c));
 }
@@ -62,7 +62,7 @@ BigInteger SixfoldVolume(const HullMesh& hull, const CommonExponent& grid) {
 
 bool IsClosed(const TriangleMesh& mesh) {
   const std::vector<uint32_t> merged = Merged(mesh);
-  // Each passage of an edge: its lower and its higher vertex, and whether it went up.
+  // Each traversal of an edge: its lower and its higher vertex, and 1 if it went up.
   std::vector<std::array<uint32_t, 3>> passages;
   for (const auto& triangle : mesh.triangles) {
     for (size_t i = 0; i < 3; ++i) {

@@ -8,16 +8,15 @@
 
 namespace hulld {
 
-// Whether the triangles close a volume: each edge is passed as often in one direction as in the
-// other. Vertices at the same coordinates count as one, as files such as STL repeat them. Cost:
-// n log n.
+// Returns true if the triangles enclose a volume: each edge is traversed equally often in both
+// directions. Vertices at the same coordinates count as one, as files such as STL repeat them.
+// Cost: n log n.
 bool IsClosed(const TriangleMesh& mesh);
 
-// How much larger the hull is than the mesh: its volume over that of the mesh, each summed exactly
-// (signed tetrahedra, Gauss 1813), the quotient rounded. Parts of the mesh that overlap count
-// twice; its direction does not matter. Nothing when the mesh is not closed, or has no volume: then
-// there is none to compare. Requires facets of the hull that are planar, as the server's are.
-// Cost: exact arithmetic for each triangle.
+// Returns the volume of the hull divided by that of the mesh: each summed exactly (signed
+// tetrahedra, Gauss 1813), the quotient rounded. Overlapping parts of the mesh count twice; its
+// orientation does not matter. Nullopt if the mesh is not closed or has no volume. Requires planar
+// facets of the hull, as the server returns them. Cost: exact arithmetic for each triangle.
 std::optional<double> VolumeRatio(const HullMesh& hull, const TriangleMesh& mesh);
 
 }  // namespace hulld

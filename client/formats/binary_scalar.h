@@ -8,7 +8,7 @@
 
 namespace hulld {
 
-// The scalars of binary PLY and PCD files.
+// Scalar types of binary PLY and PCD files.
 enum class ScalarType {
   kInt8,
   kUint8,
@@ -52,8 +52,8 @@ double LoadAs(const unsigned char* little_endian) {
   return static_cast<double>(scalar);
 }
 
-// The value of SizeOf(type) bytes. Exact but for 64-bit integers beyond 2^53, which are rounded to
-// nearest.
+// Returns the value of SizeOf(type) bytes. Exact, except for 64-bit integers beyond 2^53, which are
+// rounded to nearest.
 inline double LoadScalar(ScalarType type, const unsigned char* bytes, bool big_endian) {
   unsigned char little[kMaxScalarBytes];
   const size_t size = SizeOf(type);

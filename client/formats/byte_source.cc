@@ -82,7 +82,7 @@ bool ByteSource::FindLineEnd(size_t from, size_t* length) {
   const std::string_view unread(buffer_.data() + begin_, end_ - begin_);
   if (line_end_ == LineEnd::kUnknown) {
     const size_t found = unread.find_first_of("\r\n", from);
-    // A CR that comes last may be half of a CR LF.
+    // A CR at the end of the buffer may be the first half of a CR LF.
     if (found == std::string_view::npos || (unread[found] == '\r' && found + 1 == unread.size())) {
       return false;
     }
@@ -138,6 +138,11 @@ bool ByteSource::Skip(uint64_t size) {
     if (size == 0) return true;
     if (!Refill()) return false;
   }
+}
+
+std::string_view ByteSource::Peek(size_t size) {
+  while (end_ - begin_ < size && Refill()) continue;
+  return {buffer_.data() + begin_, std::min(size, end_ - begin_)};
 }
 
 absl::Status ByteSource::ErrorAtLine(const std::string& message) const {

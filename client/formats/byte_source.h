@@ -15,39 +15,43 @@
 
 namespace hulld {
 
-// A file or pipe that is read once from front to back, as lines or as bytes, through one buffer.
-// Its memory does not grow with the file. It knows its position, for errors.
+// Reads a file or pipe from front to back, as lines or bytes, through one buffer. Memory does not
+// grow with the file. Tracks its position for errors.
 //
-// Lines end at LF or CR LF, or at CR when the first line does. A UTF-8 byte order mark is skipped.
+// Lines end at LF or CR LF, or at CR if the first line does. A UTF-8 byte order mark is skipped.
 class ByteSource {
  public:
   static constexpr size_t kMaxLineBytes = size_t{16} << 20;
 
-  // "-" is standard input. NOT_FOUND, PERMISSION_DENIED or INVALID_ARGUMENT, naming the file.
+  // Opens a file; "-" is standard input. NOT_FOUND, PERMISSION_DENIED, or INVALID_ARGUMENT, naming
+  // the file.
   static absl::StatusOr<std::unique_ptr<ByteSource>> Open(const std::string& path);
 
-  // Takes the file descriptor over.
+  // Takes ownership of the file descriptor.
   ByteSource(int descriptor, std::string name);
   ~ByteSource();
   ByteSource(const ByteSource&) = delete;
   ByteSource& operator=(const ByteSource&) = delete;
 
-  // The next line without its end, valid until the next call. False at the end and on an error: see
-  // status().
+  // Reads the next line without its end; valid until the next call. Returns false at the end and on
+  // an error: see status().
   bool ReadLine(std::string_view* line);
-  // Exactly `size` bytes; false when there are fewer.
+  // Reads exactly `size` bytes; returns false if fewer are left.
   bool Read(void* out, size_t size);
   bool Skip(uint64_t size);
+  // The next `size` bytes, fewer at the end of the file; they stay to be read. Valid until the next
+  // call.
+  std::string_view Peek(size_t size);
 
-  // Why reading stopped; OK at the end of the file.
+  // Returns the error that stopped reading; OK at the end of the file.
   const absl::Status& status() const { return status_; }
 
   const std::string& name() const { return name_; }
-  // The number of the line last read, from 1.
+  // Number of the last line read, from 1.
   uint64_t line() const { return line_; }
-  // The position of the next byte, from 0.
+  // Position of the next byte, from 0.
   uint64_t offset() const { return base_ + begin_; }
-  // Calls `progress` with the bytes taken from the file so far, whenever the buffer is filled.
+  // Calls `progress` with the bytes read so far whenever the buffer is filled.
   void ReportProgress(std::function<void(uint64_t bytes)> progress) {
     progress_ = std::move(progress);
   }
@@ -55,16 +59,16 @@ class ByteSource {
   // INVALID_ARGUMENT "NAME:LINE: message" and "NAME: byte OFFSET: message".
   absl::Status ErrorAtLine(const std::string& message) const;
   absl::Status ErrorAtByte(const std::string& message) const;
-  // The error that stopped reading; if there is none, one that says that the file ends too early.
+  // Returns the error that stopped reading; otherwise an error that the file is truncated.
   absl::Status Truncated(const std::string& what) const;
 
  private:
   enum class LineEnd { kUnknown, kLf, kCr };
 
-  // Moves what is left to the front of the buffer and reads more behind it. False at the end.
+  // Moves the unread bytes to the front of the buffer and fills the rest. Returns false at the end.
   bool Refill();
-  // The length of the line that starts at begin_, searched from `from` on. False when the buffer
-  // does not hold its end.
+  // Finds the length of the line at begin_, searching from `from`. Returns false if its end is not
+  // in the buffer.
   bool FindLineEnd(size_t from, size_t* length);
   void SkipByteOrderMark();
 
@@ -83,7 +87,7 @@ class ByteSource {
   std::function<void(uint64_t)> progress_;
 };
 
-// All of a text, each line followed by LF. Errors are those of ByteSource.
+// Reads a whole text; each line is followed by LF. Errors are those of ByteSource.
 absl::StatusOr<std::string> ReadText(const std::string& path);
 
 }  // namespace hulld

@@ -10,11 +10,11 @@
 namespace hulld {
 namespace {
 
-// Where x, y and z stand in each row.
+// Columns of x, y, and z.
 using Columns = std::array<size_t, 3>;
 
-// A semicolon or tab anywhere in the first row separates; then a comma may be a decimal mark, which
-// is an error later.
+// Returns the separator. A semicolon or tab anywhere in the first row is one; a comma may then be a
+// decimal mark, which fails later.
 char SeparatorOf(std::string_view first_row) {
   for (const char separator : {';', '\t'}) {
     if (first_row.find(separator) != std::string_view::npos) return separator;
@@ -22,8 +22,8 @@ char SeparatorOf(std::string_view first_row) {
   return ',';
 }
 
-// Cells without the spaces and the double quotes around them. A separator within quotes does not
-// separate.
+// Splits a row into cells without surrounding spaces and double quotes. Separators within quotes do
+// not count.
 void SplitRow(std::string_view row, char separator, std::vector<std::string_view>* cells) {
   cells->clear();
   size_t begin = 0;
@@ -40,8 +40,8 @@ void SplitRow(std::string_view row, char separator, std::vector<std::string_view
   }
 }
 
-// A header holds only names. A cell that starts like a number was meant as one, even if it is
-// malformed, such as 1,5.
+// Returns true if the row holds only names. A cell that starts like a number counts as a number
+// even if it is malformed, such as 1,5.
 bool IsHeader(const std::vector<std::string_view>& cells) {
   double ignored;
   for (const std::string_view cell : cells) {
@@ -82,11 +82,11 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
                                              columns[axis] + 1));
     }
     const std::string_view cell = cells[columns[axis]];
-    const NumberText kind = ParseDouble(cell, &xyz[axis]);
+    const NumberText kind = points->Parse(cell, axis, &xyz[axis]);
     if (kind != NumberText::kNumber) return source.ErrorAtLine(NumberProblem(kind, cell));
   }
-  return points->Add(xyz[0], xyz[1], xyz[2],
-                     [&](const std::string& message) { return source.ErrorAtLine(message); });
+  return points->AddScaled(xyz[0], xyz[1], xyz[2],
+                           [&](const std::string& message) { return source.ErrorAtLine(message); });
 }
 
 }  // namespace
@@ -101,8 +101,7 @@ absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
     const std::string_view content = Trim(line);
     if (content.empty() || (content.front() == '#' && !first)) continue;
     if (first) separator = SeparatorOf(content);
-    // An empty cell at an end is cut off with the tab that separates it, so the whole line is
-    // split.
+    // Splits the whole line, as trimming would remove the tab next to an empty first or last cell.
     SplitRow(line, separator, &cells);
     absl::Status status;
     if (first && IsHeader(cells)) {

@@ -7,9 +7,10 @@
 #include <limits>
 #include <map>
 
-#include "client/formats/obj_face.h"
+#include "client/formats/obj_reader.h"
 #include "client/formats/off_reader.h"
 #include "client/formats/point_file.h"
+#include "client/formats/stl_reader.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
@@ -37,45 +38,6 @@ void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
   for (size_t i = 2; i < corners.size(); ++i) {
     mesh->triangles.push_back({corners[0], corners[i - 1], corners[i]});
   }
-}
-
-// The index among the vertices so far.
-bool FindObjVertex(std::string_view token, size_t vertices, uint32_t* index) {
-  int64_t number = 0;
-  if (!ParseObjCorner(token, &number)) return false;
-  const int64_t count = static_cast<int64_t>(vertices);
-  const int64_t found = number < 0 ? count + number : number - 1;
-  if (number < -count || found >= count) return false;
-  *index = static_cast<uint32_t>(found);
-  return true;
-}
-
-// Reads vertices to `mesh` and passes on each face, as the indices of its corners, and each `o` and
-// `g`, as keyword and name.
-absl::Status WalkObj(ByteSource* source, TriangleMesh* mesh,
-                     const std::function<void(const std::vector<uint32_t>&)>& take_face,
-                     const std::function<void(std::string_view, std::string_view)>& take_name) {
-  std::string_view line;
-  std::vector<uint32_t> corners;
-  while (source->ReadLine(&line)) {
-    std::string_view rest = line;
-    const std::string_view keyword = NextToken(&rest);
-    if (keyword == "v") {
-      if (absl::Status status = AddVertex(*source, rest, mesh); !status.ok()) return status;
-    }
-    if (keyword == "o" || keyword == "g") take_name(keyword, Trim(rest));
-    if (keyword != "f") continue;
-    corners.clear();
-    for (std::string_view token; !(token = NextToken(&rest)).empty();) {
-      if (!FindObjVertex(token, mesh->vertices.size(), &corners.emplace_back())) {
-        return source->ErrorAtLine(
-            absl::StrCat(Quoted(token), " names none of the ", mesh->vertices.size(), " vertices"));
-      }
-    }
-    if (corners.empty()) return source->ErrorAtLine("a face names no vertex");
-    take_face(corners);
-  }
-  return source->status();
 }
 
 // The triangles of a mesh in parts: part_of gives the part of each.
@@ -142,10 +104,24 @@ std::vector<MeshPart> Components(const TriangleMesh& mesh) {
 
 }  // namespace
 
+absl::Status AddMesh(const std::string& file, const TriangleMesh& part, TriangleMesh* to) {
+  const size_t first = to->vertices.size();
+  if (first + part.vertices.size() > kMaxVertices) {
+    return absl::InvalidArgumentError(absl::StrCat(file, ": too many vertices"));
+  }
+  to->vertices.insert(to->vertices.end(), part.vertices.begin(), part.vertices.end());
+  const auto offset = static_cast<uint32_t>(first);
+  for (const auto& [a, b, c] : part.triangles) {
+    to->triangles.push_back({a + offset, b + offset, c + offset});
+  }
+  return absl::OkStatus();
+}
+
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
-  return WalkObj(
-      source, mesh, [mesh](const std::vector<uint32_t>& corners) { AddPolygon(corners, mesh); },
-      [](std::string_view, std::string_view) {});
+  ObjReceiver receiver;
+  receiver.vertex = [&](std::string_view text) { return AddVertex(*source, text, mesh); };
+  receiver.face = [mesh](const std::vector<uint32_t>& corners) { AddPolygon(corners, mesh); };
+  return WalkObj(source, receiver);
 }
 
 absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts) {
@@ -155,32 +131,81 @@ absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts) {
   std::map<std::string, uint32_t> number;
   std::string object;
   std::string group;
-  absl::Status read = WalkObj(
-      source, &mesh,
-      [&](const std::vector<uint32_t>& corners) {
-        const std::string name =
-            absl::StrCat(object, object.empty() || group.empty() ? "" : ".", group);
-        const auto [entry, is_new] = number.emplace(name, static_cast<uint32_t>(names.size()));
-        if (is_new) names.push_back(name);
-        AddPolygon(corners, &mesh);
-        part_of.resize(mesh.triangles.size(), entry->second);
-      },
-      [&](std::string_view keyword, std::string_view name) {
-        if (keyword == "o") object = name;
-        // A new object starts without a group.
-        group = keyword == "g" ? std::string(name) : "";
-      });
-  if (!read.ok()) return read;
+  ObjReceiver receiver;
+  receiver.vertex = [&](std::string_view text) { return AddVertex(*source, text, &mesh); };
+  receiver.face = [&](const std::vector<uint32_t>& corners) {
+    const std::string name =
+        absl::StrCat(object, object.empty() || group.empty() ? "" : ".", group);
+    const auto [entry, is_new] = number.emplace(name, static_cast<uint32_t>(names.size()));
+    if (is_new) names.push_back(name);
+    AddPolygon(corners, &mesh);
+    part_of.resize(mesh.triangles.size(), entry->second);
+  };
+  receiver.name = [&](std::string_view keyword, std::string_view name) {
+    if (keyword == "o") object = name;
+    // A new object starts without a group.
+    group = keyword == "g" ? std::string(name) : "";
+  };
+  if (absl::Status read = WalkObj(source, receiver); !read.ok()) return read;
   *parts = Distribute(mesh, part_of, names);
   return absl::OkStatus();
 }
+
+absl::Status ReadStlParts(ByteSource* source, std::vector<MeshPart>* parts) {
+  std::map<std::string, size_t> number;
+  size_t present = 0;
+  StlReceiver receiver;
+  receiver.solid = [&](std::string_view name) {
+    const auto [entry, is_new] = number.emplace(name, parts->size());
+    if (is_new) parts->push_back({std::string(name), {}});
+    present = entry->second;
+  };
+  receiver.parse = [](std::string_view text, size_t, double* value) {
+    return ParseDouble(text, value);
+  };
+  receiver.corner = [&](const std::array<double, 3>& p, const StlErrorAt& error_at) {
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {
+      return error_at("a coordinate is not finite");
+    }
+    TriangleMesh& mesh = (*parts)[present].mesh;
+    if (mesh.vertices.size() >= kMaxVertices) return error_at("too many vertices");
+    mesh.vertices.push_back(p);
+    const auto size = static_cast<uint32_t>(mesh.vertices.size());
+    if (size % 3 == 0) mesh.triangles.push_back({size - 3, size - 2, size - 1});
+    return absl::OkStatus();
+  };
+  receiver.float_corner = [&](const std::array<float, 3>& p, const StlErrorAt& error_at) {
+    return receiver.corner({p[0], p[1], p[2]}, error_at);
+  };
+  return WalkStl(source, receiver);
+}
+
+namespace {
+
+// Reads the parts of a format that names them.
+absl::Status ReadNamedParts(const std::string& path, PointFormat format,
+                            std::vector<MeshPart>* parts) {
+  auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  switch (format) {
+    case PointFormat::kObj:
+      return ReadObjParts(source->get(), parts);
+    case PointFormat::kStl:
+      return ReadStlParts(source->get(), parts);
+    case PointFormat::kGltf:
+      return ReadGltfParts(source->get(), parts);
+    default:
+      return ReadDaeParts(path, parts);
+  }
+}
+
+}  // namespace
 
 absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split) {
   const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
   if (!format.ok()) return format.status();
   std::vector<MeshPart> parts;
-  const bool has_names = *format == PointFormat::kObj || IsAssimpFormat(*format);
-  if (split == SplitBy::kComponent || !has_names) {
+  if (split == SplitBy::kComponent || !IsMeshFormat(*format) || *format == PointFormat::kOff) {
     const auto mesh = ReadMesh(path);
     if (!mesh.ok()) return mesh.status();
     if (split == SplitBy::kComponent) {
@@ -188,15 +213,10 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
     } else if (!mesh->triangles.empty()) {
       parts.push_back({"", *mesh});
     }
-  } else if (*format == PointFormat::kObj) {
-    auto source = ByteSource::Open(path);
-    if (!source.ok()) return source.status();
-    if (absl::Status read = ReadObjParts(source->get(), &parts); !read.ok()) return read;
-  } else {
-    // Says plainly why a file cannot be opened.
-    if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
-    if (absl::Status read = ReadAssimpParts(path, &parts); !read.ok()) return read;
+  } else if (absl::Status read = ReadNamedParts(path, *format, &parts); !read.ok()) {
+    return read;
   }
+  std::erase_if(parts, [](const MeshPart& part) { return part.mesh.triangles.empty(); });
   if (!parts.empty()) return parts;
   return absl::InvalidArgumentError(absl::StrCat(path, ": there is no triangle in it"));
 }
@@ -243,9 +263,14 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
       break;
     case PointFormat::kStl:
     case PointFormat::kGltf:
-    case PointFormat::kDae:
-      status = ReadAssimpMesh(path, &mesh);
+    case PointFormat::kDae: {
+      std::vector<MeshPart> parts;
+      status = ReadNamedParts(path, *format, &parts);
+      for (size_t i = 0; i < parts.size() && status.ok(); ++i) {
+        status = AddMesh(path, parts[i].mesh, &mesh);
+      }
       break;
+    }
     default:
       status = absl::InvalidArgumentError(
           absl::StrCat(path,

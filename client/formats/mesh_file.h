@@ -42,12 +42,17 @@ enum class SplitBy {
 // no part; parts without triangles are left out. INVALID_ARGUMENT also when there is no triangle.
 absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split);
 
-// The readers of each format. Those of assimp place each mesh as its node says.
+// The readers of each format. Those of parts keep vertices that no triangle names, and parts
+// without triangles; glTF and COLLADA place each mesh as its node says.
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
-absl::Status ReadAssimpMesh(const std::string& path, TriangleMesh* mesh);
 absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts);
-absl::Status ReadAssimpParts(const std::string& path, std::vector<MeshPart>* parts);
+absl::Status ReadStlParts(ByteSource* source, std::vector<MeshPart>* parts);
+absl::Status ReadGltfParts(ByteSource* source, std::vector<MeshPart>* parts);
+absl::Status ReadDaeParts(const std::string& path, std::vector<MeshPart>* parts);
+
+// Adds `part` to `to`. INVALID_ARGUMENT, naming `file`, if there are too many vertices.
+absl::Status AddMesh(const std::string& file, const TriangleMesh& part, TriangleMesh* to);
 
 }  // namespace hulld
 

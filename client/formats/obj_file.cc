@@ -1,49 +1,107 @@
 #include <absl/strings/str_cat.h>
 
+#include <charconv>
+#include <limits>
 #include <string>
 
-#include "client/formats/obj_face.h"
+#include "client/formats/obj_reader.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
+namespace {
+
+class ObjWalk {
+ public:
+  ObjWalk(ByteSource* source, const ObjReceiver& receiver) : source_(source), receiver_(receiver) {}
+
+  absl::Status Run() {
+    std::string continued;
+    for (std::string_view line; source_->ReadLine(&line);) {
+      const std::string_view content = Trim(line);
+      // Comments often hold paths of Windows.
+      const bool is_comment = continued.empty() && !content.empty() && content.front() == '#';
+      if (!is_comment && !content.empty() && content.back() == '\\') {
+        continued.append(content.substr(0, content.size() - 1)).push_back(' ');
+        if (continued.size() <= ByteSource::kMaxLineBytes) continue;
+        return source_->ErrorAtLine("the continued line is longer than 16 MiB");
+      }
+      absl::Status status = TakeStatement(continued.empty() ? content : continued.append(content));
+      if (!status.ok()) return status;
+      continued.clear();
+    }
+    if (!source_->status().ok()) return source_->status();
+    if (!continued.empty()) return source_->Truncated("after a backslash that continues its line");
+    return Finish();
+  }
+
+ private:
+  absl::Status TakeStatement(std::string_view rest) {
+    const std::string_view keyword = NextToken(&rest);
+    if (keyword == "v") {
+      ++vertices_;
+      return receiver_.vertex(rest);
+    }
+    if (keyword == "f") return TakeFace(rest.substr(0, rest.find('#')));
+    if ((keyword == "o" || keyword == "g") && receiver_.name) receiver_.name(keyword, Trim(rest));
+    return absl::OkStatus();
+  }
+
+  // Corners are "7", "7/1", "7//3" or "7/1/3".
+  absl::Status TakeFace(std::string_view rest) {
+    corners_.clear();
+    for (std::string_view token; !(token = NextToken(&rest)).empty();) {
+      const std::string_view text = token.substr(0, token.find('/'));
+      const char* const end = text.data() + text.size();
+      int64_t vertex = 0;
+      const auto [stop, error] = std::from_chars(text.data(), end, vertex);
+      if (error == std::errc() && stop == end && vertex < 0) vertex += vertices_ + 1;
+      if (error != std::errc() || stop != end || vertex <= 0 ||
+          vertex > std::numeric_limits<uint32_t>::max()) {
+        return source_->ErrorAtLine(
+            absl::StrCat(Quoted(token), " names no vertex; ", vertices_, " came before"));
+      }
+      if (vertex > largest_) {
+        largest_ = vertex;
+        largest_line_ = source_->line();
+      }
+      corners_.push_back(static_cast<uint32_t>(vertex - 1));
+    }
+    if (corners_.empty()) return source_->ErrorAtLine("a face names no vertex");
+    if (receiver_.face) receiver_.face(corners_);
+    return absl::OkStatus();
+  }
+
+  absl::Status Finish() const {
+    if (vertices_ == 0) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          source_->name(), ": holds no vertex: no line starts with v; is it an OBJ file?"));
+    }
+    if (largest_ <= vertices_) return absl::OkStatus();
+    return absl::InvalidArgumentError(absl::StrCat(source_->name(), ":", largest_line_,
+                                                   ": a face names vertex ", largest_,
+                                                   ", but the file holds ", vertices_));
+  }
+
+  ByteSource* source_;
+  const ObjReceiver& receiver_;
+  std::vector<uint32_t> corners_;
+  int64_t vertices_ = 0;
+  // The largest number of a vertex in a face, from 1, and its line.
+  int64_t largest_ = 0;
+  uint64_t largest_line_ = 0;
+};
+
+}  // namespace
+
+absl::Status WalkObj(ByteSource* source, const ObjReceiver& receiver) {
+  return ObjWalk(source, receiver).Run();
+}
 
 absl::Status ReadObj(ByteSource* source, PointCollector* points) {
-  std::string_view line;
-  std::string continued;
-  ObjFaceCheck faces;
-  uint64_t vertices = 0;
-  while (source->ReadLine(&line)) {
-    // A backslash at the end of a line continues it on the next.
-    if (!line.empty() && line.back() == '\\') {
-      continued.append(line.substr(0, line.size() - 1)).push_back(' ');
-      if (continued.size() > ByteSource::kMaxLineBytes) {
-        return source->ErrorAtLine("the continued line is longer than 16 MiB");
-      }
-      continue;
-    }
-    if (!continued.empty()) {
-      continued.append(line);
-      line = continued;
-    }
-    std::string_view rest = line;
-    const std::string_view keyword = NextToken(&rest);
-    absl::Status status;
-    if (keyword == "v") {
-      status = AddTextPoint(*source, rest, points);
-      ++vertices;
-    } else if (keyword == "f") {
-      status = faces.Add(*source, rest, vertices);
-    }
-    if (!status.ok()) return status;
-    continued.clear();
-  }
-  if (!source->status().ok()) return source->status();
-  if (vertices == 0) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        source->name(), ": holds no vertex: no line starts with v; is it an OBJ file?"));
-  }
-  return faces.Finish(*source, vertices);
+  ObjReceiver receiver;
+  receiver.vertex = [&](std::string_view text) { return AddTextPoint(*source, text, points); };
+  return WalkObj(source, receiver);
 }
 
 }  // namespace hulld

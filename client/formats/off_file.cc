@@ -36,7 +36,7 @@ absl::Status OffReader::ReadHeader() {
   if (Trim(rest) == "BINARY") {
     return source_->ErrorAtLine("binary OFF is not supported; convert it to ascii OFF or to PLY");
   }
-  // The counts may stand beside the keyword.
+  // The counts may be on the line of the keyword.
   if (Trim(rest).empty() && !NextContent(&rest)) return source_->Truncated("before the counts");
   for (uint64_t* const count : {&vertex_count_, &face_count_}) {
     const std::string_view text = NextToken(&rest);
@@ -60,13 +60,17 @@ absl::Status OffReader::NextFace(uint64_t index, std::string_view* content) {
 absl::Status ReadOff(ByteSource* source, PointCollector* points) {
   OffReader reader(source);
   if (absl::Status status = reader.ReadHeader(); !status.ok()) return status;
+  if (reader.vertex_count() == 0 && reader.face_count() > 0) {
+    return source->ErrorAtLine(
+        absl::StrCat("the file declares ", reader.face_count(), " faces, but no vertex"));
+  }
   std::string_view content;
   for (uint64_t i = 0; i < reader.vertex_count(); ++i) {
     absl::Status status = reader.NextVertex(i, &content);
     if (status.ok()) status = AddTextPoint(*source, content, points);
     if (!status.ok()) return status;
   }
-  // The faces are not needed, but a file that lacks some was cut short.
+  // The faces are not needed, but reading them detects truncation.
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
     if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
   }

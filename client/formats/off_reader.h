@@ -10,9 +10,8 @@
 
 namespace hulld {
 
-// Walks an OFF file line by line: keyword, counts, vertices, faces. It knows
-// the variants that start each vertex line with the position: OFF, COFF, NOFF, STOFF and their
-// combinations.
+// Reads an OFF file line by line: keyword, counts, vertices, faces. Supports the variants with the
+// position first in each vertex line: OFF, COFF, NOFF, STOFF, and their combinations.
 class OffReader {
  public:
   explicit OffReader(ByteSource* source) : source_(source) {}
@@ -21,12 +20,12 @@ class OffReader {
   uint64_t vertex_count() const { return vertex_count_; }
   uint64_t face_count() const { return face_count_; }
 
-  // The line of the next vertex, the `index`-th.
+  // Reads the line of the next vertex, the `index`-th.
   absl::Status NextVertex(uint64_t index, std::string_view* content);
-  // The same for faces, which come after all vertices.
+  // Reads the line of the next face, the `index`-th. Faces follow all vertices.
   absl::Status NextFace(uint64_t index, std::string_view* content);
 
-  // The next line with something on it, comments cut off. False at the end.
+  // Reads the next line that is not blank, without comments. Returns false at the end.
   bool NextContent(std::string_view* content);
 
  private:

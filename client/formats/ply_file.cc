@@ -1,6 +1,6 @@
-// PLY: a text header declares elements and their properties in order, then their values follow as
-// text or as packed scalars. Only the element `vertex` is wanted; those before it are skipped,
-// those after it are not read.
+// PLY: a text header declares elements and their properties in order. Their values follow as text,
+// in lines of any length, or as packed scalars. Elements other than `vertex` are read to check that
+// the file is complete.
 #include <absl/strings/str_cat.h>
 
 #include <array>
@@ -20,7 +20,7 @@ constexpr size_t kMaxHeaderLines = 10000;
 struct Property {
   // For a list, the type of its items.
   ScalarType type;
-  // The type of a list's count.
+  // For a list, the type of its count.
   std::optional<ScalarType> count_type;
   // 0, 1, 2 for x, y, z.
   std::optional<size_t> axis;
@@ -34,7 +34,7 @@ struct Element {
 
 enum class Encoding { kNone, kAscii, kLittleEndian, kBigEndian };
 
-struct Header {
+struct PlyHeader {
   Encoding encoding = Encoding::kNone;
   std::vector<Element> elements;
 };
@@ -60,7 +60,7 @@ std::optional<ScalarType> TypeFromName(std::string_view name) {
   return std::nullopt;
 }
 
-absl::Status ParseFormat(const ByteSource& source, std::string_view rest, Header* header) {
+absl::Status ParseFormat(const ByteSource& source, std::string_view rest, PlyHeader* header) {
   const std::string_view encoding = NextToken(&rest);
   if (encoding == "ascii") {
     header->encoding = Encoding::kAscii;
@@ -76,7 +76,7 @@ absl::Status ParseFormat(const ByteSource& source, std::string_view rest, Header
   return absl::OkStatus();
 }
 
-absl::Status ParseElement(const ByteSource& source, std::string_view rest, Header* header) {
+absl::Status ParseElement(const ByteSource& source, std::string_view rest, PlyHeader* header) {
   Element element;
   element.name = std::string(NextToken(&rest));
   const std::string_view count = NextToken(&rest);
@@ -88,7 +88,7 @@ absl::Status ParseElement(const ByteSource& source, std::string_view rest, Heade
   return absl::OkStatus();
 }
 
-absl::Status ParseProperty(const ByteSource& source, std::string_view rest, Header* header) {
+absl::Status ParseProperty(const ByteSource& source, std::string_view rest, PlyHeader* header) {
   if (header->elements.empty()) return source.ErrorAtLine("a property before any element");
   Element& element = header->elements.back();
   Property property;
@@ -115,7 +115,7 @@ absl::Status ParseProperty(const ByteSource& source, std::string_view rest, Head
   return absl::OkStatus();
 }
 
-absl::Status ParseHeader(ByteSource* source, Header* header) {
+absl::Status ParsePlyHeader(ByteSource* source, PlyHeader* header) {
   std::string_view line;
   if (!source->ReadLine(&line)) return source->Truncated("before the keyword ply");
   if (Trim(line) != "ply") return source->ErrorAtLine("a PLY file starts with the line \"ply\"");
@@ -136,14 +136,12 @@ absl::Status ParseHeader(ByteSource* source, Header* header) {
     } else if (keyword == "property") {
       status = ParseProperty(*source, rest, header);
     }
-    // Everything else is a comment, or obj_info, or a line that some exporter wrote without a
-    // keyword.
+    // Any other line is a comment, obj_info, or written by an exporter without a keyword.
     if (!status.ok()) return status;
   }
   return source->Truncated("before end_header");
 }
 
-// Floats stay floats when all three coordinates are.
 bool HoldsFloats(const Element& vertex) {
   for (const Property& property : vertex.properties) {
     if (property.axis && property.type != ScalarType::kFloat) return false;
@@ -166,46 +164,73 @@ absl::Status CheckVertex(const ByteSource& source, const Element& vertex) {
 
 class AsciiBody {
  public:
-  explicit AsciiBody(ByteSource* source) : source_(source) {}
+  AsciiBody(ByteSource* source, const PointCollector& points) : source_(source), points_(points) {}
 
-  // Reads one element, one line, and the coordinates on it.
+  // Reads the values of an element and sets its coordinates, scaled. White space separates values,
+  // line ends included: RealSense Viewer splits a vertex and its colour over two lines.
   absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz) {
-    std::string_view line;
-    do {
-      if (!source_->ReadLine(&line))
-        return source_->Truncated("within the element " + element.name);
-      line = Trim(line);
-    } while (line.empty());
+    std::string_view token;
     for (const Property& property : element.properties) {
-      std::string_view token = NextToken(&line);
+      if (!NextValue(&token)) return source_->Truncated("within the element " + element.name);
       if (property.count_type) {
-        if (absl::Status status = SkipList(token, &line); !status.ok()) return status;
+        if (absl::Status status = SkipList(element, token); !status.ok()) return status;
         continue;
       }
-      if (token.empty()) return source_->ErrorAtLine("the line has fewer values than properties");
+      // Other values are not checked, such as "1.#QNAN" of a normal.
       if (!property.axis) continue;
-      const NumberText kind = ParseDouble(token, &(*xyz)[*property.axis]);
+      const NumberText kind = points_.Parse(token, *property.axis, &(*xyz)[*property.axis]);
       if (kind != NumberText::kNumber) return source_->ErrorAtLine(NumberProblem(kind, token));
     }
     return absl::OkStatus();
   }
 
+  template <typename ErrorAt>
+  static absl::Status Add(const std::array<double, 3>& xyz, const Element& /*vertex*/,
+                          const ErrorAt& error_at, PointCollector* points) {
+    return points->AddScaled(xyz[0], xyz[1], xyz[2], error_at);
+  }
+
+  // Extra values mean that the file was read out of step, and its points are wrong.
+  absl::Status Finish() {
+    std::string_view token;
+    if (!NextValue(&token)) return source_->status();
+    return source_->ErrorAtLine(
+        absl::StrCat(Quoted(token),
+                     " is beyond the last value that the header declares; its "
+                     "counts and properties do not fit the file"));
+  }
+
   absl::Status Error(const std::string& message) const { return source_->ErrorAtLine(message); }
 
  private:
-  absl::Status SkipList(std::string_view count_text, std::string_view* line) {
+  bool NextValue(std::string_view* token) {
+    while ((*token = NextToken(&rest_)).empty()) {
+      if (!source_->ReadLine(&rest_)) return false;
+      std::string_view line = rest_;
+      const std::string_view keyword = NextToken(&line);
+      if (keyword == "comment" || keyword == "obj_info") rest_ = {};
+    }
+    return true;
+  }
+
+  absl::Status SkipList(const Element& element, std::string_view count_text) {
     uint64_t count = 0;
     if (!ParseUnsigned(count_text, &count)) {
       return source_->ErrorAtLine(absl::StrCat(Quoted(count_text), " is not the count of a list"));
     }
+    std::string_view token;
     for (uint64_t i = 0; i < count; ++i) {
-      if (!NextToken(line).empty()) continue;
-      return source_->ErrorAtLine(absl::StrCat("the list has ", i, " items of ", count));
+      if (NextValue(&token)) continue;
+      return source_->Truncated(absl::StrCat("within the element ", element.name, ", after ", i,
+                                             " of ", count, " items of a list"));
     }
     return absl::OkStatus();
   }
 
   ByteSource* source_;
+  const PointCollector& points_;
+  // Rest of the current line.
+  std::string_view rest_;
 };
 
 class BinaryBody {
@@ -230,6 +255,18 @@ class BinaryBody {
     return absl::OkStatus();
   }
 
+  // Floats stay floats if all three coordinates are.
+  template <typename ErrorAt>
+  static absl::Status Add(const std::array<double, 3>& xyz, const Element& vertex,
+                          const ErrorAt& error_at, PointCollector* points) {
+    if (!HoldsFloats(vertex)) return points->Add(xyz[0], xyz[1], xyz[2], error_at);
+    return points->AddFloat(static_cast<float>(xyz[0]), static_cast<float>(xyz[1]),
+                            static_cast<float>(xyz[2]), error_at);
+  }
+
+  // Writers may pad the file.
+  static absl::Status Finish() { return absl::OkStatus(); }
+
   absl::Status Error(const std::string& message) const {
     return absl::InvalidArgumentError(
         absl::StrCat(source_->name(), ": byte ", element_offset_, ": ", message));
@@ -249,44 +286,53 @@ class BinaryBody {
 };
 
 template <typename Body>
-absl::Status ReadBody(const Header& header, bool binary, Body body, PointCollector* points) {
+absl::Status ReadBody(const PlyHeader& header, Body body, PointCollector* points) {
   const auto error_at = [&body](const std::string& message) { return body.Error(message); };
   for (const Element& element : header.elements) {
-    const bool is_vertex = element.name == "vertex";
-    // An element without properties takes no bytes, whatever its count.
+    // An element without properties takes no bytes, regardless of its count.
     if (element.properties.empty()) continue;
-    const bool as_float = is_vertex && binary && HoldsFloats(element);
+    const bool is_vertex = element.name == "vertex";
     std::array<double, 3> xyz = {};
     for (uint64_t i = 0; i < element.count; ++i) {
       absl::Status status = body.ReadElement(element, &xyz);
-      if (status.ok() && is_vertex) {
-        status = as_float ? points->AddFloat(static_cast<float>(xyz[0]), static_cast<float>(xyz[1]),
-                                             static_cast<float>(xyz[2]), error_at)
-                          : points->Add(xyz[0], xyz[1], xyz[2], error_at);
-      }
+      if (status.ok() && is_vertex) status = Body::Add(xyz, element, error_at, points);
       if (!status.ok()) return status;
     }
-    if (is_vertex) break;
   }
-  return absl::OkStatus();
+  return body.Finish();
+}
+
+// Returns the only element `vertex`.
+absl::StatusOr<const Element*> FindVertex(const ByteSource& source, const PlyHeader& header) {
+  const Element* vertex = nullptr;
+  for (const Element& element : header.elements) {
+    if (element.name != "vertex") continue;
+    if (vertex != nullptr)
+      return source.ErrorAtLine("the header declares the element vertex twice");
+    vertex = &element;
+  }
+  if (vertex == nullptr) return source.ErrorAtLine("the header declares no element vertex");
+  if (absl::Status status = CheckVertex(source, *vertex); !status.ok()) return status;
+  if (vertex->count > 0) return vertex;
+  for (const Element& element : header.elements) {
+    if (element.count == 0 || element.properties.empty()) continue;
+    return source.ErrorAtLine(absl::StrCat("the header declares ", element.count, " elements ",
+                                           Quoted(element.name), ", but no vertex"));
+  }
+  return vertex;
 }
 
 }  // namespace
 
 absl::Status ReadPly(ByteSource* source, PointCollector* points) {
-  Header header;
-  if (absl::Status status = ParseHeader(source, &header); !status.ok()) return status;
-  const Element* vertex = nullptr;
-  for (const Element& element : header.elements) {
-    if (element.name == "vertex" && vertex == nullptr) vertex = &element;
-  }
-  if (vertex == nullptr) return source->ErrorAtLine("the header declares no element vertex");
-  if (absl::Status status = CheckVertex(*source, *vertex); !status.ok()) return status;
+  PlyHeader header;
+  if (absl::Status status = ParsePlyHeader(source, &header); !status.ok()) return status;
+  if (const auto vertex = FindVertex(*source, header); !vertex.ok()) return vertex.status();
   if (header.encoding == Encoding::kAscii) {
-    return ReadBody(header, false, AsciiBody(source), points);
+    return ReadBody(header, AsciiBody(source, *points), points);
   }
   const bool big_endian = header.encoding == Encoding::kBigEndian;
-  return ReadBody(header, true, BinaryBody(source, big_endian), points);
+  return ReadBody(header, BinaryBody(source, big_endian), points);
 }
 
 }  // namespace hulld

@@ -2,12 +2,16 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace hulld {
 
 PointCollector::PointCollector(ReadOptions options, BlockReceiver receive)
-    : options_(options), receive_(std::move(receive)) {}
+    : options_(options), receive_(std::move(receive)) {
+  is_scaled_ = !std::all_of(options_.scale.begin(), options_.scale.end(),
+                            [](const LengthScale& scale) { return scale.is_one(); });
+}
 
 absl::Status PointCollector::Flush() {
   if (block_.size() == 0) return absl::OkStatus();
@@ -18,7 +22,7 @@ std::string PointCollector::NonFiniteMessage(double x, double y, double z) const
   const double xyz[] = {x, y, z};
   int bad = 0;
   while (std::isfinite(xyz[bad])) ++bad;
-  return absl::StrCat("point ", counts_.points + counts_.skipped, " has ",
+  return absl::StrCat("point ", counts_.points + counts_.skipped + counts_.zeros, " has ",
                       std::string(1, "xyz"[bad]), " = ", std::isnan(xyz[bad]) ? "NaN" : "infinity",
                       "; leave such points out with --skip-nonfinite");
 }

@@ -3,17 +3,21 @@
 
 #include <absl/status/status.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "client/formats/length_scale.h"
 
 namespace hulld {
 
-// Consecutive points of a file, three coordinates per point, all finite: in `xyz_float` where the
-// file's scalars are floats, otherwise in `xyz`; the other is empty.
+// Consecutive points of a file, n x 3, all finite: in `xyz_float` if the file's scalars are floats,
+// otherwise in `xyz`. The other vector is empty.
 struct PointBlock {
   std::vector<double> xyz;
   std::vector<float> xyz_float;
@@ -21,40 +25,66 @@ struct PointBlock {
   size_t size() const { return (xyz.size() + xyz_float.size()) / 3; }
 };
 
-// Takes a block; an error ends the reading and is its result.
+// Receives a block. An error ends the reading and is its result.
 using BlockReceiver = std::function<absl::Status(PointBlock block)>;
 
 struct ReadOptions {
-  // Points per block, the last of a file excepted. 0: about 1 MiB of coordinates.
+  // Points per block; the last block of a file may be smaller. 0: about 1 MiB of coordinates.
   size_t points_per_block = 0;
-  // Points with a coordinate that is NaN or infinite are counted and left out. Otherwise the first
-  // one is an error.
+  // Counts and skips points with a NaN or infinite coordinate. Otherwise the first one is an error.
   bool skip_nonfinite = false;
+  // Counts and skips points at exactly (0, 0, 0), which depth cameras write for missing data.
+  bool skip_zero = false;
+  // Factors of x, y, and z. Scaled coordinates are doubles.
+  std::array<LengthScale, 3> scale;
 };
 
 struct ReadCounts {
   uint64_t points = 0;
+  // Points skipped because a coordinate is not finite.
   uint64_t skipped = 0;
+  // Points skipped because all coordinates are 0.
+  uint64_t zeros = 0;
 };
 
-// Gathers the points that a reader finds into blocks, and applies the rule for points that are not
-// finite.
+// Collects the points of a reader into blocks, scales them, and skips the points that the options
+// exclude.
 class PointCollector {
  public:
   PointCollector(ReadOptions options, BlockReceiver receive);
 
-  // `error_at` turns a message into an error that names the place, and is called only when there is
-  // one.
+  // `error_at` adds the position to an error message. Called only on an error.
   template <typename ErrorAt>
   absl::Status Add(double x, double y, double z, const ErrorAt& error_at) {
-    return AddTo(&block_.xyz, x, y, z, error_at);
+    const bool finite = std::isfinite(x) && std::isfinite(y) && std::isfinite(z);
+    if (is_scaled_ && finite) {
+      x = options_.scale[0].Apply(x);
+      y = options_.scale[1].Apply(y);
+      z = options_.scale[2].Apply(z);
+      if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) {
+        return error_at("scaled, a coordinate is beyond the largest double");
+      }
+    }
+    return AddScaled(x, y, z, error_at);
   }
   template <typename ErrorAt>
   absl::Status AddFloat(float x, float y, float z, const ErrorAt& error_at) {
+    if (is_scaled_) return Add(x, y, z, error_at);
     return AddTo(&block_.xyz_float, x, y, z, error_at);
   }
 
-  // Delivers what is left; called once after the last point of a file.
+  // Parses the text of a coordinate (axis: 0, 1, 2) for AddScaled. Text is scaled before it is
+  // rounded.
+  NumberText Parse(std::string_view text, size_t axis, double* scaled) const {
+    return options_.scale[axis].Parse(text, scaled);
+  }
+  // Adds a point with coordinates from Parse.
+  template <typename ErrorAt>
+  absl::Status AddScaled(double x, double y, double z, const ErrorAt& error_at) {
+    return AddTo(&block_.xyz, x, y, z, error_at);
+  }
+
+  // Delivers the remaining points. Called once, after the last point of a file.
   absl::Status Flush();
 
   const ReadCounts& counts() const { return counts_; }
@@ -67,6 +97,10 @@ class PointCollector {
       ++counts_.skipped;
       if (options_.skip_nonfinite) return absl::OkStatus();
       return error_at(NonFiniteMessage(x, y, z));
+    }
+    if (options_.skip_zero && x == 0 && y == 0 && z == 0) {
+      ++counts_.zeros;
+      return absl::OkStatus();
     }
     // A block holds one kind of scalar.
     if (to->size() != 3 * block_.size()) {
@@ -84,6 +118,7 @@ class PointCollector {
   static constexpr size_t kBlockBytes = size_t{1} << 20;
 
   ReadOptions options_;
+  bool is_scaled_;
   BlockReceiver receive_;
   PointBlock block_;
   ReadCounts counts_;

@@ -17,13 +17,14 @@ struct FormatName {
   PointFormat format;
 };
 
-// The first name of each format is the one that is listed.
+// The first name of each format is the listed one.
 constexpr FormatName kFormatNames[] = {
     {"obj", PointFormat::kObj}, {"off", PointFormat::kOff},   {"ply", PointFormat::kPly},
     {"xyz", PointFormat::kXyz}, {"csv", PointFormat::kCsv},   {"pcd", PointFormat::kPcd},
     {"stl", PointFormat::kStl}, {"gltf", PointFormat::kGltf}, {"glb", PointFormat::kGltf},
     {"dae", PointFormat::kDae}, {"txt", PointFormat::kXyz},   {"asc", PointFormat::kXyz},
-    {"tsv", PointFormat::kCsv},
+    {"tsv", PointFormat::kCsv}, {"pts", PointFormat::kPts},   {"las", PointFormat::kLas},
+    {"laz", PointFormat::kLas},
 };
 
 absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
@@ -43,8 +44,14 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
       return ReadCsv(source->get(), points);
     case PointFormat::kPcd:
       return ReadPcd(source->get(), points);
+    case PointFormat::kPts:
+      return ReadPts(source->get(), points);
+    case PointFormat::kLas:
+      return ReadLas(source->get(), points);
     case PointFormat::kStl:
+      return ReadStl(source->get(), points);
     case PointFormat::kGltf:
+      return ReadGltf(source->get(), points);
     case PointFormat::kDae:
       break;
   }
@@ -52,22 +59,14 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
 }
 
 absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
-  if (!IsAssimpFormat(request.format)) return ReadText(request, points);
+  if (request.format != PointFormat::kDae) return ReadText(request, points);
   if (request.path == "-") {
     return absl::InvalidArgumentError(
-        "stl, gltf and dae cannot be read from standard input; save the data to a file and name "
-        "it");
+        "dae cannot be read from standard input; save the data to a file and name it");
   }
-  // Says plainly why a file cannot be opened.
+  // Reports plainly why a file cannot be opened.
   if (auto source = ByteSource::Open(request.path); !source.ok()) return source.status();
-  switch (request.format) {
-    case PointFormat::kStl:
-      return ReadStl(request.path, points);
-    case PointFormat::kGltf:
-      return ReadGltf(request.path, points);
-    default:
-      return ReadDae(request.path, points);
-  }
+  return ReadDae(request.path, points);
 }
 
 }  // namespace
@@ -102,11 +101,8 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
 }
 
 bool IsMeshFormat(PointFormat format) {
-  return format == PointFormat::kObj || format == PointFormat::kOff || IsAssimpFormat(format);
-}
-
-bool IsAssimpFormat(PointFormat format) {
-  return format == PointFormat::kStl || format == PointFormat::kGltf || format == PointFormat::kDae;
+  return format == PointFormat::kObj || format == PointFormat::kOff ||
+         format == PointFormat::kStl || format == PointFormat::kGltf || format == PointFormat::kDae;
 }
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {
@@ -123,12 +119,12 @@ absl::Status AddTextPoint(const ByteSource& source, std::string_view text, Point
     if (token.empty()) {
       return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, here are ", i));
     }
-    if (const NumberText kind = ParseDouble(token, &xyz[i]); kind != NumberText::kNumber) {
+    if (const NumberText kind = points->Parse(token, i, &xyz[i]); kind != NumberText::kNumber) {
       return source.ErrorAtLine(NumberProblem(kind, token));
     }
   }
-  return points->Add(xyz[0], xyz[1], xyz[2],
-                     [&](const std::string& message) { return source.ErrorAtLine(message); });
+  return points->AddScaled(xyz[0], xyz[1], xyz[2],
+                           [&](const std::string& message) { return source.ErrorAtLine(message); });
 }
 
 }  // namespace hulld

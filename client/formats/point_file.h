@@ -12,32 +12,30 @@
 
 namespace hulld {
 
-enum class PointFormat { kObj, kOff, kPly, kXyz, kCsv, kPcd, kStl, kGltf, kDae };
+enum class PointFormat { kObj, kOff, kPly, kXyz, kCsv, kPcd, kPts, kLas, kStl, kGltf, kDae };
 
-// "obj" and so on, as --format takes them.
+// Returns the values of --format: "obj" and so on.
 const std::vector<std::string>& PointFormatNames();
 absl::StatusOr<PointFormat> PointFormatFromName(const std::string& name);
-// By the extension, in any case. INVALID_ARGUMENT when it is unknown.
+// Returns the format by extension, ignoring case. INVALID_ARGUMENT if it is unknown.
 absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path);
 
-// Whether ReadMesh (mesh_file.h) reads triangles of it.
+// Returns true if ReadMesh (mesh_file.h) can read triangles of the format.
 bool IsMeshFormat(PointFormat format);
-// Whether it is read through assimp, which needs a file that has a name.
-bool IsAssimpFormat(PointFormat format);
 
-// Reads the points of one file and passes them on in blocks, in the file's order, as they are
-// found; blocks before an error were passed on. Text becomes the nearest double, binary scalars are
-// taken as they are. Errors of the file are INVALID_ARGUMENT and name file and line, or file and
-// byte; errors of `receive` are returned as they are.
+// Reads the points of a file and passes them on in blocks, in the file's order; blocks before an
+// error are delivered. Text becomes the nearest double; binary scalars are taken as they are.
+// Errors of the file are INVALID_ARGUMENT and name file and line, or file and byte. Errors of
+// `receive` are returned unchanged.
 //
-// What counts as a point: obj: each `v` (weights and colours are ignored); off, ply, pcd: each
-// vertex; xyz: the first three columns; csv: the columns x, y and z; stl: each corner of each
-// triangle; gltf, dae: each vertex of each mesh, moved as its node says, once per node that shows
-// it. COLLADA (dae) comes in metres, by the file's own unit, and with its axes as they are, as
-// robot descriptions expect it: its up_axis turns nothing.
+// Points by format: obj: each `v` (weights and colours are ignored); off, ply, pcd, las: each
+// vertex; xyz, pts: the first three columns; csv: the columns x, y, and z; stl: each corner of each
+// triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that shows
+// it. COLLADA (dae) is converted to metres by the file's own unit and keeps its axes, as robot
+// descriptions expect: up_axis is ignored.
 //
-// `path` "-" is standard input, which stl, gltf and dae refuse. `progress`, when set, is told the
-// bytes read now and then.
+// `path` "-" is standard input, which dae refuses. `progress`, if set, periodically receives
+// the number of bytes read.
 struct ReadRequest {
   std::string path;
   PointFormat format;
@@ -46,19 +44,21 @@ struct ReadRequest {
 };
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive);
 
-// The readers of each format. They stop at the first error; the caller flushes the collector.
+// Readers of the formats. They stop at the first error; the caller flushes the collector.
 absl::Status ReadObj(ByteSource* source, PointCollector* points);
 absl::Status ReadOff(ByteSource* source, PointCollector* points);
 absl::Status ReadPly(ByteSource* source, PointCollector* points);
 absl::Status ReadXyz(ByteSource* source, PointCollector* points);
 absl::Status ReadCsv(ByteSource* source, PointCollector* points);
 absl::Status ReadPcd(ByteSource* source, PointCollector* points);
-absl::Status ReadStl(const std::string& path, PointCollector* points);
-absl::Status ReadGltf(const std::string& path, PointCollector* points);
+absl::Status ReadPts(ByteSource* source, PointCollector* points);
+absl::Status ReadLas(ByteSource* source, PointCollector* points);
+absl::Status ReadStl(ByteSource* source, PointCollector* points);
+absl::Status ReadGltf(ByteSource* source, PointCollector* points);
 absl::Status ReadDae(const std::string& path, PointCollector* points);
 
-// Parses the first three tokens of `text`, the coordinates of a point that is on the source's
-// present line, and adds it.
+// Parses the first three tokens of `text`, the coordinates of a point on the source's current line,
+// and adds the point.
 absl::Status AddTextPoint(const ByteSource& source, std::string_view text, PointCollector* points);
 
 }  // namespace hulld

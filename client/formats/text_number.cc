@@ -12,9 +12,9 @@ bool IsSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
-// std::from_chars says "out of range" for both 1e999 and 1e-999. This tells them apart by the
-// decimal exponent of the first digit that is not 0; a valid number outside the range of double has
-// one above 300 or below -300.
+// Distinguishes 1e999 from 1e-999, for both of which std::from_chars returns "out of range", by the
+// decimal exponent of the first nonzero digit: for a valid number outside the range of double it is
+// above 300 or below -300.
 bool IsHuge(std::string_view text) {
   long long exponent = -1;
   bool in_fraction = false;
@@ -48,7 +48,7 @@ bool IsHuge(std::string_view text) {
 NumberText ParseDouble(std::string_view text, double* value) {
   const bool negative = !text.empty() && text[0] == '-';
   if (negative || (!text.empty() && text[0] == '+')) text.remove_prefix(1);
-  // from_chars would take a second '-'.
+  // from_chars would accept a second '-'.
   if (text.empty() || text[0] == '-') return NumberText::kNoNumber;
   const char* const end = text.data() + text.size();
   double magnitude = 0;

@@ -62,13 +62,14 @@ void AddGlobalOptions(Command program, Invocation* invocation) {
             return absl::OkStatus();
           },
           "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
-          "'backup save' take the time that they need unless it is given)")
+          "'backup save' take the time that they need unless it is given). A server that cannot be "
+          "reached is retried until then, without the option for less than a second")
       .ValueName("TIME");
   AddOutputOptions(program, invocation);
 }
 
-// The groups of the help, and the commands in them. A new command has its line here, its
-// declaration in commands/commands.h, and all else in its own file.
+// Groups of the help, and their commands. A new command adds a line here and a declaration in
+// commands/commands.h; the rest is in its own file.
 void AddCommands(Command program, Invocation* invocation) {
   program.BeginGroup("Build hulls");
   AddCreateCommand(program, invocation);
@@ -106,7 +107,7 @@ void AddCommands(Command program, Invocation* invocation) {
   program.RequireCommand();
 }
 
-// "help check" is "check --help".
+// Rewrites "help check" to "check --help".
 std::vector<std::string> WithoutHelpCommand(std::vector<std::string> arguments) {
   if (arguments.empty() || arguments.front() != "help") return arguments;
   arguments.erase(arguments.begin());
@@ -124,10 +125,10 @@ void AddProgram(Command program, Invocation* invocation) {
   AddCommands(program, invocation);
 }
 
-// Answers a shell that asks what can stand for the last of the words.
+// Prints the completions of the last word, for a shell.
 int CompleteWords(const std::vector<std::string>& words, CommandLine* command_line,
                   Invocation* invocation) {
-  // Options that tell the server; where they make no sense, there are no IDs to offer.
+  // Connection options; without them no IDs are offered.
   std::vector<std::string> options = ProgramOptionsIn(command_line->description(), words);
   options.emplace_back("health");
   std::ostringstream ignored;
@@ -149,8 +150,8 @@ int CompleteWords(const std::vector<std::string>& words, CommandLine* command_li
   return static_cast<int>(ExitCode::kDone);
 }
 
-// What the options of a shell said holds for its lines. A line that names a server gets nothing
-// that was meant for another one.
+// Passes the options of a shell session to its lines. A line with its own server inherits no
+// connection settings.
 void Inherit(const Invocation& session, Invocation* line) {
   if (!line->flags.contains("server") && line->context.empty()) {
     line->flags.insert(session.flags.begin(), session.flags.end());
@@ -167,7 +168,7 @@ ExitCode Act(Invocation* invocation) {
     const absl::Status resolved = ResolveConnection(invocation);
     if (!resolved.ok()) return invocation->FailUsage(resolved);
   }
-  // What is for other programs has no colours.
+  // Machine-readable output has no colours.
   if (invocation->json() || invocation->names()) invocation->paint = Painter();
   const ExitCode code = invocation->action();
   invocation->out.flush();
@@ -176,7 +177,7 @@ ExitCode Act(Invocation* invocation) {
   return ExitCode::kUsage;
 }
 
-// Runs one command line; it is one of a shell unless `session` is null.
+// Runs one command line; `session` is that of its shell, or null.
 int Run(const std::vector<std::string>& arguments, const Invocation* session, std::ostream& out,
         std::ostream& err) {
   CommandLine command_line(

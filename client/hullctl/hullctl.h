@@ -7,7 +7,7 @@
 
 namespace hulld {
 
-// Runs hullctl with the arguments that follow its name; returns the exit code for the shell.
+// Runs hullctl with the arguments after its name; returns the exit code.
 int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace hulld

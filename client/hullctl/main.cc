@@ -5,10 +5,10 @@
 #include "client/hullctl/hullctl.h"
 
 int main(int argc, char** argv) {
-  // A closed pipe is seen as a failed write, and reported.
+  // A closed pipe becomes a failed write, which is reported.
   std::signal(SIGPIPE, SIG_IGN);
   std::ios::sync_with_stdio(false);
-  // gRPC's own log would repeat our errors; the user can turn it on.
+  // gRPC's log would repeat our errors; the user can enable it.
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   return hulld::RunHullctl({argv + 1, argv + argc}, std::cout, std::cerr);
 }

@@ -1,10 +1,10 @@
-"""Builds the package; the code of the contract is made from ../../proto on the way.
+"""Builds the package, with the code of the contract (from ../../proto) and the asyncio client (by
+generate_aio.py).
 
     pip install --no-build-isolation client/python
 
 needs protoc and grpc_python_plugin (Debian: protobuf-compiler, protobuf-compiler-grpc), and no
-network. Nothing is written to the source tree, except by an editable install (pip install -e),
-whose generated files lie beside the sources.
+network. Nothing is written to the source tree, except by an editable install (pip install -e).
 """
 
 import atexit
@@ -12,6 +12,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 
 from setuptools import setup
@@ -19,6 +20,9 @@ from setuptools.command.build_py import build_py
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROTO = HERE.parent.parent / "proto"
+sys.path.insert(0, str(HERE))
+
+import generate_aio  # noqa: E402
 
 
 def version():
@@ -63,12 +67,13 @@ class BuildWithContract(build_py):
         super().run()
         target = HERE if getattr(self, "editable_mode", False) else self.build_lib
         generate(target)
+        generate_aio.generate(HERE / "hulld", pathlib.Path(target, "hulld"))
         pathlib.Path(target, "hulld", "_version.py").write_text(
             f'__version__ = "{version()}"\n', encoding="utf-8"
         )
 
 
-# Several builds of one tree at a time, as tests make them, must not meet in one directory.
+# Concurrent builds, as in tests, need directories of their own.
 scratch = tempfile.mkdtemp(prefix="hulld-build-")
 atexit.register(shutil.rmtree, scratch, ignore_errors=True)
 

@@ -13,7 +13,7 @@
 namespace hulld {
 namespace {
 
-// The cells of a line, without quotes and spaces. Empty for a line that says nothing.
+// Returns the cells of a line, without quotes and spaces. Empty for a blank line or a comment.
 std::vector<std::string_view> CellsOf(std::string_view line) {
   std::vector<std::string_view> cells;
   line = Trim(line);
@@ -36,19 +36,23 @@ std::vector<std::string_view> CellsOf(std::string_view line) {
   }
 }
 
-std::string NamesOf(const Robot& robot, const std::vector<int>& joints) {
-  return absl::StrJoin(joints, ", ", [&](std::string* out, int joint) {
-    out->append(robot.joints[static_cast<size_t>(joint)].name);
+// Returns the names of variables, separated by commas.
+std::string NamesOf(const std::vector<JointVariable>& variables) {
+  return absl::StrJoin(variables, ", ", [](std::string* out, const JointVariable& variable) {
+    out->append(variable.name);
   });
 }
 
-// The place of a column's joint among the free ones.
-absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<int>& free,
+// Returns the index of the variable that a column names.
+absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<JointVariable>& variables,
                             const std::string& name) {
+  const auto variable = std::find_if(variables.begin(), variables.end(),
+                                     [&](const JointVariable& one) { return one.name == name; });
+  if (variable != variables.end()) return static_cast<int>(variable - variables.begin());
   const int joint = robot.FindJoint(name);
   if (joint < 0) {
     return absl::InvalidArgumentError(absl::StrCat(
-        Quoted(name), " is no joint of the robot; those with a value are ", NamesOf(robot, free)));
+        Quoted(name), " is no joint of the robot; those with a value are ", NamesOf(variables)));
   }
   const RobotJoint& found = robot.joints[static_cast<size_t>(joint)];
   if (found.mimics >= 0) {
@@ -59,15 +63,40 @@ absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<int>& free,
   if (found.kind == JointKind::kFixed) {
     return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is fixed; leave it out"));
   }
-  return static_cast<int>(std::find(free.begin(), free.end(), joint) - free.begin());
+  std::vector<JointVariable> parts = variables;
+  std::erase_if(parts, [&](const JointVariable& one) { return one.joint != joint; });
+  return absl::InvalidArgumentError(
+      absl::StrCat(Quoted(name), " has several values; its columns are ", NamesOf(parts)));
+}
+
+// Checks that a table has all four columns of a quaternion or none: three numbers do not determine
+// the fourth.
+absl::Status CheckRotations(const ByteSource& source, const Robot& robot,
+                            const std::vector<JointVariable>& variables,
+                            const std::vector<int>& columns) {
+  std::vector<int> parts(robot.joints.size(), 0);
+  for (const int column : columns) {
+    if (column < 0) continue;
+    const JointVariable& variable = variables[static_cast<size_t>(column)];
+    const auto joint = static_cast<size_t>(variable.joint);
+    if (robot.joints[joint].kind == JointKind::kFloating && variable.place < 4) ++parts[joint];
+  }
+  for (size_t j = 0; j < parts.size(); ++j) {
+    if (parts[j] % 4 == 0) continue;
+    const std::string& name = robot.joints[j].name;
+    return source.ErrorAtLine(absl::StrCat("the header has ", parts[j], " of the 4 columns ", name,
+                                           "/rot_x, ", name, "/rot_y, ", name, "/rot_z and ", name,
+                                           "/rot_w"));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
 
 absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Robot& robot) {
-  WaypointReader reader(source);
+  WaypointReader reader(source, robot);
   reader.rest_ = RestValues(robot);
-  const std::vector<int> free = robot.FreeJoints();
+  const std::vector<JointVariable> variables = robot.Variables();
   bool names_joint = false;
   for (std::string_view line; source->ReadLine(&line);) {
     for (const std::string_view cell : CellsOf(line)) {
@@ -75,7 +104,7 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
         reader.columns_.push_back(-1);
         continue;
       }
-      const auto place = PlaceOf(robot, free, std::string(cell));
+      const auto place = PlaceOf(robot, variables, std::string(cell));
       if (!place.ok()) {
         return source->ErrorAtLine(
             std::string(place.status().message().data(), place.status().message().size()));
@@ -94,6 +123,8 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
     return absl::InvalidArgumentError(
         absl::StrCat(source->name(), ": there is no header that names joints in it"));
   }
+  absl::Status good = CheckRotations(*source, robot, variables, reader.columns_);
+  if (!good.ok()) return good;
   return reader;
 }
 
@@ -116,7 +147,10 @@ absl::StatusOr<bool> WaypointReader::Next(std::vector<double>* free_values) {
         return source_->ErrorAtLine(Quoted(cells[i]) + " is not a finite number");
       }
     }
-    return true;
+    const std::string joint = JointWithoutRotation(*robot_, *free_values);
+    if (joint.empty()) return true;
+    return source_->ErrorAtLine(
+        absl::StrCat("the quaternion of ", joint, " is 0 0 0 0, which is no rotation"));
   }
   if (!source_->status().ok()) return source_->status();
   return false;

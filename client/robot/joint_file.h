@@ -12,28 +12,31 @@
 
 namespace hulld {
 
-// Reads waypoints one by one from a table: a header of names of joints, then a row for each
-// waypoint, in radians and metres, with commas, semicolons, tabs or spaces between. A column
-// "time" is passed over, blank lines and lines that start with # are, too. Joints without a column
-// stay at rest. Memory does not grow with the file.
+// Reads waypoints one by one from a table: a header of variable names (see JointVariable), then one
+// row per waypoint, in radians and metres, separated by commas, semicolons, tabs, or spaces. Skips
+// a column "time", blank lines, and lines that start with #. Variables without a column stay at
+// rest. Memory does not grow with the file.
 class WaypointReader {
  public:
-  // Reads the header. INVALID_ARGUMENT names the line: a name that is no joint of the robot, one of
-  // a joint that is fixed or mimics another, a joint that is named twice, no joint at all.
+  // Reads the header. INVALID_ARGUMENT names the line: an unknown joint, a joint that is fixed or
+  // mimics another, a duplicate joint, an incomplete quaternion, or no joint at all. The robot must
+  // outlive the reader.
   static absl::StatusOr<WaypointReader> Open(ByteSource* source, const Robot& robot);
 
-  // Replaces `free_values`, one for each free joint of the robot, by the next waypoint. False at
-  // the end. INVALID_ARGUMENT names the line: too few or too many columns, no finite number.
+  // Sets `free_values`, one number per variable of the robot, to the next waypoint. Returns false
+  // at the end. INVALID_ARGUMENT names the line: too few or too many columns, a number that is not
+  // finite, or a quaternion of 0.
   absl::StatusOr<bool> Next(std::vector<double>* free_values);
 
-  // Where the last waypoint was.
+  // Returns the line of the last waypoint.
   uint64_t line() const { return source_->line(); }
 
  private:
-  explicit WaypointReader(ByteSource* source) : source_(source) {}
+  WaypointReader(ByteSource* source, const Robot& robot) : source_(source), robot_(&robot) {}
 
   ByteSource* source_;
-  // For each column, the place among the free joints; -1 for one that is passed over.
+  const Robot* robot_;
+  // The index of the variable of each column; -1 for a skipped column.
   std::vector<int> columns_;
   std::vector<double> rest_;
 };

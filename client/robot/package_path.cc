@@ -23,7 +23,7 @@ bool IsFile(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-// Folders called `package` below `folder`, in the order of their names, level by level.
+// Returns the folders named `package` below `folder`, level by level, each level in order of names.
 std::vector<fs::path> PackagesBelow(const fs::path& folder, const std::string& package) {
   std::vector<fs::path> found;
   std::vector<fs::path> level = {folder};
@@ -48,7 +48,7 @@ std::vector<fs::path> PackagesBelow(const fs::path& folder, const std::string& p
   return found;
 }
 
-// The folders that may be the package, the likeliest first.
+// Returns the candidate folders of the package, most likely first.
 std::vector<fs::path> FoldersOf(const PackagePaths& paths, const std::string& package) {
   if (const auto named = paths.named.find(package); named != paths.named.end()) {
     return {named->second};

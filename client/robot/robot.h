@@ -7,29 +7,31 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/length_scale.h"
 #include "client/pose/rigid_pose.h"
 
 namespace hulld {
 
-// What a robot description comes to, as far as collisions go: links that form a tree of joints, and
-// the shapes on them. Lengths are metres and angles radians, as in URDF.
+// The collision model of a robot description: links that form a tree of joints, and their collision
+// shapes. Lengths are metres and angles radians, as in URDF.
 
 enum class ShapeKind { kBox, kCylinder, kSphere, kCapsule, kMesh };
 
-// A shape that collides.
+// A collision shape.
 struct CollisionShape {
   ShapeKind kind = ShapeKind::kMesh;
-  // Box: its edges.
+  // Box: edge lengths.
   std::array<double, 3> size = {0, 0, 0};
-  // Cylinder, sphere and capsule. A capsule's length is that of its cylinder, without the caps.
+  // Cylinder, sphere, and capsule. The length of a capsule is that of its cylinder, without the
+  // caps.
   double radius = 0;
   double length = 0;
-  // Mesh: the file as the description names it, and the factors of its coordinates.
+  // Mesh: the file as named in the description, and the factors of its coordinates.
   std::string mesh;
-  std::array<double, 3> scale = {1, 1, 1};
-  // The pose in the frame of the link.
+  std::array<LengthScale, 3> scale;
+  // Pose in the frame of the link.
   RigidPose X_LS = kNoMotion;
-  // Where the description has it.
+  // Line in the description.
   int line = 0;
 };
 
@@ -40,58 +42,82 @@ struct RobotLink {
   std::vector<CollisionShape> shapes;
 };
 
-enum class JointKind { kFixed, kRevolute, kContinuous, kPrismatic };
+enum class JointKind { kFixed, kRevolute, kContinuous, kPrismatic, kPlanar, kFloating };
+
+// Values of a joint; values that its kind lacks are 0. Floating: the child's pose. Planar: x, y,
+// then the angle theta. Other kinds: one value, unused for a fixed joint.
+using JointValue = std::array<double, 7>;
 
 struct RobotJoint {
   std::string name;
   JointKind kind = JointKind::kFixed;
   int parent = 0;
   int child = 0;
-  // The pose in the frame of the parent at value 0.
+  // Pose in the frame of the parent at value 0.
   RigidPose X_PJ = kNoMotion;
+  // Unit length. For a planar joint, the normal of the plane: x and y run along the images of the x
+  // and y axes under the shortest rotation from z to the normal, and theta turns about the normal.
   std::array<double, 3> axis = {1, 0, 0};
-  // Absent for a joint that turns on and on.
+  // Absent for a continuous joint.
   std::optional<std::array<double, 2>> limits;
-  // Where it follows another joint: value = multiplier * that of joint `mimics` + offset.
+  // For a joint that follows another one: value = multiplier * (value of joint `mimics`) + offset.
   int mimics = -1;
   double multiplier = 1;
   double offset = 0;
 
-  // Whether it has a value of its own.
+  // Returns true if the joint has a value of its own.
   bool is_free() const { return kind != JointKind::kFixed && mimics < 0; }
+  // Returns true if the motion of the child is unbounded.
+  bool is_loose() const { return kind == JointKind::kPlanar || kind == JointKind::kFloating; }
+};
+
+// A variable of a robot's configuration: a value of a free joint. Named after its joint; for a
+// joint with several values, as MoveIt names them: JOINT/x, /y, and /theta of a planar joint,
+// JOINT/trans_x, /trans_y, /trans_z, /rot_x, /rot_y, /rot_z, and /rot_w of a floating one.
+struct JointVariable {
+  std::string name;
+  int joint = 0;
+  // Index in the joint's value.
+  size_t place = 0;
 };
 
 struct Robot {
   std::string name;
-  // Parents before their children; the first is the root.
+  // Parents precede their children; the first is the root.
   std::vector<RobotLink> links;
-  // In the order of their children.
+  // In the order of their child links.
   std::vector<RobotJoint> joints;
 
-  // The indices of the joints that have values of their own.
-  std::vector<int> FreeJoints() const;
-  // -1 when there is none of that name.
+  // Returns the variables of all free joints, in the order of the joints.
+  std::vector<JointVariable> Variables() const;
+  // Returns -1 for an unknown name.
   int FindLink(const std::string& link) const;
   int FindJoint(const std::string& joint) const;
 };
 
-// A value for each joint of the robot: those that are free as `free_values` says, in the order of
-// FreeJoints(), those that mimic from them, and 0 for fixed ones. Requires as many values as free
-// joints (unchecked: callers fill them from FreeJoints()).
-std::vector<double> AllJointValues(const Robot& robot, std::span<const double> free_values);
+// Returns the value of each joint: free joints from `free_values`, in the order of Variables(),
+// mimic joints computed from these, and 0 for fixed joints. Requires a number for each variable
+// (unchecked: callers fill them from Variables()).
+std::vector<JointValue> AllJointValues(const Robot& robot, std::span<const double> free_values);
 
-// Where the robot starts: 0 for each free joint, or the middle of its limits where they exclude 0.
+// Returns the rest configuration: 0 for each variable, or the middle of its limits if they exclude
+// 0; 1 for the w of a rotation.
 std::vector<double> RestValues(const Robot& robot);
 
-// X_WL of each link, where the root stands at X_WB. In floating point: each joint on the way adds
-// an error of a few units of roundoff. Requires a value for each joint (unchecked: callers pass on
-// what AllJointValues gives).
-std::vector<RigidPose> LinkPoses(const Robot& robot, const RigidPose& X_WB,
-                                 std::span<const double> joint_values);
+// Returns the name of a floating joint with the quaternion 0 0 0 0, which is no rotation; empty if
+// none has it.
+std::string JointWithoutRotation(const Robot& robot, std::span<const double> free_values);
 
-// What is wrong with the values for the limits of the joints, a sentence each; empty: nothing.
-// Requires the same.
-std::vector<std::string> LimitProblems(const Robot& robot, std::span<const double> joint_values);
+// Returns X_WL of each link for a root at X_WB. Floating point: each joint on the path adds an
+// error of a few units of roundoff. Requires a value for each joint (unchecked: callers pass the
+// result of AllJointValues).
+std::vector<RigidPose> LinkPoses(const Robot& robot, const RigidPose& X_WB,
+                                 std::span<const JointValue> joint_values);
+
+// Returns the violations of joint limits, one sentence each; empty if all values are within limits.
+// Same requirement.
+std::vector<std::string> LimitProblems(const Robot& robot,
+                                       std::span<const JointValue> joint_values);
 
 }  // namespace hulld
 

@@ -17,8 +17,8 @@ namespace {
 using Vector = std::array<double, 3>;
 using Triangle = std::array<int, 3>;
 
-// Makes room for the rounding of what follows, a few tens of operations of relative error 2^-53
-// each. Proven: 64 operations lose less than 2^-46 of a length.
+// Margin for the rounding of the following computation, a few tens of operations of relative error
+// 2^-53 each. Proven: 64 operations lose less than 2^-46 of a length.
 constexpr double kOutward = 1 + 0x1p-46;
 
 struct Sphere {
@@ -31,7 +31,7 @@ Vector Unit(const Vector& v) {
   return {v[0] / length, v[1] / length, v[2] / length};
 }
 
-// Each triangle in four, the new vertices moved onto the unit sphere.
+// Splits each triangle into four, with the new vertices on the unit sphere.
 Sphere Subdivide(const Sphere& from) {
   Sphere to;
   to.vertices = from.vertices;
@@ -73,7 +73,7 @@ Sphere Icosahedron() {
   return sphere;
 }
 
-// The distance of the nearest plane of the triangles from the origin.
+// Returns the distance of the nearest triangle plane from the origin.
 double InnerRadius(const Sphere& sphere) {
   double least = 1;
   for (const auto& [a, b, c] : sphere.triangles) {
@@ -89,9 +89,10 @@ double InnerRadius(const Sphere& sphere) {
   return least;
 }
 
-// Vertices of a polyhedron that holds the ball of radius 1 around the origin. The triangles form a
-// closed surface that each ray from the origin meets once, and no point of it is nearer than the
-// nearest plane: so what it bounds holds that ball, and the convex hull of its vertices does.
+// Returns the vertices of a polyhedron that contains the unit ball around the origin. The triangles
+// form a closed surface that each ray from the origin meets exactly once, and no point of it is
+// nearer than the nearest plane. So its interior contains the ball, and so does the convex hull of
+// its vertices.
 const std::vector<Vector>& RoundVertices() {
   static const auto* const vertices = [] {
     const Sphere sphere = Subdivide(Subdivide(Icosahedron()));
@@ -155,7 +156,8 @@ ShapeHull PrimitiveHull(const CollisionShape& shape) {
       AddRound(shape.radius, 0, &hull.xyz);
       break;
     case ShapeKind::kCapsule: {
-      // Adding the radius to half the length rounds by that sum, not by the radius.
+      // Adding the radius to half the length has a rounding error relative to the sum, not to the
+      // radius.
       const double half = shape.length / 2;
       const double slack = 1 + 0x1p-51 * (1 + half / shape.radius);
       AddRound(slack * shape.radius, half, &hull.xyz);
@@ -176,21 +178,14 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
         absl::StrCat(file, ": meshes are read from obj, stl, ply, off, gltf and dae; convert it"));
   }
   ShapeHull hull;
-  const auto counts = ReadPoints({file, *format, {}, {}}, [&](const PointBlock& block) {
-    for (size_t i = 0; i < block.xyz.size(); ++i) {
-      hull.xyz.push_back(block.xyz[i] * shape.scale[i % 3]);
-    }
-    for (size_t i = 0; i < block.xyz_float.size(); ++i) {
-      hull.xyz.push_back(static_cast<double>(block.xyz_float[i]) * shape.scale[i % 3]);
-    }
+  ReadRequest request{file, *format, {}, {}};
+  request.options.scale = shape.scale;
+  const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+    hull.xyz.insert(hull.xyz.end(), block.xyz.begin(), block.xyz.end());
+    hull.xyz.insert(hull.xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     return absl::OkStatus();
   });
   if (!counts.ok()) return counts.status();
-  const auto is_finite = [](double x) { return std::isfinite(x); };
-  if (!std::all_of(hull.xyz.begin(), hull.xyz.end(), is_finite)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(file, ": scaled, a coordinate is beyond the largest double"));
-  }
   if (hull.xyz.empty()) return absl::InvalidArgumentError(absl::StrCat(file, ": holds no vertex"));
   return hull;
 }

@@ -10,24 +10,24 @@
 
 namespace hulld {
 
-// Points whose convex hull stands for a shape.
+// Points with a convex hull that stands for a shape.
 struct ShapeHull {
-  // x y z each, in the frame of the shape.
+  // n x 3, in the frame of the shape.
   std::vector<double> xyz;
-  // The hull holds the shape and reaches no farther beyond it than this, in metres; proven, up to
-  // the rounding of this number. 0 for boxes, and for meshes, whose hull it is.
+  // The hull contains the shape and extends at most this far beyond it, in metres; proven, up to
+  // the rounding of this number. 0 for boxes, and for meshes, which are replaced by their hull.
   double excess = 0;
 };
 
-// Box: its corners, exact but for halving the smallest numbers. Cylinder: a prism of
-// kCylinderSides sides around it. Sphere: a geodesic polyhedron of 162 vertices around it.
-// Capsule: the hull of two of those. None of them is larger than it must be but for a few units of
-// roundoff. Requires sizes above 0, as ReadUrdf makes sure of; a mesh is not its business.
+// Returns points of a hull around the shape. Box: its corners, exact but for halving the smallest
+// numbers. Cylinder: a prism of kCylinderSides sides around it. Sphere: a geodesic polyhedron of
+// 162 vertices around it. Capsule: the hull of two of these. Each is as tight as possible within a
+// few units of roundoff. Requires sizes above 0, as ReadUrdf ensures, and no mesh.
 ShapeHull PrimitiveHull(const CollisionShape& shape);
 inline constexpr int kCylinderSides = 32;
 
-// The vertices of the mesh in `file`, each coordinate times its factor of the scale, rounded to the
-// nearest double. INVALID_ARGUMENT names the file and what is wrong with it.
+// Returns the vertices of the mesh in `file`, each coordinate times its factor of the scale,
+// rounded to the nearest double. INVALID_ARGUMENT names the file and its defect.
 absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::string& file);
 
 }  // namespace hulld

@@ -90,26 +90,26 @@ absl::StatusOr<std::set<LinkPair>> ReadDisabledPairs(const std::string& path, co
 }
 
 std::set<LinkPair> AdjacentPairs(const Robot& robot) {
-  // Two links with shapes are neighbours when the way between them passes none: so each is a
-  // neighbour of the nearest one with shapes above it, and all that hang from the same bare links
-  // are neighbours, too.
+  // Two links with shapes are neighbours if the path between them has no other link with shapes. So
+  // each is a neighbour of its nearest ancestor with shapes, and all links below the same links
+  // without shapes are neighbours of each other.
   std::set<LinkPair> pairs;
   const int count = static_cast<int>(robot.links.size());
-  // The topmost link of the bare ones that a link hangs from, or the nearest with shapes.
+  // Topmost of the links without shapes above a link, or its nearest ancestor with shapes.
   std::vector<int> group(robot.links.size(), 0);
   std::vector<std::vector<int>> members(robot.links.size());
   for (int i = 0; i < count; ++i) {
     const auto at = static_cast<size_t>(i);
     const int joint = robot.links[at].parent_joint;
     const bool bare = robot.links[at].shapes.empty();
-    if (joint < 0) {
+    if (joint < 0 || robot.joints[static_cast<size_t>(joint)].is_loose()) {
       group[at] = i;
       if (!bare) members[at].push_back(i);
       continue;
     }
     const auto parent = static_cast<size_t>(robot.joints[static_cast<size_t>(joint)].parent);
     const bool parent_bare = robot.links[parent].shapes.empty();
-    // Where bare links hang from one with shapes, each branch of them is a group of its own.
+    // Each branch of links without shapes below a link with shapes is a separate group.
     const int key = parent_bare ? group[parent] : i;
     group[at] = bare ? key : i;
     if (!parent_bare) members[static_cast<size_t>(key)].push_back(static_cast<int>(parent));

@@ -10,6 +10,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "client/formats/byte_source.h"
@@ -20,9 +21,10 @@ namespace hulld {
 namespace {
 
 constexpr const char* kShapes[] = {"box", "cylinder", "sphere", "capsule", "mesh"};
-constexpr const char* kJoints[] = {"fixed", "revolute", "continuous", "prismatic"};
+constexpr const char* kJoints[] = {"fixed",     "revolute", "continuous",
+                                   "prismatic", "planar",   "floating"};
 
-// Keeps the first error that liburdfdom logs, in place of what it prints.
+// Captures the first error that liburdfdom logs, in place of its output.
 class FirstError final : public console_bridge::OutputHandler {
  public:
   FirstError() { console_bridge::useOutputHandler(this); }
@@ -40,7 +42,8 @@ class FirstError final : public console_bridge::OutputHandler {
   std::string text_;
 };
 
-// Checks what the library would accept, or refuse without a line, before the library sees it.
+// Checks a description before liburdfdom parses it, for defects that the library accepts or reports
+// without a line.
 class UrdfCheck {
  public:
   explicit UrdfCheck(const XmlDocument& document) : document_(document) {}
@@ -123,7 +126,8 @@ class UrdfCheck {
     if (mesh.Attribute("scale") == nullptr) return absl::OkStatus();
     const auto scale = NumbersOf(document_, mesh, "scale", 3);
     if (!scale.ok()) return scale.status();
-    return absl::OkStatus();
+    const bool is_flat = std::count(scale->begin(), scale->end(), 0) > 0;
+    return is_flat ? document_.ErrorAt(mesh, "<mesh> scale must not be 0") : absl::OkStatus();
   }
 
   absl::Status CheckSizes(const TiXmlElement& shape, const char* attribute, size_t count) const {
@@ -162,7 +166,8 @@ class UrdfCheck {
     if (std::find(std::begin(kJoints), std::end(kJoints), kind) == std::end(kJoints)) {
       return document_.ErrorAt(
           joint, absl::StrCat("joint ", Quoted(*name), " has type ", Quoted(kind),
-                              "; types are fixed, revolute, continuous and prismatic"));
+                              "; types are fixed, revolute, continuous, prismatic, planar and "
+                              "floating"));
     }
     absl::Status good = CheckOrigin(joint);
     if (good.ok()) good = CheckAxisAndLimits(joint, kind);
@@ -180,16 +185,23 @@ class UrdfCheck {
   }
 
   absl::Status CheckAxisAndLimits(const TiXmlElement& joint, const std::string& kind) const {
-    if (kind == "fixed") return absl::OkStatus();
+    if (kind == "fixed" || kind == "floating") return absl::OkStatus();
     if (const TiXmlElement* const axis = joint.FirstChildElement("axis"); axis != nullptr) {
       const auto xyz = NumbersOf(document_, *axis, "xyz", 3);
       if (!xyz.ok()) return xyz.status();
       if ((*xyz)[0] == 0 && (*xyz)[1] == 0 && (*xyz)[2] == 0) {
         return document_.ErrorAt(*axis, "<axis> xyz must not be 0 0 0");
       }
+    } else if (kind == "planar") {
+      // URDF's default, x, is rarely intended.
+      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
+                                                   " lacks <axis xyz=\"0 0 1\"/>, the normal of "
+                                                   "its plane"));
     }
-    if (kind == "continuous") return absl::OkStatus();
+    if (kind == "continuous" || kind == "planar") return absl::OkStatus();
     const TiXmlElement* const limit = joint.FirstChildElement("limit");
+    // A mimic joint needs no limits of its own.
+    if (limit == nullptr && joint.FirstChildElement("mimic") != nullptr) return absl::OkStatus();
     if (limit == nullptr) {
       return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
                                                    " lacks <limit lower=\"\" upper=\"\" ...>"));
@@ -204,7 +216,7 @@ class UrdfCheck {
 
   absl::Status CheckMimic(const TiXmlElement& joint) const {
     std::string name = AttributeOf(joint, "name");
-    // As many steps as there are joints lead to the end, or round.
+    // As many steps as joints reach the end of the chain, or prove a cycle.
     for (size_t step = 0; step <= joints_.size(); ++step) {
       const TiXmlElement* const at = joints_.at(name);
       const TiXmlElement* const mimic = at->FirstChildElement("mimic");
@@ -219,6 +231,12 @@ class UrdfCheck {
         return document_.ErrorAt(*mimic,
                                  absl::StrCat("joint ", Quoted(name),
                                               " mimics one that there is not: ", Quoted(leader)));
+      }
+      for (const std::string& one : {name, leader}) {
+        const std::string kind = AttributeOf(*joints_.at(one), "type");
+        if (kind != "planar" && kind != "floating") continue;
+        return document_.ErrorAt(*mimic, absl::StrCat("joint ", Quoted(one), " is ", kind,
+                                                      "; joints that mimic have one value each"));
       }
       name = std::move(leader);
     }
@@ -257,35 +275,59 @@ class UrdfCheck {
   const XmlDocument& document_;
   std::map<std::string, const TiXmlElement*> links_;
   std::map<std::string, const TiXmlElement*> joints_;
-  // By child.
+  // Keyed by child.
   std::map<std::string, std::string> parent_of_;
 };
 
-// Where each shape of a link is, and which are capsules.
+// Properties of a shape that the library does not read.
 struct ShapePlace {
   int line = 0;
   bool is_capsule = false;
+  // For a mesh: exact, as the library rounds it to doubles.
+  std::array<LengthScale, 3> scale;
 };
-using ShapePlaces = std::map<std::string, std::vector<ShapePlace>>;
 
-// Leaves in the document what the library is to read. Capsules become cylinders.
-ShapePlaces PrepareForLibrary(TiXmlElement* root) {
-  ShapePlaces places;
+// Parts of the document that the library does not read.
+struct Extras {
+  // Shapes by link.
+  std::map<std::string, std::vector<ShapePlace>> shapes;
+  // Joints without <limit>, which the library requires.
+  std::set<std::string> unlimited;
+};
+
+// Requires an attribute that CheckMesh accepted, or none.
+std::array<LengthScale, 3> ScaleOf(const TiXmlElement& shape) {
+  std::array<LengthScale, 3> scale;
+  const std::string text = AttributeOf(shape, "scale");
+  std::string_view rest = text;
+  for (LengthScale& factor : scale) {
+    factor = LengthScale::FromText(NextToken(&rest)).value_or(LengthScale());
+  }
+  return scale;
+}
+
+// Reduces the document to the elements that the library is to read. Capsules become cylinders.
+Extras PrepareForLibrary(TiXmlElement* root) {
+  Extras extras;
   for (TiXmlElement* child = root->FirstChildElement(); child != nullptr;) {
     TiXmlElement* const next = child->NextSiblingElement();
     if (child->ValueStr() != "link" && child->ValueStr() != "joint") {
       root->RemoveChild(child);
     } else if (child->ValueStr() == "joint") {
-      // Forces and speeds, which the library insists on, play no part here.
+      // The library requires forces and speeds, which are not used here.
       for (const char* name : {"dynamics", "safety_controller", "calibration"}) {
         while (TiXmlElement* const part = child->FirstChildElement(name)) child->RemoveChild(part);
       }
       if (TiXmlElement* const limit = child->FirstChildElement("limit"); limit != nullptr) {
         limit->SetAttribute("effort", "0");
         limit->SetAttribute("velocity", "0");
+      } else {
+        extras.unlimited.insert(AttributeOf(*child, "name"));
+        child->InsertEndChild(TiXmlElement("limit"))->ToElement()->SetAttribute("effort", "0");
+        child->FirstChildElement("limit")->SetAttribute("velocity", "0");
       }
     } else {
-      std::vector<ShapePlace>& shapes = places[AttributeOf(*child, "name")];
+      std::vector<ShapePlace>& shapes = extras.shapes[AttributeOf(*child, "name")];
       for (TiXmlElement* part = child->FirstChildElement(); part != nullptr;) {
         TiXmlElement* const after = part->NextSiblingElement();
         if (part->ValueStr() != "collision") {
@@ -294,14 +336,14 @@ ShapePlaces PrepareForLibrary(TiXmlElement* root) {
           TiXmlElement* const shape = part->FirstChildElement("geometry")->FirstChildElement();
           const bool is_capsule = shape->ValueStr() == "capsule";
           if (is_capsule) shape->SetValue("cylinder");
-          shapes.push_back({part->Row(), is_capsule});
+          shapes.push_back({part->Row(), is_capsule, ScaleOf(*shape)});
         }
         part = after;
       }
     }
     child = next;
   }
-  return places;
+  return extras;
 }
 
 RigidPose PoseOf(const urdf::Pose& pose) {
@@ -335,34 +377,38 @@ CollisionShape ShapeOf(const urdf::Collision& collision, const ShapePlace& place
       const auto& mesh = static_cast<const urdf::Mesh&>(*collision.geometry);
       shape.kind = ShapeKind::kMesh;
       shape.mesh = mesh.filename;
-      shape.scale = {mesh.scale.x, mesh.scale.y, mesh.scale.z};
+      shape.scale = place.scale;
     }
   }
   return shape;
 }
 
-RobotJoint JointOf(const urdf::Joint& from) {
+RobotJoint JointOf(const urdf::Joint& from, const Extras& extras) {
   RobotJoint joint;
   joint.name = from.name;
   joint.kind = from.type == urdf::Joint::REVOLUTE     ? JointKind::kRevolute
                : from.type == urdf::Joint::CONTINUOUS ? JointKind::kContinuous
                : from.type == urdf::Joint::PRISMATIC  ? JointKind::kPrismatic
+               : from.type == urdf::Joint::PLANAR     ? JointKind::kPlanar
+               : from.type == urdf::Joint::FLOATING   ? JointKind::kFloating
                                                       : JointKind::kFixed;
   joint.X_PJ = PoseOf(from.parent_to_joint_origin_transform);
-  if (joint.kind == JointKind::kFixed) return joint;
+  if (joint.kind == JointKind::kFixed || joint.kind == JointKind::kFloating) return joint;
   const double length = std::hypot(from.axis.x, from.axis.y, from.axis.z);
   joint.axis = {from.axis.x, from.axis.y, from.axis.z};
-  // A prismatic joint moves by its value, however long its axis is.
+  // The travel of a prismatic joint is its value, regardless of the length of the axis.
   if (length != 1) {
     for (double& x : joint.axis) x /= length;
   }
-  const bool limited = joint.kind != JointKind::kContinuous && from.limits != nullptr;
+  const bool limited =
+      (joint.kind == JointKind::kRevolute || joint.kind == JointKind::kPrismatic) &&
+      from.limits != nullptr && !extras.unlimited.contains(joint.name);
   if (limited) joint.limits = {from.limits->lower, from.limits->upper};
   return joint;
 }
 
-// Walks the tree of the model from its root; parents come before their children.
-absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlaces& places,
+// Converts the model, parents before their children.
+absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const Extras& extras,
                               const std::string& file) {
   Robot robot;
   robot.name = model.getName();
@@ -374,9 +420,9 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlac
     const int index = static_cast<int>(robot.links.size());
     RobotLink link;
     link.name = from->name;
-    // A name with letters that XML cannot hold may come back as another.
-    const auto known = places.find(from->name);
-    if (known == places.end() || known->second.size() != from->collision_array.size()) {
+    // A name with characters that XML cannot represent may not survive the round trip.
+    const auto known = extras.shapes.find(from->name);
+    if (known == extras.shapes.end() || known->second.size() != from->collision_array.size()) {
       return absl::InvalidArgumentError(absl::StrCat(
           file, ": liburdfdom reads link ", Quoted(from->name), " otherwise; use a plain name"));
     }
@@ -385,7 +431,7 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlac
       link.shapes.push_back(ShapeOf(*from->collision_array[i], lines[i]));
     }
     if (from->parent_joint != nullptr) {
-      RobotJoint joint = JointOf(*from->parent_joint);
+      RobotJoint joint = JointOf(*from->parent_joint, extras);
       joint.parent = parent;
       joint.child = index;
       link.parent_joint = static_cast<int>(robot.joints.size());
@@ -393,7 +439,7 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlac
       robot.joints.push_back(std::move(joint));
     }
     robot.links.push_back(std::move(link));
-    // Pushed in reverse, so that the order is the file's as far as the library keeps it.
+    // Pushed in reverse, so that the order is the file's, as far as the library preserves it.
     for (auto child = from->child_links.rbegin(); child != from->child_links.rend(); ++child) {
       pending.push_back({child->get(), index});
     }
@@ -419,7 +465,7 @@ absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name
   auto document = ParseXml(text, name, "robot");
   if (!document.ok()) return document.status();
   if (absl::Status good = UrdfCheck(**document).Run(); !good.ok()) return good;
-  const ShapePlaces places = PrepareForLibrary((*document)->tree.RootElement());
+  const Extras extras = PrepareForLibrary((*document)->tree.RootElement());
   TiXmlPrinter printer;
   (*document)->tree.Accept(&printer);
   const FirstError error;
@@ -434,7 +480,7 @@ absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name
   if (model == nullptr || model->getRoot() == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": liburdfdom refuses it: ", problem));
   }
-  return RobotOf(*model, places, name);
+  return RobotOf(*model, extras, name);
 }
 
 absl::StatusOr<Robot> ReadUrdf(const std::string& path) {

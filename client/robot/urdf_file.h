@@ -9,14 +9,14 @@
 
 namespace hulld {
 
-// Reads links, joints and what collides from a robot description; - is standard input. What is only
-// looked at or weighed (visual, inertial, transmissions, simulators) is passed over. liburdfdom
-// reads the values. Capsules, which its version 3 does not know, are read here.
+// Reads links, joints, and collision shapes from a robot description; "-" is standard input.
+// Ignores other elements (visual, inertial, transmissions, simulators). liburdfdom parses the
+// values. Capsules, which its version 3 does not know, are parsed here.
 //
-// INVALID_ARGUMENT names file and line, and says what the element lacks: XML that is not
-// well-formed, a number that is none, a link or joint without a name or with one that is taken, a
-// shape without a size above 0, links that form no tree, a joint that mimics itself, and kinds of
-// joints that are not posed here (floating, planar).
+// INVALID_ARGUMENT names file and line, and the defect of the element: malformed XML, an invalid
+// number, a link or joint without a name or with a duplicate name, a shape without a size above 0,
+// a mesh scaled by 0, links that form no tree, a joint that mimics itself or a joint of several
+// values, or a planar joint without an axis.
 absl::StatusOr<Robot> ReadUrdf(const std::string& path);
 absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name);
 

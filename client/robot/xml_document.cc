@@ -16,8 +16,8 @@ namespace {
 bool IsSpace(char c) { return absl::ascii_isspace(static_cast<unsigned char>(c)); }
 bool EndsName(char c) { return IsSpace(c) || c == '>' || c == '/' || c == '=' || c == '<'; }
 
-// Walks the tags of a text, so that what TinyXML gets is well-formed: TinyXML itself closes what is
-// open without a word, and recurses as deep as tags are nested.
+// Checks that the tags of a text are well-formed before TinyXML parses it: TinyXML silently closes
+// open tags, and recurses as deep as tags are nested.
 class TagWalk {
  public:
   TagWalk(std::string_view text, const std::string& name) : text_(text), name_(name) {}
@@ -55,7 +55,7 @@ class TagWalk {
     while (at_ < text_.size() && IsSpace(text_[at_])) Advance(1);
   }
 
-  // Passes over everything to the end of `end`.
+  // Skips to the end of the next occurrence of `end`.
   absl::Status SkipPast(std::string_view end, const char* what) {
     const size_t found = text_.find(end, at_);
     if (found == std::string_view::npos) return Error(absl::StrCat(what, " is not closed"));

@@ -12,11 +12,11 @@
 namespace hulld {
 namespace {
 
-constexpr int kAttempts = 5;
+constexpr int kMeshReadAttempts = 5;
 
 constexpr char kOtherStore[] = "the server holds another store than the answer's";
 
-// Whether a hull or a body is still at that version.
+// Returns true if a hull or a body is still at that version.
 template <typename Info>
 bool IsSame(const Info& info, const v1::HullVersion& version) {
   return info.create_revision() == version.create_revision() &&
@@ -28,7 +28,7 @@ std::string MovedText(const char* what, uint64_t revision, const v1::HullVersion
                       "; the answer is from revision ", version.revision());
 }
 
-// Why nothing can be checked; none for an answer that is about what was asked.
+// Returns the reason that precludes a check; none for an answer that matches the question.
 std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement& a,
                                       const v1::HullVersion& of_a, const v1::Placement& b,
                                       const v1::HullVersion& of_b) {
@@ -45,7 +45,7 @@ Verification FromStatus(const absl::Status& checked) {
   return Verification{Verdict::kInvalid, std::string(checked.message())};
 }
 
-// Whether the pieces that the answer says decided are proven to be in its relation.
+// Returns true if the deciding pieces named in the answer are proven to be in its relation.
 bool IsDecidingPairProven(const CheckedBodies& answer) {
   if (answer.relation == v1::RELATION_SEPARATED) return true;
   return std::any_of(
@@ -65,7 +65,7 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& vers
                                                      Verification* problem) {
   const std::string& id = version.hull_id();
   auto known = meshes_.find(id);
-  // A mesh that is newer than the answer stays so; fetching it again would not help.
+  // A mesh newer than the answer cannot match it; fetching it again would not help.
   if (known == meshes_.end() || known->second.header.hull().revision() < version.revision()) {
     absl::StatusOr<HullMesh> mesh = client_.GetHullMesh(id);
     if (absl::IsNotFound(mesh.status())) {
@@ -203,7 +203,7 @@ absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
                                                         const v1::CheckCollisionRequest& request) {
   AnswerChecker checker(client);
   VerifiedResponse verified;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kMeshReadAttempts; ++attempt) {
     absl::StatusOr<v1::CheckCollisionResponse> response = client.CheckCollision(request);
     if (!response.ok()) return response.status();
     verified.response = *std::move(response);

@@ -19,21 +19,21 @@ namespace hulld {
 enum class Verdict {
   // The certificate proves the relation.
   kValid,
-  // It does not.
+  // It does not prove the relation.
   kInvalid,
-  // There is nothing to check, or the hulls that the answer was computed from are gone.
+  // Nothing to check, or the hulls of the answer no longer exist.
   kCannotCheck,
-  // The same because a hull has changed since; asking again may do better.
+  // Same as above, because a hull has changed since; a new query may succeed.
   kMoved,
 };
 
 struct Verification {
   Verdict verdict = Verdict::kCannotCheck;
-  // Why, unless valid.
+  // The reason, unless valid.
   std::string reason;
 };
 
-// One answer and what it answers.
+// One answer and its question.
 struct CheckedAnswer {
   const v1::Placement& a;
   const v1::Placement& b;
@@ -46,7 +46,7 @@ struct CheckedAnswer {
 // Revisions of hulls, by ID.
 using HullVersions = std::map<std::string, const v1::HullVersion*>;
 
-// One answer about a pair of which at least one is a body.
+// One answer about a pair with at least one body.
 struct CheckedBodies {
   const v1::Placement& a;
   const v1::Placement& b;
@@ -54,35 +54,35 @@ struct CheckedBodies {
   const v1::HullVersion& hull_a;
   const v1::HullVersion& hull_b;
   const PieceCertificates& certificates;
-  // The hulls of all pieces; a hull beside bodies may be among them or not.
+  // The hulls of all pieces. May include the other side if that is a hull.
   const HullVersions& piece_hulls;
-  // The pieces that the answer says decided; none for a hull, and none where it names none.
+  // The deciding pieces; absent for a hull, and if the answer names none.
   std::optional<uint32_t> piece_a;
   std::optional<uint32_t> piece_b;
 };
 
-// Checks answers against the hulls that GetHullMesh returns, and the bodies that GetBody does.
+// Checks answers against the hulls and bodies that GetHullMesh and GetBody return.
 class AnswerChecker {
  public:
-  // `client` must outlive this.
+  // `client` must outlive this object.
   explicit AnswerChecker(const Client& client) : client_(client) {}
 
-  // Fetches the hulls that it does not have yet and returns the errors of that. A hull that was
-  // deleted is kMoved.
+  // Fetches missing hulls and returns errors of these calls. A deleted hull gives kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
   absl::StatusOr<Verification> Check(const CheckedBodies& answer);
-  // The same of a single call, which may be about bodies.
+  // Same as above, for a single call, which may concern bodies.
   absl::StatusOr<Verification> Check(const v1::CheckCollisionRequest& request,
                                      const v1::CheckCollisionResponse& response);
 
  private:
-  // Null, with the reason, when the server no longer has the mesh at that version.
+  // Returns null, with the reason, if the server no longer has the mesh at that version.
   absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
-  // The same of a body; null without a reason where there is none of this ID.
+  // Same as above, for a body; null without a reason if no body has this ID.
   absl::StatusOr<const v1::GetBodyResponse*> FetchBody(const v1::HullVersion& version,
                                                        Verification* problem);
-  // The pieces of what is placed, or of a hull itself; none, with the reason, when the server no
-  // longer has all. `named`: whether the answer names a piece of it. They refer to what this keeps.
+  // Returns the pieces of a placed body, or the hull itself; none, with the reason, if the server
+  // no longer has all of them. `named`: true if the answer names a piece. The result refers to data
+  // kept by this object.
   absl::StatusOr<std::vector<PlacedVertices>> FetchPieces(const v1::Placement& placement,
                                                           const v1::HullVersion& version,
                                                           bool named, const HullVersions& hulls,
@@ -93,8 +93,8 @@ class AnswerChecker {
   std::map<std::string, v1::GetBodyResponse> bodies_;
 };
 
-// Asks and checks the answer; a few times, as long as a hull changes in between. Returns the last
-// answer and its verification.
+// Queries and checks the answer; retries a few times while a hull changes in between. Returns the
+// last answer and its verification.
 struct VerifiedResponse {
   v1::CheckCollisionResponse response;
   Verification verification;

@@ -13,20 +13,19 @@
 namespace hulld {
 namespace {
 
-// The contract's: Caratheodory's number for a point of the hull and Steinitz's for one inside it.
+// Limits of the contract: Caratheodory's number for a point of the hull, and Steinitz's for an
+// interior point.
 constexpr int kMostTouchingPairs = 4;
 constexpr int kMostOverlappingPairs = 6;
-// The cross product of coordinates of degree nine in doubles has far fewer digits.
+// Far above the digits of a cross product of coordinates of degree nine in doubles.
 constexpr size_t kMostDigits = 100'000;
-
-absl::Status Fails(const std::string& what) { return absl::FailedPreconditionError(what); }
 
 absl::Status ReadInteger(const std::string& text, BigInteger* number) {
   const size_t sign = !text.empty() && text[0] == '-' ? 1 : 0;
   const bool digits = std::all_of(text.begin() + static_cast<ptrdiff_t>(sign), text.end(),
                                   [](char c) { return c >= '0' && c <= '9'; });
   if (text.size() == sign || text.size() > kMostDigits || !digits) {
-    return Fails("integer_direction holds something else than a decimal integer");
+    return ProofFails("integer_direction holds something else than a decimal integer");
   }
   // A leading 0 would mean octal.
   const size_t first = std::min(text.find_first_not_of('0', sign), text.size() - 1);
@@ -40,7 +39,7 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n) {
     case v1::Certificate::kDirection: {
       const v1::Vector3& d = certificate.direction();
       const std::array<double, 3> numbers = {d.x(), d.y(), d.z()};
-      if (!AreFinite(numbers)) return Fails("the direction holds a number that is not finite");
+      if (!AreFinite(numbers)) return ProofFails("the direction holds a number that is not finite");
       CommonExponent exponent;
       exponent.Include(numbers);
       for (int i = 0; i < 3; ++i) (*n)[i] = exponent.ToInteger(numbers[i]);
@@ -54,13 +53,13 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n) {
       break;
     }
     case v1::Certificate::EXACT_DIRECTION_NOT_SET:
-      return Fails("the certificate has no direction");
+      return ProofFails("the certificate has no direction");
   }
-  if (IsZero(*n)) return Fails("the direction is zero");
+  if (IsZero(*n)) return ProofFails("the direction is zero");
   return absl::OkStatus();
 }
 
-// Sign of min n.B - max n.A.
+// Returns the sign of min n.B - max n.A.
 int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
   return (b.Extent(n).first * a.scale - a.Extent(n).second * b.scale).sign();
 }
@@ -68,11 +67,13 @@ int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
 absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& vertex,
                          std::span<const double> xyz, const std::string& name) {
   if (index >= xyz.size() / 3) {
-    return Fails(absl::StrCat(name, " is vertex ", index, ", but the hull has ", xyz.size() / 3));
+    return ProofFails(
+        absl::StrCat(name, " is vertex ", index, ", but the hull has ", xyz.size() / 3));
   }
   const double* const p = xyz.data() + 3 * size_t{index};
   if (has_vertex && (vertex.x() != p[0] || vertex.y() != p[1] || vertex.z() != p[2])) {
-    return Fails(absl::StrCat(name, " has other coordinates than vertex ", index, " of the hull"));
+    return ProofFails(
+        absl::StrCat(name, " has other coordinates than vertex ", index, " of the hull"));
   }
   return absl::OkStatus();
 }
@@ -80,8 +81,8 @@ absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& ver
 absl::Status CheckPairs(const v1::Certificate& certificate, int most, const ExactHull& a,
                         const ExactHull& b) {
   if (certificate.pairs_size() > most) {
-    return Fails(absl::StrCat("the certificate has ", certificate.pairs_size(),
-                              " vertex pairs; its relation allows ", most));
+    return ProofFails(absl::StrCat("the certificate has ", certificate.pairs_size(),
+                                   " vertex pairs; its relation allows ", most));
   }
   for (int i = 0; i < certificate.pairs_size(); ++i) {
     const v1::VertexPair& pair = certificate.pairs(i);
@@ -96,7 +97,7 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int most, const Exac
   return absl::OkStatus();
 }
 
-// Points of A - B, times both scales.
+// Returns points of A - B, times both scales.
 std::vector<BigVector> Differences(const v1::Certificate& certificate, const ExactHull& a,
                                    const ExactHull& b) {
   std::vector<BigVector> differences;
@@ -111,20 +112,23 @@ absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& 
   BigVector n;
   if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
   if (GapSign(a, b, n) < 0) {
-    return Fails("the direction does not keep the insides apart: max n.A > min n.B");
+    return ProofFails("the direction does not keep the insides apart: max n.A > min n.B");
   }
   if (HoldsOriginOnBoundary(Differences(certificate, a, b))) return absl::OkStatus();
-  return Fails("the vertex pairs show no common point: 0 is not in the hull of their differences");
+  return ProofFails(
+      "the vertex pairs show no common point: 0 is not in the hull of their differences");
 }
 
 }  // namespace
+
+absl::Status ProofFails(const std::string& reason) { return absl::FailedPreconditionError(reason); }
 
 absl::Status CheckRelation(v1::Relation relation) {
   if (relation == v1::RELATION_SEPARATED || relation == v1::RELATION_TOUCHING ||
       relation == v1::RELATION_OVERLAPPING) {
     return absl::OkStatus();
   }
-  return Fails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
+  return ProofFails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
 }
 
 absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
@@ -138,12 +142,12 @@ absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certific
   if (relation == v1::RELATION_TOUCHING) return CheckTouching(certificate, a, b);
   if (relation == v1::RELATION_OVERLAPPING) {
     if (HoldsOriginInside(Differences(certificate, a, b))) return absl::OkStatus();
-    return Fails("0 is not inside the hull of the differences of the vertex pairs");
+    return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
   }
   BigVector n;
   if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
   if (GapSign(a, b, n) > 0) return absl::OkStatus();
-  return Fails("the direction does not separate: max n.A >= min n.B");
+  return ProofFails("the direction does not separate: max n.A >= min n.B");
 }
 
 absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& certificate,
@@ -151,7 +155,7 @@ absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& cert
   if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
   if (a.xyz.empty() || b.xyz.empty()) {
     if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
-    return Fails("a hull is empty, and so separated from everything");
+    return ProofFails("a hull is empty, and so separated from everything");
   }
   CommonExponent lengths;
   for (const PlacedVertices* hull : {&a, &b}) {

@@ -8,11 +8,10 @@
 
 namespace hulld {
 
-// Whether the certificate proves that A and B are in this relation, in exact arithmetic over the
-// doubles given, from the definitions in collision.proto and geometry.proto alone: this code shares
-// nothing with the server's. OK, or FAILED_PRECONDITION with what the certificate fails to show.
-// Parts that the relation does not need are ignored. Vertices that come with coordinates must be
-// those of their index.
+// Returns OK if the certificate proves that A and B are in this relation, and FAILED_PRECONDITION
+// with the missing proof otherwise. Exact over the given doubles, from the definitions in
+// collision.proto and geometry.proto alone; shares no code with the server. Parts that the relation
+// does not need are ignored. Vertices that come with coordinates must match their index.
 //
 // An empty hull is separated from everything, and needs no certificate for that.
 //
@@ -20,9 +19,12 @@ namespace hulld {
 absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& certificate,
                               const PlacedVertices& a, const PlacedVertices& b);
 
-// The same for hulls that are not empty, both at one exponent.
+// Same as above, for hulls that are not empty, both at one exponent.
 absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
                           const ExactHull& a, const ExactHull& b);
+
+// Returns FAILED_PRECONDITION with the reason for the failed proof.
+absl::Status ProofFails(const std::string& reason);
 
 // OK, or FAILED_PRECONDITION: a relation that no certificate proves.
 absl::Status CheckRelation(v1::Relation relation);

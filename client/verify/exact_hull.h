@@ -14,11 +14,12 @@
 
 namespace hulld {
 
-// A hull as the check takes it: its vertices, x y z each, and its pose.
+// Input of a check: the vertices of a hull, n x 3, and its pose.
 struct PlacedVertices {
   std::span<const double> xyz;
   const v1::Pose& pose;
-  // For a piece of a body: its pose in the frame of the body, which is at `pose`; otherwise null.
+  // For a piece of a body: its pose in the body's frame; `pose` is then the pose of the body.
+  // Otherwise null.
   const v1::Pose* in_body = nullptr;
 };
 
@@ -27,27 +28,27 @@ bool AreFinite(std::span<const double> numbers);
 // OK, or FAILED_PRECONDITION: a number that is not finite, or a rotation of zero.
 absl::Status CheckPlacement(const PlacedVertices& hull);
 
-// Widens the exponent so that it serves the vertices and translations of this hull, too. Requires
-// CheckPlacement.
+// Widens the exponent to cover the vertices and translations of this hull. Requires CheckPlacement.
 void IncludeLengths(const PlacedVertices& hull, CommonExponent* lengths);
 
-// Vertices in the frame of their hull, for all of its placements.
+// Vertices in the frame of their hull, shared by all of its placements.
 using BigVertices = std::shared_ptr<const std::vector<BigVector>>;
 BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& lengths);
 
-// A hull in the world, exactly: p_W = (rows p + shift) / scale in integers, all lengths at one
-// power of two. That of a quaternion cancels.
+// An exact hull in the world: p_W = (rows p + shift) / scale in integers, all lengths at one power
+// of two. The power of two of a quaternion cancels.
 struct ExactHull {
-  // Requires CheckPlacement, an exponent that serves it (IncludeLengths), and its vertices in that
-  // exponent (their number is checked, their values are not: only making them again would tell).
+  // Requires CheckPlacement, an exponent that covers the hull (IncludeLengths), and its vertices at
+  // that exponent. (The number of vertices is checked. Their values are not, as that would repeat
+  // the conversion.)
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
 
-  // scale p_W of vertex i.
+  // Returns scale p_W of vertex i.
   BigVector World(size_t i) const;
-  // The least and the greatest of n.p_W over the vertices, times scale. Requires a vertex.
+  // Returns the minimum and maximum of n.p_W over the vertices, times scale. Requires a vertex.
   std::pair<BigInteger, BigInteger> Extent(const BigVector& n) const;
 
-  // As given.
+  // The original coordinates.
   std::span<const double> xyz;
   BigVertices vertices;
   BigVector rows[3];

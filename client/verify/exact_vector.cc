@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMantissaBits = 53;
 
-// An integer of 53 bits times 2^exponent.
+// mantissa (53 bits) * 2^exponent.
 struct Parts {
   int64_t mantissa;
   int exponent;
@@ -28,7 +28,7 @@ Parts Split(double number) {
   return {mantissa, exponent};
 }
 
-// Whether all are at least 0, and not all 0.
+// Returns true if all are at least 0, and not all are 0.
 bool AreWeights(std::span<const BigInteger> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](const auto& x) { return x >= 0; }) &&
          std::any_of(numbers.begin(), numbers.end(), [](const auto& x) { return x > 0; });
@@ -38,7 +38,7 @@ bool IsBetween(const BigVector& a, const BigVector& b) {
   return IsZero(Cross(a, b)) && Dot(a, b) <= 0;
 }
 
-// 0 = (b x c) a + (c x a) b + (a x b) c in the plane of the three, measured along its normal; a
+// 0 = (b x c) a + (c x a) b + (a x b) c in the plane of the three, measured along its normal. A
 // triangle without area is left to its sides.
 bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
   const BigVector bc = Cross(b, c);
@@ -64,7 +64,7 @@ BigInteger CommonExponent::ToInteger(double number) const {
   return BigInteger(parts.mantissa) << (parts.exponent - exponent_);
 }
 
-// By Caratheodory 1907: those points whose hull holds 0 lie in the plane that bounds the half
+// By Caratheodory 1907: the points with 0 in their hull lie in the plane that bounds the half
 // space, so three of them suffice.
 bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
   const size_t n = points.size();
@@ -80,9 +80,9 @@ bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
   return false;
 }
 
-// 0 is inside unless all points lie on one side of a plane through 0, or in it. The normals of such
-// planes form a cone; it is pointed when the points span space, and then has an edge, which is
-// across two of the points. So it suffices to try the cross products of two points.
+// 0 is inside unless all points lie on one side of, or in, a plane through 0. The normals of such
+// planes form a cone. It is pointed if the points span space, and then has an edge that is
+// perpendicular to two of the points. So the cross products of two points suffice as candidates.
 bool HoldsOriginInside(std::span<const BigVector> points) {
   bool spans_space = false;
   for (size_t i = 0; i < points.size(); ++i) {

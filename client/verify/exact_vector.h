@@ -29,29 +29,30 @@ inline BigVector Cross(const BigVector& a, const BigVector& b) {
 }
 inline bool IsZero(const BigVector& a) { return a[0] == 0 && a[1] == 0 && a[2] == 0; }
 
-// Numbers as integers times a common power of two.
+// Represents numbers as integers times a common power of two.
 class CommonExponent {
  public:
-  // Widens the exponent so that it serves this number, too. Requires that it is finite.
+  // Widens the exponent to cover this number. Requires a finite number.
   void Include(double number);
   void Include(std::span<const double> numbers) {
     for (const double number : numbers) Include(number);
   }
-  // number / 2^exponent. Requires that it was included.
+  // Returns number / 2^exponent. Requires that it was included.
   BigInteger ToInteger(double number) const;
   int exponent() const { return exponent_; }
 
  private:
-  // The exponent of the lowest bit of all numbers so far; no double has a higher one than this.
+  // Exponent of the lowest bit of all numbers so far. No double has a higher exponent than this
+  // value.
   int exponent_ = 1024;
 };
 
-// Whether 0 is in the convex hull of the points. Requires that all lie in a closed half space that
-// has 0 on its boundary; unchecked, as callers find the half space by exact arithmetic just before.
-// Cost: the cube of their number.
+// Returns true if 0 is in the convex hull of the points. Requires that all lie in a closed half
+// space with 0 on its boundary; unchecked, as callers find the half space by exact arithmetic just
+// before. Cost: cubic in the number of points.
 bool HoldsOriginOnBoundary(std::span<const BigVector> points);
 
-// Whether 0 is in the interior of the convex hull of the points.
+// Returns true if 0 is in the interior of the convex hull of the points.
 bool HoldsOriginInside(std::span<const BigVector> points);
 
 }  // namespace hulld

@@ -23,13 +23,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-absl::Status Fails(const std::string& what) { return absl::FailedPreconditionError(what); }
-
 std::string PairText(size_t a, size_t b) {
   return absl::StrCat("pieces ", a, " of A and ", b, " of B");
 }
 
-// A number >= 1 in its leading 62 bits, times 2^exponent.
+// The leading 62 bits of a number >= 1, times 2^exponent.
 struct Leading {
   double value;
   int exponent;
@@ -42,15 +40,15 @@ Leading LeadingBits(const BigInteger& number) {
   return {static_cast<double>(static_cast<int64_t>(number >> dropped)), static_cast<int>(dropped)};
 }
 
-// Doubles that number 2^exponent / scale lies between. A quotient of two rounded numbers errs by
-// less than 2^-50 of itself.
+// Returns doubles that bound number 2^exponent / scale. The relative error of a quotient of two
+// rounded numbers is less than 2^-50.
 std::pair<double, double> Between(const BigInteger& number, const BigInteger& scale, int exponent) {
   if (number == 0) return {0, 0};
   const Leading top = LeadingBits(abs(number));
   const Leading bottom = LeadingBits(scale);
   const double size =
       std::ldexp(top.value / bottom.value, top.exponent - bottom.exponent + exponent);
-  // So that neither bound is out of the range where errors are relative.
+  // Keeps both bounds in the range with relative errors.
   if (!std::isnormal(size) || !std::isnormal(size / 2) || !std::isnormal(size * 2)) {
     return {-kInfinity, kInfinity};
   }
@@ -58,7 +56,7 @@ std::pair<double, double> Between(const BigInteger& number, const BigInteger& sc
   return {value - size * 0x1p-48, value + size * 0x1p-48};
 }
 
-// The least box about a hull along the axes of the world.
+// The least axis-aligned box of a hull in the world.
 struct WorldBox {
   WorldBox(const ExactHull& hull, int exponent) : scale(hull.scale) {
     for (int k = 0; k < 3; ++k) {
@@ -74,7 +72,7 @@ struct WorldBox {
   BigVector low;
   BigVector high;
   BigInteger scale;
-  // Outwards.
+  // Rounded outward.
   std::array<double, 3> rounded_low;
   std::array<double, 3> rounded_high;
 };
@@ -90,7 +88,7 @@ bool AreApart(const WorldBox& a, const WorldBox& b) {
   return false;
 }
 
-// The pieces of one side; each is made exact when it is needed.
+// The pieces of a side, converted to exact numbers on demand.
 class ExactPieces {
  public:
   explicit ExactPieces(std::span<const PlacedVertices> pieces)
@@ -103,14 +101,14 @@ class ExactPieces {
     for (size_t i = 0; i < size(); ++i) {
       if (empty(i)) continue;
       if (absl::Status s = CheckPlacement(pieces_[i]); !s.ok()) {
-        return Fails(absl::StrCat("piece ", i, " of ", side, ": ", s.message()));
+        return ProofFails(absl::StrCat("piece ", i, " of ", side, ": ", s.message()));
       }
       IncludeLengths(pieces_[i], lengths);
     }
     return absl::OkStatus();
   }
 
-  // Requires a piece that is not empty, and an exponent that serves all (CommonExponent checks it).
+  // Requires a piece that is not empty, and an exponent that covers all (CommonExponent checks it).
   const ExactHull& At(size_t i, const CommonExponent& lengths) {
     HULLD_CLIENT_CHECK(!empty(i));
     if (exact_[i]) return *exact_[i];
@@ -120,7 +118,7 @@ class ExactPieces {
     return exact_[i].emplace(pieces_[i], vertices, lengths);
   }
 
-  // None for empty pieces.
+  // No box for empty pieces.
   std::vector<std::optional<WorldBox>> Boxes(const CommonExponent& lengths) {
     std::vector<std::optional<WorldBox>> boxes(size());
     for (size_t i = 0; i < size(); ++i) {
@@ -132,7 +130,8 @@ class ExactPieces {
  private:
   std::span<const PlacedVertices> pieces_;
   std::vector<std::optional<ExactHull>> exact_;
-  // By the coordinates of a piece, so that a hull that is a piece several times is converted once.
+  // Keyed by the coordinates of a piece, so that a hull shared by several pieces is converted one
+  // time.
   std::map<const double*, BigVertices> vertices_;
 };
 
@@ -142,31 +141,31 @@ absl::Status CheckOne(v1::Relation relation, const v1::PieceCertificate& of, Exa
                       ExactPieces* b, const CommonExponent& lengths, Pairs* proven) {
   const std::string name = PairText(of.piece_a(), of.piece_b());
   if (of.piece_a() >= a->size() || of.piece_b() >= b->size()) {
-    return Fails(absl::StrCat(name, " have a certificate, but A has ", a->size(), " pieces and B ",
-                              b->size()));
+    return ProofFails(absl::StrCat(name, " have a certificate, but A has ", a->size(),
+                                   " pieces and B ", b->size()));
   }
   if (!proven->emplace(of.piece_a(), of.piece_b()).second) {
-    return Fails(absl::StrCat(name, " have two certificates"));
+    return ProofFails(absl::StrCat(name, " have two certificates"));
   }
   if (absl::Status s = CheckRelation(of.relation()); !s.ok()) {
-    return Fails(absl::StrCat(name, ": ", s.message()));
+    return ProofFails(absl::StrCat(name, ": ", s.message()));
   }
-  // In the order of their numbers, a relation is stronger than those before it.
+  // Relations are numbered in ascending strength.
   if (of.relation() > relation) {
-    return Fails(absl::StrCat(name, " are ", v1::Relation_Name(of.relation()),
-                              ", so the bodies are not ", v1::Relation_Name(relation)));
+    return ProofFails(absl::StrCat(name, " are ", v1::Relation_Name(of.relation()),
+                                   ", so the bodies are not ", v1::Relation_Name(relation)));
   }
   if (a->empty(of.piece_a()) || b->empty(of.piece_b())) {
     if (of.relation() == v1::RELATION_SEPARATED) return absl::OkStatus();
-    return Fails(absl::StrCat(name, ": a hull is empty, and so separated from everything"));
+    return ProofFails(absl::StrCat(name, ": a hull is empty, and so separated from everything"));
   }
   const absl::Status checked = CheckExactly(
       of.relation(), of.certificate(), a->At(of.piece_a(), lengths), b->At(of.piece_b(), lengths));
   if (checked.ok()) return checked;
-  return Fails(absl::StrCat(name, ": ", checked.message()));
+  return ProofFails(absl::StrCat(name, ": ", checked.message()));
 }
 
-// Whether boxes settle every pair that has no certificate.
+// Checks that boxes settle every pair without a certificate.
 absl::Status CheckOthers(const Pairs& proven, ExactPieces* a, ExactPieces* b,
                          const CommonExponent& lengths) {
   const std::vector<std::optional<WorldBox>> boxes_a = a->Boxes(lengths);
@@ -179,8 +178,8 @@ absl::Status CheckOthers(const Pairs& proven, ExactPieces* a, ExactPieces* b,
         continue;
       }
       if (!boxes_a[i] || !boxes_b[j] || AreApart(*boxes_a[i], *boxes_b[j])) continue;
-      return Fails(absl::StrCat(PairText(i, j),
-                                " have no certificate, and their boxes along the axes meet"));
+      return ProofFails(absl::StrCat(PairText(i, j),
+                                     " have no certificate, and their boxes along the axes meet"));
     }
   }
   return absl::OkStatus();
@@ -205,7 +204,7 @@ absl::Status CheckPieceCertificates(v1::Relation relation, const PieceCertificat
     is_shown |= of.relation() == relation;
   }
   if (!is_shown) {
-    return Fails(
+    return ProofFails(
         absl::StrCat("no certificate shows two pieces that are ", v1::Relation_Name(relation)));
   }
   if (relation == v1::RELATION_OVERLAPPING) return absl::OkStatus();

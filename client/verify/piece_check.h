@@ -13,17 +13,17 @@ namespace hulld {
 
 using PieceCertificates = google::protobuf::RepeatedPtrField<v1::PieceCertificate>;
 
-// Whether these certificates prove that A and B, each given by all of its pieces in order, are in
-// this relation: OK, or FAILED_PRECONDITION, which names the pieces and what is not shown. Exact,
-// from the definitions in the proto files alone, as CheckCertificate.
+// Returns OK if these certificates prove that A and B, each given by all of its pieces in order,
+// are in this relation; otherwise FAILED_PRECONDITION, which names the pieces and the missing
+// proof. Exact, from the definitions in the proto files alone, as CheckCertificate.
 //
-// Each certificate must prove its own relation of its own pair, and none a stronger one than that
-// of the bodies; one must prove that of the bodies, unless it is SEPARATED. Every other pair must
-// be settled, unless the bodies are OVERLAPPING: a hull is empty, or the least boxes of both along
-// the axes of the world have no common point, exactly.
+// Each certificate must prove its own relation of its own pair, and none may be stronger than that
+// of the bodies. One must prove that of the bodies, unless it is SEPARATED. Every other pair must
+// be settled, unless the bodies are OVERLAPPING: a hull is empty, or the least axis-aligned boxes
+// of both in the world have no common point, exactly.
 //
-// Cost: about a microsecond per vertex of each piece and of each certificate; a nanosecond or so
-// for each pair of pieces.
+// Cost: about a microsecond per vertex of each piece and of each certificate; about a nanosecond
+// per pair of pieces.
 absl::Status CheckPieceCertificates(v1::Relation relation, const PieceCertificates& certificates,
                                     std::span<const PlacedVertices> a,
                                     std::span<const PlacedVertices> b);

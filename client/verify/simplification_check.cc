@@ -16,11 +16,11 @@
 namespace hulld {
 namespace {
 
-constexpr int kAttempts = 5;
+constexpr int kSimplificationReadAttempts = 5;
 
 absl::Status NotShown(const std::string& why) { return absl::FailedPreconditionError(why); }
 
-// Reads back as the same double.
+// Returns text that reads back as the same double.
 std::string Text(double number) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.17g", number);
@@ -35,8 +35,8 @@ struct Corners {
   const BigVector& c;
 };
 
-// Whether the distance from p to the segment between a and b is at most the root of
-// distance_squared, where the nearest point of their line is between them.
+// Returns true if the distance from p to the segment from a to b is at most the root of
+// distance_squared and the nearest point of their line is between them.
 bool IsWithinOfSegment(const BigVector& p, const BigVector& a, const BigVector& b,
                        const BigInteger& distance_squared) {
   const BigVector along = b - a;
@@ -47,7 +47,7 @@ bool IsWithinOfSegment(const BigVector& p, const BigVector& a, const BigVector& 
          Squared(Cross(from_a, along)) <= distance_squared * length_squared;
 }
 
-// The same for the triangle, where the nearest point of its plane is in it.
+// Same as above, for a triangle that holds the nearest point of its plane.
 bool IsWithinOfFace(const BigVector& p, const Corners& t, const BigInteger& distance_squared) {
   const BigVector normal = Cross(t.b - t.a, t.c - t.a);
   if (IsZero(normal)) return false;
@@ -68,9 +68,9 @@ bool IsWithinOfTriangle(const BigVector& p, const Corners& t, const BigInteger& 
          IsWithinOfSegment(p, t.c, t.a, distance_squared) || IsWithinOfFace(p, t, distance_squared);
 }
 
-// Whether the tetrahedron of apex and triangle holds p, its boundary included; one without volume
-// holds nothing. Cramer's rule: p - apex is a sum of the three edges with weights of at least 0
-// that together are at most 1.
+// Returns true if the closed tetrahedron of apex and triangle contains p; false for one without
+// volume. Cramer's rule: p - apex is a sum of the three edges with nonnegative weights that add up
+// to at most 1.
 bool IsInTetrahedron(const BigVector& p, const BigVector& apex, const Corners& t) {
   const BigVector a = t.a - apex;
   const BigVector b = t.b - apex;
@@ -88,7 +88,7 @@ bool IsInTetrahedron(const BigVector& p, const BigVector& apex, const Corners& t
   return rest.sign() * volume.sign() >= 0;
 }
 
-// What both hulls are measured in.
+// Common units of both hulls.
 struct Measure {
   Measure(const HullMesh& hull, const HullMesh& simplified, double error)
       : unit(Joined(hull, simplified)) {
@@ -106,10 +106,10 @@ struct Measure {
   UnitBox unit;
 };
 
-// A hull that can be asked about points.
+// A hull prepared for point queries.
 class AskedHull {
  public:
-  // Both must outlive this. FAILED_PRECONDITION: facets that do not fit the vertices.
+  // Both must outlive the result. FAILED_PRECONDITION: facets that do not match the vertices.
   static absl::StatusOr<AskedHull> Make(const HullMesh& mesh, const Measure& measure) {
     AskedHull hull(measure);
     for (size_t i = 0; i < mesh.vertex_count(); ++i) {
@@ -127,7 +127,7 @@ class AskedHull {
 
   bool HasVertex(const Point3& p) const { return known_.contains(Key(p)); }
 
-  // Whether p is within the distance, which is finite and was included in the grid.
+  // Returns true if p is within the distance, which is finite and was included in the grid.
   bool IsWithin(const Point3& p, double distance) const {
     if (HasVertex(p)) return true;
     const BigVector exact = OnGrid(p);
@@ -143,7 +143,7 @@ class AskedHull {
     if (is_flat_) return IsWithin(p, 0);
     const BigVector exact = OnGrid(p);
     const Point3 unit = measure_.unit.ToUnit(p);
-    // From a vertex that is not near, so that the direction is not a matter of rounding.
+    // Uses a distant vertex as apex, so that rounding does not dominate the direction.
     const size_t apex =
         DistanceSquared(unit_[apexes_[0]], unit) > DistanceSquared(unit_[apexes_[1]], unit)
             ? apexes_[0]
@@ -172,7 +172,7 @@ class AskedHull {
     return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]};
   }
 
-  // Facets as fans from their first vertex; what has no facet is a segment or a point.
+  // Splits facets into fans from their first vertex. A hull without facets is a segment or a point.
   absl::Status AddTriangles(const HullMesh& mesh) {
     if (mesh.facet_sizes.empty() && !vertices_.empty()) {
       const auto last = static_cast<uint32_t>(vertices_.size() - 1);
@@ -197,7 +197,7 @@ class AskedHull {
     return absl::OkStatus();
   }
 
-  // Two vertices that are far from each other, so that one of them is from any point.
+  // Finds two distant vertices, so that one of them is far from any point.
   void FindApexes() {
     for (size_t i = 1; i < unit_.size(); ++i) {
       if (DistanceSquared(unit_[i], unit_[0]) > DistanceSquared(unit_[apexes_[1]], unit_[0])) {
@@ -213,7 +213,7 @@ class AskedHull {
   std::vector<Triangle> triangles_;
   std::array<size_t, 2> apexes_ = {0, 0};
   bool is_flat_ = false;
-  // Refers to unit_ and triangles_, whose elements stay where they are when this is moved.
+  // Refers to unit_ and triangles_, whose elements keep their addresses when this is moved.
   std::optional<TriangleTree> tree_;
 };
 
@@ -306,7 +306,7 @@ absl::StatusOr<VerifiedMesh> GetSimplificationVerified(
     return absl::InvalidArgumentError("there is nothing to verify: ask for a simplification");
   }
   VerifiedMesh verified;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+  for (int attempt = 0; attempt < kSimplificationReadAttempts; ++attempt) {
     absl::StatusOr<HullMesh> simplified = client.GetHullMesh(request, on_part);
     if (!simplified.ok()) return simplified.status();
     verified.mesh = *std::move(simplified);

@@ -12,27 +12,28 @@
 
 namespace hulld {
 
-// Whether a simplification is what was asked for and what its header claims, in exact arithmetic
-// over the doubles given, from the definitions in hull.proto alone: this code shares nothing with
-// the server's. OK, or FAILED_PRECONDITION with the first claim that does not hold.
+// Returns OK if a simplification satisfies the request and the claims of its header, and
+// FAILED_PRECONDITION with the first claim that does not hold. Exact over the given doubles, from
+// the definitions in hull.proto alone; shares no code with the server.
 //
-// Inside, each vertex is one of the hull's, and each vertex of the hull is within the error of the
-// simplification; outside, each vertex of the hull is in the simplification, each vertex of which
-// is within the error of the hull. That bounds the Hausdorff distance, as the distance from a
-// convex set is largest at vertices. No more vertices than max_vertices; with max_error alone, no
-// larger error. With both, whether some other hull keeps both is not looked at.
+// Inside: each vertex is a vertex of the hull, and each vertex of the hull is within the error of
+// the simplification. Outside: the simplification contains each vertex of the hull, and each of its
+// vertices is within the error of the hull. This bounds the Hausdorff distance, as the distance
+// from a convex set is largest at vertices. The number of vertices is at most max_vertices; with
+// max_error alone, the error is at most that. With both, the check does not look for another hull
+// that satisfies both.
 //
-// A point counts as within the error when it is within the error of a triangle of vertices, and as
-// inside when a tetrahedron of vertices holds it. Facets only tell where to look, so wrong facets
-// make the check refuse what is true, and never accept what is not. Cost: about n log n, and some
-// ten microseconds of exact arithmetic for each vertex.
+// A point is within the error if it is within the error of a triangle of vertices, and inside if a
+// tetrahedron of vertices contains it. Facets only guide the search: wrong facets can make the
+// check reject a true claim, but never accept a false one. Cost: about n log n, and some ten
+// microseconds of exact arithmetic per vertex.
 absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
                                  const HullMesh& simplified);
 
-// Fetches a simplification and the hull that it stands for, both as of the same revision, and
-// checks it; a few times, as long as the hull changes in between. Returns the last simplification
-// and its verification. on_part: as for Client::GetHullMesh, of the simplification. Requires a
-// request with a simplification; without one INVALID_ARGUMENT.
+// Fetches a simplification and its hull at the same revision and checks it; retries a few times
+// while the hull changes in between. Returns the last simplification and its verification. on_part:
+// as for Client::GetHullMesh, of the simplification. INVALID_ARGUMENT: the request has no
+// simplification.
 struct VerifiedMesh {
   HullMesh mesh;
   Verification verification;

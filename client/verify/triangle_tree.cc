@@ -11,9 +11,9 @@ namespace hulld {
 namespace {
 
 constexpr uint32_t kLeafSize = 4;
-// Far more than rounding in a unit box, far less than what matters to the cost.
+// Far above the rounding errors in a unit box, and too small to affect the cost.
 constexpr double kSlack = 0x1p-40;
-// Farther than any two points of a unit box.
+// Exceeds every distance in a unit box.
 constexpr double kFar = 2;
 
 double Norm(const Point3& a) { return std::sqrt(Dot(a, a)); }
@@ -26,14 +26,14 @@ double DistanceToBox(const Point3& low, const Point3& high, const Point3& p) {
   return Norm(gap);
 }
 
-// Whether apex + t along is in the box, give or take, for some t of at least 1.
+// Returns true if apex + t along is in the box, within the slack, for some t of at least 1.
 bool MeetsBox(const Point3& low, const Point3& high, const Point3& apex, const Point3& along) {
   double from = 1 - kSlack;
   double to = INFINITY;
   for (size_t axis = 0; axis < 3; ++axis) {
     const double below = low[axis] - kSlack - apex[axis];
     const double above = high[axis] + kSlack - apex[axis];
-    // What hardly moves along this axis before it leaves the unit box stays where it is.
+    // A ray almost perpendicular to this axis leaves the unit box before it moves along the axis.
     if (std::abs(along[axis]) < kSlack * kSlack) {
       if (below > 0 || above < 0) return false;
       continue;
@@ -97,7 +97,7 @@ TriangleTree::Box TriangleTree::BoxOf(const Triangle& triangle) const {
   return box;
 }
 
-// Halves by the middles of the triangles along the longest side of their box.
+// Splits at the median of the triangle centres along the longest side of their box.
 void TriangleTree::Build(uint32_t first, uint32_t end) {
   Box box = BoxOf(triangles_[order_[first]]);
   for (uint32_t i = first + 1; i < end; ++i) {
@@ -156,8 +156,9 @@ bool TriangleTree::VisitNear(uint32_t at, const Point3& p, double reach,
   return false;
 }
 
-// Whether the plane of the triangle is certainly farther from p. Each coordinate is off by a few
-// units of 2^-53, so the normal by those times the sides; the slack is more than that makes.
+// Returns true if the plane of the triangle is certainly farther than `reach` from p. Each
+// coordinate has an error of a few units of 2^-53, and the normal that error times the side
+// lengths; the slack exceeds the sum.
 bool TriangleTree::IsPlaneBeyond(const Triangle& triangle, const Point3& p, double reach) const {
   const Point3& corner = points_[triangle[0]];
   const Point3 ab = Minus(points_[triangle[1]], corner);

@@ -18,43 +18,43 @@ inline Point3 PointAt(std::span<const double> xyz, size_t i) {
   return {xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]};
 }
 
-// Points in the unit of the box of all that were included, each coordinate from 0 to 1, so that
-// floating point serves whatever their size and place.
+// Maps points to the unit of the box of all included points: each coordinate is from 0 to 1, so
+// that floating point serves any size and position.
 class UnitBox {
  public:
-  // Requires points that are not empty.
+  // Requires at least one point.
   explicit UnitBox(std::span<const double> xyz);
 
-  // Off by a few units of 2^-53.
+  // Error: a few units of 2^-53.
   Point3 ToUnit(const Point3& p) const;
   double LengthToUnit(double length) const;
 
  private:
-  // The exponent of the largest coordinate, divided out so that no difference overflows.
+  // Exponent of the largest coordinate, divided out so that no difference overflows.
   int exponent_ = 0;
   Point3 low_ = {0, 0, 0};
   double size_ = 1;
 };
 
-// Finds the triangles that a question about a point may be about, among many. It answers in
-// floating point, with slack: it may propose a triangle for nothing, but leaves none out.
+// Finds candidate triangles for a query about a point. Floating point with slack: it may report
+// false candidates, but misses none.
 //
-// Idea: a tree of boxes over the triangles. Cost: n log n to make; about log n for a question, and
-// a call for each triangle proposed.
+// Idea: a tree of boxes over the triangles. Cost: n log n to build; about log n per query, and one
+// call per candidate.
 class TriangleTree {
  public:
-  // Whether the triangle of this index settles the question.
+  // Returns true if the triangle of this index settles the query.
   using Visitor = std::function<bool(size_t triangle)>;
 
-  // points: in a unit box; both must outlive this. Requires indices of points.
+  // points: in a unit box. Both must outlive this object. Requires valid indices of points.
   TriangleTree(std::span<const Point3> points, std::span<const Triangle> triangles);
 
-  // Proposes the triangles within the distance of p, those in near boxes first, until one settles
-  // the question; whether one did.
+  // Visits the triangles within the distance of p, nearer boxes first, until one settles the query.
+  // Returns true if one did.
   bool AnyNear(const Point3& p, double distance, const Visitor& settles) const;
-  // The same of the triangles that the ray from `apex` through p meets at p or beyond. Requires
-  // that the two are apart by much more than the slack, 2^-40 (unchecked: replies may hold points
-  // that are not; then a triangle may be left out, and what depends on it is not shown).
+  // Same as above, for the triangles that the ray from `apex` through p meets at or beyond p.
+  // Requires a distance between the two far above the slack, 2^-40. Unchecked: replies may contain
+  // closer points; then a triangle may be missed, and the claim that depends on it is not proven.
   bool AnyBeyond(const Point3& apex, const Point3& p, const Visitor& settles) const;
 
  private:
@@ -62,8 +62,8 @@ class TriangleTree {
     Point3 low;
     Point3 high;
   };
-  // The triangles order_[first, end), and where the second half of a node that has halves is; the
-  // first half is the next node. 0: a leaf.
+  // The triangles order_[first, end), and the index of the second child; the first child is the
+  // next node. 0: a leaf.
   struct Node {
     Box box;
     uint32_t first;

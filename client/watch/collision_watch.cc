@@ -44,7 +44,7 @@ void SetPose(const double* numbers, v1::Placement* placement) {
   t->set_z(numbers[6]);
 }
 
-// Puts the new poses in the place of the old ones.
+// Replaces the poses of the updated placements.
 void Apply(const v1::CollisionWatchUpdate& update, v1::CollisionWatchOpen* open) {
   for (int i = 0; i < update.placements_size(); ++i) {
     const double* const numbers = update.poses().data() + kPoseNumbers * i;
@@ -93,7 +93,7 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     }
     const absl::Status status = Close(*call_);
     call_.reset();
-    // From the first failure: there may have been hours of quiet before it.
+    // Counts from the first failure, as the watch may have been quiet for hours before it.
     if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
@@ -111,7 +111,7 @@ absl::Status CollisionWatch::Update(const v1::CollisionWatchUpdate& update) {
   if (call == nullptr) return absl::OkStatus();
   v1::WatchCollisionsRequest request;
   *request.mutable_update() = update;
-  // Where this fails, the next call opens with it.
+  // If this fails, the next call opens with the update.
   call->stream->Write(request);
   return absl::OkStatus();
 }
@@ -129,7 +129,7 @@ std::shared_ptr<CollisionWatch::Call> CollisionWatch::Open() {
   *request.mutable_open() = open_;
   call->updates_before = updates_;
   updated_call_ = call;
-  // Where this fails, Next says why.
+  // If this fails, Next returns the error.
   call->stream->Write(request);
   return call;
 }
@@ -140,7 +140,7 @@ absl::Status CollisionWatch::Close(Call& call) {
     updated_call_.reset();
   }
   absl::Status status = FromGrpcStatus(call.stream->Finish(), call.context);
-  // The client never says that it has said all.
+  // The client never half-closes the stream, so the server has no reason to end it with OK.
   if (status.ok()) status = absl::InternalError("the server ended the watch without a cause");
   const std::lock_guard lock(cancel_mutex_);
   cancelled_call_.reset();

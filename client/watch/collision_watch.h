@@ -16,15 +16,15 @@
 
 namespace hulld {
 
-// WatchCollisions, message by message: tells when pairs begin and end to collide. A watch whose
-// connection is lost goes on where it was: it opens another call with the poses as they are by now,
-// tells what changed meanwhile and nothing twice, and ends that as `synced` once more. So code that
-// folds the events needs to know nothing of connections. Next is for one thread, Update for one,
-// which may be another, and Cancel for any.
+// WatchCollisions, message by message: reports the begin and the end of collisions of pairs. After
+// a lost connection the watch resumes: it opens another call with the current poses, reports the
+// changes since the loss without repeating events, and ends them with another `synced`. Code that
+// folds the events need not handle connections. Next and Update may each be called by one thread,
+// the same or different ones; Cancel by any.
 class CollisionWatch {
  public:
-  // Connects in Next. patience: for how long to look for a server that was there before; the first
-  // call, and one that the server refuses, fail as `retry` says.
+  // Connects in Next. patience: time to search for a lost server. The first call, and a refused
+  // one, fail as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
                  RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.
@@ -32,16 +32,16 @@ class CollisionWatch {
   CollisionWatch(const CollisionWatch&) = delete;
   CollisionWatch& operator=(const CollisionWatch&) = delete;
 
-  // Waits for the next message. An error ends the watch: CANCELLED after Cancel, and those of the
+  // Waits for the next message. An error ends the watch: CANCELLED after Cancel, or an error of the
   // contract.
   absl::StatusOr<v1::WatchCollisionsResponse> Next();
 
-  // Says where placements are now. While there is no connection it is noted, for the next.
-  // INVALID_ARGUMENT, without saying anything: it names a placement that does not exist, or does
-  // not have seven numbers for each.
+  // Sets the poses of placements. While disconnected, they are kept for the next connection.
+  // INVALID_ARGUMENT, without effect: it names a placement that does not exist, or does not have
+  // seven numbers for each.
   absl::Status Update(const v1::CollisionWatchUpdate& update);
 
-  // Has Next return, now and ever after.
+  // Makes the current and every later call of Next return.
   void Cancel();
 
  private:
@@ -50,11 +50,11 @@ class CollisionWatch {
     std::unique_ptr<
         grpc::ClientReaderWriter<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>>
         stream;
-    // The updates that its `open` takes into account.
+    // Number of updates included in its `open`.
     uint64_t updates_before = 0;
   };
 
-  // Null once Cancel was called.
+  // Returns null after Cancel.
   std::shared_ptr<Call> Open();
   absl::Status Close(Call& call);
 
@@ -62,14 +62,14 @@ class CollisionWatch {
   const RetryPolicy retry_;
   const std::chrono::milliseconds patience_;
 
-  // Used by Next alone.
+  // Used by Next only.
   ToldPairs told_;
   std::shared_ptr<Call> call_;
-  // A message came, hence there is a server, which was told of pairs.
+  // True after the first message: a server was reached and has reported pairs.
   bool connected_ = false;
 
-  // Before the other where both are held. Guards what placements are where, how many updates said
-  // so, and which call they go to, and that a call begins with `open`.
+  // Acquired before cancel_mutex_. Guards the current poses, the number of updates, the call that
+  // receives them, and that a call begins with `open`.
   std::mutex update_mutex_;
   v1::CollisionWatchOpen open_;
   uint64_t updates_ = 0;

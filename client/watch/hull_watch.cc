@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
-#include "client/calls/revisions.h"
 
 namespace hulld {
 
@@ -30,15 +29,16 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     if (call == nullptr) return absl::CancelledError("the watch was cancelled");
     v1::WatchHullsResponse message;
     if (call->reader->Read(&message)) {
-      // A call that resumed nothing tells everything, but not what went meanwhile.
-      if (is_new && told_ && !IsResumed(request_)) message.set_anew(true);
+      // A call that did not resume sends the full state, without deletions since the loss.
+      if (is_new && told_ && request_.after_revision() == 0) message.set_anew(true);
       connected_ = true;
       told_ = told_ || message.events_size() > 0;
-      ResumeAfter(message.header(), &request_);
+      request_.set_after_revision(message.header().revision());
+      request_.set_store_id(message.header().store_id());
       return message;
     }
     const absl::Status status = Close();
-    // From the first failure: there may have been hours of quiet before it.
+    // Counts from the first failure, as the watch may have been quiet for hours before it.
     if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }

@@ -13,13 +13,13 @@
 
 namespace hulld {
 
-// WatchHulls, message by message. A watch whose connection is lost goes on where it was: it opens
-// another call that resumes after the last header, which ends as `synced` once more. So code that
-// folds the events needs to know nothing of connections. Next is for one thread, Cancel for any.
+// WatchHulls, message by message. After a lost connection the watch resumes: it opens another call
+// after the last header's revision, and ends the missed events with another `synced`. Code that
+// folds the events need not handle connections. Next may be called by one thread, Cancel by any.
 class HullWatch {
  public:
-  // Connects in Next. patience: for how long to look for a server that was there before; the first
-  // call, and one that the server refuses, fail as `retry` says.
+  // Connects in Next. patience: time to search for a lost server. The first call, and a refused
+  // one, fail as `retry` specifies.
   HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
             RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.
@@ -27,11 +27,11 @@ class HullWatch {
   HullWatch(const HullWatch&) = delete;
   HullWatch& operator=(const HullWatch&) = delete;
 
-  // Waits for the next message. An error ends the watch: CANCELLED after Cancel, and those of the
+  // Waits for the next message. An error ends the watch: CANCELLED after Cancel, or an error of the
   // contract.
   absl::StatusOr<v1::WatchHullsResponse> Next();
 
-  // Has Next return, now and ever after.
+  // Makes the current and every later call of Next return.
   void Cancel();
 
  private:
@@ -40,7 +40,7 @@ class HullWatch {
     std::unique_ptr<grpc::ClientReader<v1::WatchHullsResponse>> reader;
   };
 
-  // Null once Cancel was called.
+  // Returns null after Cancel.
   Call* Open();
   absl::Status Close();
 
@@ -48,7 +48,8 @@ class HullWatch {
   v1::WatchHullsRequest request_;
   const RetryPolicy retry_;
   const std::chrono::milliseconds patience_;
-  // A message came, hence there is a server; events came, which a new start must take back.
+  // connected_: a message arrived, so a server was reached. told_: events arrived, which a restart
+  // must revoke.
   bool connected_ = false;
   bool told_ = false;
 

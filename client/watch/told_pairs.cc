@@ -84,7 +84,7 @@ bool ToldPairs::TakeEvent(v1::CollisionEvent* event) {
   }
   if (!retold_) return true;
   retold_->insert(pair);
-  // The other call compares with nothing.
+  // The new call has no previous state to compare with.
   if (now.relation == v1::RELATION_SEPARATED && IsCollision(before.relation)) {
     event->set_kind(v1::COLLISION_EVENT_KIND_EXIT);
   }

@@ -12,18 +12,17 @@
 
 namespace hulld {
 
-// What a WatchCollisions call has told of pairs. Where another call takes its place, which begins
-// by telling everything, this leaves out what is known and adds what ended in between: so the two
-// calls tell what one would have told. Memory: the pairs that collide or are near.
+// Pair states reported by a WatchCollisions call. When another call replaces it and starts with the
+// full state, this removes known events and adds the events of pairs that ended in between, so that
+// both calls together report the same events as one. Memory: the pairs that collide or are near.
 class ToldPairs {
  public:
-  // `open` as the watch was opened: names the hulls of placements, and whether there is a
-  // clearance.
+  // `open` is the watch's first message: it names the hulls of placements and any clearance.
   explicit ToldPairs(const v1::CollisionWatchOpen& open);
 
-  // The next message is the first of another call.
+  // Marks the next message as the first of another call.
   void StartAnew();
-  // Takes note of a message, after making of it what it would be had there been one call.
+  // Records a message, after rewriting it to the message that a single call would have sent.
   void Take(v1::WatchCollisionsResponse* message);
 
  private:
@@ -33,24 +32,25 @@ class ToldPairs {
     bool within_clearance = false;
   };
 
-  // Empty for a placement that does not exist.
+  // Returns an empty ID for a placement that does not exist.
   const std::string& HullOf(uint32_t placement) const;
   void TakeHulls(const v1::WatchCollisionsResponse& message);
   void TakeProblems(v1::WatchCollisionsResponse* message);
   void TakeEvents(v1::WatchCollisionsResponse* message);
-  // Notes the state of the event's pair. False: it was known, and there is no event.
+  // Records the state of the event's pair. Returns false if it was known, so that the event is
+  // dropped.
   bool TakeEvent(v1::CollisionEvent* event);
-  // The events of pairs that the other call did not tell of.
+  // Adds the end events of pairs that the new call did not report.
   void TellWhatEnded(v1::WatchCollisionsResponse* message);
   v1::CollisionEvent EndOf(const Pair& pair, const State& before) const;
 
   // Placements and clearance, without poses.
   v1::CollisionWatchOpen open_;
-  // Those that collide or are within the clearance.
+  // Pairs that collide or are within the clearance.
   std::map<Pair, State> told_;
   std::map<uint32_t, std::string> problems_;
   std::map<std::string, uint64_t> revisions_;
-  // From StartAnew until `synced`: the pairs that the present call told of.
+  // From StartAnew until `synced`: the pairs that the current call has reported.
   std::optional<std::set<Pair>> retold_;
 };
 

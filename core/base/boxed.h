@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// An optional value that lives on the heap. It takes one pointer when it is absent, so that a
-// structure of many parts is small where few of them are there. A copy copies the value.
+// An optional value on the heap. It takes one pointer if absent, so that a structure with many
+// optional parts is small if few of them are present. A copy copies the value.
 template <typename T>
 class Boxed {
  public:
@@ -23,7 +23,7 @@ class Boxed {
   bool has_value() const { return value_ != nullptr; }
   explicit operator bool() const { return has_value(); }
 
-  // Requires a value.
+  // Requires: has_value().
   const T& operator*() const {
     HULLD_DCHECK(has_value());
     return *value_;

@@ -9,20 +9,22 @@ namespace hulld {
 
 }  // namespace hulld
 
-// Ends the process unless `condition` holds: a broken invariant is a defect of ours, never bad
-// input (that is a Status). Always on, so keep the condition cheap: a comparison or two.
+// Aborts the process unless `condition` holds. A broken invariant is a defect of the program, never
+// bad input (which yields a Status). Always enabled, so keep the condition cheap: a comparison or
+// two.
 #define HULLD_CHECK(condition) \
   ((condition) ? (void)0 : ::hulld::CheckFailed(__FILE__, __LINE__, #condition))
 
-// The same in builds without NDEBUG alone (the presets dev, asan-ubsan, tsan and fuzz), so the
-// condition may be expensive. Elsewhere it is compiled and never evaluated.
+// HULLD_CHECK only in builds without NDEBUG (the presets dev, asan-ubsan, tsan and fuzz), so the
+// condition may be expensive. In other builds the condition is compiled but never evaluated.
 #ifdef NDEBUG
 #define HULLD_DCHECK(condition) (true ? (void)0 : (void)(condition))
 #else
 #define HULLD_DCHECK(condition) HULLD_CHECK(condition)
 #endif
 
-// Marks what no path of a correct program reaches, as after a switch over all values of an enum.
+// Marks code that no path of a correct program reaches, for example after a switch over all values
+// of an enum.
 #define HULLD_UNREACHABLE() ::hulld::CheckFailed(__FILE__, __LINE__, "unreachable")
 
 #endif  // HULLD_CORE_BASE_CHECK_H_

@@ -10,8 +10,8 @@
 
 namespace hulld {
 
-// What one piece of work after another fills anew: a list that keeps its memory and leaves elements
-// that nobody has assigned uninitialized. A copy is empty.
+// A scratch list, refilled by successive tasks. It keeps its memory and leaves unassigned elements
+// uninitialized. A copy is empty.
 template <typename T>
 class ScratchList {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -41,12 +41,12 @@ class ScratchList {
   const T& back() const { return elements_[size_ - 1]; }
 
   void clear() { size_ = 0; }
-  // Requires room.
+  // Requires: size <= capacity.
   void SetSize(size_t size) {
     HULLD_DCHECK(size <= capacity_);
     size_ = size;
   }
-  // Makes room for this many elements in all; keeps the first `used`.
+  // Grows the capacity to at least `room` elements in total; keeps the first `used`.
   void MakeRoom(size_t room, size_t used) {
     if (room > capacity_) Grow(room, used);
   }

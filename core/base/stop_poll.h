@@ -8,9 +8,9 @@
 
 namespace hulld {
 
-// Polls a caller's should_stop from within long work: at the first step, so that work which nobody
-// waits for any more does not begin, and then once in `steps_per_poll` steps. A caller that said
-// stop is not asked again. One thread's; threads that share work have a poll each.
+// Polls a caller's should_stop from within long work: at the first step, so that abandoned work
+// does not begin, and then every `steps_per_poll` steps. After should_stop returns true it is not
+// polled again. Not thread-safe; threads that share work have a poll each.
 class StopPoll {
  public:
   // For steps that take at most about 10 us each, most of them far less.
@@ -18,8 +18,8 @@ class StopPoll {
 
   // Never stops.
   StopPoll() = default;
-  // should_stop may be empty; it must outlive this. Requires steps_per_poll > 0; 1 polls at every
-  // step.
+  // should_stop may be empty; it must outlive this object. Requires: steps_per_poll > 0; 1 polls at
+  // every step.
   explicit StopPoll(const std::function<bool()>& should_stop,
                     uint64_t steps_per_poll = kStepsPerPoll)
       : should_stop_(should_stop ? &should_stop : nullptr), steps_per_poll_(steps_per_poll) {
@@ -29,7 +29,8 @@ class StopPoll {
   StopPoll(const StopPoll&) = delete;
   StopPoll& operator=(const StopPoll&) = delete;
 
-  // Counts steps of work about to be done. Returns whether to stop: now, or since an earlier step.
+  // Counts steps of work about to be done. Returns true if the work should stop, now or since an
+  // earlier step.
   bool Step(uint64_t steps = 1) {
     if (steps_left_ >= steps) {
       steps_left_ -= steps;
@@ -38,7 +39,7 @@ class StopPoll {
     steps_left_ = steps_per_poll_ - 1;
     return Poll();
   }
-  // Polls at once, however few steps were done.
+  // Polls immediately, regardless of the number of steps.
   bool Poll() {
     if (!stopped_ && should_stop_ != nullptr) stopped_ = (*should_stop_)();
     return stopped_;
@@ -48,7 +49,7 @@ class StopPoll {
  private:
   const std::function<bool()>* should_stop_ = nullptr;
   uint64_t steps_per_poll_ = kStepsPerPoll;
-  // Steps that may still be done without asking.
+  // Remaining steps before the next poll.
   uint64_t steps_left_ = 0;
   bool stopped_ = false;
 };

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdint>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -19,13 +19,13 @@
 namespace hulld {
 namespace {
 
-// Integers that are proportional to the points' coordinates, exactly.
+// Integers exactly proportional to the points' coordinates.
 struct IntegerPoints {
   int exponent;
   std::vector<IntegerVector> points;
 };
 
-// Incomplete when stopped.
+// The result is incomplete if stopped.
 IntegerPoints ToIntegers(std::span<const Vector> points, std::span<const Vector> also,
                          StopPoll& poll) {
   int exponent = kAboveAllExponents;
@@ -47,9 +47,10 @@ absl::Status Finding(const Parts&... parts) {
 
 absl::Status Stopped() { return absl::CancelledError("stopped in an audit"); }
 
-absl::Status CheckVertices(const Hull& hull) {
+absl::Status CheckVertices(const Hull& hull, StopPoll& poll) {
   const std::span<const Vector> v = hull.vertices();
   for (size_t i = 0; i < v.size(); ++i) {
+    if (poll.Step()) return Stopped();
     for (int k = 0; k < 3; ++k) {
       if (!std::isfinite(v[i][k])) return Finding("vertex ", i, " is not finite");
       if (v[i][k] == 0 && std::signbit(v[i][k])) return Finding("vertex ", i, " holds -0");
@@ -62,8 +63,8 @@ absl::Status CheckVertices(const Hull& hull) {
   return absl::OkStatus();
 }
 
-// The normal of a facet by its first corner, not normalized; zero if the corner is straight.
-// Requires at least three corners.
+// Returns the normal of a facet by its first corner, not normalized; zero if the corner is
+// straight. Requires: at least three corners.
 IntegerVector NormalOf(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet) {
   HULLD_CHECK(facet.size() >= 3);
   return Cross(v[facet[1]] - v[facet[0]], v[facet[2]] - v[facet[0]]);
@@ -97,52 +98,99 @@ absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uin
   return absl::OkStatus();
 }
 
-// A directed edge and the facet to its left.
-using FacetByEdge = std::map<std::pair<uint32_t, uint32_t>, size_t>;
+// A directed edge of a facet: from its corner number `corner` to the next.
+struct Side {
+  uint32_t tail;
+  uint32_t head;
+  uint32_t facet;
+  uint32_t corner;
+};
 
-absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull, StopPoll& poll) {
-  FacetByEdge left;
-  std::vector<Edge> edges;
-  for (size_t f = 0; f < hull.facet_count(); ++f) {
-    const std::span<const uint32_t> facet = hull.facet(f);
-    for (size_t i = 0; i < facet.size(); ++i) {
-      if (poll.Step()) return Stopped();
-      const uint32_t tail = facet[i];
-      const uint32_t head = facet[(i + 1) % facet.size()];
-      if (!left.emplace(std::pair(tail, head), f).second) {
-        return Finding("edge ", tail, "-", head, " is used twice in one direction");
-      }
-      if (tail < head) edges.push_back({tail, head});
-    }
+// Sorts by a vertex index, below `count`; stable. The result is incomplete if stopped. Cost:
+// O(sides + count).
+template <typename VertexOf>
+std::vector<Side> SortedBy(VertexOf vertex_of, const std::vector<Side>& sides, size_t count,
+                           StopPoll& poll) {
+  std::vector<uint32_t> starts(count + 1, 0);
+  for (const Side& side : sides) {
+    if (poll.Step()) return {};
+    ++starts[vertex_of(side) + 1];
   }
-  for (const auto& [edge, facet] : left) {
-    if (poll.Step()) return Stopped();
-    if (!left.contains({edge.second, edge.first})) {
-      return Finding("edge ", edge.first, "-", edge.second, " bounds one facet only");
-    }
+  for (size_t i = 0; i < count && !poll.Step(); ++i) starts[i + 1] += starts[i];
+  std::vector<Side> sorted(sides.size());
+  for (const Side& side : sides) {
+    if (poll.Step()) return {};
+    sorted[starts[vertex_of(side)]++] = side;
   }
-  std::sort(edges.begin(), edges.end());
-  if (!std::equal(edges.begin(), edges.end(), hull.edges().begin(), hull.edges().end())) {
-    return Finding("the edges are not those of the facets, sorted");
-  }
-  return left;
+  return sorted;
 }
 
-absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left, StopPoll& poll) {
+// An edge between two facets, as a side of each.
+struct SharedEdge {
+  Side left;
+  Side right;
+};
+
+// Returns every side by tail and head, with the opposite side of the neighbouring facet: the one at
+// the same place in the order by head and tail.
+absl::StatusOr<std::vector<SharedEdge>> CheckManifold(const Hull& hull, StopPoll& poll) {
+  const size_t count = hull.vertices().size();
+  std::vector<Side> sides;
+  for (uint32_t f = 0; f < hull.facet_count(); ++f) {
+    const std::span<const uint32_t> facet = hull.facet(f);
+    for (uint32_t i = 0; i < facet.size(); ++i) {
+      if (poll.Step()) return Stopped();
+      sides.push_back({facet[i], facet[(i + 1) % facet.size()], f, i});
+    }
+  }
+  const auto tail = [](const Side& side) { return side.tail; };
+  const auto head = [](const Side& side) { return side.head; };
+  const std::vector<Side> by_tail = SortedBy(tail, SortedBy(head, sides, count, poll), count, poll);
+  if (poll.stopped()) return Stopped();
+  const std::vector<Side> by_head = SortedBy(head, SortedBy(tail, sides, count, poll), count, poll);
+  if (poll.stopped()) return Stopped();
+  std::vector<SharedEdge> shared;
+  shared.reserve(sides.size());
+  size_t edges = 0;
+  for (size_t k = 0; k < sides.size(); ++k) {
+    if (poll.Step()) return Stopped();
+    const Side& left = by_tail[k];
+    const Side& right = by_head[k];
+    if (k > 0 && by_tail[k - 1].tail == left.tail && by_tail[k - 1].head == left.head) {
+      return Finding("edge ", left.tail, "-", left.head, " is used twice in one direction");
+    }
+    if (left.tail != right.head || left.head != right.tail) {
+      return Finding("edge ", left.tail, "-", left.head, " or ", right.tail, "-", right.head,
+                     " bounds one facet only");
+    }
+    shared.push_back({left, right});
+    if (left.tail > left.head) continue;
+    if (edges >= hull.edges().size() || hull.edges()[edges] != Edge{left.tail, left.head}) {
+      return Finding("the edges are not those of the facets, sorted");
+    }
+    ++edges;
+  }
+  if (edges != hull.edges().size()) return Finding("the edges are not those of the facets, sorted");
+  return shared;
+}
+
+absl::Status CheckConnected(const Hull& hull, const std::vector<SharedEdge>& shared,
+                            StopPoll& poll) {
   std::vector<size_t> parent(hull.facet_count());
   std::iota(parent.begin(), parent.end(), size_t{0});
   const auto root = [&](size_t f) {
     while (parent[f] != f) f = parent[f] = parent[parent[f]];
     return f;
   };
-  for (const auto& [edge, facet] : left) {
-    if (poll.Step()) return Stopped();
-    parent[root(facet)] = root(left.at({edge.second, edge.first}));
-  }
   std::vector<char> used(hull.vertices().size(), 0);
+  for (const auto& [left, right] : shared) {
+    if (poll.Step()) return Stopped();
+    parent[root(left.facet)] = root(right.facet);
+    used[left.tail] = 1;
+  }
   for (size_t f = 0; f < hull.facet_count(); ++f) {
+    if (poll.Step()) return Stopped();
     if (root(f) != root(0)) return Finding("the surface is in several pieces");
-    for (const uint32_t u : hull.facet(f)) used[u] = 1;
   }
   if (std::find(used.begin(), used.end(), 0) != used.end()) {
     return Finding("a vertex is on no facet");
@@ -154,33 +202,38 @@ absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left, StopPoll&
   return absl::OkStatus();
 }
 
-// Every facet's neighbour across an edge bends strictly inwards.
+// Checks that the neighbour of every facet across every edge bends strictly inwards.
 absl::Status CheckLocalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
-                                 const FacetByEdge& left, StopPoll& poll) {
-  for (const auto& [edge, f] : left) {
+                                 const std::vector<SharedEdge>& shared, StopPoll& poll) {
+  for (const auto& [left, right] : shared) {
     if (poll.Step()) return Stopped();
-    const std::span<const uint32_t> other = hull.facet(left.at({edge.second, edge.first}));
-    const size_t tail = std::find(other.begin(), other.end(), edge.first) - other.begin();
-    const IntegerVector& beyond = v[other[(tail + 1) % other.size()]];
-    if (Sign(Dot(NormalOf(v, hull.facet(f)), beyond - v[edge.first])) >= 0) {
-      return Finding("edge ", edge.first, "-", edge.second, " is not strictly convex");
+    const std::span<const uint32_t> other = hull.facet(right.facet);
+    const IntegerVector& beyond = v[other[(right.corner + 2) % other.size()]];
+    if (Sign(Dot(NormalOf(v, hull.facet(left.facet)), beyond - v[left.tail])) >= 0) {
+      return Finding("edge ", left.tail, "-", left.head, " is not strictly convex");
     }
   }
   return absl::OkStatus();
 }
 
-// A closed surface that is locally convex is convex when a point lies below all its facets and a
-// ray from there meets it once. Coordinates are multiplied by the number of vertices, so that their
-// mean is an integer.
+// Checks that a point lies below all facets and that a ray from it meets the surface once. A
+// closed, locally convex surface with this property is convex. Coordinates are multiplied by the
+// number of vertices, so that their mean is an integer.
 absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
                                   StopPoll& poll) {
   const Integer count = v.size();
   IntegerVector mean = {0, 0, 0};
-  for (const IntegerVector& p : v) mean = mean + p;
+  for (const IntegerVector& p : v) {
+    if (poll.Step()) return Stopped();
+    mean = mean + p;
+  }
   const auto from_mean = [&](uint32_t u) { return count * v[u] - mean; };
 
   IntegerVector ray = {0, 0, 0};
-  for (const uint32_t u : hull.facet(0)) ray = ray + from_mean(u);
+  for (const uint32_t u : hull.facet(0)) {
+    if (poll.Step()) return Stopped();
+    ray = ray + from_mean(u);
+  }
   for (size_t f = 0; f < hull.facet_count(); ++f) {
     const std::span<const uint32_t> facet = hull.facet(f);
     if (Sign(Dot(NormalOf(v, facet), from_mean(facet[0]))) <= 0) {
@@ -207,10 +260,10 @@ absl::Status AuditSolid(const std::vector<IntegerVector>& v, const Hull& hull, S
     }
   }
   if (hull.facet_count() < 4) return Finding("a solid has at least four facets");
-  const absl::StatusOr<FacetByEdge> left = CheckManifold(hull, poll);
-  if (!left.ok()) return left.status();
-  if (absl::Status s = CheckConnected(hull, *left, poll); !s.ok()) return s;
-  if (absl::Status s = CheckLocalConvexity(v, hull, *left, poll); !s.ok()) return s;
+  const absl::StatusOr<std::vector<SharedEdge>> shared = CheckManifold(hull, poll);
+  if (!shared.ok()) return shared.status();
+  if (absl::Status s = CheckConnected(hull, *shared, poll); !s.ok()) return s;
+  if (absl::Status s = CheckLocalConvexity(v, hull, *shared, poll); !s.ok()) return s;
   return CheckGlobalConvexity(v, hull, poll);
 }
 
@@ -221,14 +274,23 @@ absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull,
   const std::span<const uint32_t> facet = hull.facet(0);
   if (absl::Status s = CheckFacet(v, facet, 0, poll); !s.ok()) return s;
   if (facet[1] > facet.back()) return Finding("the polygon is not the canonical way round");
-  std::vector<Edge> edges;
+  // Place in the loop, by vertex. If a vertex occurs twice, another vertex has no place.
+  std::vector<size_t> places(v.size(), SIZE_MAX);
   for (size_t i = 0; i < facet.size(); ++i) {
-    const auto [low, high] = std::minmax(facet[i], facet[(i + 1) % facet.size()]);
-    edges.push_back({low, high});
+    if (poll.Step()) return Stopped();
+    places[facet[i]] = i;
   }
-  std::sort(edges.begin(), edges.end());
-  if (!std::equal(edges.begin(), edges.end(), hull.edges().begin(), hull.edges().end())) {
-    return Finding("the edges are not those of the polygon, sorted");
+  if (hull.edges().size() != v.size()) return Finding("a polygon has as many edges as vertices");
+  for (size_t k = 0; k < v.size(); ++k) {
+    if (poll.Step()) return Stopped();
+    const Edge& edge = hull.edges()[k];
+    bool is_good = edge.tail < edge.head && edge.head < v.size();
+    is_good = is_good && (k == 0 || hull.edges()[k - 1] < edge);
+    if (is_good) {
+      const size_t steps = (places[edge.head] + v.size() - places[edge.tail]) % v.size();
+      is_good = steps == 1 || steps + 1 == v.size();
+    }
+    if (!is_good) return Finding("the edges are not those of the polygon, sorted");
   }
   return absl::OkStatus();
 }
@@ -242,7 +304,7 @@ absl::Status AuditEnds(const Hull& hull) {
   return absl::OkStatus();
 }
 
-// Whether the point is surely below the facet, by doubles; false when that is not certain.
+// Returns true if the point is certainly below the facet, in doubles; false if that is uncertain.
 class FacetFilter {
  public:
   FacetFilter(const IntegerVector& normal, const Vector& origin)
@@ -310,9 +372,9 @@ bool FlatContains(const std::vector<IntegerVector>& v, const Hull& hull, const I
 }  // namespace
 
 absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_stop) {
-  if (absl::Status s = CheckVertices(hull); !s.ok()) return s;
-  if (hull.dimension() < 2) return AuditEnds(hull);
   StopPoll poll(should_stop);
+  if (absl::Status s = CheckVertices(hull, poll); !s.ok()) return s;
+  if (hull.dimension() < 2) return AuditEnds(hull);
   const IntegerPoints v = ToIntegers(hull.vertices(), {}, poll);
   if (poll.stopped()) return Stopped();
   return hull.dimension() == 2 ? AuditPolygon(v.points, hull, poll)

@@ -10,16 +10,17 @@
 
 namespace hulld {
 
-// Checks a snapshot by other means than the builder: rational arithmetic only. Checks finite and
+// Checks a snapshot independently of the builder: in rational arithmetic only. Checks finite and
 // canonical coordinates and order, that every vertex is used, planar strictly convex facets, a
 // closed manifold with V - E + F = 2, strict local convexity at every edge, and global convexity
-// (Mehlhorn et al. 1996, Checking Geometric Programs). OK, or INTERNAL with the first finding.
-// CANCELLED when should_stop, which may be empty, said so; it is polled every 1024 steps.
-// Cost: O(V) exact operations, about 10 us each.
+// (Mehlhorn et al. 1996, Checking Geometric Programs). Returns OK, or INTERNAL with the first
+// defect. CANCELLED: should_stop, which may be empty, returned true; polled every 1024 steps. Cost:
+// O(V) exact operations, about 10 us each, regardless of the sizes of facets and the degrees of
+// vertices.
 absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_stop = {});
 
-// Checks that every point is in the closed hull. Requires finite points (checked). OK, or INTERNAL
-// naming the first point that is not. Cost: O(n F).
+// Checks that every point is in the closed hull. Requires: finite points (checked). Returns OK, or
+// INTERNAL with the first point outside. Cost: O(n F).
 absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points);
 
 }  // namespace hulld

@@ -14,7 +14,7 @@ Vector MeanOfAxisExtremes(const std::vector<Vector>& vertices) {
     const auto [low, high] =
         std::minmax_element(vertices.begin(), vertices.end(),
                             [axis](const Vector& a, const Vector& b) { return a[axis] < b[axis]; });
-    // Each divided first, so that no sum overflows.
+    // Divides each point first, so that no sum overflows.
     mean += *low / 6 + *high / 6;
   }
   return mean;

@@ -19,21 +19,21 @@ struct Edge {
   friend auto operator<=>(const Edge&, const Edge&) = default;
 };
 
-// The canonical snapshot of a convex hull: immutable, readable by any thread, the same bits for the
-// same point set whatever the order in which the points came.
+// The canonical snapshot of a convex hull. Immutable, thread-safe, and bit-identical for the same
+// point set in any order of insertion.
 //
 // Vertices are the extreme points, in lexicographic order (x, then y, then z); -0 is stored as +0.
 // Facets are maximal coplanar polygons, each from its lowest vertex, counter-clockwise seen from
-// outside, sorted by their vertex sequences. A hull of dimension 2 has one facet, which stands for
-// both its sides (its second vertex is lower than its last); one of dimension 1 has no facet and
-// one edge, one of dimension 0 one vertex, one of dimension -1 nothing. Edges are sorted.
+// outside, sorted by their vertex sequences. A hull of dimension 2 has one facet, which represents
+// both its sides (its second vertex is lower than its last); dimension 1 has no facet and one edge,
+// dimension 0 one vertex, dimension -1 nothing. Edges are sorted.
 class Hull {
  public:
   Hull() = default;
 
-  // Assembles a snapshot from parts that already are canonical. `facet_starts` has one entry per
-  // facet and one more. Requires what the class comment promises; only what costs O(1) is checked
-  // here, as AuditHull checks all of it.
+  // Assembles a snapshot from canonical parts. `facet_starts` has one entry per facet plus one.
+  // Requires: the invariants of the class comment. Checks only those that cost O(1); AuditHull
+  // checks all of them.
   Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> facet_starts,
        std::vector<uint32_t> facet_vertices, std::vector<Edge> edges);
 
@@ -42,19 +42,18 @@ class Hull {
   std::span<const Vector> vertices() const { return vertices_; }
   std::span<const Edge> edges() const { return edges_; }
   size_t facet_count() const { return facet_starts_.empty() ? 0 : facet_starts_.size() - 1; }
-  // The vertex indices of facet i. Requires i < facet_count().
+  // Returns the vertex indices of facet i. Requires: i < facet_count().
   std::span<const uint32_t> facet(size_t i) const {
     HULLD_DCHECK(i < facet_count());
     return std::span(facet_vertices_)
         .subspan(facet_starts_[i], facet_starts_[i + 1] - facet_starts_[i]);
   }
-  // Largest absolute coordinate; 0 when empty.
+  // Largest absolute coordinate; 0 if empty.
   double max_abs_coordinate() const { return max_abs_coordinate_; }
-  // The mean of the six vertices that are extreme along the coordinate axes, rounded: a place in
-  // the hull to search from. Zero when empty.
+  // The mean of the six vertices that are extreme along the coordinate axes, rounded: a point in
+  // the hull where searches start. Zero if empty.
   const Vector& center() const { return center_; }
-  // What the snapshot holds in memory, by capacities, in bytes: below 100 a vertex where facets are
-  // triangles and vertices many.
+  // Memory, by capacities, in bytes: below 100 a vertex if facets are triangles and vertices many.
   size_t MemoryBytes() const {
     return sizeof(*this) + vertices_.capacity() * sizeof(Vector) +
            (facet_starts_.capacity() + facet_vertices_.capacity()) * sizeof(uint32_t) +

@@ -7,14 +7,14 @@
 
 #include "core/numeric/vector.h"
 
-// How core addresses directions by the surface of the cube [-1, 1]^3. A direction divided by its
-// largest component lies on one of six faces. Face 2 k holds the directions whose component k is
-// the largest and positive, face 2 k + 1 those where it is negative. The coordinates on a face are
-// the two components after k, the first one after the last. A map divides each face into side x
-// side cells, row by row along the first coordinate.
+// Addresses of directions on the surface of the cube [-1, 1]^3. A direction divided by its largest
+// component lies on one of six faces. Face 2 k holds the directions with component k largest and
+// positive, face 2 k + 1 those with it negative. The coordinates on a face are the two components
+// after k, cyclically. A map divides each face into side x side cells, row by row along the first
+// coordinate.
 namespace hulld {
 
-// The component after component k, and after that one: [k] and [k + 1].
+// The two components after component k, cyclically: [k] and [k + 1].
 inline constexpr uint32_t kCubeAxisAfter[4] = {1, 2, 0, 1};
 
 inline constexpr uint32_t CubeFace(uint32_t axis, bool negative) {
@@ -25,7 +25,7 @@ inline constexpr uint32_t CubeCell(uint32_t face, uint32_t side, uint32_t i, uin
   return (face * side + i) * side + j;
 }
 
-// The direction at coordinates (s, t), from -1 to 1, of a face.
+// Returns the direction at coordinates (s, t), from -1 to 1, of a face.
 inline Vector CubeDirection(uint32_t face, double s, double t) {
   const uint32_t axis = face / 2;
   Vector n;
@@ -35,9 +35,9 @@ inline Vector CubeDirection(uint32_t face, double s, double t) {
   return n;
 }
 
-// Where a direction meets the cube: the face, and the coordinates there times largest(). Without
-// branches on data, as directions come in no foreseeable order. Among equally large components, the
-// first counts. Zero meets face 0; a direction that is not finite meets some face.
+// The intersection of a direction with the cube: the face, and the coordinates there times
+// largest(). Branch-free on data, because directions are unpredictable. Among equally large
+// components, the first counts. Zero meets face 0; a non-finite direction meets some face.
 class OnCube {
  public:
   OnCube(double x, double y, double z) : components_{x, y, z, x, y} {
@@ -46,7 +46,7 @@ class OnCube {
     const double size_z = std::abs(z);
     const double larger = std::max(size_x, size_y);
     largest_ = std::max(larger, size_z);
-    // Arithmetic of truth values, as compilers turn conditions into branches.
+    // Arithmetic on truth values, because compilers turn conditions into branches.
     const uint32_t is_y = size_y > size_x;
     const uint32_t is_z = size_z > larger;
     axis_ = (is_y & (is_z - 1)) | (2 * is_z);
@@ -61,7 +61,7 @@ class OnCube {
   double second() const { return components_[axis_ + 2]; }
 
  private:
-  // The first two components come again, so that those after any one need no table.
+  // The first two components are repeated, so that the two after any component need no table.
   double components_[5];
   double largest_;
   uint32_t axis_;

@@ -7,11 +7,11 @@
 namespace hulld {
 
 // A number as the unevaluated sum of two doubles, the lower at most half a unit in the last place
-// of the upper. What each operation errs by, in relation to its result, stands above it, with u the
-// unit roundoff. It holds as long as nothing overflows or underflows. Sources: Joldes, Muller and
-// Popescu 2017, Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic
-// (JMP); Muller and Rideau 2022, Formalization of Double-Word Arithmetic (MR), who checked the
-// theorems of JMP by a proof assistant.
+// of the upper. The comment of each operation states its relative error bound, with u the unit
+// roundoff, in the absence of overflow and underflow. Sources: Joldes, Muller and Popescu 2017,
+// Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic (JMP); Muller
+// and Rideau 2022, Formalization of Double-Word Arithmetic (MR), a check of JMP's theorems by a
+// proof assistant.
 struct DoubleDouble {
   double high = 0;
   double low = 0;
@@ -19,7 +19,7 @@ struct DoubleDouble {
   DoubleDouble operator-() const { return {-high, -low}; }
 };
 
-// 3 u^2 + 13 u^3. Algorithm 6 of JMP, and its theorem.
+// Relative error: 3 u^2 + 13 u^3. Algorithm 6 of JMP, and its theorem.
 inline DoubleDouble operator+(const DoubleDouble& x, const DoubleDouble& y) {
   const SumWithError s = TwoSum(x.high, y.high);
   const SumWithError t = TwoSum(x.low, y.low);
@@ -30,18 +30,18 @@ inline DoubleDouble operator+(const DoubleDouble& x, const DoubleDouble& y) {
 
 inline DoubleDouble operator-(const DoubleDouble& x, const DoubleDouble& y) { return x + -y; }
 
-// 5 u^2. Algorithm 10 of JMP, who show 7 u^2; MR show 5 u^2. Where y is one double, so that its
-// lower part is 0, the steps are those of algorithm 8: 3 u^2.
+// Relative error: 5 u^2. Algorithm 10 of JMP, who prove 7 u^2; MR prove 5 u^2. If y is one double,
+// with lower part 0, the steps are those of algorithm 8: 3 u^2.
 inline DoubleDouble operator*(const DoubleDouble& x, const DoubleDouble& y) {
   const SumWithError c = TwoProduct(x.high, y.high);
   const SumWithError z = FastTwoSum(c.sum, c.error + (x.high * y.low + x.low * y.high));
   return {z.sum, z.error};
 }
 
-// 17 u^2. Algorithm 17 of JMP, but for `r`. Theorem 7.1 gives 15 u^2 + 56 u^3 where the product r
-// errs by 1.5 u^2 + 4 u^3 of itself (algorithm 7); here it errs by 3 u^2 (algorithm 8). What r errs
-// by goes into the quotient once, as x - r corrects it: 1.5 u^2 more, and terms of u^3. Requires y
-// not zero.
+// Relative error: 17 u^2. Algorithm 17 of JMP, except for `r`. Theorem 7.1 gives 15 u^2 + 56 u^3
+// for a product r with relative error 1.5 u^2 + 4 u^3 (algorithm 7); here the error of r is 3 u^2
+// (algorithm 8). The error of r enters the quotient once, because x - r corrects it: 1.5 u^2 more,
+// and terms of u^3. Requires: y not zero.
 inline DoubleDouble operator/(const DoubleDouble& x, const DoubleDouble& y) {
   HULLD_DCHECK(y.high != 0);
   const double quotient = x.high / y.high;
@@ -51,7 +51,7 @@ inline DoubleDouble operator/(const DoubleDouble& x, const DoubleDouble& y) {
   return {z.sum, z.error};
 }
 
-// The exact product of two doubles.
+// Returns the exact product of two doubles.
 inline DoubleDouble ExactProduct(double x, double y) {
   const SumWithError product = TwoProduct(x, y);
   return {product.sum, product.error};

@@ -9,11 +9,11 @@
 
 namespace hulld {
 
-// Expansions: a real number as an unevaluated sum of doubles that do not overlap, smallest first,
-// zeros left out. Sums and products of expansions are exact as long as no component overflows or
-// underflows; the caller checks the exponent range beforehand (kExpansionMin, kExpansionMax). No
-// allocation. Source: Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic and Fast Robust
-// Geometric Predicates; Dekker 1971 for the product; Knuth for the sum.
+// Expansions: real numbers as unevaluated sums of non-overlapping doubles, smallest first, zeros
+// omitted. Sums and products of expansions are exact unless a component overflows or underflows;
+// the caller checks the exponent range beforehand (kExpansionMin, kExpansionMax). No allocation.
+// Source: Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
+// Predicates; Dekker 1971 for the product; Knuth for the sum.
 
 // a + b = sum + error, exactly.
 struct SumWithError {
@@ -28,14 +28,15 @@ inline SumWithError TwoSum(double a, double b) {
   return {sum, (a - a_virtual) + (b - b_virtual)};
 }
 
-// As TwoSum. Requires |a| >= |b| or a == 0.
+// TwoSum for ordered arguments. Requires: |a| >= |b| or a == 0.
 inline SumWithError FastTwoSum(double a, double b) {
   HULLD_DCHECK(std::abs(a) >= std::abs(b) || a == 0);
   const double sum = a + b;
   return {sum, b - (sum - a)};
 }
 
-// a * b = sum + error, exactly. Splits by multiplication, as the baseline has no FMA instruction.
+// a * b = sum + error, exactly. Splits by multiplication, because the baseline has no FMA
+// instruction.
 inline SumWithError TwoProduct(double a, double b) {
   constexpr double kSplitter = 0x1p27 + 1;
   const double product = a * b;
@@ -55,7 +56,7 @@ template <size_t N>
 class Expansion {
  public:
   Expansion() = default;
-  // The exact difference a - b.
+  // Returns the exact difference a - b.
   static Expansion DifferenceOf(double a, double b) requires(N == 2) {
     Expansion result;
     const SumWithError difference = TwoSum(a, -b);
@@ -66,7 +67,7 @@ class Expansion {
 
   size_t size() const { return size_; }
   double operator[](size_t i) const { return components_[i]; }
-  // The sign is that of the largest component.
+  // Returns the sign, which is that of the largest component.
   int sign() const {
     if (size_ == 0) return 0;
     return components_[size_ - 1] > 0 ? 1 : -1;
@@ -88,7 +89,7 @@ class Expansion {
   size_t size_ = 0;
 };
 
-// Exact sum: merges by magnitude, then one pass of renormalization.
+// Returns the exact sum: merges by magnitude, then renormalizes in one pass.
 template <size_t N, size_t M>
 Expansion<N + M> operator+(const Expansion<N>& e, const Expansion<M>& f) {
   Expansion<N + M> result;
@@ -115,7 +116,7 @@ Expansion<N + M> operator-(const Expansion<N>& e, const Expansion<M>& f) {
   return e + (-f);
 }
 
-// Exact product with one double.
+// Returns the exact product with one double.
 template <size_t N>
 Expansion<2 * N> Scale(const Expansion<N>& e, double factor) {
   Expansion<2 * N> result;
@@ -135,7 +136,7 @@ Expansion<2 * N> Scale(const Expansion<N>& e, double factor) {
   return result;
 }
 
-// Exact product with the exact difference of two doubles.
+// Returns the exact product with the exact difference of two doubles.
 template <size_t N>
 Expansion<4 * N> operator*(const Expansion<N>& e, const Expansion<2>& f) {
   Expansion<4 * N> result;

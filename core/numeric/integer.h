@@ -13,7 +13,7 @@
 
 namespace hulld {
 
-// An integer of any size; up to 1024 bits it lives without allocation.
+// An integer of any size, without allocation up to 1024 bits.
 using Integer = boost::multiprecision::number<
     boost::multiprecision::cpp_int_backend<1024, 0, boost::multiprecision::signed_magnitude,
                                            boost::multiprecision::unchecked>,
@@ -28,8 +28,8 @@ struct IntegerVector {
   const Integer& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
   Integer& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
 
-  // Friends, so that they are candidates for nothing but IntegerVector: Integer claims to be
-  // constructible from much.
+  // Friends, so that they are candidates only for IntegerVector: Integer claims to be constructible
+  // from many types.
   friend bool operator==(const IntegerVector&, const IntegerVector&) = default;
   friend IntegerVector operator+(const IntegerVector& a, const IntegerVector& b) {
     return {a.x + b.x, a.y + b.y, a.z + b.z};
@@ -53,14 +53,14 @@ inline bool IsZero(const IntegerVector& a) {
   return a.x.is_zero() && a.y.is_zero() && a.z.is_zero();
 }
 inline int Sign(const Integer& a) { return a.sign(); }
-// A direction across d. Requires d not zero.
+// Returns a direction perpendicular to d. Requires: d not zero.
 inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
   HULLD_CHECK(!IsZero(d));
   if (!d.y.is_zero() || !d.z.is_zero()) return {0, d.z, -d.y};
   return {0, 0, d.x};
 }
 
-// x = magnitude * 2^exponent, or minus that. Exact for every finite x.
+// x = magnitude * 2^exponent, or the negative of that. Exact for every finite x.
 struct BinaryDouble {
   uint64_t magnitude;  // below 2^53
   int exponent;
@@ -76,19 +76,19 @@ inline BinaryDouble Decompose(double x) {
   return {fraction | kImplicitBit, biased - 1075, x < 0};
 }
 
-// The exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Requires x finite and not
-// 0. Exact, subnormals included.
+// Returns the exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Exact, subnormals
+// included. Requires: x finite and not 0.
 int LowestBitExponent(double x);
 
-// The least LowestBitExponent of the non-zero components, or `otherwise` when it is less or all are
-// zero.
+// Returns the least LowestBitExponent of the non-zero components, or `otherwise` if it is less or
+// all are zero.
 int LowestBitExponent(const Vector& v, int otherwise);
 
-// x / 2^exponent. Requires x finite and a multiple of 2^exponent.
+// Returns x / 2^exponent. Requires: x finite and a multiple of 2^exponent.
 Integer ToInteger(double x, int exponent);
 IntegerVector ToInteger(const Vector& v, int exponent);
 
-// The same in a fixed width. Requires the quotient to fit (unchecked).
+// ToInteger in a fixed width. Requires: the quotient fits (unchecked).
 template <int kWords>
 WideInteger<kWords> WideIntegerOf(double x, int exponent) {
   const BinaryDouble d = Decompose(x);
@@ -105,10 +105,10 @@ WideInteger<kWords> WideIntegerOf(double x, int exponent) {
   return d.negative ? -magnitude : magnitude;
 }
 
-// The number whose magnitude has these words, the least significant first.
+// Returns the number with these words as its magnitude, the least significant first.
 Integer IntegerOf(std::span<const uint64_t> words, bool negative);
 
-// The same number.
+// Converts to an integer of any size.
 template <int kWords>
 Integer ToInteger(const WideInteger<kWords>& a) {
   const WideInteger<kWords> magnitude = a.is_negative() ? -a : a;
@@ -120,7 +120,7 @@ IntegerVector ToInteger(const WideVector<kWords>& v) {
 }
 inline const IntegerVector& ToInteger(const IntegerVector& v) { return v; }
 
-// The same number in words. False, and `wide` unset, where they are too few.
+// Converts to a fixed width. Returns false, and leaves `wide` unset, if the words are too few.
 template <int kWords>
 bool ToWide(const Integer& a, WideInteger<kWords>& wide) {
   const auto& limbs = a.backend();
@@ -128,7 +128,7 @@ bool ToWide(const Integer& a, WideInteger<kWords>& wide) {
   if (limbs.size() > kWords) return false;
   wide = 0;
   for (unsigned i = 0; i < limbs.size(); ++i) wide.word(static_cast<int>(i)) = limbs.limbs()[i];
-  // Its sign would take the highest bit.
+  // The sign would need the highest bit.
   if (wide.is_negative()) return false;
   if (limbs.sign()) wide = -wide;
   return true;
@@ -138,12 +138,12 @@ bool ToWide(const IntegerVector& v, WideVector<kWords>& wide) {
   return ToWide(v.x, wide.x) && ToWide(v.y, wide.y) && ToWide(v.z, wide.z);
 }
 
-// The number of bits of the largest component; 0 for the zero vector.
+// Returns the number of bits of the largest component; 0 for the zero vector.
 unsigned BitLength(const IntegerVector& v);
 
-// v divided by the power of two that brings its largest component into [2^62, 2^63), rounded: each
-// component of the result errs by less than 2^-52 times the largest component, relative to the
-// exact quotient. Requires v not zero.
+// Returns v, rounded, divided by the power of two that brings its largest component into [2^62,
+// 2^63). Each component of the result errs by less than 2^-52 times the largest component, relative
+// to the exact quotient. Requires: v not zero.
 Vector ToScaledDoubles(const IntegerVector& v);
 inline constexpr double kScaledDoublesError = 0x1p-52;
 inline constexpr double kScaledDoublesMax = 0x1p63;

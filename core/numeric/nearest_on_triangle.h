@@ -5,12 +5,12 @@
 
 namespace hulld {
 
-// The part of a triangle a, b, c that holds its point nearest to a given point p: a corner, the
-// inside of an edge, or the inside.
+// The part of a triangle a, b, c that contains its point nearest to a given point p: a corner, the
+// interior of an edge, or the interior.
 enum class TrianglePart : uint8_t { kA, kB, kC, kAB, kAC, kBC, kInside };
 
 // The part, and the weights of the corners in the nearest point up to a common factor. The weights
-// of corners that are not of the part are 0.
+// of corners outside the part are 0.
 struct TriangleNearest {
   TrianglePart part;
   double a;
@@ -18,16 +18,16 @@ struct TriangleNearest {
   double c;
 };
 
-// How the vector x from a corner to p projects on the two edges at a.
+// Projections of the vector x from a corner to p on the two edges at a.
 struct EdgeProjections {
   double on_ab;  // (b - a) . x
   double on_ac;  // (c - a) . x
 };
 
 // Finds the part in floating point, up to rounding: near the boundary of two parts it may be
-// either, and weights of the inside that are near 0 may be negative. project(corner), for the
-// corners 0 to 2, gives EdgeProjections; how it rounds is the caller's choice. A corner that is not
-// needed is not asked for. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
+// either, and weights of the interior that are near 0 may be negative. project(corner), for the
+// corners 0 to 2, returns EdgeProjections; the caller chooses its rounding, and it is called only
+// for corners that are needed. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
 template <typename Project>
 inline TriangleNearest FindNearestOnTriangle(Project project) {
   const EdgeProjections from_a = project(0);

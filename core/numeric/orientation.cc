@@ -20,7 +20,7 @@ namespace {
 
 thread_local OrientationCounts counts;
 
-// The sign of `value` when it exceeds its error bound; not NaN or infinity, whose comparisons fail.
+// Returns the sign of `value` if it exceeds its error bound. NaN and infinity fail the comparisons.
 std::optional<int> CertainSign(double value, double bound) {
   if (value > bound) return 1;
   if (value < -bound) return -1;
@@ -40,7 +40,7 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
                            (std::abs(t_yr_z) + std::abs(t_zr_y)) * std::abs(s.x()) +
                            (std::abs(r_ys_z) + std::abs(r_zs_y)) * std::abs(t.x());
   if (!(permanent < kPermanentMax)) return std::nullopt;
-  // A sum of absolute values stands for the largest: it is cheaper than nine comparisons.
+  // Uses a sum of absolute values in place of the largest: it is cheaper than nine comparisons.
   const double size = std::abs(r.x()) + std::abs(r.y()) + std::abs(r.z()) + std::abs(s.x()) +
                       std::abs(s.y()) + std::abs(s.z()) + std::abs(t.x()) + std::abs(t.y()) +
                       std::abs(t.z());
@@ -55,33 +55,33 @@ double LargestCoordinate(const FourPoints& points) {
   return largest;
 }
 
-// 2^exponent. Requires that this is a normal double.
+// Returns 2^exponent. Requires: the result is a normal double.
 double PowerOfTwo(int exponent) {
   HULLD_DCHECK(exponent > -1023 && exponent < 1024);
   return std::bit_cast<double>(static_cast<uint64_t>(1023 + exponent) << 52);
 }
 
-// The exponent of a double that is not negative; -1023 for zero and subnormals.
+// Returns the exponent of a non-negative double; -1023 for zero and subnormals.
 int ExponentOf(double x) { return static_cast<int>(std::bit_cast<uint64_t>(x) >> 52) - 1023; }
 
-// The difference, times the power of two that brings its largest component into [1/2, 1); a
-// subnormal one stays below. Rounded only where a component underflows.
+// Returns the difference times the power of two that brings its largest component into [1/2, 1); a
+// subnormal one stays below. Rounded only if a component underflows.
 Vector ToUnitSize(const Vector& difference) {
   const int exponent = -1 - ExponentOf(LargestComponent(difference));
-  // Two factors, as one may exceed the range of doubles.
+  // Two factors, because one may exceed the range of doubles.
   const double first = PowerOfTwo(exponent / 2);
   const double second = PowerOfTwo(exponent - exponent / 2);
   return difference * first * second;
 }
 
-// The filter with another of the points as the origin, and each difference on a scale of its own.
+// The filter with another point as the origin, and each difference on a scale of its own.
 //
-// Idea: the bound grows in proportion to the three differences. Where some of the points lie close
-// together, differences from one of these are small, hence so is the bound, though the determinant
-// is the same. Scales change no sign, so nothing overflows and little is lost to underflow. Tried
-// where it promises more than the first filter gave. Requires that no difference overflows.
+// The bound grows in proportion to the three differences. If some of the points lie close together,
+// differences from one of these are small, and so is the bound, while the determinant is the same.
+// Scales change no sign, so nothing overflows and little is lost to underflow. Tried only if it
+// promises more than the first filter. Requires: no difference overflows.
 std::optional<int> FilteredFromNearest(const FourPoints& points) {
-  // The exponents of the three differences from each point, added.
+  // The sum of the exponents of the three differences from each point.
   std::array<int, 4> sizes{};
   for (size_t i = 0; i < 4; ++i) {
     for (size_t j = i + 1; j < 4; ++j) {
@@ -98,7 +98,7 @@ std::optional<int> FilteredFromNearest(const FourPoints& points) {
       static_cast<size_t>(std::min_element(sizes.begin(), sizes.end()) - sizes.begin());
   const bool was_in_range = std::abs(sizes[0]) <= kLargestInRange;
   if (was_in_range && sizes[nearest] > sizes[0] - kLeastGain) return std::nullopt;
-  // Moving the origin to the front turns the points' order round where its place is odd.
+  // Moving the origin to the front reverses the orientation if its index is odd.
   const Vector& origin = points[nearest];
   std::array<Vector, 3> differences;
   for (size_t k = 0; k < 3; ++k) {
@@ -114,15 +114,15 @@ struct FixedPoints {
   std::array<std::array<int64_t, 3>, 4> points;
 };
 
-// A power of two for each factor of a scale that brings `largest` to [2^59, 2^60); two factors, as
+// Returns the factors of a power of two that brings `largest` to [2^59, 2^60); two factors, because
 // one may exceed the range of doubles.
 std::array<double, 2> FixedPointScale(double largest) {
   const int exponent = 59 - ExponentOf(largest);
   return {PowerOfTwo(exponent / 2), PowerOfTwo(exponent - exponent / 2)};
 }
 
-// Empty unless all coordinates are integers on the scale of the largest: those of a lattice, a
-// drawing or a scan mostly are.
+// Returns the points if all coordinates are integers on the scale of the largest, as is usual for a
+// lattice, a drawing or a scan; otherwise empty.
 std::optional<FixedPoints> ToFixedPoints(const FourPoints& points, double largest) {
   const std::array<double, 2> scale = FixedPointScale(largest);
   FixedPoints fixed;
@@ -130,7 +130,7 @@ std::optional<FixedPoints> ToFixedPoints(const FourPoints& points, double larges
   for (size_t i = 0; i < 4; ++i) {
     for (int k = 0; k < 3; ++k) {
       const double x = points[i][k];
-      // Scaling rounds only what becomes smaller than one, which no integer equals but zero.
+      // Scaling rounds only results below one, and zero is the only integer among these.
       const double scaled = x * scale[0] * scale[1];
       const auto integer = static_cast<int64_t>(scaled);
       is_exact &= static_cast<double>(integer) == scaled && (integer == 0) == (x == 0);
@@ -140,7 +140,7 @@ std::optional<FixedPoints> ToFixedPoints(const FourPoints& points, double larges
   return is_exact ? std::optional(fixed) : std::nullopt;
 }
 
-// Differences are below 2^61, minors below 2^123; the sum of their products is gathered in two
+// Differences are below 2^61, minors below 2^123; the sum of their products is accumulated in two
 // halves, the lower one below 3 * 2^125.
 int FixedPointOrient3d(const FixedPoints& fixed) {
   const auto& [a, b, c, d] = fixed.points;
@@ -169,13 +169,13 @@ bool InExpansionRange(std::initializer_list<double> coordinates) {
 
 bool InExpansionRange(const Vector& v) { return InExpansionRange({v.x(), v.y(), v.z()}); }
 
-// The points times the power of two that brings their largest coordinate next below kExpansionMax,
-// which changes no sign; empty where some other coordinate stays below kExpansionMin, so that the
-// product might be rounded. Requires a largest coordinate that is not zero.
+// Returns the points times the power of two that brings their largest coordinate just below
+// kExpansionMax, which changes no sign. Empty if another coordinate remains below kExpansionMin, so
+// that the product might be rounded. Requires: a largest coordinate that is not zero.
 std::optional<FourPoints> ScaledToExpansionRange(const FourPoints& points, double largest) {
   HULLD_CHECK(largest > 0);
   const int exponent = std::ilogb(kExpansionMax) - 1 - std::ilogb(largest);
-  // Two factors, as one may exceed the range of doubles.
+  // Two factors, because one may exceed the range of doubles.
   const double first = std::ldexp(1.0, exponent / 2);
   const double second = std::ldexp(1.0, exponent - exponent / 2);
   FourPoints scaled;
@@ -245,7 +245,7 @@ int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d)
     ++counts.filter;
     return *sign;
   }
-  // Duplicates ask for the corners and the edges of triangles themselves.
+  // Duplicates lead to queries with the corners and the edges of triangles themselves.
   if (d == a || d == b || d == c || c == a || c == b) {
     ++counts.filter;
     return 0;

@@ -8,34 +8,42 @@
 
 namespace hulld {
 
-// Sign of det[b-a, c-a, d-a]: +1 when d lies on the side that the normal (b-a) x (c-a) points to, 0
-// when the four points are coplanar, -1 otherwise. Exact for all finite input: a floating-point
-// filter with a proven bound decides almost always. For the rest, the same filter decides where
-// points lie close together, seen from one of these, and at extreme magnitudes, where a power of
-// two brings them into range; integers of fixed size decide what they can hold, 60 bits a
-// coordinate on one scale; expansions what is left within the exponent range of kExpansionMin and
-// kExpansionMax, where a power of two brings all points whose exponents lie no further apart;
-// integers of any size everything else. Cost: ~10 ns; ~30 ns from the nearest point or in fixed
-// size; ~1 us by expansions; by integers some us, growing with the spread of exponents. Source:
-// Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic.
+// Returns the sign of det[b-a, c-a, d-a]: +1 if d lies on the side that the normal (b-a) x (c-a)
+// points to, 0 if the four points are coplanar, -1 otherwise. Exact for all finite input.
+//
+// Stages: a floating-point filter with a proven bound almost always decides. Next, the same filter
+// seen from one of the points decides if points lie close together, and at extreme magnitudes,
+// which a power of two brings into range. Integers of fixed size decide if the coordinates fit, at
+// 60 bits a coordinate on one scale. Expansions decide within the exponent range of kExpansionMin
+// and kExpansionMax; a power of two brings all points with exponents no further apart into it.
+// Integers of any size decide the rest. Cost: ~10 ns by the filter; ~30 ns from the nearest point
+// or in fixed size; ~1 us by expansions; some us by integers, growing with the spread of exponents.
+// Source: Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic.
+//
+// Laws, for all finite points:
+// (1) Antisymmetry: exchanging two of the points negates the sign.
+// (2) Permutation: an even permutation of the points keeps the sign.
+// (3) Translation: adding one vector to all four points keeps the sign, if doubles represent the
+//     four sums exactly.
 int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d);
 
-// The coordinates that a projection onto a coordinate plane keeps, first and second.
+// The coordinates kept by a projection onto a coordinate plane, in order.
 struct CoordinatePlane {
   int first;
   int second;
 };
 
-// Sign of det[b-a, c-a] in a coordinate plane: +1 when a, b, c turn counter-clockwise there. Exact
-// for all finite input.
+// Returns the sign of det[b-a, c-a] in a coordinate plane: +1 if a, b, c turn counter-clockwise
+// there. Exact for all finite input.
 int Orient2d(const Vector& a, const Vector& b, const Vector& c, CoordinatePlane plane);
 
-// A coordinate plane onto which the triangle a, b, c projects with non-zero area, counter-clockwise
-// or not; first < 0 when the three points are collinear. Exact for all finite input.
+// Returns a coordinate plane onto which the triangle a, b, c projects with non-zero area,
+// counter-clockwise or not; first < 0 if the three points are collinear. Exact for all finite
+// input.
 CoordinatePlane ProjectionOf(const Vector& a, const Vector& b, const Vector& c);
 
-// How many signs each stage decided on this thread since it started: tests see that every stage is
-// reached.
+// Number of signs decided by each stage on this thread since it started. Tests use it to check that
+// every stage is reached.
 struct OrientationCounts {
   uint64_t filter = 0;
   uint64_t nearest_filter = 0;

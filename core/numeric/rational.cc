@@ -11,20 +11,20 @@
 namespace hulld {
 namespace {
 
-// Bits of the quotients before they are rounded: 64 after a square root.
+// Bits of the quotients before they are rounded; 64 after a square root.
 constexpr int kQuotientBits = 128;
 
 int BitsOf(const Integer& value) {
   return value.is_zero() ? 0 : static_cast<int>(msb(Integer(abs(value)))) + 1;
 }
 
-// value * 2^shift, rounded down. Requires value >= 0.
+// Returns value * 2^shift, rounded down. Requires: value >= 0.
 Integer Shifted(const Integer& value, int shift) {
   HULLD_DCHECK(Sign(value) >= 0);
   return shift >= 0 ? Integer(value << shift) : Integer(value >> -shift);
 }
 
-// mantissa * 2^exponent of a number other than 0, with relative error below 2^-60.
+// Rounds a number other than 0, given as mantissa * 2^exponent with relative error below 2^-60.
 Rounded Round(double mantissa, int exponent) {
   const double value = std::ldexp(mantissa, exponent);
   if (std::isinf(value)) {
@@ -71,7 +71,7 @@ int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int 
   if (threshold == 0) return Sign(numerator);
   const int lowest = LowestBitExponent(threshold);
   const Integer odd = ToInteger(threshold, lowest);
-  // numerator * 4^exponent against odd^2 * 4^lowest * denominator.
+  // Compares numerator * 4^exponent with odd^2 * 4^lowest * denominator.
   const int shift = 2 * (exponent - lowest);
   Integer left = numerator;
   Integer right = odd * odd * denominator;

@@ -13,22 +13,22 @@ struct ScaledDouble {
 };
 ScaledDouble ToScaledDouble(const Integer& value);
 
-// A real number rounded to a double: |value - number| <= bound. The sign is that of the number:
-// what is too small becomes the least positive double, or minus that. What is too large saturates,
-// and the bound is infinite.
+// A real number rounded to a double: |value - number| <= bound. The sign is that of the number: a
+// tiny number becomes the least positive double or its negative. A huge one saturates, and the
+// bound is infinite.
 struct Rounded {
   double value;
   double bound;
 };
 
-// numerator / denominator * 2^exponent. Requires denominator > 0.
+// Returns numerator / denominator * 2^exponent. Requires: denominator > 0.
 Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exponent);
 
-// sqrt(numerator / denominator) * 2^exponent. Requires numerator >= 0, denominator > 0.
+// Returns sqrt(numerator / denominator) * 2^exponent. Requires: numerator >= 0, denominator > 0.
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent);
 
-// Sign of sqrt(numerator / denominator) * 2^exponent - threshold, exactly. Requires numerator >= 0,
-// denominator > 0, threshold finite and >= 0.
+// Returns the sign of sqrt(numerator / denominator) * 2^exponent - threshold, exactly. Requires:
+// numerator >= 0, denominator > 0, threshold finite and >= 0.
 int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
                       double threshold);
 

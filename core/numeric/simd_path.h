@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-// Defined where functions for AVX2 or for NEON exist beside the portable ones.
+// Defined if functions for AVX2 or for NEON exist in addition to the portable ones.
 #if defined(__x86_64__)
 #define HULLD_HAS_AVX2_PATH
 #elif defined(__aarch64__)
@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// The instructions that loops over many points use. Results are the same bits on every path.
+// The instruction set of loops over many points. Results are bit-identical on every path.
 enum class SimdPath {
   kPortable,  // the baseline that all code is compiled for
   kAvx2,
@@ -23,7 +23,7 @@ namespace internal {
 extern std::atomic<SimdPath> simd_path;
 }  // namespace internal
 
-// The best path of this machine, unless UseSimdPath chose another.
+// Returns the best path of this machine, unless UseSimdPath has selected another.
 inline SimdPath CurrentSimdPath() {
 #if defined(HULLD_HAS_AVX2_PATH) || defined(HULLD_HAS_NEON_PATH)
   return internal::simd_path.load(std::memory_order_relaxed);
@@ -32,10 +32,10 @@ inline SimdPath CurrentSimdPath() {
 #endif
 }
 
-// The best path of this machine.
+// Returns the best path of this machine.
 SimdPath BestSimdPath();
 
-// Makes every thread take this path from now on; false, and no change, when the machine lacks it.
+// Selects the path for all threads. Returns false, and changes nothing, if the machine lacks it.
 // For tests and benchmarks.
 bool UseSimdPath(SimdPath path);
 

@@ -5,17 +5,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace hulld {
 
-// A point or a direction: three doubles, the caller's length unit where it is a point.
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// A point or a direction: three doubles. A point is in the caller's length unit.
 using Vector = Eigen::Vector3d;
 
 // The operations of IntegerVector for doubles, rounded.
 inline double Dot(const Vector& a, const Vector& b) { return a.dot(b); }
 inline Vector Cross(const Vector& a, const Vector& b) { return a.cross(b); }
 inline bool IsZero(const Vector& a) { return a.x() == 0 && a.y() == 0 && a.z() == 0; }
-// The largest absolute component. Faster than Eigen's for three, and as exact.
+// Returns the largest absolute component. As exact as Eigen's, and faster for three components.
 inline double LargestComponent(const Vector& a) {
   return std::max(std::abs(a.x()), std::max(std::abs(a.y()), std::abs(a.z())));
 }

@@ -11,10 +11,10 @@ namespace hulld {
 __extension__ using Int128 = __int128;
 __extension__ using UInt128 = unsigned __int128;
 
-// An integer of a fixed number of 64-bit words, in two's complement: no allocation, no size to look
-// at. A product is as wide as its factors together, so it always fits; a sum or a difference is as
-// wide as the wider of its terms and wraps, so the caller shows that what it adds up fits. Default
-// construction leaves it unset.
+// An integer of a fixed number of 64-bit words, in two's complement: no allocation, no size to
+// inspect. A product is as wide as its factors together, so it always fits. A sum or a difference
+// is as wide as the wider of its terms and wraps, so the caller must ensure that it fits. Default
+// construction leaves it uninitialized.
 template <int kWords>
 class WideInteger {
   static_assert(kWords >= 1);
@@ -25,7 +25,7 @@ class WideInteger {
     words_[0] = static_cast<uint64_t>(value);
     FillFrom(1, value < 0);
   }
-  // Sign-extended, or cut to the low words; what is cut off must not matter (unchecked).
+  // Sign-extends, or truncates to the low words; the truncated words must not matter (unchecked).
   template <int kOther>
   explicit WideInteger(const WideInteger<kOther>& other) {
     constexpr int kCommon = kOther < kWords ? kOther : kWords;
@@ -33,7 +33,7 @@ class WideInteger {
     if constexpr (kOther < kWords) FillFrom(kOther, other.is_negative());
   }
 
-  // The least significant first.
+  // Least significant word first.
   std::span<const uint64_t> words() const { return words_; }
   uint64_t word(int i) const { return words_[i]; }
   uint64_t& word(int i) { return words_[i]; }
@@ -78,7 +78,7 @@ class WideInteger {
   uint64_t words_[kWords];
 };
 
-// The same number.
+// Converts a 128-bit integer.
 inline WideInteger<2> WideOf(Int128 value) {
   WideInteger<2> wide;
   wide.word(0) = static_cast<uint64_t>(value);
@@ -91,7 +91,7 @@ int Sign(const WideInteger<kWords>& a) {
   return a.is_negative() ? -1 : a.is_zero() ? 0 : 1;
 }
 
-// The low kResult words of a product, which are those of the product modulo 2^(64 kResult).
+// Returns the low kResult words of a product: the product modulo 2^(64 kResult).
 template <int kResult, int kA, int kB>
 [[gnu::always_inline]] inline WideInteger<kResult> LowProduct(const WideInteger<kA>& a,
                                                               const WideInteger<kB>& b) {
@@ -103,7 +103,7 @@ template <int kResult, int kA, int kB>
     product.word(1) = static_cast<uint64_t>(t >> 64);
     return product;
   }
-  // As if both were unsigned.
+  // Multiplies as if both factors were unsigned.
   for (int i = 0; i < kResult; ++i) product.word(i) = 0;
 #pragma GCC unroll 16
   for (int i = 0; i < kA; ++i) {
@@ -117,7 +117,7 @@ template <int kResult, int kA, int kB>
     }
     if (i + kB < kResult) product.word(i + kB) = carry;
   }
-  // A negative factor was taken to be 2^(64 kA), or 2^(64 kB), more than it is.
+  // Corrects for a negative factor, which was taken to be 2^(64 kA), or 2^(64 kB), more than it is.
   const auto subtract_above = [&](const auto& other, int other_words, int first, bool negative) {
     const uint64_t mask = negative ? ~uint64_t{0} : 0;
     uint64_t borrow = 0;
@@ -140,7 +140,7 @@ WideInteger<kA + kB> operator*(const WideInteger<kA>& a, const WideInteger<kB>& 
   return LowProduct<kA + kB>(a, b);
 }
 
-// a * 2^bits. Requires bits >= 0 and the result to fit (unchecked).
+// Returns a * 2^bits. Requires: bits >= 0, and the result fits (unchecked).
 template <int kWords>
 WideInteger<kWords> Shifted(const WideInteger<kWords>& a, int bits) {
   HULLD_DCHECK(bits >= 0);
@@ -155,7 +155,7 @@ WideInteger<kWords> Shifted(const WideInteger<kWords>& a, int bits) {
   return result;
 }
 
-// A point or direction with components of a fixed width. Sums wrap as those of WideInteger.
+// A point or direction with components of a fixed width. Sums wrap like those of WideInteger.
 template <int kWords>
 struct WideVector {
   WideInteger<kWords> x;
@@ -187,7 +187,7 @@ template <int kWords>
 bool IsZero(const WideVector<kWords>& a) {
   return a.x.is_zero() && a.y.is_zero() && a.z.is_zero();
 }
-// A direction across d. Requires d not zero.
+// Returns a direction perpendicular to d. Requires: d not zero.
 template <int kWords>
 WideVector<kWords> AnyPerpendicular(const WideVector<kWords>& d) {
   HULLD_CHECK(!IsZero(d));

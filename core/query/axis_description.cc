@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// The facet whose vertices are these, ascending.
+// Returns the facet with exactly these vertices, given in ascending order.
 std::optional<uint32_t> FacetOf(const Hull& hull, const std::vector<uint32_t>& vertices) {
   if (vertices.size() < 3) return std::nullopt;
   for (uint32_t f = 0; f < hull.facet_count(); ++f) {

@@ -7,14 +7,14 @@
 
 namespace hulld {
 
-// Names an axis n (world frame): its direction rounded to unit length, the features of A and B that
-// it supports, exactly, and its kind by these: the normal of a whole facet (of A first), the cross
-// product of two edges, otherwise FLAT when A - B is flat, and GENERAL when it is not. Requires n
-// not zero, and n.(a - b) <= 0 throughout (unchecked: this is what the search has just proven).
-// Cost: O(V) and a scan of the facets.
+// Describes an axis n (world frame): its direction rounded to unit length, the exact support
+// features of A and B, and its kind. The kind follows from the features: the normal of a whole
+// facet (of A first), the cross product of two edges, otherwise FLAT if A - B is flat, and GENERAL
+// if it is not. Requires: n not zero, and n.(a - b) <= 0 throughout (unchecked: the search has just
+// proven this). Cost: O(V) and a scan of the facets.
 SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n);
 
-// n rounded to unit length. Requires n not zero.
+// Returns n rounded to unit length. Requires: n not zero.
 Vector UnitDirection(const IntegerVector& n);
 
 }  // namespace hulld

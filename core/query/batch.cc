@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// The cost of pairs differs by orders of magnitude, so threads take small pieces as they come free.
+// Pairs differ in cost by orders of magnitude, so idle threads take small chunks.
 constexpr int kPairsPerPiece = 16;
 
 }  // namespace
@@ -19,14 +19,15 @@ constexpr int kPairsPerPiece = 16;
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads) {
-  // Without a message the status is a number: with one, all answers would share and count it.
+  // A status without a message is a plain number. A message would be shared and reference-counted
+  // by all answers.
   std::vector<absl::StatusOr<Answer>> answers(pairs.size(), absl::CancelledError());
   QueryOptions each = options;
   each.threads = 1;
   const auto count = static_cast<int64_t>(pairs.size());
 #pragma omp parallel num_threads(std::max(1, threads))
   {
-    // Asking whether to stop takes longer than most pairs do, so each thread asks once a piece.
+    // Polling takes longer than most pairs, so each thread polls once per chunk.
     StopPoll poll(each.should_stop, kPairsPerPiece);
 #pragma omp for schedule(dynamic, kPairsPerPiece)
     for (int64_t i = 0; i < count; ++i) {

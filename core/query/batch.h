@@ -14,7 +14,7 @@
 
 namespace hulld {
 
-// Indices of a pair into a table of placements.
+// A pair, as indices into a table of placements.
 struct PlacedPair {
   uint32_t a;
   uint32_t b;
@@ -22,9 +22,9 @@ struct PlacedPair {
 };
 
 // Answers every pair in parallel on `threads` OpenMP threads. results[i] belongs to pairs[i] and
-// does not depend on the number of threads. The pairs that are left when should_stop says so are
-// CANCELLED. Requires indices in range. Memory: 72 bytes for each pair, and what is wanted beyond
-// the relation.
+// does not depend on the number of threads. After should_stop returns true, the remaining pairs are
+// CANCELLED. Requires: indices in range. Memory: 72 bytes for each pair, plus any details requested
+// beyond the relation.
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads);

@@ -8,19 +8,16 @@
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 Box Box::Empty() { return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)}; }
 
 Box GrownBy(const Box& box, double clearance) {
   if (clearance == 0) return box;
-  // Rounded up, one unit in the last place being the most that the sums err.
+  // Rounds outwards by one unit in the last place, the largest error of the sums.
   const auto grown = [&](double x, double towards) {
     return std::nextafter(x + std::copysign(clearance, towards), towards);
   };
@@ -36,7 +33,7 @@ Box BoundingBox(const PlacedHull& placed) {
   if (placed.empty()) return Box::Empty();
   const Vector& t = placed.X_WH().t;
   const double size = placed.query_hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
-  // That of a product is relative to its factors, which may be far larger than all of the hull.
+  // The error of a product is relative to its factors, which may be far larger than the hull.
   const double translation_error =
       placed.product() == nullptr ? 0 : placed.product()->translation_error();
   if (!IsFilterSize(size) || !std::isfinite(translation_error)) {
@@ -64,12 +61,12 @@ BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should
   for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
 }
 
-// Halves the boxes along the axis in which their centres spread widest.
+// Splits the boxes in half along the axis with the widest spread of centres.
 uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll) {
   const auto node = static_cast<uint32_t>(nodes_.size());
   Box bounds = Box::Empty();
   Box centers = bounds;
-  // Twice the centre; 0 for a box that is all of space.
+  // Twice the centre; 0 for a box that covers all of space.
   const auto center = [&](uint32_t index) {
     const Vector sum = boxes[index].low + boxes[index].high;
     return sum.array().isFinite().all() ? sum : Vector(Vector::Zero());

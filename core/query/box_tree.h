@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// A closed axis-aligned box; empty when low exceeds high.
+// A closed axis-aligned box; empty if low exceeds high.
 struct Box {
   Vector low;
   Vector high;
@@ -27,49 +27,50 @@ struct Box {
   }
 };
 
-// A box, world frame, that is certain to hold the hull: all of space where doubles do not reach.
-// Empty for an empty hull.
+// Returns a box (world frame) that certainly contains the hull. Covers all of space beyond the
+// range of doubles. Empty for an empty hull.
 Box BoundingBox(const PlacedHull& placed);
 
-// A box that holds all points within `clearance` >= 0 of this one: rounded outwards.
+// Returns a box, rounded outwards, that contains all points within `clearance` >= 0 of `box`.
 Box GrownBy(const Box& box, double clearance);
 
-// A hierarchy of boxes that finds those which meet a given one. Immutable once built.
+// A hierarchy of boxes that finds the boxes intersecting a given one. Immutable.
 class BoxTree {
  public:
-  // A search that can be left and taken up again: the nodes that it has still to look at.
+  // The state of a resumable search: the nodes still to visit.
   class Cursor {
    private:
     friend class BoxTree;
-    // Halves leave at most 32 levels.
+    // Halving leaves at most 32 levels.
     static constexpr int kMostWaiting = 40;
     uint32_t waiting_[kMostWaiting];
     int height_ = 0;
   };
 
-  // Cost: O(n log n). A tree that was stopped by should_stop lacks boxes: drop it.
+  // Cost: O(n log n). If should_stop interrupts construction, the tree is incomplete and must be
+  // discarded.
   explicit BoxTree(std::span<const Box> boxes, const std::function<bool()>& should_stop = {});
 
-  // Appends the indices of all boxes that meet `box`, from index `first` on, in no particular
-  // order. Cost: O(log n) beyond what it finds, where boxes overlap little.
+  // Appends the indices, from `first` on, of all boxes that intersect `box`, in no particular
+  // order. Cost: O(log n) plus the output, if boxes overlap little.
   void AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const;
 
-  // The same piece by piece: Begin, then AppendMeeting until it returns true. Each piece looks at
-  // `nodes` nodes at most, and so appends at most kLeafBoxes indices for each.
+  // Resumable variant: call Begin, then AppendMeeting until it returns true. Each call visits at
+  // most `nodes` nodes and appends at most kLeafBoxes indices for each.
   Cursor Begin() const;
   bool AppendMeeting(const Box& box, uint32_t first, uint64_t nodes, Cursor& cursor,
                      std::vector<uint32_t>& found) const;
 
-  // For searches of two trees at once. Nodes are known by number; that of the root is 0.
+  // Node access for simultaneous searches of two trees. The root is node 0.
   bool empty() const { return nodes_.empty(); }
   const Box& box(uint32_t node) const { return nodes_[node].box; }
   bool is_leaf(uint32_t node) const { return nodes_[node].second == 0; }
-  // Requires a node that is no leaf.
+  // Requires: `node` is not a leaf.
   std::array<uint32_t, 2> children(uint32_t node) const {
     HULLD_DCHECK(!is_leaf(node));
     return {node + 1, nodes_[node].second};
   }
-  // The boxes of a leaf, at most kLeafBoxes, and their indices.
+  // Boxes of a leaf, at most kLeafBoxes, and their indices.
   std::span<const Box> boxes(uint32_t leaf) const { return Part(boxes_, leaf); }
   std::span<const uint32_t> indices(uint32_t leaf) const { return Part(indices_, leaf); }
   // A choice, not tuned.
@@ -81,8 +82,8 @@ class BoxTree {
   }
 
  private:
-  // An inner node's children are the node after it and `second`; a leaf's boxes are those from
-  // `begin` to `end`.
+  // The children of an inner node are the next node and `second`. The boxes of a leaf are [begin,
+  // end).
   struct Node {
     Box box;
     uint32_t largest_index;
@@ -100,7 +101,7 @@ class BoxTree {
   }
 
   std::vector<Node> nodes_;
-  // In the order of the leaves.
+  // In leaf order.
   std::vector<uint32_t> indices_;
   std::vector<Box> boxes_;
 };

@@ -17,42 +17,45 @@
 namespace hulld {
 namespace {
 
-// Sign of the largest n.(a - b).
+// Returns the sign of the maximum of n.(a - b).
 int SignOfSupport(ExactPair& pair, const IntegerVector& n) {
   return Sign(Dot(n, pair.Farthest(n).w));
 }
 
-// n without common divisor.
+// Returns n divided by the greatest common divisor of its components.
 IntegerVector Reduced(const IntegerVector& n) {
   const Integer divisor = gcd(gcd(abs(n.x), abs(n.y)), abs(n.z));
   return {n.x / divisor, n.y / divisor, n.z / divisor};
 }
 
-// n in its shortest form: the support along it has the sign of that along n, -1 or 0.
+// Returns n in its shortest form. The support along the result has the sign `sign` of the support
+// along n, -1 or 0.
 std::variant<std::monostate, Vector, IntegerVector> Shortest(ExactPair& pair,
                                                              const IntegerVector& n, int sign) {
   IntegerVector reduced = Reduced(n);
-  // The power of two makes components of at most 2, which are easier to read.
+  // A power of two scales the components to at most 2, for readability.
   const Vector rounded = ToScaledDoubles(reduced) * 0x1p-62;
   const IntegerVector exact = ToInteger(rounded, LowestBitExponent(rounded, kAboveAllExponents));
   if (SignOfSupport(pair, exact) <= sign) return rounded;
   return reduced;
 }
 
-// Vertices of A - B that surround the origin.
+// Finds vertices of A - B that surround the origin.
 class Surrounding {
  public:
   Surrounding(ExactPair& pair, const std::function<bool()>& should_stop)
       : pair_(pair), poll_(should_stop, 1) {}
 
-  // Adds the farthest vertex outside a half-space that holds all vertices found and has the origin
-  // on its boundary, until there is no such half-space. Then drops vertices until each is needed.
-  // That leaves at most six (Steinitz 1913). Requires the origin strictly inside A - B.
+  // Repeats: take a half-space that contains all vertices found and has the origin on its boundary,
+  // and add the farthest vertex outside it. When no such half-space remains, drops every vertex
+  // that is not needed. At most six remain (Steinitz 1913). Requires: the origin strictly inside A
+  // - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {
       if (poll_.Step()) return absl::CancelledError("stopped in a certificate");
       corners_.push_back(pair_.Farthest(*n));
-      // No farthest vertex is outside the half-space unless the origin is strictly inside.
+      if (pair_.stopped()) return absl::CancelledError("stopped in a certificate");
+      // If the origin is strictly inside, the farthest vertex is outside the half-space.
       HULLD_CHECK(Sign(Dot(*n, corners_.back().w)) > 0);
     }
     for (size_t i = corners_.size(); i-- > 0;) {
@@ -66,11 +69,11 @@ class Surrounding {
   }
 
  private:
-  // A direction n, not zero, with n.w <= 0 for all corners; none when the origin is strictly inside
-  // their hull. The directions form a cone; when the corners span R^3 its extreme rays are cross
-  // products of two of them, and when they span a plane its normal is such a product as well. The
-  // direction is in the middle of the cone, the sum of its rays at about equal lengths: the corner
-  // found along it cuts the cone deep, so that few are needed.
+  // Returns a non-zero direction n with n.w <= 0 for all corners, or none if the origin is strictly
+  // inside their hull. These directions form a cone. If the corners span R^3, its extreme rays are
+  // cross products of two corners; if they span a plane, so is the plane's normal. The result is in
+  // the middle of the cone: the sum of its rays, scaled to about equal lengths. The corner found
+  // along it cuts the cone deeply, so few corners are needed.
   static std::optional<IntegerVector> Escape(const std::vector<ExactCorner>& corners) {
     bool parallel = true;
     std::vector<IntegerVector> rays;
@@ -99,7 +102,7 @@ class Surrounding {
     return IntegerVector{1, 0, 0};
   }
 
-  // The sum of the rays, each times the power of two that makes it about as long as the longest.
+  // Returns the sum of the rays, each scaled by a power of two to about the length of the longest.
   static IntegerVector Middle(const std::vector<IntegerVector>& rays) {
     unsigned longest = 0;
     for (const IntegerVector& ray : rays) longest = std::max(longest, BitLength(ray));
@@ -125,6 +128,7 @@ absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& de
   if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) {
     const int sign = decision.relation == Relation::kSeparated ? -1 : 0;
     certificate.direction = Shortest(exact, *n, sign);
+    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
   }
   const std::span<const VertexPair> known(decision.pairs.data(), decision.pair_count);
   if (decision.relation == Relation::kTouching) {

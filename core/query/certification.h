@@ -11,10 +11,10 @@
 
 namespace hulld {
 
-// Makes the certificate of a decision. It is copied where the decision came from floating point
-// with all that is needed, and found in exact arithmetic otherwise. Requires a relation other than
+// Returns the certificate of a decision. Copies it if the decision came from floating point with
+// all evidence, and otherwise finds it in exact arithmetic. Requires: a relation other than
 // kWithinTolerance, and `exact` of the same pair (unchecked: a decision does not name its pair).
-// CANCELLED when should_stop, which may be empty, said so.
+// CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop);
 

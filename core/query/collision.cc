@@ -38,15 +38,14 @@ std::weak_ordering Compare(const Pose& a, const Pose& b) {
   return Compare(a.q, b.q);
 }
 
-// Which of two products of poses comes first; what is none comes before what is one.
+// Orders two products of poses; null comes first.
 std::weak_ordering Compare(const PoseProduct* a, const PoseProduct* b) {
   if (a == nullptr || b == nullptr) return (a != nullptr) <=> (b != nullptr);
   if (const auto order = Compare(a->X_WB(), b->X_WB()); order != 0) return order;
   return Compare(a->X_BP(), b->X_BP());
 }
 
-// A total order of placed hulls by their content, so that a pair is answered the same way whichever
-// of the two comes first.
+// A total order of placed hulls by content, so that both orders of a pair yield the same answer.
 [[gnu::noinline]] std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
   if (const auto order = Compare(a.X_WH(), b.X_WH()); order != 0) return order;
   if (const auto order = Compare(a.product(), b.product()); order != 0) return order;
@@ -61,7 +60,7 @@ std::weak_ordering Compare(const PoseProduct* a, const PoseProduct* b) {
   return std::weak_ordering::equivalent;
 }
 
-// Whether (A, B) is in the order of Compare. The first coordinate tells mostly.
+// Returns true if (A, B) is in the order of Compare. The first coordinate usually decides.
 bool IsInOrder(const PlacedHull& a, const PlacedHull& b) {
   const double x_a = a.X_WH().t.x();
   const double x_b = b.X_WH().t.x();
@@ -74,7 +73,7 @@ AxisKind Mirrored(AxisKind kind) {
   return kind;
 }
 
-// The answer for (B, A) from that for (A, B).
+// Converts the answer for (A, B) to the answer for (B, A).
 Answer Mirrored(Answer answer) {
   if (answer.analysis && answer.analysis->stage) {
     answer.analysis->stage = Mirrored(*answer.analysis->stage);
@@ -104,17 +103,17 @@ std::optional<IntegerVector> ExactAxis(const Decision& decision) {
   return std::nullopt;
 }
 
-// Whether the answer needs more than the relation, the axis and the analysis.
+// Returns true if the answer needs more than the relation, the axis and the analysis.
 bool NeedsMore(const QueryOptions& options) {
   return options.want_certificate || options.want_separation || options.want_witness ||
          options.clearance.has_value();
 }
 
-// What the options ask for beyond the relation, the axis and the analysis.
+// Adds the requested details beyond the relation, the axis and the analysis.
 absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bool cold,
                              const QueryOptions& options, Answer& answer) {
   if (options.want_certificate) {
-    ExactPair exact(pair);
+    ExactPair exact(pair, options.should_stop);
     absl::StatusOr<Certificate> certificate = MakeCertificate(exact, decision, options.should_stop);
     if (!certificate.ok()) return certificate.status();
     answer.certificate = *std::move(certificate);
@@ -135,22 +134,24 @@ absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bo
   return absl::OkStatus();
 }
 
-// What is wanted of the axis: its description, and its kind for the analysis.
-void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
-             Answer& answer) {
+// Adds the description of the axis, and its kind to the analysis.
+absl::Status AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
+                     Answer& answer) {
   if (options.want_analysis) {
     answer.analysis = Analysis();
     answer.analysis->axes_tested = decision.directions_tried;
   }
   const std::optional<IntegerVector> n = ExactAxis(decision);
-  if (!n) return;
-  ExactPair exact(pair);
+  if (!n) return absl::OkStatus();
+  ExactPair exact(pair, options.should_stop);
   SeparatingAxis axis = DescribeAxis(exact, *n);
+  if (exact.stopped()) return absl::CancelledError("stopped in a query");
   if (options.want_analysis) answer.analysis->stage = axis.kind;
   if (options.want_axis) answer.axis = std::move(axis);
+  return absl::OkStatus();
 }
 
-// A and B in the order of their content.
+// Requires: A and B in the order of their content.
 absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);
@@ -163,7 +164,9 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
   Answer answer;
   answer.relation = decision.relation;
   answer.rung = decision.rung;
-  if (options.want_axis || options.want_analysis) AddAxis(pair, decision, options, answer);
+  if (options.want_axis || options.want_analysis) {
+    if (absl::Status s = AddAxis(pair, decision, options, answer); !s.ok()) return s;
+  }
   if (NeedsMore(options)) {
     absl::Status s = AddWhatIsWanted(pair, decision, cache == nullptr, options, answer);
     if (!s.ok()) return s;
@@ -177,10 +180,10 @@ PairCache Mirrored(PairCache cache) {
   return cache;
 }
 
-// The relation and nothing else, which is what most callers want of most pairs.
+// Answers queries for the relation alone, the most common kind.
 absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
-  // The relation of B and A is that of A and B. Only the cache distinguishes them.
+  // The relation is symmetric; only the cache depends on the order.
   const bool swapped = !IsInOrder(a, b);
   if (swapped && cache != nullptr) *cache = Mirrored(*cache);
   Decision decision;
@@ -188,7 +191,7 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
       Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
              Purpose::kRelation, options.should_stop, decision);
   if (swapped && cache != nullptr) *cache = Mirrored(*cache);
-  // All returns name this one variable, so that the compiler constructs it in the caller's place.
+  // All returns name this variable, so that the compiler constructs it in the caller's storage.
   absl::StatusOr<Answer> answer(absl::in_place);
   if (decided.ok()) {
     answer->relation = decision.relation;
@@ -209,7 +212,7 @@ absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const Placed
   return Mirrored(*std::move(answer));
 }
 
-// The textbook's answer, and what else is wanted as the search finds it.
+// Completes the textbook's answer with the details that only the search finds.
 absl::StatusOr<Answer> WithTheRest(Answer answer, const PlacedHull& a, const PlacedHull& b,
                                    const QueryOptions& options) {
   if (!NeedsMore(options)) return answer;
@@ -241,7 +244,7 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
   return answer;
 }
 
-// CheckCollision for every kind of question. It is kept apart from what most pairs need.
+// CheckCollision for every kind of query. Not inlined, to keep the common path short.
 [[gnu::noinline]] absl::StatusOr<Answer> AnswerAny(const PlacedHull& a, const PlacedHull& b,
                                                    const QueryOptions& options, PairCache* cache) {
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
@@ -285,7 +288,8 @@ absl::StatusOr<bool> TextbookCheck::Advance(std::chrono::steady_clock::time_poin
 absl::StatusOr<Answer> TextbookCheck::Finish() {
   if (!search_.has_value()) return AnswerOfEmpty(*options_);
   const auto start = TextbookSearch::Clock::now();
-  absl::StatusOr<Answer> answer = WithTheRest(search_->Finish(), *a_, *b_, *options_);
+  absl::StatusOr<Answer> answer = search_->Finish();
+  if (answer.ok()) answer = WithTheRest(*std::move(answer), *a_, *b_, *options_);
   time_ += TextbookSearch::Clock::now() - start;
   if (answer.ok() && options_->want_analysis) answer->analysis->time = time_;
   return answer;

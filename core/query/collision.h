@@ -17,31 +17,31 @@
 
 namespace hulld {
 
-// The relation of hull A and hull B at their poses, exact for every finite input, and what else the
-// options ask for. `cache` may be null; with it the relation, the separation and its bound are
-// those without it. Swapping A and B mirrors the answer.
-// INVALID_ARGUMENT: ValidateOptions. RESOURCE_EXHAUSTED: the textbook method would test more axes
-// than allowed. CANCELLED: should_stop said so.
+// Computes the relation of hulls A and B at their poses, exact for every finite input, and the
+// details requested by the options. `cache` may be null and does not change the relation, the
+// separation or its bound. Swapping A and B mirrors the answer. INVALID_ARGUMENT: see
+// ValidateOptions. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed.
+// CANCELLED: should_stop returned true.
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options = {}, PairCache* cache = nullptr);
 
-// CheckCollision by the textbook method in pieces: the answer and its cost are the same, and others
-// may have their turn between two pieces.
+// A resumable CheckCollision by the textbook method, with the same answer and cost. Callers may
+// interleave other work between two steps.
 class TextbookCheck {
  public:
-  // All must outlive the check. Requires options.method to be the textbook. Errors: those of
-  // CheckCollision, but for CANCELLED.
+  // All arguments must outlive the check. Requires: options.method is the textbook. Errors: as
+  // CheckCollision, except CANCELLED.
   static absl::StatusOr<TextbookCheck> Begin(const PlacedHull& a, const PlacedHull& b,
                                              const QueryOptions& options);
 
-  // Works until `end`, but a little at least. Whether Finish is all that is left. CANCELLED:
-  // should_stop said so.
+  // Works until `end`, but makes some progress in every call. Returns true if only Finish remains.
+  // CANCELLED: should_stop returned true.
   absl::StatusOr<bool> Advance(std::chrono::steady_clock::time_point end);
 
-  // Requires that Advance said so. CANCELLED: should_stop said so.
+  // Requires: Advance returned true. CANCELLED: should_stop returned true.
   absl::StatusOr<Answer> Finish();
 
-  // What it holds (TextbookSearch); nothing where a hull is empty.
+  // Memory of the search (TextbookSearch); 0 if a hull is empty.
   size_t MemoryBytes() const { return search_.has_value() ? search_->MemoryBytes() : 0; }
 
  private:
@@ -51,13 +51,13 @@ class TextbookCheck {
   const PlacedHull* a_;
   const PlacedHull* b_;
   const QueryOptions* options_;
-  // None where a hull is empty.
+  // None if a hull is empty.
   std::optional<TextbookSearch> search_;
   std::chrono::steady_clock::duration time_{0};
 };
 
-// The same for hulls that are asked about once: makes what queries need of them (QueryHull), and
-// drops it. INVALID_ARGUMENT also for poses that are not valid (ValidatePose).
+// CheckCollision for hulls that are queried only once: builds and discards their QueryHulls.
+// INVALID_ARGUMENT also for invalid poses (ValidatePose).
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options = {});
 

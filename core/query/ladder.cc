@@ -13,20 +13,21 @@
 namespace hulld {
 namespace {
 
-// Whether spheres round the hulls show that they are separated; then along n, which leads from A's
-// centre to B's.
+// Returns true if bounding spheres prove the hulls separated along n, the vector from A's centre to
+// B's.
 bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
   const double reach = pair.a().query_hull().radius() + pair.b().query_hull().radius() +
                        kSphereErrorFactor * pair.size();
   return SquaredNorm(n) > reach * reach * kSphereSquareRoundUp;
 }
 
-// What the hulls' bounds about their centres show along n, which leads from A's centre to B's: that
-// n separates them, or that the segment between the centres is covered by their insides.
+// Compares the bounds about the hulls' centres along n, the vector from A's centre to B's. Returns
+// SEPARATED if n separates the hulls, OVERLAPPING if their interiors cover the segment between the
+// centres.
 std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n,
                                             const FloatPair::CenterView& view) {
   if (!view.known()) return std::nullopt;
-  // Where one is not a number, no comparison holds.
+  // If a bound is NaN, all comparisons fail.
   const CenterBounds::Bounds a = view.bounds_a();
   const CenterBounds::Bounds b = view.bounds_b();
   const double error = kCenterSupportFactor * LargestComponent(n) * pair.size();
@@ -38,22 +39,22 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
   return std::nullopt;
 }
 
-// Whether bounds about the centres may settle a pair that spheres do not.
+// Returns true if bounds about the centres may settle a pair that spheres do not.
 bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
   if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
-  // Coarse bounds settle little but overlaps of hulls whose centres are this near.
+  // Coarse bounds settle little except overlaps of hulls with centres this near.
   const double reach = a.radius() + b.radius();
   return 4 * SquaredNorm(n) < reach * reach;
 }
 
-// The relation, where the bounds about the centres show it. Otherwise `first` becomes the direction
-// in which the walk should look first: along the normals of the surfaces between the centres, which
-// show better than the centres where a gap is. It stays as it is where these normals are unknown or
-// nearly cancel. The function is kept apart from what distant pairs need.
+// Returns the relation if the bounds about the centres prove it. Otherwise sets `first` to the
+// initial direction of the walk, from the normals of the surfaces between the centres; they
+// indicate a gap better than the centres do. Leaves `first` unchanged if these normals are unknown
+// or nearly cancel. Not inlined, to keep the path of distant pairs short.
 [[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
                                                         PlainVector& first) {
   constexpr double kLeastLikely = 0x1p-4;
@@ -91,7 +92,7 @@ void Accept(const FloatSearchResult& found, Rung rung, Purpose purpose, Decision
   }
 }
 
-// What the next query of the pair may try first.
+// Stores a suggestion for the next query of the pair.
 void Remember(const FloatSearchResult& found, PairCache& cache) {
   cache = PairCache();
   if (found.verdict == FloatVerdict::kSeparated) cache.axis = found.axis;
@@ -101,9 +102,9 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   }
 }
 
-// The rungs between spheres and exact arithmetic; false when none of them decides. `n` leads from
-// A's centre to B's; `found` becomes where the search ended. Requires pair.usable(). Kept apart
-// from what distant pairs need.
+// Tries the rungs between spheres and exact arithmetic. Returns false if none of them decides. `n`
+// leads from A's centre to B's; `found` receives the state in which the search ended. Requires:
+// pair.usable(). Not inlined, to keep the path of distant pairs short.
 [[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
                                              double tolerance, PairCache* cache, Purpose purpose,
                                              FloatSearchResult& found, Decision& decision) {
@@ -119,7 +120,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   if (purpose == Purpose::kRelation) {
     if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
       decision.relation = *relation;
-      // The suggestion of the cache failed, and trying it again would cost more than these bounds.
+      // The cached suggestion failed, and retrying it would cost more than these bounds.
       if (cache != nullptr) *cache = PairCache();
       return true;
     }

@@ -18,34 +18,35 @@
 
 namespace hulld {
 
-// A relation and, where it is to be evidence, what showed it.
+// A relation and, for Purpose::kEvidence, its evidence.
 struct Decision {
-  // Not defaulted: a compiler then clears the room for every kind of axis, half a kilobyte.
+  // Not defaulted: a compiler would then clear the storage for every kind of axis, half a kilobyte.
   Decision() {}  // NOLINT
 
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
-  // Separated: n.(a - b) < 0 throughout; touching: <= 0; exactly, as it stands.
+  // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
   std::variant<std::monostate, Vector, IntegerVector> axis;
-  // Overlapping: none, or four pairs whose differences hold 0 strictly inside their hull. Touching:
-  // none, or three whose differences hold 0 in their hull, repetitions included.
+  // Overlapping: none, or four pairs with differences that contain 0 strictly inside their hull.
+  // Touching: none, or three pairs, repetitions included, with differences that contain 0 in their
+  // hull.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
   uint64_t directions_tried = 0;
 };
 
-// What a decision is for.
+// The purpose of a decision.
 enum class Purpose {
   kRelation,
   kEvidence,  // also the axis and the pairs that the search found
 };
 
-// The ladder. Each rung answers only what its own error bound proves: spheres round the hulls; what
-// the cache suggests; for the relation alone, how far the hulls reach along the line of their
-// centres; the hulls in floating point; exact arithmetic. Fills `decision`, which must be as
-// constructed. Requires tolerance >= 0. Updates the cache, which may be null and otherwise belongs
-// to these two hulls. CANCELLED when should_stop, which may be empty, said so; only the exact rung
-// asks it.
+// Decides the relation by a ladder of rungs, each of which answers only if its own error bound
+// proves it: bounding spheres; the suggestion of the cache; for the relation alone, bounds of the
+// hulls along the line of their centres; the hulls in floating point; exact arithmetic. Fills
+// `decision`, which must be as constructed. Requires: tolerance >= 0. Updates the cache, which may
+// be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,
+// returned true; only the exact rung polls it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     const std::function<bool()>& should_stop, Decision& decision);
 

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/rational.h"
+#include "core/numeric/vector.h"
 #include "core/query/exact/exact_depth.h"
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_pair.h"
@@ -24,17 +26,20 @@
 namespace hulld {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Expansions of a polytope between two polls. An expansion that creates many facets counts several
+// times.
+constexpr uint64_t kExpansionsPerPoll = 256;
 
-// The absolute value of the separation from its bounds: their middle, and half their width rounded
-// up. The middle is positive because the upper bound is.
+// Returns the absolute separation from its bounds: their midpoint, and half their width rounded up.
+// The midpoint is positive because the upper bound is.
 Separation MiddleOf(const SeparationBounds& bounds) {
   const double middle = bounds.low + (bounds.high - bounds.low) / 2;
   const double half = std::max(bounds.high - middle, middle - bounds.low);
   return {middle, std::nextafter(half, kInfinity)};
 }
 
-// Whether separation <= clearance, when the absolute separation compares so with |clearance|.
+// Returns true if separation <= clearance, given the comparison of the absolute separation with
+// |clearance|.
 bool IsWithin(Relation relation, int comparison) {
   return relation == Relation::kSeparated ? comparison <= 0 : comparison >= 0;
 }
@@ -46,6 +51,7 @@ class SeparationSearch {
       : pair_(pair),
         relation_(decision.relation),
         should_stop_(should_stop),
+        poll_(should_stop, kExpansionsPerPoll),
         size_(pair.a().query_hull().radius() + pair.b().query_hull().radius()) {
     if (relation_ == Relation::kTouching) {
       start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
@@ -67,6 +73,7 @@ class SeparationSearch {
       goal.size = size_;
     }
     Bound(goal, request.witness);
+    if (poll_.stopped()) return Stopped();
     const Separation middle = MiddleOf(bounds_);
     const bool close =
         std::isfinite(bounds_.high) &&
@@ -86,7 +93,7 @@ class SeparationSearch {
   absl::Status AddClearance(double clearance, SeparationAnswer& answer) {
     if (relation_ == Relation::kTouching || (relation_ == Relation::kSeparated && clearance <= 0) ||
         (relation_ == Relation::kOverlapping && clearance >= 0) || std::isinf(clearance)) {
-      // The signs decide, as a separation is finite.
+      // The separation is finite, so the sign of an infinite clearance decides.
       answer.within_clearance = relation_ == Relation::kSeparated ? clearance > 0 : clearance >= 0;
       return absl::OkStatus();
     }
@@ -96,6 +103,7 @@ class SeparationSearch {
       SeparationGoal goal;
       goal.threshold = threshold;
       Bound(goal, false);
+      if (poll_.stopped()) return Stopped();
     }
     int comparison = bounds_.high < threshold ? -1 : 1;
     if (open()) {
@@ -109,8 +117,10 @@ class SeparationSearch {
   }
 
  private:
-  // Chooses where floating point starts: the axis that it found, or four pairs whose differences
-  // surround the origin. The choice does not depend on what a cache suggested.
+  static absl::Status Stopped() { return absl::CancelledError("stopped in a query"); }
+
+  // Chooses the start of the floating-point search: the axis that it found, or four pairs with
+  // differences that surround the origin. The choice does not depend on the suggestion of a cache.
   void StartFrom(const Decision& decision, bool cold) {
     towards_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
@@ -124,8 +134,8 @@ class SeparationSearch {
     start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
   }
 
-  // Finds bounds in floating point, as close to the goal as that allows. Exact arithmetic starts
-  // from the vertices that it met.
+  // Finds bounds in floating point, as close to the goal as it allows. Exact arithmetic starts from
+  // the vertices that this visits.
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (relation_ == Relation::kSeparated) {
@@ -133,13 +143,13 @@ class SeparationSearch {
       seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
     } else {
       seed_.clear();
-      bounds_ = BoundDepth(pair_, start_, goal, want_point, seed_);
+      bounds_ = BoundDepth(pair_, start_, goal, want_point, poll_, seed_);
     }
   }
 
   absl::Status FindExactly() {
     if (nearest_) return absl::OkStatus();
-    exact_.emplace(pair_);
+    exact_.emplace(pair_, should_stop_);
     absl::StatusOr<ExactNearest> nearest =
         relation_ == Relation::kOverlapping ? FindDepthExactly(*exact_, seed_, should_stop_)
         : relation_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
@@ -166,7 +176,7 @@ class SeparationSearch {
     return absl::OkStatus();
   }
 
-  // False when the point is not known well enough.
+  // Returns false if the point is not known accurately enough.
   bool AddFloatWitness(SeparationAnswer& answer) const {
     const FloatCombination& point = bounds_.point;
     if (point.count == 0) return false;
@@ -189,7 +199,7 @@ class SeparationSearch {
     return true;
   }
 
-  // The sum of weighted vertices of A, or of B, in the world.
+  // Returns the weighted sum of vertices of A, or of B, in the world frame.
   Vector ExactPoint(bool of_a, double& error) {
     const ExactCombination& point = nearest_->point;
     IntegerVector sum = point.weight_sum * exact_->TranslationA();
@@ -220,6 +230,7 @@ class SeparationSearch {
   const FloatPair& pair_;
   const Relation relation_;
   const std::function<bool()>& should_stop_;
+  StopPoll poll_;
   const double size_;
   Vector towards_ = Vector::Zero();
   std::vector<VertexPair> start_;

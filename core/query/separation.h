@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// What is wanted of the signed separation beyond the relation.
+// The details of the signed separation to compute.
 struct SeparationRequest {
   bool separation = false;
   bool witness = false;
@@ -26,11 +26,11 @@ struct SeparationAnswer {
   std::optional<bool> within_clearance;
 };
 
-// Fills `answer`: from floating point with a proven bound where that is close enough, otherwise
-// from exact arithmetic, whose result is rounded. The values depend on the pair alone, not on how
-// the relation was found. Requires a relation other than kWithinTolerance. `cold`: whether no cache
-// helped to find the decision, so that its pairs may be used. CANCELLED when should_stop, which may
-// be empty, said so.
+// Fills `answer` from floating point with a proven bound if that is close enough, and otherwise
+// from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
+// relation. Requires: a relation other than kWithinTolerance. `cold`: true if no cache helped the
+// decision, so that its pairs may be used. CANCELLED: should_stop, which may be empty, returned
+// true.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                             const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer);

@@ -24,21 +24,21 @@
 namespace hulld {
 namespace {
 
-// A thread polls should_stop once in this many axes.
+// A thread polls should_stop once per this many axes or projected vertices.
 constexpr uint64_t kAxesPerPoll = 64;
+constexpr uint64_t kVerticesPerPoll = uint64_t{1} << 18;
 constexpr uint64_t kNone = UINT64_MAX;
 
-// What one axis shows.
+// The result of testing an axis.
 enum class Gap { kOverlap, kZero, kSeparated };
 
-// A normal in floating point; each component within `error` of the exact one.
+// A floating-point normal; each component is within `error` of the exact one.
 struct FloatNormal {
   Vector n;
   double error;
 };
 
-// The candidate axes of a pair, by index. After construction all functions may be called by several
-// threads at once.
+// The candidate axes of a pair, by index. Thread-safe after construction.
 class AxisTable {
  public:
   AxisTable(ExactPair& exact, const FloatPair& filter)
@@ -48,8 +48,16 @@ class AxisTable {
         facets_b_(exact.b().hull().facet_count()),
         edges_b_(exact.b().hull().edges().size()),
         edge_pairs_(exact.a().hull().edges().size() * edges_b_) {
+    span_ = SpanOf(exact_);
+  }
+
+  // Includes the axes of a flat difference. O(1).
+  uint64_t size() const { return facets_a_ + facets_b_ + edge_pairs_ + flat_count(); }
+
+  // Computes the data that the tests need. Call before any test.
+  void Prepare() {
     exact_.CacheAllVertices();
-    AppendFlatAxes();
+    if (!exact_.stopped()) AppendFlatAxes();
     for (uint32_t i = 0; i < exact_.a().hull().vertices().size(); ++i) {
       positions_a_.push_back(filter_.PositionA(i));
     }
@@ -58,7 +66,13 @@ class AxisTable {
     }
   }
 
-  uint64_t size() const { return facets_a_ + facets_b_ + edge_pairs_ + flat_axes_.size(); }
+  // Number of axes tested between two polls.
+  uint64_t block() const {
+    const uint64_t vertices = exact_.a().point_count() + exact_.b().point_count();
+    return std::clamp<uint64_t>(kVerticesPerPoll / vertices, 1, kAxesPerPoll);
+  }
+  // True if a test was interrupted; its result is then meaningless.
+  bool stopped() const { return exact_.stopped(); }
 
   AxisKind KindOf(uint64_t axis) const {
     if (axis < facets_a_) return AxisKind::kFacetA;
@@ -74,14 +88,14 @@ class AxisTable {
       const double d = kMinkowskiErrorFactor * filter_.size();
       const double bound = kGapNormalFactor * normal.error * filter_.size() +
                            kGapPositionFactor * normal.n.cwiseAbs().maxCoeff() * d;
-      // Written so that a bound that underflowed to zero, or a NaN, is never certain.
+      // In this form, a bound that underflowed to zero, or a NaN, is never certain.
       if (bound > kGapMinBound && gap > bound) return Gap::kSeparated;
       if (bound > kGapMinBound && gap < -bound) return Gap::kOverlap;
     }
     return ExactGap(Exact(axis));
   }
 
-  // The exact axis, turned so that it points from A towards B. Requires a gap of at least zero.
+  // Returns the exact axis, oriented from A towards B. Requires: a gap of at least zero.
   IntegerVector Oriented(uint64_t axis) {
     const IntegerVector n = Exact(axis);
     if (SignOfGap(n) >= 0) return n;
@@ -141,7 +155,7 @@ class AxisTable {
     return flat_axes_[axis - facets_a_ - facets_b_ - edge_pairs_];
   }
 
-  // The distance between the intervals times |n|; negative when they overlap.
+  // Returns the distance between the intervals times |n|; negative if they overlap.
   double FloatGap(const Vector& n) const {
     const auto range = [&n](const std::vector<Vector>& positions) {
       double low = INFINITY;
@@ -158,7 +172,7 @@ class AxisTable {
     return std::max(low_b - high_a, low_a - high_b);
   }
 
-  // Sign of min n.B - max n.A.
+  // Returns the sign of min n.B - max n.A.
   int SignOfGap(const IntegerVector& n) {
     return Sign(Dot(n, exact_.VertexB(exact_.FarthestB(n)) - exact_.VertexA(exact_.FarthestA(n))));
   }
@@ -170,8 +184,13 @@ class AxisTable {
     return sign > 0 ? Gap::kSeparated : sign == 0 ? Gap::kZero : Gap::kOverlap;
   }
 
+  uint64_t flat_count() const {
+    if (span_.dimension == 3) return 0;
+    return span_.dimension == 2 ? 1 + exact_.a().hull().edges().size() + edges_b_ : 3;
+  }
+
   void AppendFlatAxes() {
-    const MinkowskiSpan span = SpanOf(exact_);
+    const MinkowskiSpan& span = span_;
     if (span.dimension == 3) return;
     if (span.dimension == 2) {
       flat_axes_.push_back(span.direction);
@@ -205,6 +224,7 @@ class AxisTable {
   uint64_t facets_b_;
   uint64_t edges_b_;
   uint64_t edge_pairs_;
+  MinkowskiSpan span_;
   std::vector<IntegerVector> flat_axes_;
   std::vector<Vector> positions_a_;
   std::vector<Vector> positions_b_;
@@ -216,28 +236,29 @@ void LowerTo(std::atomic<uint64_t>& lowest, uint64_t value) {
   }
 }
 
-// The lowest axes that separate and that show a zero gap; axes beyond a separating one are skipped,
-// which hides none lower.
+// Finds the lowest axis that separates and the lowest that shows a zero gap. Skips axes beyond a
+// separating one; this hides no lower axis.
 struct Scan {
   using Clock = TextbookSearch::Clock;
 
   std::atomic<uint64_t> separated = kNone;
   std::atomic<uint64_t> zero = kNone;
   std::atomic<bool> stopped = false;
-  // Blocks of axes are taken in their order, and the thread that takes one tests it.
+  // Threads claim blocks of axes in order.
   std::atomic<uint64_t> next_axis = 0;
 
-  // Goes on until `end`. Whether nothing is left to test.
+  // Continues until `end`. Returns true if no axis is left to test.
   bool Run(AxisTable& axes, const QueryOptions& options, Clock::time_point end) {
     std::atomic<bool> paused = false;
 #pragma omp parallel num_threads(std::max(1, options.threads)) if (options.threads > 1)
     {
       StopPoll poll(options.should_stop, 1);
       while (!paused.load(std::memory_order_relaxed) && !stopped.load(std::memory_order_relaxed)) {
-        const uint64_t first = next_axis.fetch_add(kAxesPerPoll, std::memory_order_relaxed);
+        const uint64_t first = next_axis.fetch_add(axes.block(), std::memory_order_relaxed);
         if (IsLeft(first, axes) && poll.Step()) stopped = true;
         if (!IsLeft(first, axes) || poll.stopped()) break;
-        RunBlock(axes, first, std::min(first + kAxesPerPoll, axes.size()));
+        RunBlock(axes, first, std::min(first + axes.block(), axes.size()));
+        if (axes.stopped()) stopped = true;
         if (Clock::now() >= end) paused = true;
       }
     }
@@ -251,6 +272,7 @@ struct Scan {
   void RunBlock(AxisTable& axes, uint64_t first, uint64_t end) {
     for (uint64_t axis = first; axis < end; ++axis) {
       const Gap gap = axes.Test(axis);
+      if (axes.stopped()) return;
       if (gap == Gap::kZero) LowerTo(zero, axis);
       if (gap == Gap::kSeparated) {
         LowerTo(separated, axis);
@@ -259,6 +281,8 @@ struct Scan {
     }
   }
 };
+
+absl::Status Stopped() { return absl::CancelledError("stopped in textbook SAT"); }
 
 absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
   if (count <= options.max_textbook_axes) return absl::OkStatus();
@@ -270,7 +294,10 @@ absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
 
 struct TextbookSearch::State {
   State(const PlacedHull& a, const PlacedHull& b, const QueryOptions& given_options)
-      : options(given_options), filter(a, b), exact(filter), axes(exact, filter) {}
+      : options(given_options),
+        filter(a, b),
+        exact(filter, options.should_stop),
+        axes(exact, filter) {}
 
   const QueryOptions& options;
   FloatPair filter;
@@ -290,21 +317,23 @@ absl::StatusOr<TextbookSearch> TextbookSearch::Begin(const PlacedHull& placed_a,
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
   HULLD_CHECK(!a.empty() && !b.empty());
-  // The limit is checked before anything is computed, and again with the axes of a flat difference.
+  // Checks the limit before any computation, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
   auto state = std::make_unique<State>(placed_a, placed_b, options);
   if (absl::Status status = CheckCount(state->axes.size(), options); !status.ok()) return status;
+  state->axes.Prepare();
+  if (state->exact.stopped()) return Stopped();
   return TextbookSearch(std::move(state));
 }
 
 absl::StatusOr<bool> TextbookSearch::Advance(Clock::time_point end) {
   const bool done = state_->scan.Run(state_->axes, state_->options, end);
-  if (state_->scan.stopped) return absl::CancelledError("stopped in textbook SAT");
+  if (state_->scan.stopped) return Stopped();
   return done;
 }
 
-Answer TextbookSearch::Finish() {
+absl::StatusOr<Answer> TextbookSearch::Finish() {
   const QueryOptions& options = state_->options;
   const Scan& scan = state_->scan;
   AxisTable& axes = state_->axes;
@@ -333,6 +362,7 @@ Answer TextbookSearch::Finish() {
   }
   if (options.want_axis && found != kNone) {
     SeparatingAxis axis = DescribeAxis(state_->exact, axes.Oriented(found));
+    if (axes.stopped()) return Stopped();
     axis.kind = axes.KindOf(found);
     answer.axis = std::move(axis);
   }

@@ -13,42 +13,42 @@
 
 namespace hulld {
 
-// The separating axis test as textbooks have it, with exact signs: reference, oracle and baseline.
+// The textbook separating axis test with exact signs: reference, oracle and baseline.
 //
 // Candidate axes, in this order: facet normals of A, facet normals of B, cross products of the
-// edges of A with the edges of B (edge of A major) and, where A - B is flat, its normals and the
-// in-plane normals of its edges, which the textbook forgets. On each, every vertex is projected, in
-// floating point with a proven bound; where that leaves the order of the intervals open, exactly.
-// The lowest-numbered strictly separating axis decides SEPARATED, otherwise the lowest with zero
-// gap TOUCHING; otherwise the hulls are OVERLAPPING. The axes are shared among options.threads
-// OpenMP threads; the answer and its report do not depend on their number. Cost: O(E_A E_B (V_A +
-// V_B)). Source: Gottschalk 1996, Separating axis theorem; Eberly 2001, Dynamic Collision Detection
-// using Oriented Bounding Boxes.
+// edges of A with the edges of B (edge of A major) and, if A - B is flat, its normals and the
+// in-plane normals of its edges, which the textbook omits. Each test projects every vertex, in
+// floating point with a proven bound, and exactly if the bound leaves the order of the intervals
+// open. The lowest-numbered strictly separating axis decides SEPARATED, otherwise the lowest with
+// zero gap TOUCHING; otherwise the hulls are OVERLAPPING. options.threads OpenMP threads share the
+// axes; the answer and its report do not depend on their number.
 //
-// Requires both hulls not empty. RESOURCE_EXHAUSTED: more axes than options.max_textbook_axes.
-// CANCELLED: should_stop.
+// Requires: both hulls not empty. RESOURCE_EXHAUSTED: more axes than options.max_textbook_axes.
+// CANCELLED: should_stop returned true. Cost: O(E_A E_B (V_A + V_B)). Source: Gottschalk 1996,
+// Separating axis theorem; Eberly 2001, Dynamic Collision Detection using Oriented Bounding Boxes.
 absl::StatusOr<Answer> TextbookSat(const PlacedHull& a, const PlacedHull& b,
                                    const QueryOptions& options);
 
-// The same in pieces, for callers that must let others have their turn.
+// A resumable TextbookSat, for callers that must interleave other work.
 class TextbookSearch {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // All must outlive the search. Errors as TextbookSat's, but for CANCELLED.
+  // All arguments must outlive the search. Errors: as TextbookSat.
   static absl::StatusOr<TextbookSearch> Begin(const PlacedHull& a, const PlacedHull& b,
                                               const QueryOptions& options);
   TextbookSearch(TextbookSearch&&) noexcept;
   TextbookSearch& operator=(TextbookSearch&&) noexcept;
   ~TextbookSearch();
 
-  // Tests axes until `end`, but some at least. Whether the answer is known. CANCELLED: should_stop.
+  // Tests axes until `end`, at least some in every call. Returns true if the answer is known.
+  // CANCELLED: should_stop returned true.
   absl::StatusOr<bool> Advance(Clock::time_point end);
 
-  // Requires that Advance said so.
-  Answer Finish();
+  // Requires: Advance returned true. CANCELLED: should_stop returned true.
+  absl::StatusOr<Answer> Finish();
 
-  // What it holds: every vertex of both hulls in integers, some 500 bytes each.
+  // Memory: every vertex of both hulls in integers, some 500 bytes each.
   size_t MemoryBytes() const;
 
  private:

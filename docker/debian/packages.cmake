@@ -1,9 +1,9 @@
 # The Debian packages: hulld, hullctl, libhulld-dev, and python3-hulld. docker/debian/build.sh builds them.
 
-# Everything that only a package contains is left out of a plain `cmake --install`.
+# A plain `cmake --install` omits files that only a package contains.
 install(FILES docker/hulld.service DESTINATION /lib/systemd/system COMPONENT server EXCLUDE_FROM_ALL)
 install(FILES docker/debian/hulld/hulld.toml DESTINATION /etc/hulld COMPONENT server EXCLUDE_FROM_ALL)
-# Every flag is documented by --help; the manual page and the completion are derived from it.
+# --help documents every flag; the manual page and the completion are generated from it.
 install(FILES docker/debian/hulld/hulld.completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
         RENAME hulld COMPONENT server EXCLUDE_FROM_ALL)
 install(CODE [[
@@ -19,7 +19,7 @@ install(CODE [[
                           --no-build-isolation --no-compile --root-user-action=ignore --break-system-packages
                           --ignore-installed --root $ENV{DESTDIR} --prefix ${CMAKE_INSTALL_PREFIX} ${source}
                   COMMAND_ERROR_IS_FATAL ANY)
-  # pip records the folder of the sources.
+  # pip records the source folder in this file.
   file(GLOB direct_url $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/python3/dist-packages/hulld-*/direct_url.json)
   file(REMOVE ${direct_url})
 ]] COMPONENT python EXCLUDE_FROM_ALL)

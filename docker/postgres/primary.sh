@@ -1,7 +1,8 @@
 #!/bin/bash
-# Prepares the primary of docker/compose.many.yaml, once, when its data directory is made: lets the
-# standby copy it. The image of PostgreSQL runs what lies in /docker-entrypoint-initdb.d.
+# Prepares the primary of docker/compose.many.yaml for replication when its data directory is
+# created. The PostgreSQL image runs the files in /docker-entrypoint-initdb.d.
 set -euo pipefail
 psql --set ON_ERROR_STOP=1 --dbname "$POSTGRES_DB" --command "CREATE ROLE standby REPLICATION LOGIN"
-# All machines in their network may connect, as for the database itself: nobody else can reach it.
+# All machines in their network may connect, as for the database itself: no other machine can reach
+# it.
 echo "host replication standby samenet trust" >>"$PGDATA/pg_hba.conf"

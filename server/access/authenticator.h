@@ -15,30 +15,29 @@
 
 namespace hulld::server {
 
-// Tells who calls, by "authorization: Bearer TOKEN" in the call's metadata. Without tokens everyone
-// may do everything. Any thread.
+// Identifies the caller by "authorization: Bearer TOKEN" in the metadata of a call. Without tokens
+// every caller may do everything. Thread-safe.
 class Authenticator {
  public:
   using Metadata = std::multimap<grpc::string_ref, grpc::string_ref>;
 
-  // UNAUTHENTICATED: no token, or none that is known; the message never repeats it.
-  // PERMISSION_DENIED: the token's role does not allow the call.
+  // Returns the caller. UNAUTHENTICATED: the token is missing or unknown; the message never repeats
+  // it. PERMISSION_DENIED: the token's role does not allow the call.
   absl::StatusOr<Caller> Authenticate(const Metadata& metadata, Rpc rpc) const;
 
-  // From now on callers need one of these tokens. Calls that run are for others to end (Knows).
+  // Requires one of these tokens from now on. Does not end running calls (see Knows).
   void SetTokens(TokenTable tokens);
 
-  // Whether the token of a caller that was let in is still valid, with the rights that it had.
+  // Returns true if the token of an authenticated caller is still valid, with the same rights.
   bool Knows(const Caller& caller) const;
-  // How often the tokens changed. What was found out about a caller holds as long as this stays the
-  // same.
+  // Number of changes of the tokens. Results of Authenticate stay valid while it is the same.
   uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
 
  private:
   std::shared_ptr<const TokenTable> tokens() const;
 
   mutable std::mutex mutex_;
-  // Null: no tokens are needed. Guarded by the mutex.
+  // Null: calls need no token. Guarded by mutex_.
   std::shared_ptr<const TokenTable> tokens_;
   std::atomic<uint64_t> generation_ = 0;
 };

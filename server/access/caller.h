@@ -11,34 +11,33 @@ namespace hulld::server {
 
 enum class Rpc;
 
-// What a caller may do; each includes those before it.
+// Permissions of a caller. Each includes the previous ones.
 enum class Permission {
-  // Needs no token.
+  // Open to everyone, without a token.
   kNone,
-  // Asks; changes nothing.
+  // Reads only.
   kRead,
-  // Creates, changes and deletes hulls.
+  // Changes hulls and bodies.
   kWrite,
-  // Concerns the store as a whole.
+  // Administers the whole store.
   kAdmin,
 };
 
-// The name of the role that has this permission: "read-only", "read-write" or "admin"; "none" has
-// none.
+// Returns the name of the role with this permission: "none", "read-only", "read-write", or "admin".
 const char* RoleName(Permission permission);
 
-// What a call needs: the one table of that.
+// Returns the permission that a call needs. The only such table.
 Permission PermissionFor(Rpc rpc);
 
-// The caller of a call, and what the caller may do and see. The default is the caller of a server
-// without tokens, who may do everything.
+// The caller of a call, with its rights. The default is the caller of a server without tokens, with
+// all rights.
 struct Caller {
-  // The token's name; empty without tokens. It is no secret.
+  // The token's name, which is no secret; empty without tokens.
   std::string name;
   Permission permission = Permission::kAdmin;
-  // What the IDs that the caller sees start with: ends in "/", or is empty for all.
+  // Prefix of all visible IDs: ends in "/", or is empty for all IDs.
   std::string prefix;
-  // Tells the tokens apart that had this name one after another. Never shown.
+  // Distinguishes successive tokens of one name. Never shown.
   uint64_t token = 0;
 
   bool sees_all() const { return prefix.empty(); }
@@ -46,17 +45,16 @@ struct Caller {
   bool operator==(const Caller&) const = default;
 };
 
-// PERMISSION_DENIED, naming the role that is missing, unless the caller may call this.
+// Returns OK if the caller may call this RPC. PERMISSION_DENIED names the required role.
 absl::Status CheckPermission(const Caller& caller, Rpc rpc);
 
-// Every hull ID of a request goes through here before anything is looked up by it. OK when `id` is
-// well-formed and the caller's. INVALID_ARGUMENT: as CheckHullIdSyntax. PERMISSION_DENIED: it is
-// not under the caller's prefix, whether or not such a hull exists.
+// Returns OK if `id` is well-formed and visible to the caller. Every hull ID of a request is
+// checked before it is looked up. INVALID_ARGUMENT: as CheckHullIdSyntax. PERMISSION_DENIED: it is
+// outside the caller's prefix, whether or not the hull exists.
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field);
 
-// The prefix to list for a caller who asks for `prefix`: the narrower of the two.
-// INVALID_ARGUMENT: longer than any ID. PERMISSION_DENIED when nothing the caller sees can start
-// with it.
+// Returns the narrower one of `prefix` and the caller's prefix. INVALID_ARGUMENT: `prefix` is
+// longer than any ID. PERMISSION_DENIED: no ID that starts with `prefix` is visible to the caller.
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix);
 
 }  // namespace hulld::server

@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Logs once what is wrong with a file, and once that it is in order again.
+// Logs each error of a file, and its recovery, without repetition.
 void Complain(const char* what, const absl::Status& status, std::string* complaint) {
   const std::string message(status.message());
   if (message == *complaint) return;
@@ -70,6 +70,10 @@ void Guard::OnTokensChanged(std::function<void()> changed) {
 
 absl::Status Guard::ReloadTls() {
   absl::StatusOr<TlsIdentity> loaded = LoadTlsIdentity(config_);
+  if (!loaded.ok() && tls_ != nullptr && HasLostAuthorities(config_)) {
+    RevokeAuthorities();
+    return absl::OkStatus();
+  }
   if (!loaded.ok()) return loaded.status();
   if (*loaded == identity_) return absl::OkStatus();
   identity_ = *loaded;
@@ -85,13 +89,34 @@ absl::Status Guard::ReloadTls() {
   return absl::OkStatus();
 }
 
+void Guard::RevokeAuthorities() {
+  TlsIdentity alone = identity_;
+  alone.client_authorities = FirstCertificate(identity_.certificates);
+  if (alone == identity_) return;
+  identity_ = alone;
+  tls_->SetIdentity(std::move(alone));
+  spdlog::error(
+      "--tls-client-ca {} is gone or holds no certificate: no client may connect any more; restore "
+      "the file to let clients in again",
+      config_.tls_client_ca);
+}
+
 absl::Status Guard::ReloadTokens() {
-  absl::StatusOr<TokenTable> table = ReadTokensFile(config_.tokens_file);
+  absl::StatusOr<TokenTable> table = authenticator_.generation() == 0
+                                         ? ReadTokensFile(config_.tokens_file)
+                                         : RereadTokensFile(config_.tokens_file);
   if (!table.ok()) return table.status();
   if (*table == tokens_) return absl::OkStatus();
   tokens_ = *std::move(table);
   authenticator_.SetTokens(tokens_);
-  spdlog::info("{} tokens in force", tokens_.size());
+  if (tokens_.empty()) {
+    spdlog::error(
+        "--tokens-file {} is gone or holds no token: every token is revoked, and every call is "
+        "refused; add a line with 'hullctl token new' to let callers in again",
+        config_.tokens_file);
+  } else {
+    spdlog::info("{} tokens in force", tokens_.size());
+  }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();
 }

@@ -17,13 +17,13 @@
 
 namespace hulld::server {
 
-// Decides who may connect and who may call, as the files of --tls-cert, --tls-key, --tls-client-ca
-// and --tokens-file say. It looks at the files every Config::kReloadInterval. New files that are
-// valid hold for connections and calls from then on, and calls that run on tokens that are gone are
-// ended. Files that are broken are reported and change nothing.
+// Controls access by the files of --tls-cert, --tls-key, --tls-client-ca, and --tokens-file. Checks
+// the files every Config::kReloadInterval. Valid new files apply to later connections and calls,
+// and running calls with revoked tokens end. Invalid files are logged and change nothing. A file of
+// tokens or of clients' authorities that is missing or empty revokes all of them.
 class Guard {
  public:
-  // INVALID_ARGUMENT names the setting whose file is wrong.
+  // INVALID_ARGUMENT names the setting with an invalid file.
   static absl::StatusOr<std::unique_ptr<Guard>> Load(const Config& config);
 
   Guard(const Guard&) = delete;
@@ -31,22 +31,24 @@ class Guard {
   ~Guard();
 
   const Authenticator& authenticator() const { return authenticator_; }
-  // For the listening port: TLS, or none.
+  // Credentials for the listening port: TLS, or none.
   std::shared_ptr<grpc::ServerCredentials> credentials() const;
 
-  // Looks at the files now. Any thread.
+  // Checks the files now. Thread-safe.
   void Reload();
 
-  // Called whenever other tokens are in force, on the thread that noticed; null: no longer. Once
-  // this returns, the one before is not running.
+  // Sets the callback that runs after each change of the tokens, on the thread that found it; null:
+  // none. Blocks until the previous callback has returned.
   void OnTokensChanged(std::function<void()> changed);
 
  private:
   explicit Guard(const Config& config) : config_(config) {}
 
   absl::Status LoadAll();
-  // The following require the mutex.
+  // The following require mutex_.
   absl::Status ReloadTls();
+  // Refuses all further connections.
+  void RevokeAuthorities();
   absl::Status ReloadTokens();
   void Watch();
 
@@ -56,7 +58,7 @@ class Guard {
   std::shared_ptr<TlsCredentials> tls_;
 
   std::mutex mutex_;
-  // What is in force, and what was last complained about. Guarded by the mutex.
+  // Files in force, and the last logged error of each. Guarded by mutex_.
   TlsIdentity identity_;
   TokenTable tokens_;
   std::string tls_complaint_;

@@ -19,7 +19,7 @@ absl::Status Problem(const std::string& setting, const std::string& path, const 
   return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
 }
 
-// Empty when only we, and the group of a file of root's, can get at it.
+// Returns an empty string if only this user, or the group of a file of root, has access.
 std::string CheckAccess(const struct stat& info) {
   if (info.st_uid != 0 && info.st_uid != geteuid()) {
     return absl::StrFormat(
@@ -56,7 +56,7 @@ absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std:
 
 absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string& setting,
                                      bool secret) {
-  // Not blocking, so that a pipe is seen for what it is.
+  // Nonblocking, so that a pipe is recognized instead of waited for.
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return Problem(setting, path, std::strerror(errno));
   absl::StatusOr<std::string> text = ReadOpen(fd, path, setting, secret);
@@ -72,6 +72,11 @@ absl::StatusOr<std::string> ReadSettingFile(const std::string& path, const std::
 
 absl::StatusOr<std::string> ReadSecretFile(const std::string& path, const std::string& setting) {
   return ReadFile(path, setting, true);
+}
+
+bool IsMissing(const std::string& path) {
+  struct stat info = {};
+  return stat(path.c_str(), &info) != 0 && (errno == ENOENT || errno == ENOTDIR);
 }
 
 }  // namespace hulld::server

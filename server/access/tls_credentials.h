@@ -13,23 +13,21 @@
 
 namespace hulld::server {
 
-// TLS 1.2 or later with an identity that can be exchanged: connections made after SetIdentity use
-// the new one, and existing connections stay. Clients need a certificate when the first identity
-// names authorities.
+// TLS 1.2 or later with a replaceable identity. New connections use the latest identity, existing
+// connections keep theirs. Clients need a certificate if the first identity has authorities.
 //
-// gRPC's C++ interface offers this only by watching files, which it takes as they come, whether
-// or not key and certificate belong together; so this goes to its core, which asks for the identity
-// at each handshake.
+// gRPC's C++ interface can only watch files, without checking that key and certificate match. So
+// this uses its core, which fetches the identity at each handshake.
 class TlsCredentials : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(TlsIdentity identity);
   ~TlsCredentials() override;
 
-  // Any thread. Requires an identity as LoadTlsIdentity gives it, that names authorities if and
-  // only if the first did.
+  // Thread-safe. Requires: an identity of LoadTlsIdentity that has authorities if and only if the
+  // first one had.
   void SetIdentity(TlsIdentity identity);
 
-  // Not supported: Call authenticates. Does nothing.
+  // Does nothing: calls are authenticated by Authenticator.
   void SetAuthMetadataProcessor(
       const std::shared_ptr<grpc::AuthMetadataProcessor>& processor) override;
 
@@ -41,7 +39,7 @@ class TlsCredentials : public grpc::ServerCredentials {
 
   std::mutex mutex_;
   TlsIdentity identity_;
-  // Whether gRPC has seen identity_. Both guarded by the mutex.
+  // True if gRPC has fetched identity_. Both are guarded by mutex_.
   bool fetched_ = false;
   grpc_server_credentials* credentials_;
 };

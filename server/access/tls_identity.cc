@@ -36,7 +36,7 @@ absl::Status Problem(const char* setting, const std::string& path, const std::st
   return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
 }
 
-// All certificates of a file; never none.
+// Returns all certificates of a file, at least one.
 absl::StatusOr<std::vector<Certificate>> ParseCertificates(const std::string& text,
                                                            const char* setting,
                                                            const std::string& path) {
@@ -58,7 +58,7 @@ absl::StatusOr<std::vector<Certificate>> ParseCertificates(const std::string& te
   return certificates;
 }
 
-// Asked for the passphrase of an encrypted key: there is none.
+// Refuses to give a passphrase for an encrypted key.
 int NoPassphrase(char*, int, int, void*) { return -1; }
 
 absl::StatusOr<Key> ParseKey(const std::string& text, const std::string& path) {
@@ -79,12 +79,16 @@ std::chrono::system_clock::time_point TimeOf(const ASN1_TIME* time) {
   return std::chrono::system_clock::from_time_t(timegm(&utc));
 }
 
-std::string SubjectOf(const X509* certificate) {
-  const Bio bio(BIO_new(BIO_s_mem()));
-  X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate), 0, XN_FLAG_ONELINE);
+std::string Contents(const Bio& bio) {
   char* text = nullptr;
   const long length = BIO_get_mem_data(bio.get(), &text);
   return std::string(text, static_cast<size_t>(length));
+}
+
+std::string SubjectOf(const X509* certificate) {
+  const Bio bio(BIO_new(BIO_s_mem()));
+  X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate), 0, XN_FLAG_ONELINE);
+  return Contents(bio);
 }
 
 }  // namespace
@@ -129,6 +133,21 @@ absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
   identity.not_before = TimeOf(X509_get0_notBefore(leaf));
   identity.not_after = TimeOf(X509_get0_notAfter(leaf));
   return identity;
+}
+
+bool HasLostAuthorities(const Config& config) {
+  if (config.tls_client_ca.empty()) return false;
+  if (IsMissing(config.tls_client_ca)) return true;
+  const absl::StatusOr<std::string> text = ReadSettingFile(config.tls_client_ca, "--tls-client-ca");
+  return text.ok() && text->find("-----BEGIN") == std::string::npos;
+}
+
+std::string FirstCertificate(const std::string& certificates) {
+  const Bio text = Open(certificates);
+  const Certificate first(PEM_read_bio_X509(text.get(), nullptr, nullptr, nullptr));
+  const Bio copy(BIO_new(BIO_s_mem()));
+  PEM_write_bio_X509(copy.get(), first.get());
+  return Contents(copy);
 }
 
 absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_clock::time_point now) {

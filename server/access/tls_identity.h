@@ -10,15 +10,15 @@
 
 namespace hulld::server {
 
-// What the server proves itself with, and whom it lets in, as PEM.
+// The server's certificates and key, and the authorities of its clients, as PEM.
 struct TlsIdentity {
-  // The server's certificate first, then those that lead to its authority.
+  // The server's certificate, then the chain to its authority.
   std::string certificates;
   std::string key;
-  // The authorities whose clients may connect; empty: clients need no certificate.
+  // Authorities of client certificates; empty: clients need no certificate.
   std::string client_authorities;
 
-  // The subject and the validity of the server's certificate.
+  // Subject and validity of the server's certificate.
   std::string subject;
   std::chrono::system_clock::time_point not_before;
   std::chrono::system_clock::time_point not_after;
@@ -26,17 +26,22 @@ struct TlsIdentity {
   bool operator==(const TlsIdentity&) const = default;
 };
 
-// Reads --tls-cert, --tls-key and --tls-client-ca, and checks that they are whole and belong
-// together, so that files caught in the middle of an exchange are told apart from good ones.
-// Requires config.has_tls(). INVALID_ARGUMENT names the setting. A certificate that has expired is
-// not an error here.
+// Reads --tls-cert, --tls-key, and --tls-client-ca, and checks that they are complete and match, so
+// that a half-done exchange of files is recognized. Requires: config.has_tls(). INVALID_ARGUMENT
+// names the setting. An expired certificate is no error here.
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config);
 
-// Why nobody would trust the certificate at `now`: INVALID_ARGUMENT when it has expired or is not
+// Returns true if --tls-client-ca is set and its file is missing or holds no PEM block.
+bool HasLostAuthorities(const Config& config);
+// Returns the first certificate of PEM text that LoadTlsIdentity accepted. As an authority it
+// admits only the owner of its key.
+std::string FirstCertificate(const std::string& certificates);
+
+// Returns OK if the certificate is valid at `now`. INVALID_ARGUMENT: it has expired, or is not
 // valid yet.
 absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_clock::time_point now);
 
-// "2027-01-31T12:00:00Z".
+// Returns the time in UTC, as in "2027-01-31T12:00:00Z".
 std::string FormatTime(std::chrono::system_clock::time_point time);
 
 }  // namespace hulld::server

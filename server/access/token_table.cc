@@ -59,10 +59,6 @@ absl::StatusOr<TokenTable> TokenTable::Parse(const std::string& text) {
     const absl::Status added = table.AddLine(line);
     if (!added.ok()) return Prefixed(absl::StrCat("line ", number, ": "), added);
   }
-  if (table.entries_.empty()) {
-    return absl::InvalidArgumentError(
-        "it holds no token, so that nobody could call; add one with 'hullctl token new'");
-  }
   return table;
 }
 
@@ -137,11 +133,31 @@ bool TokenTable::Knows(const Caller& caller) const {
                      [&](const Entry& entry) { return entry.caller == caller; });
 }
 
-absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {
+namespace {
+
+absl::StatusOr<TokenTable> ParseTokensFile(const std::string& path) {
   const absl::StatusOr<std::string> text = ReadSecretFile(path, "--tokens-file");
   if (!text.ok()) return text.status();
   absl::StatusOr<TokenTable> table = TokenTable::Parse(*text);
   if (!table.ok()) return Prefixed(absl::StrCat("--tokens-file ", path, ": "), table.status());
+  return table;
+}
+
+}  // namespace
+
+absl::StatusOr<TokenTable> RereadTokensFile(const std::string& path) {
+  if (IsMissing(path)) return TokenTable();
+  return ParseTokensFile(path);
+}
+
+absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {
+  absl::StatusOr<TokenTable> table = ParseTokensFile(path);
+  if (table.ok() && table->empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--tokens-file ", path,
+                     ": it holds no token, so that nobody could call; add one with 'hullctl token "
+                     "new'"));
+  }
   return table;
 }
 

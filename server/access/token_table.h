@@ -13,30 +13,33 @@
 
 namespace hulld::server {
 
-// The callers of --tokens-file, by the hashes of their tokens. The file holds one token a line:
+// The callers of --tokens-file, by the hashes of their tokens. The file holds one token per line:
 //
-//   # name      role        prefix   hash
-//   camera-1    read-write  cell-1/
-//   sha256:9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08 dashboard   read-only
-//   *        sha256:60303ae22b998861bce3b28f33eec1be758a213c86c93c076dbe9f558c11c752
+//   # name    role       prefix  hash
+//   camera-1  read-write cell-1/ sha256:9f86d081...b0f00a08
+//   dashboard read-only  *       sha256:60303ae2...8c11c752
 //
 // name: letters, digits, ".", "_" and "-", 64 at most, unique. role: read-only, read-write or
-// admin. prefix: what the IDs that it sees start with, ending in "/"; "*" for all. hash: SHA-256 of
-// the token, 64 hexadecimal digits. Blank lines and lines that start with "#" say nothing.
+// admin. prefix: the prefix of all visible IDs, ending in "/"; "*" for all IDs. hash: SHA-256 of
+// the token, 64 hexadecimal digits. Blank lines and lines that start with "#" are ignored.
 //
-// A plain hash guards only what nobody can guess: tokens are 256 random bits (hullctl token new).
+// A plain hash protects only secrets of high entropy: tokens are 256 random bits (hullctl token
+// new).
 class TokenTable {
  public:
-  // INVALID_ARGUMENT names the line; it never quotes a hash.
+  // Parses the text of a file. Text without a token gives an empty table. INVALID_ARGUMENT names
+  // the line; it never quotes a hash.
   static absl::StatusOr<TokenTable> Parse(const std::string& text);
 
-  // Whose token this is. The time does not depend on how much of a hash is right.
+  // Returns the owner of the token, if any. The time is independent of the matching part of a hash.
   std::optional<Caller> Find(const std::string& token) const;
 
-  // Whether a token still makes its owner this caller. Cost: O(tokens), some nanoseconds each.
+  // Returns true if a token identifies this caller, with the same rights. Cost: O(tokens), some
+  // nanoseconds each.
   bool Knows(const Caller& caller) const;
 
   size_t size() const { return entries_.size(); }
+  bool empty() const { return entries_.empty(); }
 
   bool operator==(const TokenTable&) const = default;
 
@@ -54,8 +57,12 @@ class TokenTable {
   std::vector<Entry> entries_;
 };
 
-// Reads --tokens-file. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse.
+// Reads --tokens-file. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse, or the file holds
+// no token.
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path);
+// Rereads --tokens-file. A missing file or one without a token gives an empty table: the last
+// token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse.
+absl::StatusOr<TokenTable> RereadTokensFile(const std::string& path);
 
 }  // namespace hulld::server
 

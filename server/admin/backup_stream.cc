@@ -16,7 +16,7 @@
 namespace hulld::server {
 namespace {
 
-// A backup holds everybody's hulls.
+// A backup holds the hulls of all callers.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return WithReason(absl::PermissionDeniedError(absl::StrCat(
@@ -28,10 +28,10 @@ absl::Status CheckSeesAll(const Caller& caller) {
 }  // namespace
 
 WriteReactor* BackupStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Store& store, const Shards& shards, WorkerPool& readers,
+                                  Store& store, const Registry& registry, WorkerPool& readers,
                                   const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BackupStream>(
-      new BackupStream(context, admission, store, shards, readers, request)));
+      new BackupStream(context, admission, store, registry, readers, request)));
 }
 
 BackupStream::~BackupStream() {
@@ -64,13 +64,13 @@ absl::Status BackupStream::Begin() {
   std::sort(files_.rbegin(), files_.rend());
   spdlog::info("a backup of the store is being saved");
   v1::BackupBegin* begin = reply().mutable_begin();
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{shards_.Sizes().revisions}, begin->mutable_header());
+  EncodeHeader(registry_.store(), registry_.Sizes().store_revision, begin->mutable_header());
   begin->set_version(HULLD_VERSION);
   begin->set_store_format(kStoreFormat);
   return absl::OkStatus();
 }
 
-// Reads files, so not on gRPC's thread.
+// Runs on a reader thread, since it reads files.
 void BackupStream::OnSent() {
   RunOn(readers_, [this] {
     const absl::StatusOr<bool> more = NextMessage();

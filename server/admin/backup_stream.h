@@ -13,13 +13,13 @@
 #include "hulld/v1/maintenance.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-// One SaveBackup call: makes a copy of the store, sends its files piece by piece, each read when
-// the one before is sent, and removes the copy.
+// One SaveBackup call: makes a copy of the store, sends its files in pieces, and removes the copy.
+// Each piece is read after the previous one was sent.
 class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBackupResponse>,
                                           v1::SaveBackupRequest> {
  public:
@@ -27,31 +27,31 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   ~BackupStream() override;
 
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Store& store, const Shards& shards, WorkerPool& readers,
+                             Store& store, const Registry& registry, WorkerPool& readers,
                              const grpc::ByteBuffer& request);
 
  private:
   BackupStream(grpc::CallbackServerContext& context, Admission& admission, Store& store,
-               const Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request)
+               const Registry& registry, WorkerPool& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kSaveBackup),
         store_(store),
-        shards_(shards),
+        registry_(registry),
         readers_(readers) {}
 
   void Open() override;
   void OnSent() override;
 
-  // Makes the copy, and the message that precedes its files.
+  // Makes the copy, and the first message.
   absl::Status Begin();
-  // Fills the reply with the next part; false when all are sent.
+  // Fills the reply with the next part. Returns false after the last one.
   absl::StatusOr<bool> NextMessage();
   absl::StatusOr<bool> NextPiece();
 
   Store& store_;
-  const Shards& shards_;
+  const Registry& registry_;
   WorkerPool& readers_;
   std::string directory_;
-  // Relative to directory_; the last is sent first.
+  // Paths relative to directory_. The last one is sent first.
   std::vector<std::string> files_;
   std::ifstream file_;
   uint64_t offset_ = 0;

@@ -33,7 +33,7 @@ struct Report {
   uint64_t vertices = 0;
   uint64_t bodies = 0;
   std::vector<Finding> findings;
-  // Not of a hull: what kept the hulls from being read.
+  // Error that kept the hulls from being read.
   std::string failure;
 };
 
@@ -112,9 +112,9 @@ void PrintText(const Report& report) {
               report.findings.size());
 }
 
-absl::Status CutLog(RocksDbOptions options) {
+absl::Status AcceptLoss(RocksDbOptions options) {
   options.read_only = false;
-  options.cut_log = true;
+  options.accept_loss = true;
   return RocksDbStore::Open(std::move(options)).status();
 }
 
@@ -125,16 +125,16 @@ int RunDoctor(const std::vector<std::string>& arguments) {
   RocksDbOptions options;
   options.read_only = true;
   bool json = false;
-  bool cut_log = false;
+  bool accept_loss = false;
   app.add_option("--data-dir", options.data_dir, "Directory of the store")
       ->envname("HULLD_DATA_DIR")
       ->required();
   app.add_flag("--json", json, "Print one JSON object");
   app.add_flag(
-      "--cut-log", cut_log,
-      "If the log is damaged, cut it before its first damaged record: what was acknowledged "
-      "after that is lost, and the store takes a new ID. Without it nothing is changed");
-  app.footer("Exit status: 0 all is well, 1 something is damaged, 2 there is nothing to look at.");
+      "--accept-loss,--cut-log", accept_loss,
+      "If the log is damaged, or shorter than what was acknowledged, accept that the changes in "
+      "the lost part are gone. The store gets a new ID. Without this flag nothing is changed");
+  app.footer("Exit status: 0 all is well, 1 something is damaged, 2 the store cannot be examined.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
     app.parse(std::move(reversed));
@@ -142,9 +142,9 @@ int RunDoctor(const std::vector<std::string>& arguments) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
-  if (cut_log && absl::IsDataLoss(store.status())) {
-    const absl::Status cut = CutLog(options);
-    store = cut.ok() ? RocksDbStore::Open(options) : cut;
+  if (accept_loss && absl::IsDataLoss(store.status())) {
+    const absl::Status accepted = AcceptLoss(options);
+    store = accepted.ok() ? RocksDbStore::Open(options) : accepted;
   }
   if (!store.ok()) {
     std::fprintf(stderr, "hulld doctor: %s\n", std::string(store.status().message()).c_str());

@@ -6,11 +6,11 @@
 
 namespace hulld::server {
 
-// 'hulld doctor': looks at every hull of a store without changing anything: reads its record and
-// its vertices, builds it, compares it with what the record says, and audits it by other means than
-// the builder. With --cut-log it first cuts a damaged log. arguments: those after "doctor". Prints
-// a report, and returns the exit status of the process: 0 when all is well, 1 when something is
-// damaged, 2 when the arguments are wrong or there is no store to look at.
+// 'hulld doctor': audits every hull of a store without changing it. Reads the record and the
+// vertices, builds the hull, compares it with the record, and audits it by means independent of the
+// builder. With --accept-loss a damaged or incomplete log is accepted first. arguments: those after
+// "doctor". Prints a report and returns the exit status: 0 if the store is sound; 1 if it is
+// damaged; 2 if the arguments are wrong, or the store does not exist or is in use.
 int RunDoctor(const std::vector<std::string>& arguments);
 
 }  // namespace hulld::server

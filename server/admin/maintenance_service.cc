@@ -6,7 +6,7 @@ namespace hulld::server {
 
 WriteReactor* MaintenanceService::SaveBackup(grpc::CallbackServerContext* context,
                                              const grpc::ByteBuffer* request) {
-  return BackupStream::Start(*context, admission_, store_, shards_, readers_, *request);
+  return BackupStream::Start(*context, admission_, store_, registry_, readers_, *request);
 }
 
 }  // namespace hulld::server

@@ -7,7 +7,7 @@
 #include "server/call/admission.h"
 #include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -17,15 +17,16 @@ class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_
                                v1::MaintenanceService::Service> {
  public:
   // Backups are read on `readers`. All must outlive this.
-  MaintenanceService(Store& store, const Shards& shards, Admission& admission, WorkerPool& readers)
-      : store_(store), shards_(shards), admission_(admission), readers_(readers) {}
+  MaintenanceService(Store& store, const Registry& registry, Admission& admission,
+                     WorkerPool& readers)
+      : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
 
   WriteReactor* SaveBackup(grpc::CallbackServerContext* context,
                            const grpc::ByteBuffer* request) override;
 
  private:
   Store& store_;
-  const Shards& shards_;
+  const Registry& registry_;
   Admission& admission_;
   WorkerPool& readers_;
 };

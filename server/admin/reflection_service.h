@@ -17,12 +17,12 @@ using ReflectionServiceOfBytes =
     grpc::reflection::v1alpha::ServerReflection::WithRawCallbackMethod_ServerReflectionInfo<
         grpc::reflection::v1alpha::ServerReflection::Service>;
 
-// grpc.reflection.v1alpha.ServerReflection: tells tools such as grpcurl what can be called. It
-// needs no token, as the contract is no secret; its streams count among those of their client
-// (--max-streams-per-client), and hold no thread while they wait.
+// grpc.reflection.v1alpha.ServerReflection: lists the services for tools such as grpcurl. It needs
+// no token, since the contract is no secret. Its streams count towards --max-streams-per-client and
+// hold no thread while they wait.
 class ReflectionService : public ReflectionServiceOfBytes {
  public:
-  // services: the full names of those to tell of. The admission must outlive this.
+  // services: full names of the services to list. The admission must outlive this.
   ReflectionService(Admission& admission, std::vector<std::string> services)
       : admission_(admission), services_(std::move(services)) {}
 

@@ -19,8 +19,8 @@ grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* 
 }
 
 void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) const {
-  const ShardsSizes sizes = shards_.Sizes();
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{sizes.revisions}, response->mutable_header());
+  const RegistrySizes sizes = registry_.Sizes();
+  EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
   response->set_version(HULLD_VERSION);
   const auto started = started_.time_since_epoch();
   const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(started);
@@ -28,13 +28,13 @@ void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) 
   response->mutable_started()->set_nanos(static_cast<int32_t>(
       std::chrono::duration_cast<std::chrono::nanoseconds>(started - seconds).count()));
   EncodeDuration(std::chrono::steady_clock::now() - started_steady_, response->mutable_uptime());
-  response->set_store_kind(shards_.any_store().kind());
+  response->set_store_kind(registry_.store().kind());
   if (caller.sees_all()) {
     response->set_hull_count(sizes.hull_count);
     response->set_vertex_count(sizes.vertex_count);
     response->set_body_count(sizes.body_count);
   }
-  const Limits& limits = shards_.limits();
+  const Limits& limits = registry_.limits();
   v1::Limits* message = response->mutable_limits();
   message->set_max_points_per_chunk(limits.max_points_per_chunk);
   message->set_max_vertices_per_hull(limits.max_vertices_per_hull);

@@ -8,7 +8,7 @@
 #include "hulld/v1/status.grpc.pb.h"
 #include "server/access/caller.h"
 #include "server/call/admission.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
@@ -16,7 +16,8 @@ namespace hulld::server {
 class StatusService
     : public v1::StatusService::WithRawCallbackMethod_GetStatus<v1::StatusService::Service> {
  public:
-  StatusService(Shards& shards, Admission& admission) : shards_(shards), admission_(admission) {}
+  StatusService(Registry& registry, Admission& admission)
+      : registry_(registry), admission_(admission) {}
 
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
                                       const grpc::ByteBuffer* request,
@@ -25,7 +26,7 @@ class StatusService
  private:
   void Fill(const Caller& caller, v1::GetStatusResponse* response) const;
 
-  Shards& shards_;
+  Registry& registry_;
   Admission& admission_;
   const std::chrono::system_clock::time_point started_ = std::chrono::system_clock::now();
   const std::chrono::steady_clock::time_point started_steady_ = std::chrono::steady_clock::now();

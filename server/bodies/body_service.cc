@@ -10,9 +10,9 @@
 #include "server/access/caller.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
+#include "server/registry/body_resolution.h"
 #include "server/registry/catalog/body.h"
 #include "server/settings/config.h"
-#include "server/shards/body_resolution.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"
@@ -84,10 +84,10 @@ std::optional<uint64_t> IfRevision(const Request& request) {
 grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request,
                                                grpc::ByteBuffer* response) {
-  return PutCall::Start(
-      *context, admission_, Rpc::kPutBody, {request, response}, [this](PutCall* call) {
-        readers_.of_several().Submit([this, call] { Put(call); }, call->call().client());
-      });
+  return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
+                        [this](PutCall* call) {
+                          readers_.Submit([this, call] { Put(call); }, call->call().client());
+                        });
 }
 
 grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* context,
@@ -95,7 +95,7 @@ grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* cont
                                                grpc::ByteBuffer* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
-        call->EndOn(readers_.of(shards_.shard_of(call->request().body_id())),
+        call->EndOn(readers_,
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
 }
@@ -106,11 +106,11 @@ grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* c
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
         EndFresh(
-            shards_, readers_.of_several(), call,
+            registry_, readers_, call,
             [this, call](std::chrono::nanoseconds staleness) {
               return List(call->request(), call->call(), staleness, &call->response());
             },
-            !shards_.any_store().finds_records());
+            !registry_.store().finds_records());
       });
 }
 
@@ -124,49 +124,45 @@ grpc::ServerUnaryReactor* BodyService::DeleteBody(grpc::CallbackServerContext* c
 void BodyService::Put(PutCall* call) {
   if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
   absl::StatusOr<StoredBody> body =
-      DecodeBody(call->request(), call->call().caller(), shards_.limits().max_pieces_per_body);
+      DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  Registry& registry = shards_.of(body->record.body_id);
-  registry.PutBody(*std::move(body), IfRevision(call->request()),
-                   [&registry, call](const absl::StatusOr<PutBodyResult>& result) {
-                     if (!result.ok()) return call->End(result.status());
-                     const BodyRecord& record = result->body;
-                     call->call().LogChange(result->created ? "body created" : "body replaced",
-                                            {"body", record.body_id}, record.revision);
-                     v1::PutBodyResponse& response = call->response();
-                     EncodeHeader(registry.store(), result->store_revision,
-                                  response.mutable_header());
-                     v1::BodyInfo* const info = response.mutable_body();
-                     info->set_body_id(record.body_id);
-                     info->set_create_revision(record.create_revision);
-                     info->set_revision(record.revision);
-                     info->set_piece_count(result->piece_count);
-                     response.set_created(result->created);
-                     response.set_durability(EncodeDurability(registry.store().durability()));
-                     call->End(absl::OkStatus());
-                   });
+  registry_.PutBody(*std::move(body), IfRevision(call->request()),
+                    [this, call](const absl::StatusOr<PutBodyResult>& result) {
+                      if (!result.ok()) return call->End(result.status());
+                      const BodyRecord& record = result->body;
+                      call->call().LogChange(result->created ? "body created" : "body replaced",
+                                             {"body", record.body_id}, record.revision);
+                      v1::PutBodyResponse& response = call->response();
+                      EncodeHeader(registry_.store(), result->store_revision,
+                                   response.mutable_header());
+                      v1::BodyInfo* const info = response.mutable_body();
+                      info->set_body_id(record.body_id);
+                      info->set_create_revision(record.create_revision);
+                      info->set_revision(record.revision);
+                      info->set_piece_count(result->piece_count);
+                      response.set_created(result->created);
+                      response.set_durability(EncodeDurability(registry_.store().durability()));
+                      call->End(absl::OkStatus());
+                    });
 }
 
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
                               v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request.freshness(), shards_.store_ids(), call.arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
   if (!freshness.ok()) return freshness.status();
-  const size_t shard = shards_.shard_of(id);
-  Registry& registry = shards_.at(shard);
-  const auto staleness =
-      registry.AwaitFresh(freshness->Of(shard), [&call] { return call.ShouldStop(); });
+  const auto staleness = registry_.AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
   if (!staleness.ok()) return staleness.status();
   const FoundBodies found =
-      registry.FindBodies(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+      registry_.FindBodies(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
-  EncodeHeader(registry.store(), AsOf{found.store_revision, *staleness},
+  EncodeHeader(registry_.store(), AsOf{found.store_revision, *staleness},
                response->mutable_header());
   EncodeBody(*body, response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
@@ -183,20 +179,22 @@ absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call&
                                v1::ListBodiesResponse* response) {
   const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
   if (!prefix.ok()) return prefix.status();
-  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
+  const absl::StatusOr<std::string> after =
+      DecodePageToken(Rpc::kListBodies, request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::StatusOr<ShardsBodyPage> page =
-      shards_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                         [&call] { return call.ShouldStop(); });
+  const absl::StatusOr<BodyPage> page =
+      registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                           [&call] { return call.ShouldStop(); });
   if (!page.ok()) return page.status();
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{page->revisions, staleness},
+  EncodeHeader(registry_.store(), AsOf{page->store_revision, staleness},
                response->mutable_header());
   for (const std::shared_ptr<const Body>& body : page->bodies) {
     EncodeBody(*body, response->add_bodies());
   }
   if (page->more) {
-    response->set_next_page_token(EncodePageToken(*prefix, page->bodies.back()->record().body_id));
+    response->set_next_page_token(
+        EncodePageToken(Rpc::kListBodies, *prefix, page->bodies.back()->record().body_id));
   }
   return absl::OkStatus();
 }
@@ -206,12 +204,11 @@ void BodyService::Delete(DeleteCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), id, "body_id"); !s.ok()) {
     return call->End(s);
   }
-  Registry& registry = shards_.of(id);
-  registry.DeleteBody(
-      id, IfRevision(call->request()), [&registry, call](const absl::StatusOr<uint64_t>& revision) {
+  registry_.DeleteBody(
+      id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
         call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);
-        EncodeHeader(registry.store(), *revision, call->response().mutable_header());
+        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
         call->End(absl::OkStatus());
       });
 }

@@ -10,23 +10,23 @@
 #include "server/call/admission.h"
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
-#include "server/shards/shard_pools.h"
-#include "server/shards/shards.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// The generated service; its methods take and give bytes (message_bytes.h).
+// The generated service, with methods on bytes (message_bytes.h).
 using BodyServiceOfBytes =
     v1::BodyService::WithRawCallbackMethod_PutBody<v1::BodyService::WithRawCallbackMethod_GetBody<
         v1::BodyService::WithRawCallbackMethod_ListBodies<
             v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
 
-// hulld.v1.BodyService: the contract in body.proto over the shards. Calls that look into records
-// are answered where they arrive; those with pieces, which may be many, on `readers`.
+// hulld.v1.BodyService: implements the contract in body.proto on the registry. Calls that only read
+// records are answered on arrival; calls with pieces, which may be many, on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
-  BodyService(Shards& shards, Admission& admission, ShardPools& readers)
-      : shards_(shards), admission_(admission), readers_(readers) {}
+  BodyService(Registry& registry, Admission& admission, WorkerPool& readers)
+      : registry_(registry), admission_(admission), readers_(readers) {}
 
   grpc::ServerUnaryReactor* PutBody(grpc::CallbackServerContext* context,
                                     const grpc::ByteBuffer* request,
@@ -47,7 +47,7 @@ class BodyService : public BodyServiceOfBytes {
   using ListCall = UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>;
   using DeleteCall = UnaryCall<v1::DeleteBodyRequest, v1::DeleteBodyResponse>;
 
-  // Put and Delete end the call once the change is committed.
+  // Put and Delete end the call after the change is committed.
   void Put(PutCall* call);
   absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
                    v1::GetBodyResponse* response);
@@ -55,9 +55,9 @@ class BodyService : public BodyServiceOfBytes {
                     std::chrono::nanoseconds staleness, v1::ListBodiesResponse* response);
   void Delete(DeleteCall* call);
 
-  Shards& shards_;
+  Registry& registry_;
   Admission& admission_;
-  ShardPools& readers_;
+  WorkerPool& readers_;
 };
 
 }  // namespace hulld::server

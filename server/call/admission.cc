@@ -3,6 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -13,10 +14,10 @@
 namespace hulld::server {
 namespace {
 
-// When to try again: a unary call takes well under a millisecond, a batch about a second.
+// Retry delays: a unary call takes well under a millisecond, a batch about a second.
 constexpr std::chrono::milliseconds kRetryCall(100);
 constexpr std::chrono::milliseconds kRetryBatch(1000);
-// A call that polls notices by itself that its time is up, and says so better than a cancellation.
+// A polling call notices its deadline itself and reports it better than a cancellation.
 constexpr std::chrono::seconds kGrace(2);
 
 }  // namespace
@@ -51,6 +52,12 @@ CallKind KindOf(Rpc rpc) {
   HULLD_UNREACHABLE();
 }
 
+namespace {
+
+bool IsAnonymous(Rpc rpc) { return PermissionFor(rpc) == Permission::kNone; }
+
+}  // namespace
+
 bool UsesWriters(Rpc rpc) { return rpc == Rpc::kAppendPoints || rpc == Rpc::kReplaceHull; }
 
 Admission::Ticket::Ticket(Admission* admission, Rpc rpc)
@@ -61,6 +68,7 @@ Admission::Ticket::Ticket(Ticket&& other) noexcept
       rpc_(other.rpc_),
       kind_(other.kind_),
       client_(other.client_),
+      connection_(other.connection_),
       revocable_(other.revocable_),
       is_revocable_(other.is_revocable_),
       watched_(other.watched_),
@@ -94,7 +102,18 @@ Admission::~Admission() {
 
 absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
   const CallKind kind = KindOf(rpc);
-  // What lasts leaves a part to single calls.
+  if (IsAnonymous(rpc)) {
+    const uint64_t of_client =
+        std::max<uint64_t>(1, limits_.max_anonymous_calls / Limits::kAnonymousShare);
+    if (anonymous_ < limits_.max_anonymous_calls && client.anonymous < of_client) {
+      return absl::OkStatus();
+    }
+    return Overloaded(
+        absl::StrCat(anonymous_, " calls without a token are running, ", client.anonymous,
+                     " of them this client's, which may have ", of_client),
+        limits_.max_anonymous_calls, "max-anonymous-calls", kRetryBatch);
+  }
+  // Long calls leave a part to single calls.
   const auto room = [kind](uint64_t limit) {
     return kind == CallKind::kUnary ? limit : limit - limit / Limits::kKeptForSingleCalls;
   };
@@ -103,11 +122,16 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
                ? std::string()
                : absl::StrCat(", and the last ", limit - room(limit), " are kept for single calls");
   };
-  if (running_ >= room(limits_.max_calls)) {
-    return Overloaded(absl::StrCat(running(), " calls are running", kept(limits_.max_calls)),
+  const size_t counted = running_ - anonymous_;
+  if (counted >= room(limits_.max_calls)) {
+    return Overloaded(absl::StrCat(counted, " calls are running", kept(limits_.max_calls)),
                       limits_.max_calls, "max-calls", kRetryCall);
   }
-  if (const size_t waiting = backlog_ ? backlog_(rpc) : 0; waiting >= limits_.max_waiting_calls) {
+  size_t waiting = backlog_ ? backlog_(rpc) : 0;
+  // Tasks queued by streams, such as thousands of watches opened or notified together, keep out no
+  // single call: clients take turns.
+  if (kind == CallKind::kUnary) waiting = std::min(waiting, single_calls_);
+  if (waiting >= limits_.max_waiting_calls) {
     return Overloaded(absl::StrCat(waiting, " calls wait for a thread"), limits_.max_waiting_calls,
                       "max-waiting-calls", kRetryCall);
   }
@@ -124,8 +148,9 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
         absl::StrCat("this client has ", client.batches, " batches and scenes running"),
         limits_.max_batches_per_client, "max-batches-per-client", kRetryBatch);
   }
-  if (client.calls >= room(limits_.max_calls_per_client)) {
-    return Overloaded(absl::StrCat("this client has ", client.calls, " calls running",
+  const uint64_t of_client = client.calls - client.anonymous;
+  if (of_client >= room(limits_.max_calls_per_client)) {
+    return Overloaded(absl::StrCat("this client has ", of_client, " calls running",
                                    kept(limits_.max_calls_per_client)),
                       limits_.max_calls_per_client, "max-calls-per-client", kRetryCall);
   }
@@ -137,7 +162,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   const std::lock_guard lock(mutex_);
   if (draining_) return Draining();
   const auto known = clients_.find(arrival.client);
-  // Calls that tell the operator how the server is must work even when it is full.
+  // Operators' status calls must work even if the server is full.
   if (arrival.rpc != Rpc::kGetStatus) {
     const absl::Status room =
         CheckRoom(arrival.rpc, known == clients_.end() ? Ticket::Client{} : known->second);
@@ -152,11 +177,17 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
   Ticket::Client& client = ticket.client_->second;
   ++client.calls;
+  if (connections_ != nullptr) ticket.connection_ = connections_->BeginCall(arrival.peer);
+  if (ticket.kind_ == CallKind::kUnary) ++single_calls_;
+  if (IsAnonymous(arrival.rpc)) {
+    ++client.anonymous;
+    ++anonymous_;
+  }
   if (ticket.kind_ == CallKind::kBatch) {
     ++client.batches;
     ++batches_;
   }
-  if (ticket.kind_ == CallKind::kStream) ++client.streams;
+  if (ticket.kind_ == CallKind::kStream && !IsAnonymous(arrival.rpc)) ++client.streams;
   if (!arrival.caller.name.empty() && arrival.lifetime != nullptr) {
     ticket.revocable_ = revocable_.insert(
         revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime, arrival.on_revoked});
@@ -184,7 +215,7 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
     }
     watched_changed_.notify_all();
   }
-  // Those calls may leave before this returns.
+  // The calls may leave before this returns.
   for (const std::function<void()>& end_call : waiting) end_call();
   return count;
 }
@@ -228,7 +259,7 @@ void Admission::CancelOverdue() {
       watched_.front().is_cancelled = true;
       cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
     }
-    // gRPC may call back, and those calls may leave, before this returns.
+    // gRPC may call back, and the calls may leave, before this returns.
     lock.unlock();
     if (is_revoked) {
       grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,
@@ -254,7 +285,7 @@ bool Admission::WaitIdle(std::chrono::steady_clock::time_point deadline) {
 void Admission::Leave(Ticket& ticket) {
   grpc_call* watched = nullptr;
   {
-    // Notified under the lock, as the thread that waits may destroy this once it is released.
+    // Notifies under the lock, because the waiting thread may destroy this after its release.
     const std::lock_guard lock(mutex_);
     if (ticket.is_watched_) {
       watched = ticket.watched_->call;
@@ -267,7 +298,13 @@ void Admission::Leave(Ticket& ticket) {
       --client.batches;
       --batches_;
     }
-    if (ticket.kind_ == CallKind::kStream) --client.streams;
+    if (ticket.kind_ == CallKind::kStream && !IsAnonymous(ticket.rpc_)) --client.streams;
+    if (ticket.connection_ != 0) connections_->EndCall(ticket.connection_);
+    if (ticket.kind_ == CallKind::kUnary) --single_calls_;
+    if (IsAnonymous(ticket.rpc_)) {
+      --client.anonymous;
+      --anonymous_;
+    }
     if (--client.calls == 0) clients_.erase(clients_.find(ticket.client_->first));
     running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();

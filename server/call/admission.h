@@ -14,6 +14,7 @@
 #include <functional>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -22,13 +23,14 @@
 #include "server/call/call_lifetime.h"
 #include "server/call/request_memory.h"
 #include "server/contract/rpc.h"
+#include "server/network/connection_table.h"
 #include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
 
-// How a call loads the server, which decides what bounds it.
+// Load of a call on the server; determines the limits that apply to it.
 enum class CallKind {
   // One request, one short answer.
   kUnary,
@@ -36,7 +38,7 @@ enum class CallKind {
   kBatch,
   // One request, an answer of many messages.
   kDownload,
-  // Lasts as long as its client or the size of the store demands: --max-streams-per-client.
+  // Duration depends on the client or the size of the store: --max-streams-per-client.
   kStream,
 };
 
@@ -44,30 +46,34 @@ CallKind KindOf(Rpc rpc);
 
 class Authenticator;
 
-// Whether a call waits for the writers' pool; others wait for the readers' and for that of answers.
+// True if a call waits for the writers' pool; false: for the readers' and the answers' pools.
 bool UsesWriters(Rpc rpc);
 
-// Lets calls in while the limits leave room and until the server drains, counts those that run,
-// tells those to end whose token is no longer valid, and cancels those that neither end nor poll
-// for their end, as when a client reads no more.
+// Admits calls within the limits until the server drains, counts running calls, ends calls with a
+// revoked token, and cancels overdue calls that neither end nor poll, for example because the
+// client stopped reading.
 //
-// Each client has its share of calls, streams and batches. A part of all calls, and of each
-// client's, is kept for single calls, so calls that last never keep them out.
+// Each client has a share of calls, streams and batches. A part of all calls, and of each client's,
+// is reserved for single calls, so long calls never keep them out. Calls that need no token have
+// their own share, so they never keep out calls with a token.
 class Admission {
  public:
-  // Sets what tells callers apart. Called before the first call; `authenticator` must outlive this.
-  // Without one, everyone may do everything.
+  // Sets the authenticator. Call before the first call; it must outlive this. Without one, all
+  // callers have all permissions.
   void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
   const Authenticator* authenticator() const { return authenticator_; }
+  // Sets the table that records connections with calls. Call before the first call; it must outlive
+  // this.
+  void SetConnections(ConnectionTable& connections) { connections_ = &connections; }
 
-  // One admitted call; it ends with its ticket.
+  // An admitted call; ends with its ticket.
   class Ticket {
    public:
     Ticket(Ticket&& other) noexcept;
     Ticket& operator=(Ticket&&) = delete;
     ~Ticket();
 
-    // Whose share of the threads it uses.
+    // Client charged in fair scheduling of the threads.
     ClientId client() const;
 
    private:
@@ -77,8 +83,9 @@ class Admission {
       uint64_t calls = 0;
       uint64_t batches = 0;
       uint64_t streams = 0;
+      uint64_t anonymous = 0;
     };
-    // The nodes of an unordered_map stay where they are.
+    // Nodes of an unordered_map have stable addresses.
     using Clients = std::unordered_map<std::string, Client>;
     struct Watched {
       std::chrono::steady_clock::time_point end;
@@ -90,9 +97,9 @@ class Admission {
       grpc_call* call;
       CallLifetime* lifetime;
       std::function<void()> on_revoked;
-      // Once it is revoked: when it is cancelled unless it ended by itself.
+      // Time of cancellation of a revoked call that does not end by itself.
       std::chrono::steady_clock::time_point end = {};
-      // The list that it is in.
+      // List that contains this.
       std::list<Revocable>* list = nullptr;
     };
     Ticket(Admission* admission, Rpc rpc);
@@ -101,10 +108,12 @@ class Admission {
     Rpc rpc_;
     CallKind kind_;
     Clients::value_type* client_ = nullptr;
+    // The caller's connection in the ConnectionTable; 0: none.
+    uint64_t connection_ = 0;
     // Set for calls with a token.
     std::list<Revocable>::iterator revocable_;
     bool is_revocable_ = false;
-    // Set for downloads and batches, while --max-request-time limits them.
+    // Set for downloads and batches while --max-request-time limits them.
     std::list<Watched>::iterator watched_;
     bool is_watched_ = false;
   };
@@ -119,54 +128,56 @@ class Admission {
   const Limits& limits() const { return limits_; }
   Metrics& metrics() { return metrics_; }
 
-  // What the requests that were let in take.
+  // Memory of the admitted requests.
   RequestMemory& request_memory() { return request_memory_; }
 
-  // What waits for a thread where this call would, bounded by --max-waiting-calls. Set before the
-  // first call.
+  // Sets the function that returns the length of the queue a call would join, bounded by
+  // --max-waiting-calls. Call before the first call.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
-  // What must be known of a call to let it in.
+  // Properties of a call that admission depends on.
   struct Arrival {
     Rpc rpc;
-    // Whose share it uses.
+    // Client charged for the call.
     std::string client;
+    // Address of the peer, unless it is a unix socket.
+    std::optional<PeerAddress> peer = {};
     // gRPC's object of the call.
     grpc_call* call = nullptr;
-    // Whose token it carries, if it does, and what ends when that is no longer valid, which must
-    // outlive the ticket. Then on_revoked is called, if there is one, on any thread, perhaps when
-    // the ticket is gone: it ends a call that waits and so polls for nothing.
+    // Owner of the call's token, if any, and the lifetime that ends when the token is revoked; it
+    // must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after the
+    // ticket is gone: it ends a call that waits without polling.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
     std::function<void()> on_revoked = {};
   };
 
-  // Lets a call in. UNAVAILABLE once the server drains; RESOURCE_EXHAUSTED naming the limit, with a
-  // time to retry.
+  // Admits a call. UNAVAILABLE: the server drains. RESOURCE_EXHAUSTED naming the limit, with a
+  // retry delay.
   absl::StatusOr<Ticket> Admit(const Arrival& arrival);
 
-  // Ends every call of a token that `is_valid` does not know any more: UNAUTHENTICATED. A call that
-  // does not end by itself within two seconds, as where the client does not read what is written,
-  // is cancelled, and then without details of the error. How many.
+  // Ends every call with a token that `is_valid` rejects: UNAUTHENTICATED. A call that does not end
+  // by itself within two seconds, for example because its client does not read, is cancelled,
+  // without error details. Returns their number.
   size_t EndRevoked(const std::function<bool(const Caller&)>& is_valid);
 
   void BeginDrain();
 
-  // Waits until no call runs; false when some still run at `deadline`.
+  // Waits until no call runs. Returns false if calls still run at `deadline`.
   bool WaitIdle(std::chrono::steady_clock::time_point deadline);
 
-  // Calls that run now.
+  // Number of running calls.
   size_t running() const { return running_.load(std::memory_order_relaxed); }
 
  private:
-  // Both require the mutex; unchecked, as a std::mutex cannot tell who holds it.
+  // Require the mutex (not checked: a std::mutex does not know its holder).
   absl::Status CheckRoom(Rpc rpc, const Ticket::Client& client);
   void Watch(grpc_call* call, Ticket* ticket);
   static void MoveTo(std::list<Ticket::Revocable>& list,
                      std::list<Ticket::Revocable>::iterator call);
 
   void Leave(Ticket& ticket);
-  // The watchman's thread.
+  // Body of the watchdog thread.
   void CancelOverdue();
 
   const Limits limits_;
@@ -175,26 +186,30 @@ class Admission {
   std::function<size_t(Rpc)> backlog_;
 
   const Authenticator* authenticator_ = nullptr;
+  ConnectionTable* connections_ = nullptr;
   // hulld_requests_running{rpc}.
   std::array<prometheus::Gauge*, kRpcCount> running_gauges_;
 
   std::mutex mutex_;
-  // The rest is guarded by the mutex, `running_` for changes.
+  // The mutex guards the members below, and changes of `running_`.
   std::condition_variable idle_;
   bool draining_ = false;
   std::atomic<size_t> running_ = 0;
   size_t batches_ = 0;
-  // Those that have calls here alone.
+  // Running calls of these kinds.
+  size_t single_calls_ = 0;
+  size_t anonymous_ = 0;
+  // Only clients with running calls.
   Ticket::Clients clients_;
   ClientId last_client_ = kNoClient;
-  // Those with a valid token; those that are to end, in the order in which they are cancelled
-  // otherwise; and those that were.
+  // Calls with a valid token; revoked calls in the order of their cancellation; and cancelled
+  // revoked calls.
   std::list<Ticket::Revocable> revocable_;
   std::list<Ticket::Revocable> revoked_;
   std::list<Ticket::Revocable> cut_off_;
-  // In the order in which they end, as all are given the same time.
+  // In the order of their deadlines, because all have the same time limit.
   std::list<Ticket::Watched> watched_;
-  // Those of which the time was up: nothing more is done about them.
+  // Overdue calls, already cancelled.
   std::list<Ticket::Watched> cancelled_;
   // Notified when watched_ or revoked_ changes.
   std::condition_variable watched_changed_;

@@ -16,19 +16,19 @@ namespace {
 
 constexpr char kRequestIdKey[] = "x-request-id";
 constexpr char kTraceKey[] = "traceparent";
-// What gRPC's own retries honour, too.
+// Also honoured by gRPC's own retries.
 constexpr char kRetryKey[] = "grpc-retry-pushback-ms";
 
 double Milliseconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-// Whether --max-request-time limits each message of the client, rather than the call.
+// True if --max-request-time limits each message of the client rather than the call.
 bool IsTimedByMessage(Rpc rpc) {
   return rpc == Rpc::kStreamCollisions || rpc == Rpc::kWatchCollisions;
 }
 
-// Whether the server itself is to blame.
+// True if the error is a fault of the server.
 bool IsFault(absl::StatusCode code) {
   return code == absl::StatusCode::kInternal || code == absl::StatusCode::kUnknown ||
          code == absl::StatusCode::kDataLoss;
@@ -37,6 +37,8 @@ bool IsFault(absl::StatusCode code) {
 }  // namespace
 
 absl::Status Call::Begin(std::function<void()> on_revoked) {
+  // Skips work for cancelled calls, because many may be cancelled together.
+  if (context_.IsCancelled()) return absl::CancelledError("the call was cancelled");
   const auto& metadata = context_.client_metadata();
   const auto given = metadata.find(kRequestIdKey);
   if (given != metadata.end()) {
@@ -44,7 +46,7 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
     request_id_told_ = true;
     if (IsRequestId(id)) std::call_once(request_id_made_, [&] { request_id_ = id; });
   }
-  // Two of them say nothing.
+  // Ignored if repeated.
   if (metadata.count(kTraceKey) == 1) {
     const grpc::string_ref text = metadata.find(kTraceKey)->second;
     trace_ = TraceContext::Parse({text.data(), text.size()});
@@ -53,11 +55,12 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
   const uint64_t generation = authenticator == nullptr ? 0 : authenticator->generation();
   if (absl::Status s = Authenticate(); !s.ok()) return s;
 
+  const std::optional<PeerAddress> peer = PeerAddress::FromGrpc(peer_);
   absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
-      {rpc_, Client(), context_.c_call(), caller_, &lifetime_, std::move(on_revoked)});
+      {rpc_, Client(peer), peer, context_.c_call(), caller_, &lifetime_, std::move(on_revoked)});
   if (!ticket.ok()) return ticket.status();
   ticket_.emplace(*std::move(ticket));
-  // The tokens may have changed before it could be found among the calls that run.
+  // The tokens may have changed before the call was registered as running.
   if (authenticator != nullptr && authenticator->generation() != generation &&
       !caller_.name.empty() && !authenticator->Knows(caller_)) {
     lifetime_.Revoke();
@@ -84,12 +87,9 @@ absl::Status Call::Authenticate() {
   return absl::OkStatus();
 }
 
-// The token's name; without tokens the address, without the port, which differs for each
-// connection.
-std::string Call::Client() const {
+std::string Call::Client(const std::optional<PeerAddress>& peer) const {
   if (!caller_.name.empty()) return "token:" + caller_.name;
-  if (!peer_.starts_with("ipv4:") && !peer_.starts_with("ipv6:")) return peer_;
-  return peer_.substr(0, peer_.rfind(':'));
+  return peer.has_value() ? peer->NetworkName() : peer_;
 }
 
 void Call::BeginMessage() {

@@ -22,10 +22,9 @@
 
 namespace hulld::server {
 
-// What every running call has, unary or stream: one part of each reactor, as long-lived as that.
+// Common part of all running calls, unary or stream: a member of each reactor with its lifetime.
 //
-// Begin comes first and End last, each once; both may be called on any thread, and so may the rest
-// between them.
+// Begin comes first and End last, one time each. All functions may be called on any thread.
 class Call {
  public:
   // Context and admission must outlive this.
@@ -38,18 +37,16 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return caller_;
   }
-  // The request ID: the client's (metadata x-request-id), or ours, which is made when it is first
-  // needed, as most calls succeed and nothing is logged about them. All that is logged about the
-  // call carries it, and so does the reply of a call that is logged or fails, or whose client gave
-  // one.
+  // Request ID: the client's (metadata x-request-id), or one generated at first use, because most
+  // calls succeed without a log line. Every log line about the call carries it. The reply carries
+  // it if the call is logged or fails, or if the client supplied it.
   const std::string& request_id() const;
-  // Whose share of the threads it uses. Requires that Begin succeeded.
+  // Client charged in fair scheduling of the threads. Requires that Begin succeeded.
   ClientId client() const {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // When it came; in a stream that BeginMessage is called for, when the message that is under way
-  // came.
+  // Arrival of the call; and, in a stream that calls BeginMessage, of the message being processed.
   std::chrono::steady_clock::time_point arrival() const { return arrival_; }
   std::chrono::steady_clock::time_point message_arrival() const { return message_arrival_; }
   Metrics& metrics() const { return admission_.metrics(); }
@@ -62,42 +59,43 @@ class Call {
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 
-  // Finds out who calls and lets the call in; it must be ended with the error if there is one.
-  // on_revoked: as Admission::Arrival says.
-  // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
-  // drains. RESOURCE_EXHAUSTED: a limit on calls.
+  // Authenticates and admits the call. The caller must end it with the error, if any. on_revoked:
+  // as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate.
+  // UNAVAILABLE: the server drains. RESOURCE_EXHAUSTED: a limit on calls.
   absl::Status Begin(std::function<void()> on_revoked = {});
 
-  // Counts what the call asked for.
+  // Count the work requested by the call.
   void AddPairs(uint64_t pairs) { pairs_.fetch_add(pairs, std::memory_order_relaxed); }
   void AddPoints(uint64_t points) { points_.fetch_add(points, std::memory_order_relaxed); }
 
-  // A stream took up a message, and made its answer ready: messages are timed one by one, as the
-  // stream itself lasts as long as its client likes.
+  // Mark the start of processing of a stream's message, and the completion of its answer. Messages
+  // are timed individually, because the client determines the duration of the stream.
   void BeginMessage();
   void EndMessage() { EndMessage(message_arrival_); }
-  // The same where several messages are under way: `arrival` is that of the one.
+  // As above for streams with several messages in flight: `arrival` is the message's.
   void EndMessage(std::chrono::steady_clock::time_point arrival);
 
-  // Counts a limit that was met without ending the call, as by one pair of a batch.
+  // Counts a limit that was hit without ending the call, for example by one pair of a batch.
   void CountLimit(const absl::Status& status) const;
 
-  // Logs one line about this call, with the trace that it is part of.
+  // Logs one line about this call, with its trace.
   void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
-  // Logs a change of a hull or a body, as {"hull", ID}, and who made it: the token's name and the
+  // Logs a change of a hull or a body, as {"hull", ID}, with its author: the token's name and the
   // peer.
   void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 
-  // What the reactor is to finish with.
+  // Returns the status with which the reactor must finish.
   grpc::Status End(const absl::Status& status);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Fills caller_.
+  // Sets caller_.
   absl::Status Authenticate();
-  std::string Client() const;
+  // Client charged for the call: the token's name; without tokens the peer's network, or gRPC's
+  // name of a unix socket's peer.
+  std::string Client(const std::optional<PeerAddress>& peer) const;
   void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
 
   grpc::CallbackServerContext& context_;
@@ -106,9 +104,9 @@ class Call {
   const Clock::time_point arrival_ = Clock::now();
   mutable std::string request_id_;
   mutable std::once_flag request_id_made_;
-  // The client gave one, or something names it: the reply is to carry it.
+  // The reply must carry the ID: the client supplied it, or a log line or error names it.
   mutable std::atomic<bool> request_id_told_ = false;
-  // Known from the start: a connection that is gone has no peer.
+  // Saved at the start: a closed connection has no peer.
   const std::string peer_ = context_.peer();
   std::optional<TraceContext> trace_;
   CallLifetime lifetime_;
@@ -116,7 +114,7 @@ class Call {
   std::atomic<uint64_t> points_ = 0;
   Clock::time_point message_arrival_;
   Caller caller_;
-  // Taken by Begin, given back when the reactor goes.
+  // Acquired by Begin, released when the reactor is destroyed.
   std::optional<Admission::Ticket> ticket_;
 };
 

@@ -12,24 +12,24 @@
 
 namespace hulld::server {
 
-// Whether a call still has someone who waits for its answer. Polled by any thread. Its clock is the
-// monotonic one: a call neither ends early nor lasts because somebody set the time of day.
+// Deadline, cancellation and revocation of a call. Polled by any thread. Uses the monotonic clock,
+// so setting the time of day neither ends nor extends a call.
 class CallLifetime {
  public:
   using Clock = std::chrono::steady_clock;
   using WallClock = std::chrono::system_clock;
 
-  // deadline: as gRPC gives it, in the time of day; it is `wall_now` while Clock says `now`.
+  // deadline: gRPC's wall-clock deadline. wall_now, now: the same time on both clocks.
   explicit CallLifetime(WallClock::time_point deadline,
                         WallClock::time_point wall_now = WallClock::now(),
                         Clock::time_point now = Clock::now())
       : deadline_(Monotonic(deadline, wall_now, now)) {}
 
-  // When the client gives up.
+  // The client's deadline.
   Clock::time_point deadline() const { return deadline_; }
 
-  // Ends the call after `limit` (--max-request-time), from now on; zero: never. A stream that lasts
-  // as long as its client likes begins anew with every message.
+  // Ends the call after `limit` (--max-request-time) from now; zero: never. A stream of unlimited
+  // duration restarts the limit with every message.
   void LimitTime(std::chrono::milliseconds limit) {
     limit_.store(limit, std::memory_order_relaxed);
     const bool unlimited = limit == std::chrono::milliseconds::zero();
@@ -38,7 +38,7 @@ class CallLifetime {
   }
 
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }
-  // The token of the call is no longer valid.
+  // Stops the call because its token was revoked.
   void Revoke() {
     revoked_.store(true);
     Cancel();
@@ -47,8 +47,8 @@ class CallLifetime {
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
-  // Why the call stopped. Requires ShouldStop(); unchecked, as EndMessage may have lifted the limit
-  // since.
+  // Reason why the call stopped. Requires ShouldStop() (not checked, because EndMessage may have
+  // lifted the limit since).
   absl::Status StopStatus() const {
     if (is_revoked()) {
       return WithReason(absl::UnauthenticatedError(kRevoked), v1::ERROR_REASON_TOKEN_UNKNOWN);
@@ -73,7 +73,7 @@ class CallLifetime {
   static Clock::time_point Monotonic(WallClock::time_point deadline, WallClock::time_point wall_now,
                                      Clock::time_point now) {
     if (deadline == WallClock::time_point::max()) return Clock::time_point::max();
-    // Far away is as good as never, and must not overflow.
+    // Treats a distant deadline as none, to avoid overflow.
     constexpr auto kFar = std::chrono::hours(24 * 365);
     if (deadline - kFar > wall_now) return Clock::time_point::max();
     return now + std::chrono::duration_cast<Clock::duration>(deadline - wall_now);

@@ -18,19 +18,19 @@
 
 namespace hulld::server {
 
-// gRPC's reactors for the kinds of streams. They are streams of bytes, as message_bytes.h says.
+// gRPC's reactors of the kinds of streams, over bytes (message_bytes.h).
 using ReadReactor = grpc::ServerReadReactor<grpc::ByteBuffer>;
 using WriteReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 using BidiReactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
 
-// What every streaming call has: it owns itself until gRPC is done with it, is admitted before
-// anything else, and finishes exactly once. Reactor: one of those above.
+// Base of all streaming calls: owns itself until gRPC is done with it, is admitted before anything
+// else, and finishes exactly once. Reactor: one of the above.
 //
-// PulledStream and QueuedStream build on this: replies made one at a time, or queued.
+// PulledStream and QueuedStream derive from this: replies made one by one, or queued.
 template <typename Reactor>
 class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
  public:
-  // Admits the call of a new stream and opens it; a call that is not admitted ends at once.
+  // Admits the call of a new stream and opens it; a refused call ends immediately.
   static Reactor* Launch(const std::shared_ptr<CallStream>& stream) {
     stream->self_ = stream;
     absl::Status begun = stream->call_.Begin([weak = std::weak_ptr<CallStream>(stream)] {
@@ -43,7 +43,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
       return stream.get();
     }
     stream->Open();
-    // One of the two sees what the other did.
+    // A concurrent revocation sees opened_, or is seen here.
     stream->opened_ = true;
     if (stream->call_.is_revoked()) stream->OnRevoked();
     return stream.get();
@@ -52,19 +52,19 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
  protected:
   CallStream(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
       : call_(context, admission, rpc) {}
-  // Under way are neither a reaction nor a task: each holds a reference.
+  // No reaction or task is in flight: each holds a reference.
   ~CallStream() override { HULLD_CHECK(finished_); }
 
   Call& call() { return call_; }
   const Call& call() const { return call_; }
 
-  // Parses the request, where the client sends one that comes with the call.
+  // Parses the request if it arrives with the call.
   virtual absl::Status Receive() { return absl::OkStatus(); }
-  // Starts the first step, on gRPC's thread: neither waits nor computes for long.
+  // Starts the first step, on gRPC's thread: neither blocks nor computes for long.
   virtual void Open() = 0;
-  // The token is no longer valid: ends the call if it waits for something that may never come.
-  // What computes or writes sees by itself that it should stop. On any thread, perhaps twice, and
-  // perhaps when the call has finished.
+  // Ends the call after its token was revoked, if it waits for an event that may never come. Steps
+  // that compute or write notice the revocation themselves. Called on any thread, possibly twice,
+  // and possibly after the call has finished.
   virtual void OnRevoked() {}
 
   // Runs `step` on a pool or lane, which keeps this alive until then.
@@ -81,15 +81,15 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
     step();
   }
 
-  // Why the call stopped, if it did; otherwise `status`.
+  // Returns the reason why the call stopped, if it did; otherwise `status`.
   absl::Status OrStopped(const absl::Status& status) const {
     return call_.ShouldStop() ? call_.StopStatus() : status;
   }
 
-  // Ends the call, exactly once. No other operation of gRPC's may be under way but a read.
+  // Ends the call. Must be called exactly once, with no gRPC operation in flight except a read.
   void FinishCall(const absl::Status& status) {
     HULLD_CHECK(!std::exchange(finished_, true));
-    // What stopped the work is better known here than where it was noticed.
+    // The reason why the call stopped is more precise than CANCELLED from the work.
     this->Finish(call_.End(absl::IsCancelled(status) ? OrStopped(status) : status));
   }
   bool finished() const { return finished_; }
@@ -97,7 +97,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
-  // Whether one mutex guards all that several threads touch.
+  // True if one mutex guards all state shared by threads.
   static constexpr bool kIsLocked = false;
 
  private:
@@ -109,18 +109,19 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   std::shared_ptr<CallStream> self_;
 };
 
-// A stream that answers one request. Stream: a CallStream whose reactor writes.
+// A stream that answers one request. Stream: a CallStream with a writing reactor.
 template <typename Stream, typename Request>
 class RequestStream : public Stream {
  protected:
-  // bytes: the request as gRPC holds it until the call ends; taken from there. args: for Stream.
+  // bytes: the request, moved out of the buffer that gRPC holds until the call ends. args: for
+  // Stream.
   template <typename... Args>
   explicit RequestStream(const grpc::ByteBuffer& bytes, Args&&... args)
       : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
 
-  // Requires that the call was let in.
+  // Requires that the call was admitted.
   const Request& request() const { return request_; }
-  // To take a part of it, which stays counted until the call ends.
+  // For moving out a part, which stays counted until the call ends.
   Request& own_request() { return request_; }
 
  private:
@@ -133,19 +134,20 @@ class RequestStream : public Stream {
   Request request_;
 };
 
-// Reads messages into one request, one at a time. Stream: a CallStream whose reactor reads.
+// Reads messages into one request, one after the other. Stream: a CallStream with a reading
+// reactor.
 template <typename Stream, typename Request>
 class ReadingStream : public Stream {
  protected:
   using Stream::Stream;
 
-  // Starts to read the next message. Requires that none is being read, and that the call has not
-  // finished. A call whose token is no longer valid ends instead.
+  // Starts reading the next message. Requires: no read is in flight, and the call has not finished.
+  // A call with a revoked token ends instead.
   void Read() {
     if (!BeginRead()) OnNoMessage(absl::OkStatus());
   }
   bool reading() const { return reading_; }
-  // The message that was read. Requires that none is being read.
+  // The message read last. Requires that no read is in flight.
   Request& request() {
     HULLD_DCHECK(!reading_);
     return request_;
@@ -155,14 +157,14 @@ class ReadingStream : public Stream {
     return request_;
   }
 
-  // What follows a read, as Stream::React runs it.
+  // Called after a successful read, within Stream::React.
   virtual void OnMessage() = 0;
-  // OK: the client has said all, or is gone, or is no longer let in. Otherwise as ParseRequest says
-  // of its last message.
+  // Called after the last message. OK: the client half-closed, disconnected, or was revoked.
+  // Otherwise the error of ParseRequest for its last message.
   virtual void OnNoMessage(const absl::Status& why) = 0;
 
  private:
-  // What a request may hold on to while the next one is awaited, uncounted.
+  // Uncounted bytes that a request may retain while the next one is awaited.
   static constexpr uint64_t kKeptBytes = 64 << 10;
 
   bool BeginRead() {
@@ -174,7 +176,7 @@ class ReadingStream : public Stream {
     this->StartRead(&bytes_);
     return true;
   }
-  // Whether a message was awaited until now.
+  // Returns true if a read was in flight.
   bool EndRead() {
     const auto lock = LockRead();
     return std::exchange(reading_, false);
@@ -187,7 +189,7 @@ class ReadingStream : public Stream {
     if constexpr (Stream::kIsLocked) {
       Stream::OnRevoked();
     } else if (EndRead()) {
-      // Nothing else is under way: what gRPC still reads is dropped.
+      // Nothing else is in flight; a message that gRPC still reads is dropped.
       this->React([this] { OnNoMessage(absl::OkStatus()); });
     }
   }
@@ -208,12 +210,11 @@ class ReadingStream : public Stream {
     });
   }
 
-  // What gRPC reads into.
+  // Buffer of gRPC's read.
   grpc::ByteBuffer bytes_;
   RequestMemory::Share share_;
   Request request_;
-  // Guards `reading_` where no mutex of the stream does: a revocation ends a read from another
-  // thread.
+  // Guards `reading_` if the stream has no mutex: a revocation ends a read from another thread.
   std::mutex read_mutex_;
   bool reading_ = false;
 };

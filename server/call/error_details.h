@@ -7,9 +7,9 @@
 
 namespace hulld::server {
 
-// What the trailing metadata grpc-status-details-bin of an error holds: a serialized
-// google.rpc.Status (google/rpc/status.proto) with the details of google/rpc/error_details.proto
-// that apply:
+// Returns the value of an error's trailing metadata grpc-status-details-bin: a serialized
+// google.rpc.Status (google/rpc/status.proto) with the applicable details of
+// google/rpc/error_details.proto:
 //   RequestInfo   always: request_id
 //   ErrorInfo     when the error has a reason: see v1/error.proto
 //   QuotaFailure  when a limit caused the error: subject is its flag

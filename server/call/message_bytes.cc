@@ -42,7 +42,7 @@ grpc::ByteBuffer SerializeReply(const google::protobuf::Message& message) {
   bool is_owned = false;
   const grpc::Status serialized =
       grpc::SerializationTraits<google::protobuf::Message>::Serialize(message, &bytes, &is_owned);
-  // It fails for messages of 2 GiB and more alone.
+  // Fails only for messages of 2 GiB and more.
   HULLD_CHECK(serialized.ok());
   return bytes;
 }

@@ -9,16 +9,16 @@
 
 namespace hulld::server {
 
-// Messages as gRPC carries them. Every call takes and gives bytes, not messages: gRPC would parse a
-// request before anyone can ask who calls, and without any limit.
+// Messages as gRPC carries them. Calls exchange bytes instead of messages, because gRPC would parse
+// a request before authentication and without a limit.
 
-// Parses a request of a caller that was let in, and frees its bytes. `share` covers the message
-// from then on: keep it as long as the message. INVALID_ARGUMENT: the bytes are no such message.
-// RESOURCE_EXHAUSTED: as RequestMemory::Take; the message is not parsed then.
+// Parses a request of an admitted caller and frees its bytes. `share` then covers the message and
+// must live as long. INVALID_ARGUMENT: the bytes are not such a message. RESOURCE_EXHAUSTED: as
+// RequestMemory::Take; the message is not parsed then.
 absl::Status ParseRequest(grpc::ByteBuffer& bytes, RequestMemory& memory,
                           google::protobuf::Message* message, RequestMemory::Share& share);
 
-// The bytes of a request that gRPC hands out as const and has no more use for.
+// Moves out the bytes of a request that gRPC passes as const but no longer needs.
 inline grpc::ByteBuffer TakenFrom(const grpc::ByteBuffer& bytes) {
   grpc::ByteBuffer taken;
   taken.Swap(const_cast<grpc::ByteBuffer*>(&bytes));

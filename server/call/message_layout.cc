@@ -18,19 +18,19 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::io::CodedInputStream;
 using WireFormat = google::protobuf::internal::WireFormatLite;
 
-// What the allocator adds to an allocation, at most, for its sizes and rounding.
+// Maximum overhead of an allocation.
 constexpr uint64_t kAllocation = 16;
-// Lists grow by doubling, so up to half of what they hold is free.
+// Lists grow by doubling, so up to half of their capacity is unused.
 constexpr uint64_t kSlack = 2;
 constexpr uint64_t kListedPointer = kSlack * sizeof(void*);
 constexpr uint64_t kText = sizeof(std::string) + 2 * kAllocation;
-// What a list allocates for its first elements.
+// First allocation of a list.
 constexpr uint64_t kFirstElements = 64;
-// One entry of an UnknownFieldSet, and the string that it may point to.
+// An entry of an UnknownFieldSet, and the string that it may point to.
 constexpr uint64_t kUnknown = 2 * 16 + kText;
 // The set itself, which each message may have.
 constexpr uint64_t kUnknownSet = 48;
-// As deep as protobuf parses.
+// Protobuf's depth limit.
 constexpr int kDeepest = 100;
 // Field numbers of the contract are small; a larger one counts as unknown, which takes more.
 constexpr int kLargestNumber = 255;
@@ -78,7 +78,8 @@ class MessageLayout::PiecedInput {
   bool ReadVarint(uint64_t* value) { return input_.ReadVarint64(value); }
   bool Skip(uint32_t length) { return input_.Skip(static_cast<int>(length)); }
 
-  // Passes over `length` bytes and counts those that end a varint. False: there are fewer.
+  // Skips `length` bytes and counts the ones that end a varint. Returns false if there are fewer
+  // bytes.
   bool CountVarints(uint32_t length, uint64_t& count) {
     while (length > 0) {
       const void* data = nullptr;
@@ -93,7 +94,7 @@ class MessageLayout::PiecedInput {
     return true;
   }
 
-  // Counts a message of the next `length` bytes. False: it is malformed.
+  // Counts a message of the next `length` bytes. Returns false if it is malformed.
   bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
                     uint64_t& bytes);
 
@@ -101,7 +102,7 @@ class MessageLayout::PiecedInput {
   CodedInputStream& input_;
 };
 
-// One in a single piece, which most small ones are.
+// A message in a single piece, as most small ones are.
 class MessageLayout::FlatInput {
  public:
   FlatInput(const uint8_t* begin, const uint8_t* end) : next_(begin), end_(end) {}
@@ -169,8 +170,8 @@ bool MessageLayout::PiecedInput::CountMessage(const MessageLayout& layout, uint3
 }
 
 const MessageLayout& MessageLayout::Of(const Descriptor& type) {
-  // Recursive: a layout asks for those of its fields. Types that contain themselves would need
-  // more; the contract has none.
+  // Recursive: a layout requests the layouts of its fields. Self-referential types are not
+  // supported; the contract has none.
   static std::recursive_mutex mutex;
   static auto& layouts = *new std::map<const Descriptor*, std::unique_ptr<const MessageLayout>>;
   const std::lock_guard lock(mutex);
@@ -229,7 +230,7 @@ uint64_t MessageLayout::ParsedBytes(CodedInputStream& input, uint64_t most) cons
 
 template <typename Input>
 void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const {
-  // Within a group, which no type of the contract has, everything is unknown.
+  // Fields within a group count as unknown; the contract has no groups.
   int groups = 0;
   while (bytes <= most) {
     const uint32_t tag = input.ReadTag();
@@ -237,7 +238,7 @@ void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& byte
     static const Field kNone;
     const Field& field = groups > 0 ? kNone : FieldAt(WireFormat::GetTagFieldNumber(tag));
     const bool is_number = field.kind == Field::Kind::kNumber;
-    // A list takes numbers one by one, too. A number in the wrong form is kept as unknown.
+    // A list also accepts unpacked numbers. A number of the wrong wire type is kept as unknown.
     const uint64_t number_bytes =
         !is_number ? kUnknown : (field.is_repeated ? kSlack * field.element_bytes : 0);
     switch (WireFormat::GetTagWireType(tag)) {
@@ -273,13 +274,13 @@ void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& byte
   }
 }
 
-// Counts a field that begins with its length. False: it is malformed, or too deep.
+// Counts a length-delimited field. Returns false if it is malformed or nested too deep.
 template <typename Input>
 bool MessageLayout::CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
                                    uint64_t& bytes) {
   const bool is_number = field.kind == Field::Kind::kNumber;
   const bool is_message = field.kind == Field::Kind::kMessage;
-  // Parsing allocates before it finds that a length is malformed.
+  // Parsing allocates before it detects a malformed length.
   bytes += is_message ? field.message->own_bytes_ : kAllocation;
   if (field.is_repeated && !is_number) bytes += kListedPointer;
   uint64_t read = 0;

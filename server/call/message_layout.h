@@ -10,18 +10,16 @@
 
 namespace hulld::server {
 
-// What each field of a type of messages takes in memory once it is parsed, so that the bytes of a
-// message tell what it will take before anybody parses it. Two bytes on the wire, an empty
-// submessage, become a hundred in memory.
+// Memory layout of each field of a message type, for computing a message's parsed size from its
+// bytes before parsing. An empty submessage of two bytes on the wire takes a hundred in memory.
 class MessageLayout {
  public:
-  // The layout of a type that is compiled in; made once, and kept. Thread-safe.
+  // Returns the layout of a compiled-in type, cached after the first call. Thread-safe.
   static const MessageLayout& Of(const google::protobuf::Descriptor& type);
 
-  // Bytes of memory that the message in `input` takes once it is parsed, at most; more than `most`
-  // as soon as it is more than that. Unknown fields, which parsing keeps, count too. Where the
-  // message is malformed the count ends, as parsing will. Cost: O(fields), some ns each;
-  // numbers in packed lists are counted at memory speed.
+  // Returns an upper bound on the bytes of the message in `input` after parsing; stops counting
+  // above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
+  // the point where parsing fails. Cost: O(fields), some ns each; packed numbers at memory speed.
   uint64_t ParsedBytes(google::protobuf::io::CodedInputStream& input, uint64_t most) const;
 
  private:
@@ -29,8 +27,7 @@ class MessageLayout {
     enum class Kind : uint8_t { kUnknown, kNumber, kText, kMessage };
     Kind kind = Kind::kUnknown;
     bool is_repeated = false;
-    // Whether its elements, where they are numbers, are varints on the wire; packed ones are of the
-    // same kind.
+    // True if numeric elements are varints on the wire, packed or not.
     bool is_varint = false;
     uint32_t element_bytes = 0;
     const MessageLayout* message = nullptr;
@@ -48,9 +45,9 @@ class MessageLayout {
                              uint64_t& bytes);
   const Field& FieldAt(int number) const;
 
-  // By number; those in between are unknown.
+  // Indexed by field number; gaps are unknown fields.
   std::vector<Field> fields_;
-  // An empty message.
+  // Size of an empty message.
   uint64_t own_bytes_ = 0;
 };
 

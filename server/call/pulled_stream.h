@@ -10,27 +10,26 @@
 
 namespace hulld::server {
 
-// A stream whose replies are pulled: each is made when the one before was written, so a client that
-// reads slowly costs one message of memory. One thing at a time is under way: a read, a task or a
-// write. Nothing else touches the state, so it needs no mutex. A revocation takes the place of a
-// read that is under way.
+// A stream with pulled replies: each is made after the previous one was written, so a slow client
+// costs one message of memory. One operation is in flight: a read, a task or a write. Only it
+// touches the state, so no mutex is needed. A revocation replaces a read in flight.
 template <typename Reactor, typename Reply>
 class PulledStream : public CallStream<Reactor> {
  protected:
   using CallStream<Reactor>::CallStream;
 
-  // The reply that is being made or sent.
+  // The reply being made or sent.
   Reply& reply() { return reply_; }
 
-  // Sends the reply. Requires that nothing else is under way.
+  // Sends the reply. Requires that nothing else is in flight.
   void Send() {
     HULLD_CHECK(!std::exchange(writing_, true));
     bytes_ = SerializeReply(reply_);
     this->StartWrite(&bytes_);
   }
 
-  // The reply was written, and is still there, so that its memory can be used again: clears it, and
-  // makes the next one, reads on, or ends.
+  // Called after the reply was written: clears it, which retains its memory for reuse, and makes
+  // the next one, reads on, or ends.
   virtual void OnSent() = 0;
 
  private:
@@ -45,7 +44,7 @@ class PulledStream : public CallStream<Reactor> {
   }
 
   Reply reply_;
-  // The reply as gRPC sends it.
+  // The serialized reply in flight.
   grpc::ByteBuffer bytes_;
   bool writing_ = false;
 };

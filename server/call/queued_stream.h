@@ -17,18 +17,18 @@
 
 namespace hulld::server {
 
-// A stream whose replies are queued: they are made by any thread and written one at a time, in the
-// order of the queue. One mutex guards the state; reads, writes and the end are started under it,
-// and gRPC calls back without it.
+// A stream with queued replies: any thread makes them, and they are written one by one in the order
+// of the queue. One mutex guards the state; reads, writes and the end are started under it, and
+// gRPC calls back without it.
 //
-// The stream ends once an end is set, the replies before are written, and no work is under way. A
-// client that is gone, or is no longer let in, ends it without the replies that wait.
+// The stream ends after an end is set, the earlier replies are written, and no work is in flight.
+// If the client disconnects or is revoked, it ends without the queued replies.
 template <typename Reactor, typename Reply>
 class QueuedStream : public CallStream<Reactor> {
  protected:
   using CallStream<Reactor>::CallStream;
 
-  // Runs `step` under the mutex, then starts what may start by then.
+  // Runs `step` under the mutex, then starts any operations that are now possible.
   template <typename Step>
   void Locked(Step&& step) {
     const auto self = this->shared_from_this();
@@ -49,33 +49,33 @@ class QueuedStream : public CallStream<Reactor> {
     Locked([this] { Abandon(); });
   }
 
-  // The rest requires the mutex, so is for steps of Locked.
+  // The functions below require the mutex: call them in steps of Locked.
 
   // Starts work, reads or tasks, as the state permits; called after each Locked step until an end
   // is set. May queue replies and set the end.
   virtual void StartWork() = 0;
-  // Whether something is under way that must be over before the stream ends.
+  // True if work is in flight that must be over before the stream ends.
   virtual bool IsWorking() const = 0;
-  // Whether the only reply that waits is to wait longer, so that others join it, which saves
-  // writes. Requires, if true, that a Locked step follows soon.
+  // True if the only queued reply must wait to be merged with later ones, which saves writes. If it
+  // returns true, a Locked step must follow soon.
   virtual bool KeepsWaiting() const { return false; }
 
-  // Queues a reply. bytes: its size, where the stream bounds what waits.
+  // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
     CheckLocked();
     unsent_bytes_ += bytes;
     waiting_.push_back({std::move(reply), bytes, std::chrono::steady_clock::now()});
   }
-  // The last reply while it waits, so that more may be added to it; null when none waits.
+  // The last queued reply, for merging more into it; null if the queue is empty.
   Reply* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back().reply; }
   size_t LastWaitingBytes() const { return waiting_.empty() ? 0 : waiting_.back().bytes; }
-  // Notes what was added to the last waiting reply.
+  // Adds to the size of the last queued reply.
   void GrowLastWaiting(size_t bytes) {
     HULLD_CHECK(!waiting_.empty());
     waiting_.back().bytes += bytes;
     unsent_bytes_ += bytes;
   }
-  // For how long it waits.
+  // Time since it was queued.
   std::chrono::steady_clock::duration LastWaitingTime() const {
     return std::chrono::steady_clock::now() - waiting_.back().since;
   }
@@ -84,15 +84,15 @@ class QueuedStream : public CallStream<Reactor> {
     for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
     waiting_.clear();
   }
-  // The size of the replies that wait and of the one that is being written.
+  // Total size of the queued replies and of the one being written.
   size_t unsent_bytes() const { return unsent_bytes_; }
 
-  // Sets the end, unless one is set.
+  // Sets the end unless one is set.
   void End(const absl::Status& status) {
     CheckLocked();
     if (!end_.has_value()) end_ = status;
   }
-  // Sets an end that tells more than the one that is set.
+  // Replaces the end by a more specific one.
   void EndInsteadWith(const absl::Status& status) {
     CheckLocked();
     end_ = status;
@@ -121,7 +121,7 @@ class QueuedStream : public CallStream<Reactor> {
     Locked([this] { Abandon(); });
   }
 
-  // The client reads no more, or is no longer let in.
+  // Ends the call: the client stopped reading or was revoked.
   void Abandon() {
     this->call().Cancel();
     DropWaiting();
@@ -144,14 +144,14 @@ class QueuedStream : public CallStream<Reactor> {
 
   std::mutex mutex_;
   std::atomic<std::thread::id> holder_ = std::thread::id();
-  // The rest is guarded by the mutex.
+  // The mutex guards the members below.
   std::deque<Waiting> waiting_;
-  // The reply that is being written, as gRPC sends it, and the size that it was queued with.
+  // The serialized reply in flight, and the size with which it was queued.
   grpc::ByteBuffer bytes_;
   size_t bytes_in_flight_ = 0;
   size_t unsent_bytes_ = 0;
   bool writing_ = false;
-  // Set once nothing more is to come.
+  // Set when no more replies will be queued.
   std::optional<absl::Status> end_;
 };
 

@@ -5,11 +5,11 @@
 
 namespace hulld::server {
 
-// Whether a client may name its request so: 1 to 128 letters, digits or -_.:/+=, so that it can
-// stand in a log and in metadata as it is.
+// Returns true if `text` is a valid request ID: 1 to 128 letters, digits or -_.:/+=, safe in logs
+// and metadata without escaping.
 bool IsRequestId(const std::string& text);
 
-// An ID that no other request has: random per process, then counted. Cost: ~100 ns.
+// Returns a unique request ID: random per process, then counted. Cost: ~100 ns.
 std::string NextRequestId();
 
 }  // namespace hulld::server

@@ -10,7 +10,7 @@ namespace hulld::server {
 namespace {
 
 constexpr char kFlag[] = "request-memory";
-// Requests that hold much take about as long as a batch.
+// Large requests take about as long as a batch.
 constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace

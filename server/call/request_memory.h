@@ -9,11 +9,11 @@
 
 namespace hulld::server {
 
-// The memory of all requests that were parsed and are not answered yet, held to one limit
-// (--request-memory): what many callers send at once cannot fill the machine. Thread-safe.
+// Memory of all parsed requests without an answer yet, bounded by --request-memory, so that many
+// callers together cannot exhaust the machine. Thread-safe.
 class RequestMemory {
  public:
-  // What one request takes; given back when it goes. The RequestMemory must outlive it. Not
+  // Share of a request, released on destruction. The RequestMemory must outlive it. Not
   // thread-safe.
   class Share {
    public:
@@ -44,8 +44,8 @@ class RequestMemory {
   RequestMemory(const RequestMemory&) = delete;
   RequestMemory& operator=(const RequestMemory&) = delete;
 
-  // Takes this many bytes into `share`, in place of what it held. RESOURCE_EXHAUSTED: a single
-  // request of this size is beyond the limit; with a time to retry: the others leave no room.
+  // Sets `share` to this many bytes, releasing its former bytes. RESOURCE_EXHAUSTED: a single
+  // request of this size exceeds the limit; with a retry delay: other requests leave no room.
   absl::Status Take(uint64_t bytes, Share& share);
 
   uint64_t limit_bytes() const { return limit_bytes_; }

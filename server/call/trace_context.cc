@@ -23,7 +23,7 @@ std::optional<TraceContext> TraceContext::Parse(std::string_view text) {
   const std::string_view version = text.substr(0, 2);
   const std::string_view flags = text.substr(kLength - 2, 2);
   if (!IsHexadecimal(version) || version == "ff" || !IsHexadecimal(flags)) return std::nullopt;
-  // Later versions may say more.
+  // Later versions may be longer.
   if (text.size() > kLength && (version == "00" || text[kLength] != '-')) return std::nullopt;
   if (text[2] != '-' || text[kParentId - 1] != '-' || text[kLength - 3] != '-') return std::nullopt;
   if (!IsId(text.substr(kTraceId, 32)) || !IsId(text.substr(kParentId, 16))) return std::nullopt;

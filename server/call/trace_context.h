@@ -7,17 +7,17 @@
 
 namespace hulld::server {
 
-// The trace that a call is part of, as its client names it in the metadata "traceparent". Source:
-// W3C Recommendation Trace Context, level 1 (2021), section 3.2.
+// Trace of a call, from its metadata "traceparent". Source: W3C Recommendation Trace Context, level
+// 1 (2021), section 3.2.
 class TraceContext {
  public:
-  // None when `text` is not a traceparent: 00, the trace's ID of 32 digits, its parent's of 16 and
-  // flags of 2, all hexadecimal in lower case, with "-" between them; neither ID is zero. A later
-  // version than 00 is read as far as 00 knows it.
+  // Returns nullopt if `text` is not a traceparent: 00, a trace ID of 32 digits, a parent ID of 16
+  // and flags of 2, all in lower-case hexadecimal, separated by "-"; neither ID is zero. A version
+  // later than 00 is parsed as far as 00 defines it.
   static std::optional<TraceContext> Parse(std::string_view text);
 
   std::string trace_id() const { return text_.substr(kTraceId, 32); }
-  // The ID of the client's span.
+  // ID of the client's span.
   std::string parent_id() const { return text_.substr(kParentId, 16); }
   // As a traceparent of version 00.
   const std::string& text() const { return text_; }

@@ -7,8 +7,8 @@
 
 namespace hulld::server {
 
-// How bytes move between gRPC and us, whatever they mean: sizes of messages, sharing of ports. The
-// floor that tests/bench compares with is set up by it too.
+// Configures gRPC's transport: message sizes, port sharing, compression. The baseline server of
+// tests/bench uses it too.
 void SetTransport(const Config& config, grpc::ServerBuilder& builder);
 
 }  // namespace hulld::server

@@ -13,19 +13,18 @@
 
 namespace hulld::server {
 
-// The request that a unary call brought and where its response goes, as gRPC holds them until the
-// call ends.
+// Request of a unary call, and the buffer of its response, held by gRPC until the call ends.
 struct UnaryBytes {
   const grpc::ByteBuffer* request;
   grpc::ByteBuffer* response;
 };
 
-// One unary call, answered on any thread; it owns itself until gRPC is done with it.
+// A unary call, answered on any thread; owns itself until gRPC is done with it.
 template <typename Request, typename Response>
 class UnaryCall : public grpc::ServerUnaryReactor {
  public:
-  // Admits a call, parses its request, and hands it to `start`, which must see to it that End is
-  // called exactly once, now or later. A call that is not admitted, or malformed, ends at once.
+  // Admits a call, parses its request, and passes it to `start`, which must ensure that End is
+  // called exactly once, now or later. A refused or malformed call ends immediately.
   template <typename Step>
   static grpc::ServerUnaryReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
                                          Rpc rpc, const UnaryBytes& bytes, Step&& start) {
@@ -43,8 +42,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
     return call;
   }
 
-  // Ends the call with what `work` gives, on `pool`. Requires that it has not ended (unchecked: a
-  // call that has ended may be gone).
+  // Ends the call with the result of `work`, run on `pool`. Requires that it has not ended (not
+  // checked: an ended call may be gone).
   template <typename Work>
   void EndOn(WorkerPool& pool, Work work) {
     pool.Submit(
@@ -52,9 +51,9 @@ class UnaryCall : public grpc::ServerUnaryReactor {
         call_.client());
   }
 
-  // Sends the response, or the error; the call must not be touched afterwards.
+  // Sends the response or the error; the call must not be used afterwards.
   void End(const absl::Status& status) {
-    // What stopped the work is better known here than where it was noticed.
+    // The reason why the call stopped is more precise than CANCELLED from the work.
     const bool stopped = status.code() == absl::StatusCode::kCancelled && call_.ShouldStop();
     if (status.ok()) *response_bytes_ = SerializeReply(response_);
     Finish(call_.End(stopped ? call_.StopStatus() : status));
@@ -71,8 +70,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
 
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
-  // Both reactions are trivial: gRPC need not wake a thread of its executor for each call's OnDone.
-  // Not part of gRPC's API; without it calls only take longer
+  // Both reactions are trivial, so gRPC need not wake an executor thread for each call's OnDone.
+  // Not part of gRPC's public API; without it calls only take longer
   // (tests/bench/service/remote_benchmark.cc).
   bool InternalInlineable() override { return true; }
 

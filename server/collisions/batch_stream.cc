@@ -13,16 +13,16 @@
 namespace hulld::server {
 namespace {
 
-// The first pieces are small, as the cost of a pair is not known; the largest bounds what a wrong
-// guess of it can do.
+// The first pieces are small, because the cost of a pair is unknown; the largest bounds the damage
+// of a wrong estimate.
 constexpr uint64_t kFirstPairs = 128;
 constexpr uint64_t kMostPairs = 1 << 14;
-// This many placements are decoded and placed in about a slice.
-constexpr int kMostShortPlacements = 4096;
-// Pairs between two looks at the clock.
-constexpr uint64_t kPairsPerLook = 64;
+// Decoding and placing this many placements takes about a slice.
+constexpr int kMostPlacementsPerSlice = 4096;
+// Pairs between two reads of the clock.
+constexpr uint64_t kPairsPerPoll = 64;
 
-// Adds the answers of the pairs that follow those of `message`.
+// Appends answers of pairs that follow the pairs of `message`.
 void Append(const v1::BatchCheckCollisionsResponse& next,
             v1::BatchCheckCollisionsResponse* message) {
   const uint64_t first_pair = message->first_pair();
@@ -33,32 +33,32 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 }  // namespace
 
 WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards, const PieceThreads& threads, Executor& executor,
-                                 const grpc::ByteBuffer& request) {
+                                 Registry& registry, const PieceThreads& threads,
+                                 Executor& executor, const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BatchStream>(
-      new BatchStream(context, admission, shards, threads, executor, request)));
+      new BatchStream(context, admission, registry, threads, executor, request)));
 }
 
-BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                         const PieceThreads& threads, Executor& executor,
+BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
+                         Registry& registry, const PieceThreads& threads, Executor& executor,
                          const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, shards, threads,
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry, threads,
                     {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()) {}
 
 bool BatchStream::IsShort() const {
   return request().placements_size() + request().packed_placements().hulls_size() <=
-         kMostShortPlacements;
+         kMostPlacementsPerSlice;
 }
 
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
-                       shards().limits(), call().lifetime());
+                       registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request().freshness(), shards().store_ids(), call().arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   options_ = *std::move(options);
@@ -66,24 +66,24 @@ absl::Status BatchStream::Validate() {
   team_options_.threads = team_threads_;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
-                           call().caller(), shards().limits().max_placements, "the batch");
+                           call().caller(), registry().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
-  // Each is asked for twice, on average, at the most: placing it again costs less than the memory
+  // Each placement is used at most twice on average: placing it again costs less than the memory
   // for all of them.
   const bool is_textbook = options_.method == Method::kTextbookSat;
   if (!is_textbook && pair_count_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(pair_count_);
-  return ValidatePairs(request().pairs(), table_.size(), shards().limits().max_pairs_per_batch,
+  return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
-  const ShardsPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
-                           freshness_};
-  if (!may_wait) return table_.TryResolve(shards(), options_, plan);
-  if (absl::Status s = table_.Resolve(shards(), options_, plan); !s.ok()) return s;
+  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
+                         freshness_};
+  if (!may_wait) return table_.TryResolve(registry(), options_, plan);
+  if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
   return true;
 }
 
@@ -93,7 +93,7 @@ absl::Status BatchStream::Prepare() {
 }
 
 bool BatchStream::QueueHead() {
-  if (next_row_ == 0) table_.EncodeHeader(shards(), head_.mutable_header());
+  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
   next_row_ = table_.EncodeHulls(next_row_, &head_);
   if (next_row_ == table_.table_rows()) {
     has_head_ = true;
@@ -118,7 +118,7 @@ bool BatchStream::IsForTeam(const PlacedPair& pair) const {
   return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
 }
 
-// A pair for the team makes a piece of its own.
+// A pair for the team gets its own piece.
 uint64_t BatchStream::EndOfPiece(uint64_t begin, uint64_t end) const {
   if (options_.method != Method::kTextbookSat) return end;
   for (uint64_t i = begin; i < end; ++i) {
@@ -127,7 +127,7 @@ uint64_t BatchStream::EndOfPiece(uint64_t begin, uint64_t end) const {
   return end;
 }
 
-// The team works on one pair at a time. What is begun holds memory, so a batch begins one.
+// The team works on a single pair. Started pairs hold memory, so a batch starts only one.
 bool BatchStream::MayRunAhead(const PairsPiece& piece) const {
   return !IsForTeam(PairAt(piece.next));
 }
@@ -151,7 +151,7 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
                          : Answer(piece, &columns, &counts);
     ++pairs;
   } while (status.ok() && piece.next < piece.end &&
-           ((!looks_each_time && pairs % kPairsPerLook != 0) || Clock::now() < end));
+           ((!looks_each_time && pairs % kPairsPerPoll != 0) || Clock::now() < end));
   if (!status.ok()) return status;
   call().metrics().CountPairs(counts);
   piece.is_done = piece.next == piece.end;
@@ -172,11 +172,11 @@ absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungC
   return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
 }
 
-// As AskPlaced and AddPlacedAnswer, which take 10 to 12 % more of the server's processor time where
-// each pair has packed placements of its own, and 2 % more where pairs share 128 placements.
-// Observed: close pairs of UR5 links over unix sockets, this and that in turn in either order,
-// medians of 9 and 7 rounds of remote_benchmark (0.74 us a pair for 0.82, and 0.65 for 0.73). This
-// is the only place that knows that most pairs need no more.
+// Fast path of AskPlaced and AddPlacedAnswer, which take 10 to 12 % more of the server's processor
+// time if each pair has its own packed placements, and 2 % more if pairs share 128 placements.
+// **Observed**: close pairs of UR5 links over unix sockets, both variants alternating in either
+// order, medians of 9 and 7 rounds of remote_benchmark (0.74 us per pair instead of 0.82, and 0.65
+// instead of 0.73). Only this function exploits that most pairs need no more.
 absl::Status BatchStream::AnswerRelation(PairsPiece& piece, BatchColumns* columns,
                                          RungCounts* counts) {
   const PlacedPair pair = PairAt(piece.next);
@@ -199,7 +199,7 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
   if (!piece.check.has_value()) {
     const bool is_for_team = IsForTeam(pair);
     if (is_for_team) {
-      if (absl::Status s = shards().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+      if (absl::Status s = registry().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
     }
     absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(
         table_.placed()[pair.a], table_.placed()[pair.b], is_for_team ? team_options_ : options_);
@@ -252,7 +252,7 @@ bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
   return true;
 }
 
-// A batch without pairs is its head.
+// A batch without pairs consists of its head.
 void BatchStream::OnAllDelivered() {
   if (!std::exchange(has_head_, false)) return;
   const size_t bytes = head_.ByteSizeLong();

@@ -18,40 +18,39 @@
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 #include "server/wire/batch_columns.h"
 
 namespace hulld::server {
 
-// A range of pairs, and how far the textbook came with the next of them, if it began.
+// A range of pairs, and the textbook's progress with the next one, if it began.
 struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
   std::optional<TextbookCheck> check;
 
   size_t held_bytes() const { return check.has_value() ? check->MemoryBytes() : 0; }
 };
 
-// One BatchCheckCollisions call: resolves every hull once, on a reader thread, then answers ranges
-// of pairs on all threads of the pool.
+// A BatchCheckCollisions call: resolves each hull a single time, on a reader thread, then answers
+// ranges of pairs on all threads of the pool.
 class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, const PieceThreads& threads, Executor& executor,
+                             Registry& registry, const PieceThreads& threads, Executor& executor,
                              const grpc::ByteBuffer& request);
 
  private:
-  BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+  BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               const PieceThreads& threads, Executor& executor, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
   absl::Status Validate() override;
-  std::span<const std::string> HullIds() const override { return table_.hull_ids(); }
-  const ShardsFreshness& freshness() const override { return freshness_; }
+  const Freshness& freshness() const override { return freshness_; }
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
   size_t HeldBytes() const override { return table_.MemoryBytes(); }
-  // The rest requires the mutex.
+  // The functions below require the mutex.
   bool QueueHead() override;
   uint64_t CountUnits() override { return pair_count_; }
   uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
@@ -66,7 +65,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
-  // Each answers the next pair of the piece; by the textbook, a part of that at least. CANCELLED.
+  // Answers the next pair of the piece; by the textbook, at least a part of it. CANCELLED.
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerRelation(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
@@ -74,23 +73,22 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
                    RungCounts* counts);
 
-  // The size of the team, and the turns of this call on it.
+  // Size of the team, and this call's lane on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
 
   // Written before the first piece.
   uint64_t pair_count_ = 0;
-  ShardsFreshness freshness_;
+  Freshness freshness_;
   QueryOptions options_;
-  // The same for a pair that is worth the team.
+  // Options for a pair that justifies the team.
   QueryOptions team_options_;
   PlacementTable table_;
-  // Every pair is one of hulls, and the relation is all that is wanted: AnswerRelation.
+  // All pairs are of hulls, and only relations are wanted: AnswerRelation.
   bool is_plain_ = false;
 
-  // Guarded by the mutex.
-  // The first row of the table of hulls that is still to be told, and the last part of the table,
-  // for the first answers.
+  // Guarded by the mutex. The next row of the table of hulls to send, and the last part of the
+  // table, which the first answers join.
   size_t next_row_ = 0;
   v1::BatchCheckCollisionsResponse head_;
   bool has_head_ = false;

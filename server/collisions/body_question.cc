@@ -6,8 +6,8 @@
 namespace hulld::server {
 namespace {
 
-// Steps between two looks at the clock.
-constexpr uint64_t kStepsPerLook = 64;
+// Steps between two reads of the clock.
+constexpr uint64_t kStepsPerAdvance = 64;
 
 std::unique_ptr<const QueryBody> FormOf(const HullView& view, bool canonical) {
   if (view.body != nullptr) return nullptr;
@@ -43,7 +43,7 @@ void BodyQuestion::Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView 
 void BodyQuestion::RunSlice() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
-    const absl::StatusOr<bool> ended = search_.Advance(kStepsPerLook);
+    const absl::StatusOr<bool> ended = search_.Advance(kStepsPerAdvance);
     if (!ended.ok()) return done_(ended.status(), a_, b_);
     if (*ended) return done_(search_.Take(), a_, b_);
     if (std::chrono::steady_clock::now() >= end) break;

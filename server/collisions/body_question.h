@@ -11,18 +11,18 @@
 #include "core/query/terms/query_options.h"
 #include "server/process/fair_queue.h"
 #include "server/process/task_pool.h"
-#include "server/shards/body_resolution.h"
+#include "server/registry/body_resolution.h"
 
 namespace hulld::server {
 
-// One question about a pair of which at least one is a body. It is answered in slices, of which
-// only the first goes ahead of batches. Owns itself until it is answered.
+// A query of a pair with at least one body, answered in slices, the first of which precedes
+// batches. Owns itself until it is answered.
 class BodyQuestion : public std::enable_shared_from_this<BodyQuestion> {
  public:
-  // A hull, in the form of a body of one piece, or a body, at a pose.
+  // A body, or a hull as a body with a single piece, at a pose.
   class Side {
    public:
-    // canonical: as the hulls were looked up.
+    // canonical: as in the lookup of the hulls.
     Side(HullView view, const Pose& X_W, bool canonical);
     Side(const Side&) = delete;
     Side& operator=(const Side&) = delete;
@@ -38,9 +38,9 @@ class BodyQuestion : public std::enable_shared_from_this<BodyQuestion> {
   };
   using Done = std::function<void(absl::StatusOr<BodyAnswer>, const Side& a, const Side& b)>;
 
-  // client: the one that waits for the answer. `done` is called once, on a thread of the pool.
-  // Requires valid options for bodies (ValidateBodyOptions). CANCELLED: options.should_stop said
-  // so.
+  // client: the client that waits for the answer. `done` is called exactly once, on a thread of the
+  // pool. Requires valid options for bodies (ValidateForBodies). CANCELLED: options.should_stop
+  // returned true.
   static void Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
                     const QueryOptions& options, ClientId client, Done done);
 

@@ -10,9 +10,9 @@
 namespace hulld::server {
 
 // A range of work, [0, count), that several threads claim block by block, from its end. Unlike in
-// SharedLoop, nobody waits: the thread that gives back the last block goes on with what comes
-// after, and a thread that comes when all is claimed finds nothing. That also holds once the next
-// range has begun or this one's owner has ended its work. Any thread may claim at any time.
+// SharedLoop, no thread waits: the thread that returns the last block continues with the next step,
+// and a thread that arrives after all blocks are claimed finds nothing. This also holds after the
+// next range has begun or the owner has ended its work. Any thread may claim at any time.
 class ClaimedRange {
  public:
   struct Block {
@@ -22,20 +22,20 @@ class ClaimedRange {
     bool empty() const { return begin == end; }
   };
 
-  // Begins a range. A thread that claims a block of it sees what was written before. Requires that
-  // the range before was given back.
+  // Begins a range. Earlier writes are visible to threads that claim its blocks. Requires that the
+  // previous range was returned.
   void Begin(uint32_t count) {
     HULLD_CHECK(left_.load(std::memory_order_relaxed) == 0);
     left_.store(count, std::memory_order_relaxed);
     unclaimed_.store(count, std::memory_order_release);
   }
 
-  // The next block, of `most` at most; empty when all is claimed. Requires most > 0.
+  // Claims the next block, of at most `most`; empty if all is claimed. Requires most > 0.
   Block Claim(uint32_t most) {
     HULLD_CHECK(most > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);
-    // Nothing that was read before counts: where a range has begun meanwhile, the exchange shows it
-    // whole, and the block is one of it.
+    // Earlier reads do not matter: if a new range has begun since, the exchange makes it visible,
+    // and the block belongs to it.
     while (end > 0) {
       const uint32_t begin = end - std::min(end, most);
       if (unclaimed_.compare_exchange_weak(end, begin, std::memory_order_acq_rel,
@@ -46,8 +46,8 @@ class ClaimedRange {
     return {};
   }
 
-  // Gives back a block that was claimed, once its work is done. True for one caller, the last, who
-  // sees what all others wrote.
+  // Returns a claimed block after its work is done. Returns true for exactly one caller, the last,
+  // who sees the writes of all threads.
   bool GiveBack(const Block& block) {
     const uint32_t done = block.end - block.begin;
     return left_.fetch_sub(done, std::memory_order_acq_rel) == done;
@@ -55,7 +55,7 @@ class ClaimedRange {
 
  private:
   std::atomic<uint32_t> unclaimed_ = 0;
-  // Not given back.
+  // Not returned yet.
   std::atomic<uint32_t> left_ = 0;
 };
 

@@ -25,16 +25,16 @@
 #include "server/collisions/watch/collision_watch.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
+#include "server/registry/body_resolution.h"
 #include "server/settings/config.h"
-#include "server/shards/body_resolution.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
 namespace {
 
-// Calls that the committing thread answers by itself when the store has answered, rather than
-// handing them on: 32 questions of some 10 us keep it from committing for as long as a round trip.
+// Maximum number of waiting calls that the committing thread answers itself after a store query, in
+// place of dispatching them: 32 queries of some 10 us delay its commits by about a round trip.
 constexpr size_t kMostAnsweredInTurn = 32;
 
 absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
@@ -54,12 +54,8 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
   return {request.a().hull_id(), request.b().hull_id()};
 }
 
-void EncodeVersion(const Shards& shards, const HullRecord& record, v1::HullVersion* message) {
-  EncodeVersion(shards.store_id_of(record.hull_id), record, message);
-}
-
-// The first reason why there is no answer.
-absl::Status FirstProblem(const absl::StatusOr<ShardsResolved>& resolved) {
+// Returns the first error in `resolved`, or OK.
+absl::Status FirstProblem(const absl::StatusOr<Resolved>& resolved) {
   if (!resolved.ok()) return resolved.status();
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     if (!hull.ok()) return hull.status();
@@ -67,21 +63,21 @@ absl::Status FirstProblem(const absl::StatusOr<ShardsResolved>& resolved) {
   return absl::OkStatus();
 }
 
-// What stands for a hull where no pair of pieces decided.
+// Stand-in hull if no pair of pieces decided.
 const QueryHull& NoHull() {
   static const Hull kNothing;
   static const QueryHull kNoHull(kNothing);
   return kNoHull;
 }
 
-void EncodeVersions(const Shards& shards, const ShardsAsOf& as_of, const HullView& a,
-                    const HullView& b, v1::CheckCollisionResponse* response) {
-  EncodeHeader(shards.store_ids(), as_of, response->mutable_header());
-  EncodeVersion(shards, a.record, response->mutable_hull_a());
-  EncodeVersion(shards, b.record, response->mutable_hull_b());
+void EncodeVersions(const Store& store, const AsOf& as_of, const HullView& a, const HullView& b,
+                    v1::CheckCollisionResponse* response) {
+  EncodeHeader(store, as_of, response->mutable_header());
+  EncodeVersion(store, a.record, response->mutable_hull_a());
+  EncodeVersion(store, b.record, response->mutable_hull_b());
 }
 
-// a, b: the hulls that decided. They are canonical where the answer names vertices.
+// a, b: the deciding hulls; canonical if the answer names vertices.
 absl::Status EncodeAnswer(const Answer& answer, const QueryHull& a, const QueryHull& b,
                           const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
   response->set_relation(EncodeRelation(answer.relation));
@@ -99,34 +95,34 @@ absl::Status EncodeAnswer(const Answer& answer, const QueryHull& a, const QueryH
   return EncodeAxis(*answer.axis, a.hull(), b.hull(), response->mutable_axis());
 }
 
-void EncodePiece(const Shards& shards, const BodyQuestion::Side& side, uint32_t piece,
+void EncodePiece(const Store& store, const BodyQuestion::Side& side, uint32_t piece,
                  v1::DecidingPiece* message) {
   message->set_index(piece);
-  EncodeVersion(shards, side.view().body->hull_of(piece).record, message->mutable_hull());
+  EncodeVersion(store, side.view().body->hull_of(piece).record, message->mutable_hull());
 }
 
 const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
   return *side.placed().body().pieces()[piece].hull;
 }
 
-// The hulls of all pieces, each once; for a hull, itself.
-void EncodeHulls(const Shards& shards, const BodyQuestion::Side& side,
+// Encodes the hulls of all pieces, without duplicates; for a hull, itself.
+void EncodeHulls(const Store& store, const BodyQuestion::Side& side,
                  std::set<std::string_view>* known, v1::CheckCollisionResponse* response) {
   const auto encode = [&](const HullView& view) {
     if (!known->insert(view.record.hull_id).second) return;
-    EncodeVersion(shards, view.record, response->add_piece_hulls());
+    EncodeVersion(store, view.record, response->add_piece_hulls());
   };
   if (!side.is_body()) return encode(side.view());
   for (const HullView& view : side.view().body->hulls) encode(view);
 }
 
-// What the relation of bodies follows from. RESOURCE_EXHAUSTED: it is too much for a reply.
-absl::Status EncodeProof(const Shards& shards, const std::vector<PieceCertificate>& certificates,
+// Encodes the proof of the relation of bodies. RESOURCE_EXHAUSTED: it is too large for a reply.
+absl::Status EncodeProof(const Store& store, const std::vector<PieceCertificate>& certificates,
                          const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                          v1::CheckCollisionResponse* response) {
   std::set<std::string_view> known;
-  EncodeHulls(shards, a, &known, response);
-  EncodeHulls(shards, b, &known, response);
+  EncodeHulls(store, a, &known, response);
+  EncodeHulls(store, b, &known, response);
   size_t bytes = response->ByteSizeLong();
   for (const PieceCertificate& certificate : certificates) {
     // Tag and length.
@@ -141,7 +137,7 @@ absl::Status EncodeProof(const Shards& shards, const std::vector<PieceCertificat
   return ProofTooLarge(certificates.size(), Config::kMaxProofBytes);
 }
 
-absl::Status EncodeBodyAnswer(const Shards& shards, const BodyAnswer& answer,
+absl::Status EncodeBodyAnswer(const Store& store, const BodyAnswer& answer,
                               const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                               const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
   absl::Status encoded;
@@ -149,26 +145,25 @@ absl::Status EncodeBodyAnswer(const Shards& shards, const BodyAnswer& answer,
     encoded = EncodeAnswer(answer.answer, NoHull(), NoHull(), wanted, response);
   } else {
     const PiecePair pieces = *answer.pieces;
-    if (a.is_body()) EncodePiece(shards, a, pieces.a, response->mutable_piece_a());
-    if (b.is_body()) EncodePiece(shards, b, pieces.b, response->mutable_piece_b());
+    if (a.is_body()) EncodePiece(store, a, pieces.a, response->mutable_piece_a());
+    if (b.is_body()) EncodePiece(store, b, pieces.b, response->mutable_piece_b());
     encoded = EncodeAnswer(answer.answer, HullOfPiece(a, pieces.a), HullOfPiece(b, pieces.b),
                            wanted, response);
   }
   if (!encoded.ok() || !wanted.certificate()) return encoded;
-  return EncodeProof(shards, answer.certificates, a, b, response);
+  return EncodeProof(store, answer.certificates, a, b, response);
 }
 
 }  // namespace
 
-// One pair, ready to be answered by any thread.
+// A query of a pair, ready to be answered on any thread.
 struct CollisionService::PairQuery {
-  // All but the hulls.
+  // Reads everything except the hulls.
   static absl::StatusOr<PairQuery> Read(const Limits& limits, const Call& call,
                                         const v1::CheckCollisionRequest& request);
 
-  // Takes the hulls that were found for it, of which none is a body, and gives the response their
-  // versions.
-  void Place(const Shards& shards, ShardsResolved resolved, v1::CheckCollisionResponse* response);
+  // Takes the resolved hulls, neither of them a body, and adds their versions to the response.
+  void Place(const Store& store, Resolved resolved, v1::CheckCollisionResponse* response);
 
   // Requires that Place succeeded.
   bool IsQuick() const {
@@ -189,7 +184,7 @@ struct CollisionService::PairQuery {
   Pose X_WA;
   Pose X_WB;
   QueryOptions options;
-  // Keep the hulls.
+  // Keep the hulls alive.
   std::vector<absl::StatusOr<HullView>> views;
   std::optional<PlacedHull> a;
   std::optional<PlacedHull> b;
@@ -211,7 +206,7 @@ absl::StatusOr<CollisionService::PairQuery> CollisionService::PairQuery::Read(
   return query;
 }
 
-void CollisionService::PairQuery::Place(const Shards& shards, ShardsResolved resolved,
+void CollisionService::PairQuery::Place(const Store& store, Resolved resolved,
                                         v1::CheckCollisionResponse* response) {
   views = std::move(resolved.hulls);
   const bool canonical = options.WantsCanonical();
@@ -220,29 +215,29 @@ void CollisionService::PairQuery::Place(const Shards& shards, ShardsResolved res
   };
   a = PlacedHull(query_hull(*views[0]), X_WA);
   b = PlacedHull(query_hull(*views[1]), X_WB);
-  EncodeVersions(shards, resolved.as_of, *views[0], *views[1], response);
+  EncodeVersions(store, resolved.as_of(), *views[0], *views[1], response);
 }
 
 struct CollisionService::TextbookQuery {
-  TextbookQuery(Shards& shards, PairQuery given_pair, bool for_team)
+  TextbookQuery(Registry& registry, PairQuery given_pair, bool for_team)
       : pair(std::move(given_pair)),
         is_for_team(for_team),
-        charge(shards.memory(), MemoryUse::kReading) {}
+        charge(registry.memory(), MemoryUse::kReading) {}
 
-  // RESOURCE_EXHAUSTED: there is no room for what a large pair holds from slice to slice, or it has
-  // too many axes.
-  absl::Status Begin(Shards& shards);
+  // RESOURCE_EXHAUSTED: no memory for the state of a large pair between slices, or it has too many
+  // axes.
+  absl::Status Begin(Registry& registry);
 
   PairQuery pair;
   const bool is_for_team;
   std::optional<TextbookCheck> check;
-  // Counts the check.
+  // Charge for the check.
   MemoryCharge charge;
 };
 
-absl::Status CollisionService::TextbookQuery::Begin(Shards& shards) {
+absl::Status CollisionService::TextbookQuery::Begin(Registry& registry) {
   if (is_for_team) {
-    if (absl::Status s = shards.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+    if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   }
   absl::StatusOr<TextbookCheck> begun =
       TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
@@ -272,67 +267,57 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 void CollisionService::Check(CheckCall* call) {
   pool_.NoteSingleCall();
   const v1::CheckCollisionRequest& request = call->request();
-  absl::StatusOr<PairQuery> query = PairQuery::Read(shards_.limits(), call->call(), request);
+  absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), request);
   if (!query.ok()) return call->End(query.status());
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request.freshness(), shards_.store_ids(), call->call().arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
   PlacedLookup lookup;
   lookup.plan.freshness = *freshness;
   lookup.canonical = query->options.WantsCanonical();
   lookup.prefix = call->call().caller().prefix;
-  std::optional<ShardsResolved> ready = TryResolvePlaced(shards_, HullIds(request), lookup);
+  std::optional<Resolved> ready = TryResolvePlaced(registry_, HullIds(request), lookup);
   if (ready.has_value()) return AnswerPair(*std::move(query), *std::move(ready), call);
-  // Where others commit to the store, it is asked, and no thread waits for what it answers.
+  // A shared store is queried first; no thread waits for its answer.
   const auto waiting = std::make_shared<PairQuery>(*std::move(query));
   const auto answer = [this, call, lookup, waiting](const absl::Status& status) {
     if (!status.ok()) return call->End(status);
     if (waiting_.count() >= kMostAnsweredInTurn) {
       return AnswerLater(std::move(*waiting), lookup, call);
     }
-    std::optional<ShardsResolved> found =
-        TryResolvePlaced(shards_, HullIds(call->request()), lookup);
+    std::optional<Resolved> found = TryResolvePlaced(registry_, HullIds(call->request()), lookup);
     if (found.has_value()) return AnswerPair(std::move(*waiting), *std::move(found), call);
     AnswerLater(std::move(*waiting), lookup, call);
   };
-  const bool awaits = waiting_.AwaitFresh(shards_, HullIds(request), *freshness,
-                                          waiting->options.should_stop, answer);
+  const bool awaits =
+      waiting_.AwaitFresh(registry_, *freshness, waiting->options.should_stop, answer);
   if (!awaits) AnswerLater(std::move(*waiting), lookup, call);
 }
 
-// The pieces of a body may be in other shards than the body.
-WorkerPool& CollisionService::ReadersOf(const v1::CheckCollisionRequest& request) {
-  const size_t shard = shards_.shard_of(request.a().hull_id());
-  const bool is_one = shard == shards_.shard_of(request.b().hull_id()) && !shards_.has_bodies();
-  return is_one ? readers_.of(shard) : readers_.of_several();
-}
-
-// Waits for the store, or for canonical snapshots or boxes of pieces to be made.
+// Waits for the store, or for canonical snapshots or boxes of pieces to be built.
 void CollisionService::AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call) {
   const ClientId client = call->call().client();
-  ReadersOf(call->request())
-      .Submit(
-          [this, call, lookup, query = std::move(query)]() mutable {
-            absl::StatusOr<ShardsResolved> resolved =
-                ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop);
-            AnswerPair(std::move(query), std::move(resolved), call);
-          },
-          client);
+  readers_.Submit(
+      [this, call, lookup, query = std::move(query)]() mutable {
+        absl::StatusOr<Resolved> resolved =
+            ResolvePlaced(registry_, HullIds(call->request()), lookup, query.options.should_stop);
+        AnswerPair(std::move(query), std::move(resolved), call);
+      },
+      client);
 }
 
-void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved,
+void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved,
                                   CheckCall* call) {
   if (absl::Status problem = FirstProblem(resolved); !problem.ok()) return call->End(problem);
   const bool has_body = resolved->hulls[0]->body != nullptr || resolved->hulls[1]->body != nullptr;
   if (has_body) return AnswerBodies(query, *std::move(resolved), call);
-  query.Place(shards_, *std::move(resolved), &call->response());
+  query.Place(registry_.store(), *std::move(resolved), &call->response());
   Compute(std::move(query), call);
 }
 
-void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resolved,
-                                    CheckCall* call) {
+void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call) {
   if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
-  EncodeVersions(shards_, resolved.as_of, *resolved.hulls[0], *resolved.hulls[1],
+  EncodeVersions(registry_.store(), resolved.as_of(), *resolved.hulls[0], *resolved.hulls[1],
                  &call->response());
   BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
                       *std::move(resolved.hulls[1]), query.X_WB, query.options,
@@ -343,8 +328,8 @@ void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resol
                         RungCounts counts;
                         counts.Add(answer->answer.rung);
                         call->call().metrics().CountPairs(counts);
-                        call->End(EncodeBodyAnswer(shards_, *answer, a, b, call->request().wanted(),
-                                                   &call->response()));
+                        call->End(EncodeBodyAnswer(registry_.store(), *answer, a, b,
+                                                   call->request().wanted(), &call->response()));
                       });
 }
 
@@ -355,7 +340,7 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
   if (query.options.method == Method::kTextbookSat) {
     const bool is_for_team = query.IsForTeam();
     if (is_for_team) query.options.threads = executor_.threads();
-    return SubmitPiece(std::make_shared<TextbookQuery>(shards_, std::move(query), is_for_team),
+    return SubmitPiece(std::make_shared<TextbookQuery>(registry_, std::move(query), is_for_team),
                        call);
   }
   // `wanted` lives until the call ends.
@@ -376,7 +361,7 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
         const auto end = std::chrono::steady_clock::now() +
                          (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
         if (!query->check.has_value()) {
-          if (absl::Status s = query->Begin(shards_); !s.ok()) return call->End(s);
+          if (absl::Status s = query->Begin(registry_); !s.ok()) return call->End(s);
         }
         const absl::StatusOr<bool> done = query->check->Advance(end);
         if (!done.ok()) return call->End(done.status());
@@ -389,24 +374,23 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
                                                      const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, shards_,
-                            {long_readers_.of_several(), pool_, waiting_}, executor_, *request);
+  return BatchStream::Start(*context, admission_, registry_, {long_readers_, pool_, waiting_},
+                            executor_, *request);
 }
 
 BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, shards_, readers_.of_several(),
-                                long_readers_.of_several(), pool_, waiting_);
+  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_, pool_,
+                                waiting_);
 }
 
 WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, shards_,
-                            {long_readers_.of_several(), pool_, waiting_}, *request);
+  return SceneStream::Start(*context, admission_, registry_, {long_readers_, pool_, waiting_},
+                            *request);
 }
 
 BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
-  return CollisionWatch::Start(*context, admission_, shards_, readers_.of_several(),
-                               long_readers_.of_several(), pool_);
+  return CollisionWatch::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
 }
 
 }  // namespace hulld::server

@@ -12,14 +12,14 @@
 #include "server/call/unary_call.h"
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
-#include "server/shards/body_resolution.h"
-#include "server/shards/shard_pools.h"
-#include "server/shards/shards.h"
-#include "server/shards/waiting_calls.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/body_resolution.h"
+#include "server/registry/registry.h"
+#include "server/registry/waiting_calls.h"
 
 namespace hulld::server {
 
-// The generated service; its methods take and give bytes (message_bytes.h).
+// The generated service, with methods on bytes (message_bytes.h).
 using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_CheckCollision<
     v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<
         v1::CollisionService::WithRawCallbackMethod_StreamCollisions<
@@ -27,18 +27,18 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
                 v1::CollisionService::WithRawCallbackMethod_WatchCollisions<
                     v1::CollisionService::Service>>>>>;
 
-// hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
-// answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
-// of moderate size and ready. Everything else is computed by `pool`: single pairs and the steps of
-// streams ahead of slices of batches, scenes and long steps. What may wait for the store, and what
-// makes canonical snapshots, runs on `readers`, hulls of one pair, or `long_readers`, hulls of
-// many. Pairs for TEXTBOOK_SAT are answered in pieces, between which others have their turn; those
-// whose loop over axes is worth a team of threads go to the executor.
+// hulld.v1.CollisionService: implements the contract in collision.proto on core's queries. A single
+// pair is answered on arrival, on gRPC's thread, if only its relation is wanted and its hulls are
+// of moderate size and ready. Everything else runs on `pool`: single pairs and steps of streams
+// ahead of slices of batches, scenes and long steps. Work that may wait for the store, or that
+// builds canonical snapshots, runs on `readers` (hulls of a pair) or `long_readers` (hulls of
+// many). Pairs for TEXTBOOK_SAT are answered in pieces that alternate with other calls; pairs with
+// enough axes to justify a team of threads go to the executor.
 class CollisionService : public CollisionServiceOfBytes {
  public:
-  CollisionService(Shards& shards, Admission& admission, ShardPools& readers,
-                   ShardPools& long_readers, TaskPool& pool, Executor& executor)
-      : shards_(shards),
+  CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
+                   WorkerPool& long_readers, TaskPool& pool, Executor& executor)
+      : registry_(registry),
         admission_(admission),
         readers_(readers),
         long_readers_(long_readers),
@@ -63,21 +63,20 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
-  WorkerPool& ReadersOf(const v1::CheckCollisionRequest& request);
   void AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call);
-  void AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved, CheckCall* call);
-  void AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call);
-  // Answers the query on the thread that suits it.
+  void AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
+  void AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call);
+  // Answers the query on a suitable thread.
   void Compute(PairQuery query, CheckCall* call);
-  // The next piece of a query for the textbook, which lasts as long as its hulls are large: others
-  // have their turn after each.
+  // Submits the next piece of a textbook query, the duration of which depends on its hulls; other
+  // calls run between pieces.
   struct TextbookQuery;
   void SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCall* call);
 
-  Shards& shards_;
+  Registry& registry_;
   Admission& admission_;
-  ShardPools& readers_;
-  ShardPools& long_readers_;
+  WorkerPool& readers_;
+  WorkerPool& long_readers_;
   TaskPool& pool_;
   Executor& executor_;
   WaitingCalls waiting_;

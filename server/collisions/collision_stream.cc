@@ -20,31 +20,32 @@
 namespace hulld::server {
 namespace {
 
-// Pairs between two looks at the clock.
-constexpr size_t kPairsPerLook = 16;
+// Pairs between two reads of the clock.
+constexpr size_t kPairsPerClaim = 16;
 // Decoding the poses of an update up to this size takes less than a slice.
 constexpr int kMostShortUpdate = 4096;
-// An update that concerns no more pairs is answered where it arrives.
+// An update that affects at most this many pairs is answered on arrival.
 constexpr int kMostQuickPairs = 8;
-// A stream is opened for many updates; how many is a guess.
+// A stream is opened for many updates; the number is a guess.
 constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
 // A relation and a rung.
 constexpr size_t kRelationBytes = 2;
-// Decided pairs that are told between two looks at the clock, in some 20 us.
+// Decided pairs that are encoded between two reads of the clock, in some 20 us.
 constexpr size_t kToldPerLook = 4096;
-// Pairs for which another thread is asked to help: they take some 20 us at the least, and a thread
-// about as long to come. Observed: close pairs of UR5 links.
+// Pairs per helper thread: they take at least 20 us, and a thread about as long to arrive.
+// **Observed**: close pairs of UR5 links.
 constexpr size_t kPairsPerHelper = 192;
 
 }  // namespace
 
 BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                    Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
-                                    TaskPool& pool, WaitingCalls& waiting) {
+                                    Registry& registry, WorkerPool& readers,
+                                    WorkerPool& long_readers, TaskPool& pool,
+                                    WaitingCalls& waiting) {
   return Launch(std::shared_ptr<CollisionStream>(
-      new CollisionStream(context, admission, shards, readers, long_readers, pool, waiting)));
+      new CollisionStream(context, admission, registry, readers, long_readers, pool, waiting)));
 }
 
 void CollisionStream::OnMessage() {
@@ -53,10 +54,10 @@ void CollisionStream::OnMessage() {
     pool_.NoteSingleCall();
     return Handle();
   }
-  // What resolves hulls may wait for the store; the first message resolves all of them.
+  // Resolving hulls may wait for the store; the first message resolves all of them.
   if (!open_) return RunOn(long_readers_, [this] { Handle(); });
   if (request().update().refresh_hulls()) return RunOn(readers_, [this] { Handle(); });
-  // Only the first slice of a step goes ahead of batches.
+  // Only the first slice of a step precedes batches.
   const bool is_short = request().update().placements_size() <= kMostShortUpdate;
   if (is_short) return RunOn(pool_, [this] { Handle(); });
   RunOn(lane_, [this] { Handle(); });
@@ -70,7 +71,7 @@ void CollisionStream::OnSent() {
   RunOn(lane_, [this] { AnswerSlice(); });
 }
 
-// Whether the message can be answered here and now, on gRPC's thread.
+// True if the message can be answered immediately on gRPC's thread.
 bool CollisionStream::IsQuick() const {
   if (!open_ || !request().has_update() || !options_.WantsRelationOnly()) return false;
   const v1::CollisionStreamUpdate& update = request().update();
@@ -97,29 +98,29 @@ void CollisionStream::Handle() {
   refresh_.reset();
   const absl::Status status = HandleMessage();
   if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
-  // No thread waits while stores are asked: one that does not answer would hold all of them.
+  // No thread waits during a store query: an unresponsive store would block all of them.
   WorkerPool& threads = messages_ == 0 ? long_readers_ : readers_;
   const bool awaits = waiting_.AwaitFresh(
-      shards_, table_.hull_ids(), refresh_->freshness, [this] { return call().ShouldStop(); },
+      registry_, refresh_->freshness, [this] { return call().ShouldStop(); },
       [this, &threads, self = shared_from_this()](const absl::Status& fresh) {
         RunOn(threads, [this, fresh] { AnswerMessage(OfMessage(fresh)); });
       });
   if (!awaits) AnswerMessage(absl::OkStatus());
 }
 
-// Looks the hulls up, if the message has them looked up, and answers it. status: that of what came
-// before.
+// Looks up the hulls, if the message requires it, and answers the message. status: result of the
+// previous step.
 void CollisionStream::AnswerMessage(absl::Status status) {
   if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
   if (!std::is_sorted(asked_.begin(), asked_.end())) std::sort(asked_.begin(), asked_.end());
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
-  table_.EncodeHeader(shards_, reply().mutable_header());
+  table_.EncodeHeader(registry_.store(), reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
   is_decided_ = false;
-  // A few, or where one thread answers, by this one.
+  // Places a few placements, or all of a single-threaded answer, on this thread.
   if (!IsPlain() || moved_.size() < kPairsPerHelper) {
     for (const uint32_t placement : moved_) table_.PlaceAgain(placement);
     moved_.clear();
@@ -127,7 +128,7 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   AnswerSlice();
 }
 
-// What came of an update, as the client is told.
+// Returns the client's status for the result of an update.
 absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
   if (messages_ == 0) return status;
   return Prefixed(absl::StrCat("update ", messages_, ": "), status);
@@ -153,19 +154,20 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   v1::CollisionStreamOpen& open = *request().mutable_open();
-  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
-      v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), shards_.limits(), call().lifetime());
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
+                       call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(open.freshness(), shards_.store_ids(), call().message_arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(open.freshness(), registry_.store(), call().message_arrival());
   if (!freshness.ok()) return Prefixed("open: ", freshness.status());
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
-                           shards_.limits().max_placements, "the stream");
+                           registry_.limits().max_placements, "the stream");
   if (!table.ok()) return Prefixed("open: ", table.status());
   const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
-                                           shards_.limits().max_pairs_per_batch, "the stream");
+                                           registry_.limits().max_pairs_per_batch, "the stream");
   if (!valid.ok()) return Prefixed("open: ", valid);
   options_ = *std::move(options);
   wanted_ = open.wanted();
@@ -193,23 +195,23 @@ absl::Status CollisionStream::HandleOpen() {
   open_ = true;
   is_asked_.assign(pairs_.size(), false);
   for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
-  // It is worth the wait: the hulls are used until the client refreshes them.
+  // Preparation is worth the wait: the hulls are used until the client refreshes them.
   const uint64_t pairs_per_hull = 2 * pairs_.size() / std::max<size_t>(1, table_.hull_count());
   refresh_ = {kExpectedUpdates * pairs_per_hull, true, freshness_};
   return absl::OkStatus();
 }
 
-// Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
-// there is no room for it.
+// Charges the stream's memory to --memory-limit before allocating it. RESOURCE_EXHAUSTED: there is
+// no room.
 absl::Status CollisionStream::ChargeFor(size_t pairs) {
-  // A pair among the pairs of two placements, and among those that are asked about and decided.
+  // A pair has entries in the pairs of two placements, and in the pairs to query and decided.
   constexpr size_t kPerPair =
       sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char) + sizeof(Decided);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
-  return shards_.CheckMemory(MemoryUse::kReading);
+  return registry_.CheckMemory(MemoryUse::kReading);
 }
 
-// Checks all of the update before it applies any.
+// Validates the whole update before applying any of it.
 absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
   if (absl::Status s = ValidateMoves(update.placements(), update.poses(), table_.size()); !s.ok()) {
     return s;
@@ -219,8 +221,8 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
     AskAboutPairsOf(update.placements(i));
   }
   if (update.refresh_hulls()) {
-    // That places all.
-    refresh_ = ShardsPlan{.freshness = freshness_};
+    // Refreshing places all placements.
+    refresh_ = ReadPlan{.freshness = freshness_};
     refresh_->freshness.began = call().message_arrival();
   } else {
     moved_.assign(update.placements().begin(), update.placements().end());
@@ -228,16 +230,15 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   return absl::OkStatus();
 }
 
-absl::Status CollisionStream::Refresh(const ShardsPlan& plan) {
-  if (absl::Status s = table_.Refresh(shards_, options_, plan); !s.ok()) return s;
+absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
+  if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
   }
   for (size_t i = 0; i < table_.size(); ++i) {
     if (table_.hull_changed(i)) AskAboutPairsOf(i);
     if (!table_.query_hull_changed(i)) continue;
-    // The points that a cache names are those of the QueryHull before. Its axis is as good a guess
-    // as it was.
+    // The cached points are of the former QueryHull. The cached axis remains a good guess.
     for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) {
       pairs_[pairs_of_[k]].cache.pair_count = 0;
     }
@@ -283,9 +284,8 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
-// Places what moved, and then decides the pairs that are asked about, with the help of other
-// threads, as far as these come in time: helpers take slices, in the turns of this call, so they
-// wait where others have to.
+// Places moved placements, then decides the requested pairs, together with any helper threads that
+// arrive in time. Helpers run slices in this call's turns, so they yield to other calls.
 void CollisionStream::DecideTogether() {
   decided_.resize(asked_.size());
   is_placing_ = !moved_.empty();
@@ -295,7 +295,7 @@ void CollisionStream::DecideTogether() {
     return TellDecided();
   }
   const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
-  // Helpers of an earlier step that did not have their turn yet count as well.
+  // Includes queued helpers of an earlier step.
   for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
     ++helpers_waiting_;
     RunOn(lane_, [this] {
@@ -306,7 +306,7 @@ void CollisionStream::DecideTogether() {
   TakePart();
 }
 
-// Requires that all is placed. False when there is nothing to decide.
+// Requires that all placements are placed. Returns false if there is nothing to decide.
 bool CollisionStream::BeginDeciding() {
   is_placing_ = false;
   if (asked_.empty()) return false;
@@ -314,29 +314,29 @@ bool CollisionStream::BeginDeciding() {
   return true;
 }
 
-// The next block. While others still place the last placements, the pairs are worth a short wait:
-// another thread would have to be woken for them.
+// Claims the next block. While other threads place the last placements, a short wait is worth it:
+// the pairs would otherwise require waking another thread.
 ClaimedRange::Block CollisionStream::Claim() {
   constexpr int kMostYields = 64;
-  ClaimedRange::Block block = unclaimed_.Claim(kPairsPerLook);
+  ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
   for (int i = 0; block.empty() && is_placing_ && i < kMostYields; ++i) {
     std::this_thread::yield();
-    block = unclaimed_.Claim(kPairsPerLook);
+    block = unclaimed_.Claim(kPairsPerClaim);
   }
   return block;
 }
 
-// Works on blocks until none is left, or it is the turn of others. Runs on any thread, and on
-// several at a time; the thread that gives back the last block goes on. Nothing of this stream may
-// be touched after the last block was given back, or when there was none.
+// Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
+// several concurrently; the thread that returns the last block continues. Nothing of this stream
+// may be used after returning the last block, or if no block was available.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
     const ClaimedRange::Block block = Claim();
     if (block.empty()) return;
-    // What is begun next waits until this block is given back.
+    // The next step cannot start before this block is returned.
     const bool is_placing = is_placing_;
-    // When the call is to stop, blocks are given back undone, so that one thread is still the last.
+    // If the call must stop, blocks are returned undone, so that exactly one thread is the last.
     if (!call().ShouldStop()) {
       for (uint32_t i = block.begin; i < block.end; ++i) {
         is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);
@@ -355,7 +355,7 @@ void CollisionStream::Decide(uint32_t i) {
     const std::span<const PlacedHull> placed = table_.placed();
     const absl::StatusOr<Answer> answer =
         CheckCollision(placed[pair.a], placed[pair.b], options_, &pair.cache);
-    // Nothing else can happen to the relation of valid hulls at valid poses.
+    // No other error is possible for the relation of valid hulls at valid poses.
     HULLD_CHECK(answer.ok() || absl::IsCancelled(answer.status()));
     if (!answer.ok()) return;
     relation = EncodeRelation(answer->relation);
@@ -365,7 +365,7 @@ void CollisionStream::Decide(uint32_t i) {
   decided_[i] = {static_cast<uint8_t>(relation), rung, is_changed};
 }
 
-// Tells what was decided: as much as fits a message, or until it is the turn of others.
+// Encodes the decided pairs, until the message is full or other calls are due.
 void CollisionStream::TellDecided() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   is_decided_ = true;
@@ -397,7 +397,7 @@ void CollisionStream::SendPart(bool last) {
   Send();
 }
 
-// Computes until the answer is complete, a message is full, or it is the turn of others.
+// Computes until the answer is complete, the message is full, or other calls are due.
 void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
     next_row_ = table_.EncodeHulls(next_row_, &reply());
@@ -406,7 +406,7 @@ void CollisionStream::AnswerSlice() {
   }
   if (IsPlain()) return is_decided_ ? TellDecided() : DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-  const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerLook;
+  const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerClaim;
   while (next_asked_ < asked_.size()) {
     if (reply_bytes_ >= FullMessageBytes(wanted_)) break;
     AddAnswer(asked_[next_asked_++]);

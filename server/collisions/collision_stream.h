@@ -20,55 +20,55 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
-#include "server/shards/waiting_calls.h"
+#include "server/registry/registry.h"
+#include "server/registry/waiting_calls.h"
 
 namespace hulld::server {
 
-// One StreamCollisions call: reads a message, answers it, sends the answer, and only then reads the
-// next, so that a fast client fills gRPC's window and not our memory. A message that takes no time
-// is answered where it arrives, one that resolves hulls on a reader thread, and others on the pool.
-// Long answers are computed in slices, between which other calls get their turn, and sent in
-// pieces. Where the relation of hulls is all that is wanted, other threads of the pool help with a
-// step: they take slices, so they wait where others have to.
+// A StreamCollisions call: reads a message, answers it, sends the answer, and only then reads the
+// next, so that a fast client fills gRPC's window and not the server's memory. A quick message is
+// answered on arrival, one that resolves hulls on a reader thread, the rest on the pool. Long
+// answers are computed in slices, which alternate with other calls, and sent in pieces. If only
+// relations of hulls are wanted, other threads of the pool help with a step: they run slices, so
+// they yield to other calls.
 class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
  public:
   static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
+                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
                             TaskPool& pool, WaitingCalls& waiting);
 
  private:
-  // What is kept of a pair from one answer to the next.
+  // State of a pair kept between answers.
   struct PairState {
     uint32_t a;
     uint32_t b;
     PairCache cache;
-    // As answered last.
+    // The last answer.
     v1::Relation relation = v1::RELATION_UNSPECIFIED;
   };
 
-  // What was found of a pair.
+  // Result of a pair.
   struct Decided {
-    // As a v1::Relation; unspecified where a placement has a problem, which is told elsewhere.
+    // A v1::Relation; unspecified if a placement has a problem, which is reported elsewhere.
     uint8_t relation = 0;
     Rung rung = Rung::kBounds;
-    // Whether it was answered otherwise before.
+    // True if the last answer differed.
     bool is_changed = false;
   };
 
-  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
                   WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool,
                   WaitingCalls& waiting)
       : ReadingStream(context, admission, Rpc::kStreamCollisions),
-        shards_(shards),
+        registry_(registry),
         readers_(readers),
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
         waiting_(waiting),
-        charge_(shards.memory(), MemoryUse::kReading) {}
+        charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override { Read(); }
   void OnMessage() override;
@@ -83,7 +83,7 @@ class CollisionStream
   absl::Status HandleOpen();
   absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
-  absl::Status Refresh(const ShardsPlan& plan);
+  absl::Status Refresh(const ReadPlan& plan);
   void AnswerMessage(absl::Status status);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
@@ -98,54 +98,53 @@ class CollisionStream
   void SendAnswered();
   void SendPart(bool last);
 
-  Shards& shards_;
+  Registry& registry_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
   TaskPool& pool_;
-  // The slices of long answers.
+  // Slices of long answers.
   TaskPool::Lane lane_;
   WaitingCalls& waiting_;
   // Covers placements and pairs.
   MemoryCharge charge_;
 
-  // The size of the reply, estimated.
+  // Estimated size of the reply.
   size_t reply_bytes_ = 0;
   uint64_t messages_ = 0;
 
   // From `open`.
   bool open_ = false;
   bool only_changes_ = false;
-  ShardsFreshness freshness_;
-  // How the current message has the hulls looked up, if it does.
-  std::optional<ShardsPlan> refresh_;
+  Freshness freshness_;
+  // Plan for looking up the hulls, if the current message requires it.
+  std::optional<ReadPlan> refresh_;
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;
-  // The first row of the table that is still to be told; all rows when none is.
+  // Next row of the table to send; table_rows() if none is left.
   size_t next_row_ = 0;
   std::vector<PairState> pairs_;
-  // The pairs of placement i: pairs_of_[pairs_begin_[i]] up to pairs_begin_[i + 1].
+  // Pairs of placement i: pairs_of_[pairs_begin_[i]] up to pairs_begin_[i + 1].
   std::vector<uint32_t> pairs_of_;
   std::vector<size_t> pairs_begin_;
 
-  // The pairs that the current message asks about, ascending, and the next of them to answer.
+  // Pairs queried by the current message, ascending, and the next one to answer.
   std::vector<uint32_t> asked_;
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;
   RungCounts rungs_;
 
-  // The placements that the current message moved and that are not placed yet.
+  // Placements moved by the current message and not placed yet.
   std::vector<uint32_t> moved_;
 
-  // A plain answer is decided as a whole, by several threads, and then told.
+  // A plain answer is decided as a whole, by several threads, and then encoded.
   bool is_decided_ = false;
   // Parallel to asked_.
   std::vector<Decided> decided_;
-  // What no thread has begun with: entries of moved_ while they are placed, and then entries of
-  // asked_.
+  // Unclaimed work: entries of moved_ during placing, then entries of asked_.
   ClaimedRange unclaimed_;
   std::atomic<bool> is_placing_ = false;
-  // Slices of helpers that wait for their turn.
+  // Queued slices of helpers.
   std::atomic<size_t> helpers_waiting_ = 0;
 };
 

@@ -22,33 +22,33 @@
 #include "server/process/shared_loop.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/registry/waiting_calls.h"
 #include "server/settings/config.h"
-#include "server/shards/shards.h"
-#include "server/shards/waiting_calls.h"
 
 namespace hulld::server {
 
-// A piece of a call's work, a range of units (pairs, or placements of a scene), and its answers
-// that wait for those of the pieces before.
+// A piece of a call's work: a range of units (pairs, or placements of a scene), and its answers,
+// which wait for earlier pieces.
 template <typename Reply>
 struct Piece {
-  // What is left of it.
+  // The remaining range.
   uint64_t next = 0;
   uint64_t end = 0;
   std::vector<Reply> replies = {};
-  // The size of each reply, and of all.
+  // Size of each reply, and their total.
   std::vector<size_t> reply_bytes = {};
   size_t bytes = 0;
   bool is_done = false;
 
-  // For PiecedReplies: a slice is queued or runs; what the piece held before that; what the slices
-  // took so far.
+  // For PiecedReplies: a slice is queued or running; bytes held before the slice; time of the
+  // slices so far.
   bool is_running = false;
   size_t noted_bytes = 0;
   uint64_t units = 0;
   std::chrono::steady_clock::duration elapsed{0};
 
-  // What the rest of the piece holds in memory, beside the replies.
+  // Bytes held by the piece, excluding the replies.
   size_t held_bytes() const { return 0; }
 
   void Add(Reply reply) {
@@ -59,115 +59,114 @@ struct Piece {
   }
 };
 
-// Where a call is prepared and computed.
+// Threads that prepare and compute a call.
 struct PieceThreads {
-  // For what may wait.
+  // For steps that may block.
   WorkerPool& readers;
   TaskPool& pool;
-  // Where it waits, without a thread, until what is here is fresh.
+  // Waits for freshness without a thread.
   WaitingCalls& waiting;
 };
 
-// A stream whose answers are computed in pieces by all threads of a pool and sent in order. A piece
-// is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
-// their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
-// while a bounded number of bytes waits for the client, no slice starts, and no more is told of
-// what comes first. So memory is bounded, and a client that does not read holds up no other. What
-// the call holds counts against --memory-limit: what HeldBytes says, and its answers, as long as
-// they are on the wire.
+// A stream with answers computed in pieces by all threads of a pool and sent in order. One slice at
+// a time works on a piece, each of about TaskPool::kSliceTime, so that other calls get their turn.
+// A bounded number of pieces is in flight, each with a bounded number of bytes; while a bounded
+// number of bytes is unsent, no slice starts, and no more of the head is queued. So memory is
+// bounded, and a client that does not read delays no other client. The call's memory, HeldBytes and
+// answers in flight, counts against --memory-limit.
 //
-// Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
+// Work: state of a piece between slices, derived from Piece<Reply>.
 template <typename Request, typename Reply, typename Work>
 class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Request> {
  protected:
   using Base = RequestStream<QueuedStream<WriteReactor, Reply>, Request>;
   using Clock = std::chrono::steady_clock;
 
-  // Bytes that may wait for the client before no slice is started. A choice: some messages, so that
-  // the threads need not wait while gRPC's get their turn.
+  // Unsent bytes above which no slice starts. A choice: some messages, so that the threads need not
+  // wait for gRPC's threads.
   static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
-  // Bytes that a piece may hold while another is before it.
+  // Maximum bytes held by a piece behind another one.
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
   // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
-  // Replies up to this size join the one that waits before them. A reply up to this size waits for
-  // others while slices run, but no longer than this time by much: a write costs both sides as much
-  // as a hundred pairs.
+  // Maximum size of a reply that is merged with the queued one, and of a reply that waits to be
+  // merged while slices run, though not much longer than kMostWait: a write costs both sides as
+  // much as a hundred pairs.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
   static constexpr std::chrono::milliseconds kMostWait{2};
 
-  // How pieces grow.
+  // Growth of pieces.
   struct Shape {
     uint64_t first_units;
     uint64_t most_units;
   };
 
   PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
-                Admission& admission, Rpc rpc, Shards& shards, const PieceThreads& threads,
+                Admission& admission, Rpc rpc, Registry& registry, const PieceThreads& threads,
                 const Shape& shape)
       : Base(request, context, admission, rpc),
-        shards_(shards),
+        registry_(registry),
         readers_(threads.readers),
         lane_(threads.pool),
         waiting_(threads.waiting),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
-        charge_(shards.memory(), MemoryUse::kReading),
+        charge_(registry.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
-  // Whether preparing takes about a slice when nothing has to be waited for.
+  // True if preparation takes about a slice, waits excluded.
   virtual bool IsShort() const = 0;
-  // The call is prepared step by step, without the mutex, on one thread at a time.
+  // The call is prepared step by step, without the mutex, on one thread.
   virtual absl::Status Validate() = 0;
-  // What the call names, and how fresh that is to be. Requires that it is valid.
-  virtual std::span<const std::string> HullIds() const = 0;
-  virtual const ShardsFreshness& freshness() const = 0;
-  // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
+  // Requires that the call is valid.
+  virtual const Freshness& freshness() const = 0;
+  // Resolves the hulls. Returns false if that may block and `may_wait` is false.
   virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
   virtual absl::Status Prepare() { return absl::OkStatus(); }
-  // What the call holds until it ends, pieces apart. Called without the mutex after each of these
+  // Bytes held until the call ends, excluding pieces. Called without the mutex after each of these
   // steps.
   virtual size_t HeldBytes() const = 0;
 
-  Shards& shards() { return shards_; }
+  Registry& registry() { return registry_; }
 
-  // Runs `work` on ranges that together are [0, count), each once: a long call's on several threads
-  // at a time. For the steps above.
+  // Runs `work` on disjoint ranges that cover [0, count); for a long call, on several threads
+  // concurrently. For the steps above.
   void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
     SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
   }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
-  // without the mutex, on any thread, by one thread at a time for each piece.
+  // without the mutex, on any thread, but never concurrently for the same piece.
   virtual absl::Status Advance(Work& piece, Clock::time_point end) = 0;
 
-  // The rest requires the mutex.
+  // The functions below require the mutex.
 
-  // Queues a message of what comes before all answers, or keeps it for the first of them. Whether
-  // more of that is to come. Called as the client reads, once the hulls are resolved.
+  // Queues a message of the head, which precedes all answers, or keeps it to join the first of
+  // them. Returns true if more of the head follows. Called as the client reads, after the hulls are
+  // resolved.
   virtual bool QueueHead() = 0;
-  // The number of units. Requires that the call is prepared.
+  // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
-  // Where the piece that starts at `begin` ends, at most `end`; for units whose cost is known.
+  // Returns the end of the piece that starts at `begin`, at most `end`; for units of known cost.
   virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
     static_cast<void>(begin);
     return end;
   }
-  // Whether a slice of the piece may start while others are before it.
+  // True if a slice of the piece may start while earlier pieces are in flight.
   virtual bool MayRunAhead(const Work& piece) const {
     static_cast<void>(piece);
     return true;
   }
-  // Starts a slice of the piece. To be overridden where some pieces run elsewhere.
+  // Starts a slice of the piece. Override to run some pieces elsewhere.
   virtual void Submit(Work& piece) {
     this->RunOn(lane_, [this, &piece] { RunSlice(piece); });
   }
-  // Queues replies of the piece at the front; sees it with is_done once, at its end.
+  // Queues replies of the front piece; called one last time with is_done.
   virtual void Deliver(Work& piece) = 0;
-  // Adds a small reply to the one that waits, in place of queueing it; false where they do not fit.
+  // Merges a small reply into the queued one; returns false if they do not fit.
   virtual bool Join(const Reply& reply, Reply* waiting) = 0;
-  // Every piece was delivered. To queue what comes last; the end is set afterwards.
+  // Called after every piece was delivered, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
   void RunSlice(Work& piece) {
@@ -186,7 +185,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // Queues the replies that the piece holds, in order.
+  // Queues the replies of the piece in order.
   void DeliverReplies(Work& piece) {
     for (size_t i = 0; i < piece.replies.size(); ++i) {
       QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
@@ -208,7 +207,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
  private:
-  // A short call whose hulls are ready need not wait for another thread.
+  // A short call with ready hulls need not wait for another thread.
   void Open() final {
     if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
     this->RunOn(readers_, [this] {
@@ -218,14 +217,14 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // Whether it waits for a store, to be opened when that has answered. No thread waits meanwhile:
-  // a store that does not answer would hold all of them, also from calls that name nothing of it.
+  // Returns true if the call waits, without a thread, for the store and will be opened after its
+  // answer.
   bool AwaitsFresh() {
     const auto should_stop = [this] { return this->call().ShouldStop(); };
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
       this->RunOn(readers_, [this, status] { OpenWith(status, true); });
     };
-    return waiting_.AwaitFresh(shards_, HullIds(), freshness(), should_stop, open);
+    return waiting_.AwaitFresh(registry_, freshness(), should_stop, open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
@@ -240,7 +239,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       status = resolved.status();
     }
     if (status.ok()) {
-      // What is known goes out while the rest is prepared.
+      // The head can be sent during preparation.
       this->Locked([this] { is_head_left_ = true; });
       status = Prepare();
     }
@@ -253,18 +252,18 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // RESOURCE_EXHAUSTED: there is no room for what the call holds. A small call is let in all the
-  // same, as hulls in memory are served to those that name few.
+  // RESOURCE_EXHAUSTED: no room for the call's memory. A small call is admitted all the same,
+  // because hulls in memory are served to calls that name few.
   absl::Status Charge() {
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
     if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
-    return shards_.CheckMemory(MemoryUse::kReading);
+    return registry_.CheckMemory(MemoryUse::kReading);
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
-  // A slice that runs ends in a Locked step.
+  // A running slice ends in a Locked step.
   bool KeepsWaiting() const final {
     return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
            this->LastWaitingTime() < kMostWait;
@@ -315,7 +314,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     }
   }
 
-  // Pieces grow and shrink so that each takes about one slice.
+  // Adapts the size of pieces so that each takes about one slice.
   void AdaptUnits(const Work& piece) {
     const auto least = std::chrono::nanoseconds(1);
     const double factor = std::chrono::duration<double>(TaskPool::kSliceTime) /
@@ -324,26 +323,26 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
   }
 
-  Shards& shards_;
+  Registry& registry_;
   WorkerPool& readers_;
   TaskPool::Lane lane_;
   WaitingCalls& waiting_;
   const size_t most_pieces_;
   const uint64_t most_units_;
 
-  // While the call is opened they belong to the thread that does.
+  // Owned by the opening thread while the call is opened.
   MemoryCharge charge_;
   size_t fixed_bytes_ = 0;
 
-  // The rest is guarded by the mutex; a running piece belongs to its slice.
+  // The mutex guards the members below; a running piece belongs to its slice.
   bool opening_ = true;
-  // Something of what comes first is to be queued.
+  // Part of the head is still to be queued.
   bool is_head_left_ = false;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;
-  // The size of the next piece.
+  // Size of the next piece.
   uint64_t piece_units_;
-  // Under way, in order.
+  // Pieces in flight, in order.
   std::deque<std::unique_ptr<Work>> pieces_;
   size_t running_ = 0;
 };

@@ -12,17 +12,17 @@
 namespace hulld::server {
 namespace {
 
-// The first pieces are small, as the number of candidates is not known; the largest bounds what a
-// wrong guess of it can do.
+// The first pieces are small, because the number of candidates is unknown; the largest bounds the
+// damage of a wrong estimate.
 constexpr uint64_t kFirstPlacements = 4;
 constexpr uint64_t kMostPlacements = 1024;
-// The tree of this many placements is built in about a slice.
-constexpr int kMostShortPlacements = 512;
-// Candidates, placements or parts of a gathering between two looks at the clock, and the nodes of
-// such a part, which takes about as long as a candidate.
-constexpr uint64_t kStepsPerLook = 16;
+// Building the tree of this many placements takes about a slice.
+constexpr int kMostBoxesPerSlice = 512;
+// Candidates, placements or gathering steps between two reads of the clock, and nodes per gathering
+// step, which takes about as long as a candidate.
+constexpr uint64_t kStepsPerPoll = 16;
 constexpr uint64_t kNodesPerStep = 16;
-// Placements whose boxes a thread computes at a time: some 100 us.
+// Placements per step of computing boxes: some 100 us.
 constexpr size_t kBoxesPerStep = 256;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
@@ -54,34 +54,35 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 }  // namespace
 
 WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards, const PieceThreads& threads,
+                                 Registry& registry, const PieceThreads& threads,
                                  const grpc::ByteBuffer& request) {
-  return Launch(
-      std::shared_ptr<SceneStream>(new SceneStream(context, admission, shards, threads, request)));
+  return Launch(std::shared_ptr<SceneStream>(
+      new SceneStream(context, admission, registry, threads, request)));
 }
 
-SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                         const PieceThreads& threads, const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, shards, threads,
+SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
+                         Registry& registry, const PieceThreads& threads,
+                         const grpc::ByteBuffer& request)
+    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, registry, threads,
                     {kFirstPlacements, kMostPlacements}) {}
 
 bool SceneStream::IsShort() const {
   return request().placements_size() + request().packed_placements().hulls_size() <=
-         kMostShortPlacements;
+         kMostBoxesPerSlice;
 }
 
 absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
-                       shards().limits(), call().lifetime());
+                       registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request().freshness(), shards().store_ids(), call().arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
-                           call().caller(), shards().limits().max_placements, "the scene");
+                           call().caller(), registry().limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
@@ -94,11 +95,11 @@ absl::Status SceneStream::Validate() {
 }
 
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
-  // The box of each placement, and at least a pair of it.
-  const ShardsPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
-                           freshness_};
-  if (!may_wait) return table_.TryResolve(shards(), options_.query, plan);
-  if (absl::Status s = table_.Resolve(shards(), options_.query, plan); !s.ok()) return s;
+  // Expects the box and at least one pair of each placement.
+  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
+                         freshness_};
+  if (!may_wait) return table_.TryResolve(registry(), options_.query, plan);
+  if (absl::Status s = table_.Resolve(registry(), options_.query, plan); !s.ok()) return s;
   return true;
 }
 
@@ -125,7 +126,7 @@ size_t SceneStream::HeldBytes() const {
 
 bool SceneStream::QueueHead() {
   v1::FindCollisionsResponse head;
-  if (next_row_ == 0) table_.EncodeHeader(shards(), head.mutable_header());
+  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
   next_row_ = table_.EncodeHulls(next_row_, &head);
   const size_t bytes = head.ByteSizeLong();
   Queue(std::move(head), bytes);
@@ -135,7 +136,7 @@ bool SceneStream::QueueHead() {
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   v1::FindCollisionsResponse reply;
   size_t reply_bytes = 0;
-  const uint64_t steps_per_look = table_.has_bodies() ? 1 : kStepsPerLook;
+  const uint64_t steps_per_look = table_.has_bodies() ? 1 : kStepsPerPoll;
   for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
     if (piece.next == piece.end) break;
     const auto a = static_cast<uint32_t>(piece.next);
@@ -186,7 +187,7 @@ void SceneStream::Deliver(ScenePiece& piece) {
   DeliverReplies(piece);
 }
 
-// The messages of the head hold no answers.
+// Messages of the head hold no answers.
 bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
                        v1::FindCollisionsResponse* waiting) {
   if (waiting->pairs_size() == 0 || NamesRows(reply.columns())) return false;

@@ -16,45 +16,44 @@
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// A range of placements, each to be asked about with those after it.
+// A range of placements, each to be queried against its successors.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
-  // The candidates of placement `next` that are still to be asked about, once they were begun with.
+  // Remaining candidates of placement `next`, if it was started.
   bool has_candidates = false;
   SceneCandidates candidates;
-  // What was counted since the piece was delivered last.
+  // Counts since the last delivery of the piece.
   v1::SceneTotals totals;
   RungCounts rungs;
 
   size_t held_bytes() const { return candidates.MemoryBytes(); }
 };
 
-// One FindCollisions call: resolves every hull once and builds the tree of boxes, on a reader
-// thread, then searches ranges of placements on all threads of the pool. Gathering the candidates
-// of one placement is cut into slices like asking about them.
+// A FindCollisions call: resolves each hull a single time and builds the tree of boxes, on a reader
+// thread, then searches ranges of placements on all threads of the pool. Both gathering and
+// querying the candidates of a placement are split into slices.
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, const PieceThreads& threads,
+                             Registry& registry, const PieceThreads& threads,
                              const grpc::ByteBuffer& request);
 
  private:
-  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               const PieceThreads& threads, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
   absl::Status Validate() override;
-  std::span<const std::string> HullIds() const override { return table_.hull_ids(); }
-  const ShardsFreshness& freshness() const override { return freshness_; }
+  const Freshness& freshness() const override { return freshness_; }
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
   size_t HeldBytes() const override;
-  // The rest requires the mutex.
+  // The functions below require the mutex.
   bool QueueHead() override;
   uint64_t CountUnits() override { return search_->size(); }
   void Deliver(ScenePiece& piece) override;
@@ -67,13 +66,12 @@ class SceneStream
 
   // Written before the first piece.
   SceneOptions options_;
-  ShardsFreshness freshness_;
+  Freshness freshness_;
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;
   std::optional<SceneSearch> search_;
 
-  // Guarded by the mutex.
-  // The first row of the table of hulls that is still to be told.
+  // Guarded by the mutex. The next row of the table of hulls to send.
   size_t next_row_ = 0;
   v1::SceneTotals totals_;
 };

@@ -10,7 +10,7 @@ namespace {
 
 constexpr char kDomain[] = "hulld";
 constexpr char kReasonPrefix[] = "ERROR_REASON_";
-// The payload of a status that holds a serialized ErrorInfo.
+// Status payload with a serialized ErrorInfo.
 constexpr char kInfoPayload[] = "type.googleapis.com/google.rpc.ErrorInfo";
 
 std::string ReasonName(v1::ErrorReason reason) {
@@ -24,7 +24,7 @@ std::optional<rpc::ErrorInfo> GivenInfo(const absl::Status& status) {
   return info;
 }
 
-// For errors of which the code says all.
+// Returns the reason of codes that imply one.
 v1::ErrorReason ImpliedReason(absl::StatusCode code) {
   switch (code) {
     case absl::StatusCode::kInvalidArgument:

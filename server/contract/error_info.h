@@ -24,21 +24,21 @@ struct MetadataEntry {
   std::string value;
 };
 
-// The status with its reason, and the metadata that error.proto lists for that reason; it replaces
-// a reason given before. Kept as a payload: Prefixed carries it on.
+// Returns the status with its reason and the metadata that error.proto lists for it; replaces a
+// former reason. Stored as a payload, which Prefixed preserves.
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
                         std::initializer_list<MetadataEntry> metadata = {});
 
-// UNAVAILABLE: the server drains, so that no call begins and no watch goes on.
+// UNAVAILABLE: the server drains, so no call starts and no watch continues.
 absl::Status Draining();
 
-// The reason of an error; where none was given, the one that its code implies, if any.
+// Returns the reason of an error; without one, the reason implied by its code, if any.
 v1::ErrorReason ReasonOf(const absl::Status& status);
 
-// A value of the metadata given to WithReason.
+// Returns a value of the metadata given to WithReason.
 std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key);
 
-// The serialized google.rpc.ErrorInfo of an error; none for an error without a reason.
+// Returns the serialized google.rpc.ErrorInfo of an error; nullopt for an error without a reason.
 std::optional<std::string> EncodeErrorInfo(const absl::Status& status);
 
 }  // namespace hulld::server

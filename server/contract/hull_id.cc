@@ -8,7 +8,7 @@
 namespace hulld::server {
 namespace {
 
-// Not std::isalnum, which depends on the locale.
+// Unlike std::isalnum, independent of the locale.
 bool IsAlphanumeric(char c) {
   return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
 }

@@ -7,9 +7,10 @@
 
 namespace hulld::server {
 
-// OK when `id` is segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by "/", 256 characters at most;
-// otherwise INVALID_ARGUMENT, which names `field` (as in "a.hull_id") and the offending character.
-// IDs of requests go through CheckHullId (caller.h), which also asks whether they are the caller's.
+// Returns OK if `id` is segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by "/", at most 256
+// characters; otherwise INVALID_ARGUMENT naming `field` (as in "a.hull_id") and the offending
+// character. IDs of requests go through CheckHullId (caller.h), which also checks the caller's
+// prefix.
 absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field);
 
 }  // namespace hulld::server

@@ -9,10 +9,10 @@
 namespace hulld::server {
 namespace {
 
-// Keys of the metadata, as error.proto names them.
+// Metadata keys of error.proto.
 constexpr char kFlag[] = "flag";
 constexpr char kLimit[] = "limit";
-// A payload of the status, read again where the call ends.
+// Status payload, read at the end of the call.
 constexpr char kRetryPayload[] = "hulld/retry-ms";
 
 }  // namespace

@@ -10,24 +10,24 @@
 
 namespace hulld::server {
 
-// RESOURCE_EXHAUSTED because of the limit of a flag: "<what>; the limit is <limit> (--<flag>)",
+// Returns RESOURCE_EXHAUSTED for the limit of a flag: "<what>; the limit is <limit> (--<flag>)",
 // with the reason LIMIT_EXCEEDED. flag: without dashes, as in "max-hulls".
 absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag);
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag);
 
-// The same, with the reason OVERLOADED, for a limit that others use up at the moment: the same
-// request may succeed after `retry`.
+// As LimitExceeded with the reason OVERLOADED, for a limit used up by other calls at the moment:
+// the same request may succeed after `retry`.
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry);
 
-// LimitExceeded for a limit that core was given: core's words, followed by the flag.
+// Returns LimitExceeded for a limit passed to core: core's message, followed by the flag.
 absl::Status AtLimit(const absl::Status& status, uint64_t limit, const std::string& flag);
 
-// The flag whose limit caused this error, if one did.
+// Returns the flag of the limit that caused this error, if any.
 std::optional<std::string> ExceededLimit(const absl::Status& status);
 
-// When a request that met this error may be repeated, if soon.
+// Returns the delay after which a request with this error may be retried, if soon.
 std::optional<std::chrono::milliseconds> RetryAfter(const absl::Status& status);
 
 }  // namespace hulld::server

@@ -5,7 +5,7 @@
 
 namespace hulld::server {
 
-// What a client may call.
+// RPCs of the server.
 enum class Rpc {
   kCreateHull,
   kAppendPoints,
@@ -26,13 +26,13 @@ enum class Rpc {
   kGetBody,
   kListBodies,
   kDeleteBody,
-  // Reflection, which is a protocol of gRPC's own.
+  // gRPC's own reflection protocol.
   kServerReflectionInfo,
 };
 
 inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kServerReflectionInfo) + 1;
 
-// As in the contract: "CheckCollision".
+// Returns the name in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);
 
 }  // namespace hulld::server

@@ -45,7 +45,7 @@ grpc::StatusCode ToGrpc(absl::StatusCode code) {
     case absl::StatusCode::kDoNotUseReservedForFutureExpansionUseDefaultInSwitchInstead_:
       return grpc::StatusCode::UNKNOWN;
   }
-  HULLD_UNREACHABLE();  // a status of absl has one of these codes, whatever it was made of
+  HULLD_UNREACHABLE();  // the code of an absl::Status is always one of the above
 }
 
 grpc::Status ToGrpc(const absl::Status& status) {

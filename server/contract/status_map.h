@@ -8,13 +8,13 @@
 
 namespace hulld::server {
 
-// The status that a caller gets for a status of ours: same code, same message.
+// Converts a status for the caller: same code, same message.
 grpc::Status ToGrpc(const absl::Status& status);
 
-// The same for a code alone; also the google.rpc.Code of problems inside replies.
+// Converts a code; also yields the google.rpc.Code of problems inside replies.
 grpc::StatusCode ToGrpc(absl::StatusCode code);
 
-// The status with `prefix` before its message and its payloads kept; OK stays OK.
+// Returns the status with `prefix` before its message, keeping its payloads; OK stays OK.
 absl::Status Prefixed(const std::string& prefix, const absl::Status& status);
 
 }  // namespace hulld::server

@@ -6,7 +6,7 @@
 #include <chrono>
 #include <functional>
 
-// Work that ends early once should_stop says that nobody waits for its answer any more.
+// Early end of work after should_stop reports that no caller waits for its answer.
 namespace hulld::server {
 
 // should_stop: may be empty.
@@ -16,7 +16,7 @@ inline bool Stopped(const std::function<bool()>& should_stop) {
 
 inline absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
-// How soon a thread that waits for others notices that it is to stop; a choice.
+// Interval at which a waiting thread polls should_stop; a choice.
 constexpr std::chrono::milliseconds kStopPoll(20);
 
 }  // namespace hulld::server

@@ -21,7 +21,7 @@ absl::Status ValidateWriterId(const std::string& writer_id) {
                                                  Config::kMaxIdCharacters));
 }
 
-// One chunk that is being built and one that is decoded meanwhile.
+// One chunk being built and one being decoded.
 constexpr int kMaxUnbuilt = 2;
 constexpr int kMaxUncommitted = 64;
 
@@ -35,8 +35,8 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 }  // namespace
 
 BidiReactor* AppendStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards) {
-  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, shards)));
+                                 Registry& registry) {
+  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, registry)));
 }
 
 void AppendStream::Open() {
@@ -49,11 +49,11 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry().CloseAppend(*session_);
+    registry_.CloseAppend(*session_);
   });
 }
 
-// Called while gRPC still has the call.
+// Requires that gRPC still has the call.
 void AppendStream::LogApplied() {
   if (applied_chunks_ == 0) return;
   call().LogChange(
@@ -97,7 +97,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  registry().OpenAppend(
+  registry_.OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -117,7 +117,7 @@ void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;
   v1::AppendOpened* reply = opened_reply.mutable_opened();
-  EncodeHeader(registry().store(), opened->store_revision, reply->mutable_header());
+  EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
   reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
@@ -128,7 +128,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
     return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
   }
-  absl::StatusOr<Chunk> chunk = DecodeChunk(message, shards_.limits().max_points_per_chunk);
+  absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
   if (!chunk.ok()) return Fail(chunk.status());
   request().Clear();
   ++unbuilt_;
@@ -137,7 +137,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const auto self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   const auto arrival = std::chrono::steady_clock::now();
-  registry().Append(
+  registry_.Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
@@ -158,18 +158,18 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
     applied_points_ += result->counts.received;
     last_revision_ = result->hull_revision;
   }
-  if (call().ShouldStop()) return;  // the client is gone
-  // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
+  if (call().ShouldStop()) return;  // the client disconnected
+  // `opened` is sent before the first chunk is read, so a queued reply can only be an ack.
   if (LastWaiting() == nullptr) Queue({});
   HULLD_CHECK(!LastWaiting()->has_opened());
   v1::AppendAck* ack = LastWaiting()->mutable_ack();
-  EncodeHeader(registry().store(), result->store_revision, ack->mutable_header());
+  EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
     ack->set_outcome(result->already_applied ? v1::APPEND_OUTCOME_ALREADY_APPLIED
                                              : v1::APPEND_OUTCOME_APPLIED);
   }
-  ack->set_durability(EncodeDurability(registry().store().durability()));
+  ack->set_durability(EncodeDurability(registry_.store().durability()));
   ack->set_hull_revision(result->hull_revision);
   ack->set_vertex_count(result->vertex_count);
   AddTo(ack->mutable_counts(), result->counts);
@@ -188,7 +188,7 @@ void AppendStream::FailAt(uint64_t sequence, const absl::Status& status) {
     end_sequence_ = sequence;
     return Fail(status);
   }
-  // The client may have said all before the chunk was refused.
+  // The client may have half-closed before the chunk was refused.
   if (end()->ok() || end_sequence_ > sequence) EndInsteadWith(status);
 }
 

@@ -37,12 +37,12 @@ grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* c
 }
 
 BidiReactor* HullService::AppendPoints(grpc::CallbackServerContext* context) {
-  return AppendStream::Start(*context, admission_, shards_);
+  return AppendStream::Start(*context, admission_, registry_);
 }
 
 ReadReactor* HullService::ReplaceHull(grpc::CallbackServerContext* context,
                                       grpc::ByteBuffer* response) {
-  return ReplaceStream::Start(*context, admission_, shards_, writers_, response);
+  return ReplaceStream::Start(*context, admission_, registry_, writers_, response);
 }
 
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
@@ -50,16 +50,16 @@ grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* cont
                                                grpc::ByteBuffer* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
-        // An audit takes as long as the hull is large.
-        ShardPools& readers = call->request().audit() ? long_readers_ : readers_;
-        call->EndOn(readers.of(shards_.shard_of(call->request().hull_id())),
+        // The duration of an audit depends on the size of the hull.
+        WorkerPool& readers = call->request().audit() ? long_readers_ : readers_;
+        call->EndOn(readers,
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
 }
 
 WriteReactor* HullService::GetHullMesh(grpc::CallbackServerContext* context,
                                        const grpc::ByteBuffer* request) {
-  return MeshStream::Start(*context, admission_, shards_, long_readers_, *request);
+  return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
 }
 
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
@@ -68,11 +68,11 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
   return ListCall::Start(
       *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
         EndFresh(
-            shards_, readers_.of_several(), call,
+            registry_, readers_, call,
             [this, call](std::chrono::nanoseconds staleness) {
               return List(call->request(), call->call(), staleness, &call->response());
             },
-            !shards_.any_store().finds_records());
+            !registry_.store().finds_records());
       });
 }
 
@@ -85,7 +85,7 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
 
 WriteReactor* HullService::WatchHulls(grpc::CallbackServerContext* context,
                                       const grpc::ByteBuffer* request) {
-  return WatchStream::Start(*context, admission_, shards_, readers_.of_several(), *request);
+  return WatchStream::Start(*context, admission_, registry_, readers_, *request);
 }
 
 void HullService::Create(CreateCall* call) {
@@ -93,21 +93,20 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  Registry& registry = shards_.of(request.hull_id());
-  registry.Create(request.hull_id(), request.if_absent(),
-                  [&registry, call](const absl::StatusOr<CreateResult>& created) {
-                    if (!created.ok()) return call->End(created.status());
-                    const HullRecord& hull = created->hull;
-                    if (created->created) {
-                      call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
-                    }
-                    v1::CreateHullResponse& response = call->response();
-                    EncodeHeader(registry.store(), created->store_revision,
-                                 response.mutable_header());
-                    EncodeRecord(hull, response.mutable_hull());
-                    response.set_created(created->created);
-                    call->End(absl::OkStatus());
-                  });
+  registry_.Create(
+      request.hull_id(), request.if_absent(),
+      [this, call](const absl::StatusOr<CreateResult>& created) {
+        if (!created.ok()) return call->End(created.status());
+        const HullRecord& hull = created->hull;
+        if (created->created) {
+          call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
+        }
+        v1::CreateHullResponse& response = call->response();
+        EncodeHeader(registry_.store(), created->store_revision, response.mutable_header());
+        EncodeRecord(hull, response.mutable_hull());
+        response.set_created(created->created);
+        call->End(absl::OkStatus());
+      });
 }
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
@@ -115,21 +114,19 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return s;
   }
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request.freshness(), shards_.store_ids(), call.arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
   if (!freshness.ok()) return freshness.status();
-  const size_t shard = shards_.shard_of(request.hull_id());
-  Registry& registry = shards_.at(shard);
-  const auto resolved = registry.Resolve(
-      request.hull_id(), [&call] { return call.ShouldStop(); }, freshness->Of(shard));
+  const auto resolved = registry_.Resolve(
+      request.hull_id(), [&call] { return call.ShouldStop(); }, *freshness);
   if (!resolved.ok()) return resolved.status();
   const auto& [as_of, view] = *resolved;
-  EncodeHeader(registry.store(), as_of, response->mutable_header());
+  EncodeHeader(registry_.store(), as_of, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
   if (request.without_facets() && !request.audit()) return absl::OkStatus();
   const auto should_stop = [&call] { return call.ShouldStop(); };
-  const absl::StatusOr<const Hull*> hull = registry.Canonical(view, should_stop);
+  const absl::StatusOr<const Hull*> hull = registry_.Canonical(view, should_stop);
   if (!hull.ok()) return hull.status();
   if (!request.without_facets()) {
     response->set_edge_count((*hull)->edges().size());
@@ -148,14 +145,15 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
                                v1::ListHullsResponse* response) {
   const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
   if (!prefix.ok()) return prefix.status();
-  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
+  const absl::StatusOr<std::string> after =
+      DecodePageToken(Rpc::kListHulls, request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::StatusOr<ShardsHullPage> page =
-      shards_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                   [&call] { return call.ShouldStop(); });
+  const absl::StatusOr<HullPage> page =
+      registry_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                     [&call] { return call.ShouldStop(); });
   if (!page.ok()) return page.status();
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{page->revisions, staleness},
+  EncodeHeader(registry_.store(), AsOf{page->store_revision, staleness},
                response->mutable_header());
   for (const ListedHull& hull : page->hulls) {
     v1::HullInfo* info = response->add_hulls();
@@ -163,7 +161,8 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
     info->set_damaged(hull.damaged);
   }
   if (page->more) {
-    response->set_next_page_token(EncodePageToken(*prefix, page->hulls.back().record.hull_id));
+    response->set_next_page_token(
+        EncodePageToken(Rpc::kListHulls, *prefix, page->hulls.back().record.hull_id));
   }
   return absl::OkStatus();
 }
@@ -175,12 +174,11 @@ void HullService::Delete(DeleteCall* call) {
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  Registry& registry = shards_.of(request.hull_id());
-  registry.Delete(
-      request.hull_id(), if_revision, [&registry, call](const absl::StatusOr<uint64_t>& revision) {
+  registry_.Delete(
+      request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
         call->call().LogChange("hull deleted", {"hull", call->request().hull_id()}, *revision);
-        EncodeHeader(registry.store(), *revision, call->response().mutable_header());
+        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
         call->End(absl::OkStatus());
       });
 }

@@ -10,12 +10,12 @@
 #include "server/call/call.h"
 #include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
-#include "server/shards/shard_pools.h"
-#include "server/shards/shards.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// The generated service; its methods take and give bytes (message_bytes.h).
+// The generated service, with methods on bytes (message_bytes.h).
 using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
     v1::HullService::WithRawCallbackMethod_AppendPoints<
         v1::HullService::WithRawCallbackMethod_ReplaceHull<
@@ -26,17 +26,15 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
                             v1::HullService::WithRawCallbackMethod_WatchHulls<
                                 v1::HullService::Service>>>>>>>>;
 
-// hulld.v1.HullService: the contract in hull.proto over the shards. Calls that only look into
-// records are answered where they arrive; those that need a snapshot, on `readers`,
-// meshes and audits, which may take long, on `long_readers`, and replacements are built on
-// `writers`, as the registry builds chunks.
-// Watches look into records where they are told of changes, and read boxes from the store on
-// `readers`.
+// hulld.v1.HullService: implements the contract in hull.proto on the registry. Calls that only read
+// records are answered on arrival. Calls that need a snapshot run on `readers`; meshes and audits,
+// which may take long, on `long_readers`. Replacements are built on `writers`, as are chunks.
+// Watches read records on notification, and boxes from the store on `readers`.
 class HullService : public HullServiceOfBytes {
  public:
-  HullService(Shards& shards, Admission& admission, ShardPools& writers, ShardPools& readers,
-              ShardPools& long_readers)
-      : shards_(shards),
+  HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
+              WorkerPool& long_readers)
+      : registry_(registry),
         admission_(admission),
         writers_(writers),
         readers_(readers),
@@ -68,7 +66,7 @@ class HullService : public HullServiceOfBytes {
   using ListCall = UnaryCall<v1::ListHullsRequest, v1::ListHullsResponse>;
   using DeleteCall = UnaryCall<v1::DeleteHullRequest, v1::DeleteHullResponse>;
 
-  // Create and Delete end the call once the change is committed.
+  // Create and Delete end the call after the change is committed.
   void Create(CreateCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
@@ -76,11 +74,11 @@ class HullService : public HullServiceOfBytes {
                     std::chrono::nanoseconds staleness, v1::ListHullsResponse* response);
   void Delete(DeleteCall* call);
 
-  Shards& shards_;
+  Registry& registry_;
   Admission& admission_;
-  ShardPools& writers_;
-  ShardPools& readers_;
-  ShardPools& long_readers_;
+  WorkerPool& writers_;
+  WorkerPool& readers_;
+  WorkerPool& long_readers_;
 };
 
 }  // namespace hulld::server

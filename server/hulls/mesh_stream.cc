@@ -21,14 +21,14 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 WriteReactor* MeshStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                Shards& shards, ShardPools& readers,
+                                Registry& registry, WorkerPool& readers,
                                 const grpc::ByteBuffer& request) {
   return Launch(
-      std::shared_ptr<MeshStream>(new MeshStream(context, admission, shards, readers, request)));
+      std::shared_ptr<MeshStream>(new MeshStream(context, admission, registry, readers, request)));
 }
 
 void MeshStream::Open() {
-  RunOn(readers_.of(shards_.shard_of(request().hull_id())), [this] {
+  RunOn(readers_, [this] {
     const absl::Status made = MakeHeader();
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
     if (!made.ok()) return FinishCall(made);
@@ -40,14 +40,12 @@ absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(request().freshness(), shards_.store_ids(), call().arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry_.store(), call().arrival());
   if (!freshness.ok()) return freshness.status();
-  const size_t shard = shards_.shard_of(request().hull_id());
-  Registry& registry = shards_.at(shard);
-  const auto resolved = registry.Resolve(request().hull_id(), should_stop, freshness->Of(shard));
+  const auto resolved = registry_.Resolve(request().hull_id(), should_stop, *freshness);
   if (!resolved.ok()) return resolved.status();
-  const absl::StatusOr<const Hull*> hull = registry.Canonical(resolved->second, should_stop);
+  const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();
   mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
   v1::MeshHeader* header = reply().mutable_header();
@@ -55,7 +53,7 @@ absl::Status MeshStream::MakeHeader() {
     const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry.store(), resolved->first, header->mutable_header());
+  EncodeHeader(registry_.store(), resolved->first, header->mutable_header());
   EncodeRecord(resolved->second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());
@@ -111,7 +109,7 @@ void MeshStream::FillVertices(v1::MeshVertices* message) {
   }
 }
 
-// Whole facets only; one that is larger than a message makes a message of its own.
+// Adds only whole facets; a facet larger than a message gets its own message.
 void MeshStream::FillFacets(v1::MeshFacets* message) {
   while (next_facet_ < mesh_->facet_count()) {
     const auto facet = mesh_->facet(next_facet_);

@@ -10,23 +10,24 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/shards/shard_pools.h"
-#include "server/shards/shards.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// One GetHullMesh call: a header, then pieces of one snapshot of the hull.
+// A GetHullMesh call: a header, then pieces of a single snapshot of the hull.
 class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMeshResponse>,
                                         v1::GetHullMeshRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, ShardPools& readers, const grpc::ByteBuffer& request);
+                             Registry& registry, WorkerPool& readers,
+                             const grpc::ByteBuffer& request);
 
  private:
-  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-             ShardPools& readers, const grpc::ByteBuffer& request)
+  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+             WorkerPool& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kGetHullMesh),
-        shards_(shards),
+        registry_(registry),
         readers_(readers) {}
 
   void Open() override;
@@ -34,14 +35,14 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
 
   absl::Status MakeHeader();
   absl::Status Simplify(const v1::Simplification& simplification, v1::MeshHeader* header);
-  // Fills the reply with the next piece; false when all are sent.
+  // Fills the reply with the next piece; returns false after the last one.
   bool NextMessage();
   void FillVertices(v1::MeshVertices* message);
   void FillFacets(v1::MeshFacets* message);
 
-  Shards& shards_;
-  ShardPools& readers_;
-  // What is sent: the hull itself, or what stands for it.
+  Registry& registry_;
+  WorkerPool& readers_;
+  // The hull to send, or its stand-in.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;
   size_t next_facet_ = 0;

@@ -13,17 +13,18 @@
 namespace hulld::server {
 
 ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Shards& shards, ShardPools& writers, grpc::ByteBuffer* response) {
+                                  Registry& registry, WorkerPool& writers,
+                                  grpc::ByteBuffer* response) {
   return Launch(std::shared_ptr<ReplaceStream>(
-      new ReplaceStream(context, admission, shards, writers, response)));
+      new ReplaceStream(context, admission, registry, writers, response)));
 }
 
 void ReplaceStream::OnNoMessage(const absl::Status& why) {
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!why.ok()) return FinishCall(why);
   const bool opened = replacement_.builder != nullptr;
-  // Only the empty block tells a client that has said all from one that is gone.
-  if (opened && complete_) return RunOn(writers(), [this] { Commit(); });
+  // Only the empty block distinguishes a complete request from a disconnected client.
+  if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
   FinishCall(absl::InvalidArgumentError(
       opened ? "the stream ended without an empty block of points, which says that nothing is "
                "missing; the hull is as it was"
@@ -35,7 +36,7 @@ void ReplaceStream::OnMessage() {
   ++messages_;
   if (absl::Status s = HandleMessage(); !s.ok()) return FinishCall(s);
   if (!request().has_points() || complete_) return Read();
-  RunOn(writers(), [this, arrival = std::chrono::steady_clock::now()] {
+  RunOn(writers_, [this, arrival = std::chrono::steady_clock::now()] {
     const absl::Status built = Build();
     if (!built.ok()) return FinishCall(OrStopped(built));
     call().EndMessage(arrival);
@@ -43,7 +44,7 @@ void ReplaceStream::OnMessage() {
   });
 }
 
-// All but the building.
+// Does all except building.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
   switch (request().message_case()) {
@@ -75,7 +76,7 @@ absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
 
 absl::Status ReplaceStream::Build() {
   const std::string name = absl::StrCat("message ", messages_, ": ");
-  const Limits& limits = shards_.limits();
+  const Limits& limits = registry_.limits();
   const absl::StatusOr<std::vector<Vector>> points =
       DecodePoints(request().points(), limits.max_points_per_chunk);
   if (!points.ok()) return Prefixed(name, points.status());
@@ -85,7 +86,8 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = shards_.CheckMemory(MemoryUse::kWriting); !s.ok()) return Prefixed(name, s);
+  if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())
+    return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call().ShouldStop(); }});
@@ -100,11 +102,10 @@ absl::Status ReplaceStream::Build() {
 }
 
 void ReplaceStream::Commit() {
-  // The registry answers on another thread, when the change is committed.
-  Registry& registry = shards_.of(replacement_.hull_id);
-  const Store& store = registry.store();
+  // The registry answers on another thread after the commit.
+  const Store& store = registry_.store();
   const auto done = [this, &store](const absl::StatusOr<ReplaceResult>& result) {
-    // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
+    // Counted twice since the registry took it, which at worst evicts a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
     call().LogChange(result->created ? "hull created" : "hull replaced",
@@ -118,7 +119,7 @@ void ReplaceStream::Commit() {
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   };
-  registry.Replace(std::move(replacement_), done);
+  registry_.Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

@@ -11,28 +11,27 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shard_pools.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// One ReplaceHull call: builds a hull apart, message by message on a thread of the writers, and
-// hands it to the registry when the client has said all. One thing at a time is under way, a read
-// or the building of what was read, so the state needs no mutex.
+// A ReplaceHull call: builds a hull aside, message by message on a writer thread, and passes it to
+// the registry when the client has sent everything. One operation is in flight, a read or a build,
+// so the state needs no mutex.
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
   // writers: the threads that build. response: as gRPC holds it until the call ends.
   static ReadReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Shards& shards, ShardPools& writers, grpc::ByteBuffer* response);
+                            Registry& registry, WorkerPool& writers, grpc::ByteBuffer* response);
 
  private:
-  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                ShardPools& writers, grpc::ByteBuffer* response)
+  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+                WorkerPool& writers, grpc::ByteBuffer* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
-        shards_(shards),
+        registry_(registry),
         writers_(writers),
         response_(response),
-        charge_(shards.memory(), MemoryUse::kWriting) {}
+        charge_(registry.memory(), MemoryUse::kWriting) {}
 
   void Open() override { Read(); }
   void OnMessage() override;
@@ -42,11 +41,9 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   absl::Status HandleOpen(const v1::ReplaceOpen& open);
   absl::Status Build();
   void Commit();
-  // Once the hull is named.
-  WorkerPool& writers() { return writers_.of(shards_.shard_of(replacement_.hull_id)); }
 
-  Shards& shards_;
-  ShardPools& writers_;
+  Registry& registry_;
+  WorkerPool& writers_;
   grpc::ByteBuffer* const response_;
   // Covers the builder until the registry has it.
   MemoryCharge charge_;

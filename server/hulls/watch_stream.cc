@@ -52,42 +52,31 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
   EncodeVector(change.high, event->mutable_box_max());
 }
 
-// Whether a shard is further than when that was told. Both are of the same shards, or `told` is of
-// none.
-bool HasMovedOn(const ShardRevisions& told, const ShardRevisions& now) {
-  for (size_t i = 0; i < now.size(); ++i) {
-    if (now[i].revision > (told.empty() ? 0 : told[i].revision)) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards, WorkerPool& readers,
+                                 Registry& registry, WorkerPool& readers,
                                  const grpc::ByteBuffer& request) {
-  return Launch(
-      std::shared_ptr<WatchStream>(new WatchStream(context, admission, shards, readers, request)));
+  return Launch(std::shared_ptr<WatchStream>(
+      new WatchStream(context, admission, registry, readers, request)));
 }
 
 void WatchStream::Open() {
   const absl::StatusOr<WatchTarget> target = ReadTarget();
   if (!target.ok()) return FinishCall(target.status());
-  const absl::StatusOr<ShardsWatchStart> start = ReadStart();
+  const absl::StatusOr<WatchStart> start = ReadStart();
   if (!start.ok()) return FinishCall(start.status());
   RunOn(readers_, [this, target = *target, start = *start] { Begin(target, start); });
 }
 
 // What the server has acknowledged by now, or another one over the same store, is told.
-void WatchStream::Begin(const WatchTarget& target, const ShardsWatchStart& start) {
+void WatchStream::Begin(const WatchTarget& target, const WatchStart& start) {
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::Status fresh = target.ids.empty()
-                                 ? shards_.AwaitOthers(should_stop)
-                                 : shards_.of(target.ids.front()).AwaitOthers(should_stop);
+  const absl::Status fresh = registry_.AwaitOthers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
-  absl::StatusOr<std::shared_ptr<ShardsWatch>> watch =
-      shards_.OpenWatch(target, start, [this, self = shared_from_this()] { TellNext(); });
+  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch =
+      registry_.OpenWatch(target, start, [this, self = shared_from_this()] { TellNext(); });
   if (!watch.ok()) return FinishCall(watch.status());
   {
     const std::lock_guard lock(watch_mutex_);
@@ -110,35 +99,24 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   return WatchTarget{"", {request().hull_id()}, request().bodies()};
 }
 
-absl::StatusOr<ShardsWatchStart> WatchStream::ReadStart() const {
+absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
   if (request().after_revision() > 0 && request().store_id().empty()) {
     return absl::InvalidArgumentError(
         "after_revision needs store_id; give that of the same header");
   }
-  ShardsWatchStart start = {.tell_present = true};
-  if (request().after_revision() > 0) {
-    if (!request().after().empty()) {
-      return absl::InvalidArgumentError(
-          "after_revision and after are both set; give what the last header names");
-    }
-    start.after.push_back({request().store_id(), request().after_revision()});
-  }
-  for (const v1::ShardRevision& after : request().after()) {
-    start.after.push_back({after.store_id(), after.revision()});
-  }
-  return start;
+  return WatchStart{true, request().after_revision(), request().store_id()};
 }
 
 // Sends what is next, or has the registry call this again. One at a time runs, or is due.
 void WatchStream::TellNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    absl::StatusOr<ShardsWatchPiece> piece = watch_->TakeChanges();
+    absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
     if (!piece.ok()) return FinishCall(piece.status());
     // It may be called again by now.
     if (piece->waits) return;
     is_synced_ = piece->synced || (is_synced_ && !piece->anew);
-    const bool is_mark = HasMovedOn(sent_revisions_, piece->revisions);
+    const bool is_mark = piece->revision > sent_revision_;
     if (piece->changes.empty() && !piece->synced && !piece->anew && !is_mark) continue;
     if (!std::ranges::any_of(piece->changes, WantsBox)) return Tell(*piece);
     return RunOn(readers_, [this, loaded = *std::move(piece)]() mutable {
@@ -152,15 +130,13 @@ void WatchStream::TellNext() {
 // Reads what is missing from the store: the box of each hull as it is by now, and nothing for one
 // that is gone by now, which is told later. One hull after another, so that they need not be in
 // memory together.
-absl::Status WatchStream::LoadBoxes(ShardsWatchPiece* piece) {
+absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
   std::vector<HullChange> loaded;
   loaded.reserve(piece->changes.size());
   for (HullChange& change : piece->changes) {
     if (WantsBox(change)) {
-      const auto resolved = shards_.at(piece->shard)
-                                .Resolve(
-                                    change.record.hull_id, [this] { return call().ShouldStop(); },
-                                    Freshness::OfWhatIsHere());
+      const auto resolved = registry_.Resolve(
+          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::OfWhatIsHere());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
       if (!status.ok() && !absl::IsDataLoss(status)) return status;
@@ -179,16 +155,12 @@ absl::Status WatchStream::LoadBoxes(ShardsWatchPiece* piece) {
   return absl::OkStatus();
 }
 
-void WatchStream::Tell(const ShardsWatchPiece& piece) {
-  sent_revisions_ = piece.revisions;
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{piece.revisions}, reply().mutable_header());
+void WatchStream::Tell(const WatchPiece& piece) {
+  sent_revision_ = piece.revision;
+  EncodeHeader(registry_.store(), piece.revision, reply().mutable_header());
   reply().set_synced(piece.synced);
   reply().set_anew(piece.anew);
-  for (const HullChange& change : piece.changes) {
-    v1::HullEvent* const event = reply().add_events();
-    EncodeEvent(change, event);
-    if (piece.revisions.size() > 1) event->set_store_id(shards_.store_ids()[piece.shard]);
-  }
+  for (const HullChange& change : piece.changes) EncodeEvent(change, reply().add_events());
   Send();
 }
 
@@ -204,23 +176,23 @@ void WatchStream::OnCancel() {
 }
 
 void WatchStream::Nudge() {
-  std::shared_ptr<ShardsWatch> watch;
+  std::shared_ptr<ChangeWatch> watch;
   {
     const std::lock_guard lock(watch_mutex_);
     watch = watch_;
   }
-  if (watch != nullptr) watch->Nudge();
+  if (watch != nullptr) registry_.NudgeWatch(watch);
 }
 
 void WatchStream::OnDone() {
   const auto self = shared_from_this();
   PulledStream::OnDone();
-  std::shared_ptr<ShardsWatch> watch;
+  std::shared_ptr<ChangeWatch> watch;
   {
     const std::lock_guard lock(watch_mutex_);
     watch = std::exchange(watch_, nullptr);
   }
-  if (watch != nullptr) watch->Close();
+  if (watch != nullptr) registry_.CloseWatch(watch);
 }
 
 }  // namespace hulld::server

@@ -12,23 +12,24 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// One WatchHulls call: takes what is to be told next from the shards, sends it, and comes for
+// One WatchHulls call: takes what is to be told next from the registry, sends it, and comes for
 // more once that was written. When there is nothing, the registry calls back; no thread waits.
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request);
+                             Registry& registry, WorkerPool& readers,
+                             const grpc::ByteBuffer& request);
 
  private:
-  WatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+  WatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kWatchHulls),
-        shards_(shards),
+        registry_(registry),
         readers_(readers) {}
 
   void Open() override;
@@ -37,24 +38,24 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
-  void Begin(const WatchTarget& target, const ShardsWatchStart& start);
+  void Begin(const WatchTarget& target, const WatchStart& start);
   absl::StatusOr<WatchTarget> ReadTarget() const;
-  absl::StatusOr<ShardsWatchStart> ReadStart() const;
+  absl::StatusOr<WatchStart> ReadStart() const;
   void TellNext();
-  absl::Status LoadBoxes(ShardsWatchPiece* piece);
-  void Tell(const ShardsWatchPiece& piece);
+  absl::Status LoadBoxes(WatchPiece* piece);
+  void Tell(const WatchPiece& piece);
   // Has it look whether it should stop.
   void Nudge();
 
-  Shards& shards_;
+  Registry& registry_;
   WorkerPool& readers_;
   // Guards the beginning and the end of watch_ against threads that cancel. Between these it stays.
   std::mutex watch_mutex_;
-  std::shared_ptr<ShardsWatch> watch_;
+  std::shared_ptr<ChangeWatch> watch_;
   // What was there has been told.
   bool is_synced_ = false;
-  // The revisions in the header that was sent last.
-  ShardRevisions sent_revisions_;
+  // The revision in the header that was sent last.
+  uint64_t sent_revision_ = 0;
 };
 
 }  // namespace hulld::server

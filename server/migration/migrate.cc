@@ -3,8 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <array>
 #include <chrono>
 #include <filesystem>
 #include <memory>
@@ -15,9 +13,7 @@
 #include "server/access/secret_file.h"
 #include "server/contract/status_map.h"
 #include "server/migration/migration.h"
-#include "server/migration/sharded_source.h"
 #include "server/process/log.h"
-#include "server/shards/slots.h"
 #include "server/store/data_directory.h"
 #include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/postgres_store.h"
@@ -29,28 +25,22 @@ namespace {
 
 constexpr int kExitFailed = 1;
 constexpr int kExitRefused = 2;
-// Between two lines that say how far it is.
+// Interval between progress lines.
 constexpr std::chrono::seconds kPause{10};
 
-// One end of the copy, or a shard of it, as options name it. One of the three is set.
+// Source or destination of the copy, as named by options. One of the two members is set.
 struct Place {
   std::string data_dir;
   std::string conninfo_file;
-  std::string shards_file = {};
-  // The slots of a shard, as PostgresOptions::slots.
-  std::string slots = {};
 
-  bool is_one() const {
-    return 1 == !data_dir.empty() + !conninfo_file.empty() + !shards_file.empty();
-  }
+  bool is_one() const { return data_dir.empty() != conninfo_file.empty(); }
   bool operator==(const Place&) const = default;
   std::string Describe() const {
-    if (!shards_file.empty()) return "shards (" + shards_file + ")";
     return data_dir.empty() ? "PostgreSQL (" + conninfo_file + ")" : data_dir;
   }
 };
 
-// What opening a store at a place says, in the words of this program.
+// Rewords the error of opening a store for this program.
 absl::Status Explain(const Place& place, const absl::Status& status) {
   if (status.ok()) return status;
   if (absl::IsCancelled(status)) {
@@ -64,12 +54,12 @@ absl::StatusOr<std::string> ReadConninfo(const Place& place, const char* option)
   return ReadSecretFile(place.conninfo_file, option);
 }
 
-// Opening a store that is not there would make one.
+// Opening a missing store would create it.
 absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data_dir) {
   RocksDbOptions options;
   options.data_dir = data_dir;
   options.read_only = true;
-  // Where it cannot be looked at, opening it says why.
+  // If the directory is inaccessible, opening the store reports the reason.
   std::error_code error;
   if (!std::filesystem::exists(DatabaseDirectory(data_dir), error) && !error) {
     return absl::NotFoundError("there is no store of hulld");
@@ -81,11 +71,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data
   return *std::move(store);
 }
 
-absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& conninfo,
-                                                          const std::string& slots) {
+absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& conninfo) {
   PostgresOptions options;
   options.conninfo = conninfo;
-  options.slots = slots;
   options.should_stop = [] { return true; };
   const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
   if (!parsed.ok()) return parsed.status();
@@ -106,16 +94,16 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& con
 absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
   if (!place.data_dir.empty()) return OpenRocksDbSource(place.data_dir);
   const auto conninfo = ReadConninfo(place, "--from-postgres-conninfo-file");
-  return conninfo.ok() ? OpenPostgresSource(*conninfo, place.slots) : conninfo.status();
+  return conninfo.ok() ? OpenPostgresSource(*conninfo) : conninfo.status();
 }
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenTarget(const Place& place) {
   if (!place.data_dir.empty()) return OpenRocksDbTarget(place.data_dir);
   const auto conninfo = ReadConninfo(place, "--to-postgres-conninfo-file");
-  return conninfo.ok() ? OpenPostgresTarget(*conninfo, place.slots) : conninfo.status();
+  return conninfo.ok() ? OpenPostgresTarget(*conninfo) : conninfo.status();
 }
 
-// Says how far it is, now and then.
+// Prints progress at intervals.
 class ProgressLines {
  public:
   explicit ProgressLines(std::ostream& err) : err_(err) {}
@@ -144,7 +132,8 @@ std::string Describe(const MigrationCounts& counts) {
   return absl::StrCat(text, "; ", counts.resumed, " of these were there from an earlier run");
 }
 
-// What is compared is what a server will open, nothing that is still in our memory.
+// Reopens the target, so that the comparison reads the data that a server will open, and nothing
+// that is still in memory.
 absl::Status CompareAnew(const Place& to, const Migration& migration,
                          absl::StatusOr<std::unique_ptr<MigrationTarget>>* target) {
   target->value().reset();
@@ -158,126 +147,40 @@ absl::Status CompareAnew(const Place& to, const Migration& migration,
   return migration.Compare(target->value()->store());
 }
 
-// The places of the shards, and which of them has which slot; for a place that is not several,
-// itself.
-struct Places {
-  std::vector<Place> all;
-  std::array<uint16_t, kSlots> shard_of{};
-
-  size_t IndexOf(const std::string& id) const { return shard_of[SlotOf(id)]; }
-};
-
-absl::StatusOr<Places> PlacesOf(const Place& place, const char* option) {
-  if (place.shards_file.empty()) return Places{{place}, {}};
-  const absl::StatusOr<ShardFile> file = ReadShardFile(place.shards_file, option);
-  if (!file.ok()) return file.status();
-  Places places;
-  places.shard_of = file->shard_of;
-  for (const ShardFile::Shard& shard : file->shards) {
-    places.all.push_back({"", shard.conninfo_file, "", shard.slots});
-  }
-  return places;
-}
-
-// What is left to do of one store, once it holds what it is to hold.
-struct Copied {
-  MigrationSource source;
-  bool is_finished = false;
-};
-
-// Whether an earlier run finished this shard and was ended before it finished all.
-absl::StatusOr<bool> IsFinished(const Migration& migration, MigrationTarget& target) {
-  const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
-  if (!mark.ok()) return mark.status();
-  const uint64_t revision = target.store().revision();
-  if (mark->has_value() || revision == 0 || revision != migration.source().revision) return false;
-  const absl::Status compared = migration.Compare(target.store());
-  if (compared.ok() || absl::IsDataLoss(compared)) return compared.ok();
-  return compared;
-}
-
-// Copies into one store what belongs there, and compares; what is left is to finish.
-absl::StatusOr<Copied> CopyInto(const Place& from, const Place& to, bool is_of_several,
-                                Store& source,
-                                absl::StatusOr<std::unique_ptr<MigrationTarget>>* target,
-                                std::ostream& out, std::ostream& err) {
-  ProgressLines lines(err);
-  absl::StatusOr<Migration> migration =
-      Migration::Read(source, [&lines](uint64_t done, uint64_t all) { lines.Tell(done, all); });
-  if (!migration.ok()) return Explain(from, migration.status());
-  if (is_of_several) {
-    const absl::StatusOr<bool> is_finished = IsFinished(*migration, ***target);
-    if (!is_finished.ok()) return Explain(to, is_finished.status());
-    if (*is_finished) return Copied{migration->source(), true};
-  }
-  absl::StatusOr<MigrationCounts> counts = migration->CopyTo(***target);
-  if (!counts.ok()) return is_of_several ? Explain(to, counts.status()) : counts.status();
-  out << "copied store " << migration->source().store_id << " at revision "
-      << migration->source().revision << ": " << Describe(*counts)
-      << (is_of_several ? ", to " + to.Describe() : "") << std::endl;
-  lines.SetPhase("compared");
-  absl::Status compared = CompareAnew(to, *migration, target);
-  if (absl::IsDataLoss(compared) && counts->resumed > 0) {
-    // Points that move no vertex leave the store's revision as it is, so the source may have
-    // changed unseen since the earlier run.
-    out << std::string(compared.message()) << "; copying it anew" << std::endl;
-    if (absl::Status s = (**target)->Begin(migration->source()); !s.ok()) return s;
-    lines.SetPhase("copied");
-    counts = migration->CopyTo(***target);
-    if (!counts.ok()) return counts.status();
-    lines.SetPhase("compared");
-    compared = CompareAnew(to, *migration, target);
-  }
-  if (!compared.ok()) return compared;
-  return Copied{migration->source(), false};
-}
-
 absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ostream& err) {
   if (from == to) {
     return absl::InvalidArgumentError(
         absl::StrCat("source and destination are both ", from.Describe()));
   }
-  const absl::StatusOr<Places> sources = PlacesOf(from, "--from-postgres-shards");
-  if (!sources.ok()) return sources.status();
-  const absl::StatusOr<Places> targets = PlacesOf(to, "--to-postgres-shards");
-  if (!targets.ok()) return targets.status();
-  std::vector<std::unique_ptr<Store>> stores;
-  std::vector<Store*> pointers;
-  for (const Place& place : sources->all) {
-    absl::StatusOr<std::unique_ptr<Store>> store = OpenSource(place);
-    if (!store.ok()) return Explain(place, store.status());
-    pointers.push_back(store->get());
-    stores.push_back(*std::move(store));
+  const absl::StatusOr<std::unique_ptr<Store>> source = OpenSource(from);
+  if (!source.ok()) return Explain(from, source.status());
+  absl::StatusOr<std::unique_ptr<MigrationTarget>> target = OpenTarget(to);
+  if (!target.ok()) return Explain(to, target.status());
+  ProgressLines lines(err);
+  absl::StatusOr<Migration> migration =
+      Migration::Read(**source, [&lines](uint64_t done, uint64_t all) { lines.Tell(done, all); });
+  if (!migration.ok()) return Explain(from, migration.status());
+  absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
+  if (!counts.ok()) return counts.status();
+  out << "copied store " << migration->source().store_id << " at revision "
+      << migration->source().revision << ": " << Describe(*counts) << std::endl;
+  lines.SetPhase("compared");
+  absl::Status compared = CompareAnew(to, *migration, &target);
+  if (absl::IsDataLoss(compared) && counts->resumed > 0) {
+    // Points that move no vertex do not change the store's revision, so the source may have changed
+    // undetected since the earlier run.
+    out << std::string(compared.message()) << "; copying it anew" << std::endl;
+    if (absl::Status s = (*target)->Begin(migration->source()); !s.ok()) return s;
+    lines.SetPhase("copied");
+    counts = migration->CopyTo(**target);
+    if (!counts.ok()) return counts.status();
+    lines.SetPhase("compared");
+    compared = CompareAnew(to, *migration, &target);
   }
-  // All are claimed before anything is copied.
-  std::vector<absl::StatusOr<std::unique_ptr<MigrationTarget>>> opened;
-  for (const Place& place : targets->all) {
-    opened.push_back(OpenTarget(place));
-    if (!opened.back().ok()) return Explain(place, opened.back().status());
-  }
-  std::vector<Copied> copied;
-  for (size_t i = 0; i < opened.size(); ++i) {
-    ShardedSource source(
-        pointers, [&](const std::string& id) { return targets->IndexOf(id) == i; },
-        [&](const std::string& id) { return sources->IndexOf(id); });
-    const absl::StatusOr<Copied> done =
-        CopyInto(from, targets->all[i], opened.size() > 1, source, &opened[i], out, err);
-    if (!done.ok()) {
-      // Some of the destination is filled by now, which is no refusal.
-      const bool has_filled =
-          std::ranges::any_of(copied, [](const Copied& one) { return !one.is_finished; });
-      return has_filled ? absl::AbortedError(done.status().message()) : done.status();
-    }
-    copied.push_back(*done);
-  }
-  std::string ids;
-  for (size_t i = 0; i < opened.size(); ++i) {
-    if (!copied[i].is_finished) {
-      if (absl::Status s = (*opened[i])->Finish(copied[i].source); !s.ok()) return s;
-    }
-    absl::StrAppend(&ids, i == 0 ? "" : ", ", (*opened[i])->store().id());
-  }
-  out << "compared: every record is the same; " << to.Describe() << " is store " << ids << " now\n";
+  if (!compared.ok()) return compared;
+  if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
+  out << "compared: every record is the same; " << to.Describe() << " is store "
+      << (*target)->store().id() << " now\n";
   return absl::OkStatus();
 }
 
@@ -293,13 +196,9 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
   app.add_option("--from-data-dir", from.data_dir, "The source: a directory of --store=rocksdb");
   app.add_option("--from-postgres-conninfo-file", from.conninfo_file,
                  "The source: a database of --store=postgres");
-  app.add_option("--from-postgres-shards", from.shards_file,
-                 "The source: the databases of --postgres-shards");
   app.add_option("--to-data-dir", to.data_dir, "The destination: a directory, which is made");
   app.add_option("--to-postgres-conninfo-file", to.conninfo_file,
                  "The destination: an empty database");
-  app.add_option("--to-postgres-shards", to.shards_file,
-                 "The destination: empty databases, by slots of the IDs");
   app.footer(
       "A run that was ended is gone on with by the same command. Revisions and writers' sequences "
       "are\nkept; the copy is another store, with an ID of its own.\n"
@@ -312,9 +211,8 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
     return app.exit(error, out, err) == 0 ? 0 : kExitRefused;
   }
   if (!from.is_one() || !to.is_one()) {
-    err << "hulld migrate: name one source (--from-data-dir, --from-postgres-conninfo-file or "
-           "--from-postgres-shards) and one destination (--to-data-dir, "
-           "--to-postgres-conninfo-file or --to-postgres-shards)\n";
+    err << "hulld migrate: name one source (--from-data-dir or --from-postgres-conninfo-file) and "
+           "one destination (--to-data-dir or --to-postgres-conninfo-file)\n";
     return kExitRefused;
   }
   SetUpLog("warn", "text");

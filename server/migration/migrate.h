@@ -8,10 +8,9 @@
 namespace hulld::server {
 
 // 'hulld migrate': copies a store that no server has open to another place, of another kind or the
-// same, and compares the two. arguments: those after "migrate". Prints what it did to `out`, and
-// what is wrong to `err`. Returns the exit status of the process: 0 when all is copied and the
-// same, 1 when it failed on its way and can be run again, 2 when it was refused and changed
-// nothing.
+// same, and compares the two. arguments: the arguments after "migrate". Prints progress and results
+// to `out`, and errors to `err`. Returns the exit status of the process: 0 if everything is copied
+// and equal, 1 if it failed midway and can be run again, 2 if it was refused and changed nothing.
 int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace hulld::server

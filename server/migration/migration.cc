@@ -11,17 +11,16 @@
 namespace hulld::server {
 namespace {
 
-// A transaction ends once it has this many vertices (24 MB), or changes of hulls and bodies. A
-// choice.
+// Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. A choice.
 constexpr size_t kMostVertices = 1'000'000;
 constexpr size_t kMostChanges = 1000;
 
-// Changes that go to the target together.
+// Changes sent to the target together.
 class Batch {
  public:
   explicit Batch(MigrationTarget& target) : target_(target) {}
 
-  // All of one hull, or a body.
+  // Adds all changes of a hull, or of a body.
   absl::Status Add(std::vector<Change> changes) {
     for (Change& change : changes) {
       vertices_ += change.vertices.size();
@@ -53,7 +52,7 @@ absl::Status Differs(const std::string& id, const std::string& what) {
 const std::string& IdOf(const StoredHull& hull) { return hull.record.hull_id; }
 const std::string& IdOf(const StoredBody& body) { return body.record.body_id; }
 
-// Whether both have the same IDs, and of each pair the same. Both are in byte order of the IDs.
+// OK if both have the same IDs with equal values. Requires byte order of the IDs.
 template <typename Stored, typename Same>
 absl::Status CompareAll(const std::vector<Stored>& expected, const std::vector<Stored>& found,
                         const Same& same) {
@@ -73,8 +72,7 @@ bool HasSameBits(const Vector& a, const Vector& b) {
   });
 }
 
-// The greatest IDs of the hulls and of the bodies that a store has; the copied ones are all up to
-// there.
+// Greatest IDs of a store's hulls and bodies; the copied ones are contiguous up to these.
 struct LastCopied {
   std::string hull_id;
   std::string body_id;
@@ -120,8 +118,8 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   return migration;
 }
 
-// If a migration has begun to fill the target from this source as it is now, it is continued. A
-// target that was filled from the source as it was before is begun anew.
+// Continues a migration that has begun to fill the target from the present state of this source.
+// Restarts one from an earlier state.
 absl::Status Migration::Prepare(MigrationTarget& target) {
   const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
   if (!mark.ok()) return mark.status();
@@ -190,7 +188,7 @@ absl::Status Migration::CopyBodies(MigrationTarget& target, MigrationCounts* cou
   return batch.Flush();
 }
 
-// What a hull has become, as changes: all its vertices as one base, and each writer.
+// Returns the state of a hull as changes: all vertices as one base, and each writer.
 absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull) const {
   absl::StatusOr<std::vector<Vector>> vertices = source_->LoadVertices(hull);
   if (!vertices.ok()) return vertices.status();

@@ -18,30 +18,30 @@ namespace hulld::server {
 struct MigrationCounts {
   uint64_t hulls = 0;
   uint64_t bodies = 0;
-  // How many of these hulls and bodies an earlier run had copied.
+  // Number of these hulls and bodies copied by an earlier run.
   uint64_t resumed = 0;
 };
 
-// Copies all that a store holds: hulls with their revisions, counts and vertices, their writers'
-// sequences, and bodies; then compares. What it reads of hulls and bodies at once, but for
-// vertices, is kept in memory: some 200 bytes a hull.
+// Copies the contents of a store: hulls with their revisions, counts and vertices, their writers'
+// sequences, and bodies; then compares. Keeps all records of hulls and bodies, without vertices, in
+// memory: some 200 bytes per hull.
 class Migration {
  public:
-  // Told how many of how many hulls and bodies are done.
+  // Receives the number of hulls and bodies done, and the total.
   using Progress = std::function<void(uint64_t done, uint64_t all)>;
 
-  // Reads what hulls and bodies there are. The source must outlive this, and must not change.
-  // DATA_LOSS naming the first hull or body that is damaged.
+  // Reads the records of hulls and bodies. The source must outlive this, and must not change.
+  // DATA_LOSS naming the first damaged hull or body.
   static absl::StatusOr<Migration> Read(Store& source, Progress progress);
 
-  // Copies what the target does not have yet, in byte order of the IDs, all of a hull at once; so a
-  // run that was ended anywhere can be continued. FAILED_PRECONDITION, without changing anything:
-  // the target is a store of its own, or of a migration from another store. DATA_LOSS: a hull of
-  // the source is damaged. Others: as the target's.
+  // Copies the hulls and bodies missing in the target, in byte order of the IDs, each as a whole,
+  // so that a run interrupted at any point can be continued. FAILED_PRECONDITION, without any
+  // change: the target is a complete store, or of a migration from another store. DATA_LOSS: a hull
+  // of the source is damaged. Other errors: as the target's.
   absl::StatusOr<MigrationCounts> CopyTo(MigrationTarget& target);
 
-  // Reads everything back, from both. DATA_LOSS naming the first hull or body that is not the same:
-  // its record and revisions, its vertices bit by bit, its writers' sequences, its pieces.
+  // Reads everything back, from both. DATA_LOSS naming the first hull or body that differs: its
+  // record and revisions, its vertices bit by bit, its writers' sequences, its pieces.
   absl::Status Compare(Store& copy) const;
 
   const MigrationSource& source() const { return as_of_; }

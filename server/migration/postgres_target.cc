@@ -18,11 +18,11 @@
 namespace hulld::server {
 namespace {
 
-// How long nothing may come from the database while an answer is due.
+// Maximum silence of the database while an answer is due.
 constexpr std::chrono::milliseconds kAnswerTime{30'000};
 
-// What is committed here is on disk, whatever the role has as its default. The fence: see
-// postgres_store.h. Requires that no row of the store is gone.
+// Commits are on disk, regardless of the role's default. For the fence see postgres_store.h.
+// Requires that the store's row exists.
 constexpr char kPrepare[] = R"(
     SET search_path = '';
     SET synchronous_commit = on;
@@ -31,8 +31,8 @@ constexpr char kPrepare[] = R"(
       UPDATE hulld.store SET hulls = hulls + $1, vertices = vertices + $2, bodies = bodies + $3;
     PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
 
-// The store has the claim, and is read; a session of its own writes, fenced by the epoch of that
-// claim.
+// The store holds the claim and serves reads; a separate session writes, fenced by the epoch of
+// that claim.
 class PostgresTarget : public MigrationTarget {
  public:
   PostgresTarget(std::unique_ptr<PostgresStore> store, std::unique_ptr<Session> session)
@@ -73,7 +73,7 @@ class PostgresTarget : public MigrationTarget {
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    // A hull may be several changes, all of them here; a body is one.
+    // A hull may be several changes, all of them in this call; a body is one.
     std::map<std::string_view, uint64_t> vertices;
     uint64_t bodies = 0;
     for (const Change* change : changes) {
@@ -115,21 +115,19 @@ class PostgresTarget : public MigrationTarget {
     return absl::Status(status.code(), absl::StrCat("the database: ", status.message()));
   }
 
-  // Before the session: whose end must not wait for the claim's.
+  // Declared before the session, which must end without waiting for the claim's end.
   const std::unique_ptr<PostgresStore> store_;
   const std::unique_ptr<Session> session_;
 };
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo,
-                                                                    const std::string& slots) {
+absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo) {
   const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
   if (!parsed.ok()) return parsed.status();
   PostgresOptions options;
   options.conninfo = conninfo;
   options.migrating = true;
-  options.slots = slots;
   options.should_stop = [] { return true; };
   absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
   if (!store.ok()) return store.status();

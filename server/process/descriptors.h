@@ -2,24 +2,17 @@
 #define HULLD_SERVER_PROCESS_DESCRIPTORS_H_
 
 #include <cstdint>
-#include <string>
 
 namespace hulld::server {
 
-// What this process has open.
-struct OpenDescriptors {
-  // All that are open; 0 where /proc is not there.
-  uint64_t count = 0;
-  // Connections that others made to the address.
-  uint64_t connections = 0;
-};
+// Returns the number of open descriptors of this process; 0 without /proc. Cost: ~1 us each.
+uint64_t CountDescriptors();
 
-// address: where the process listens, as ListenAddress::Format writes it: "host:port" or
-// "unix:path". Cost: ~2 us a descriptor.
-OpenDescriptors CountDescriptors(const std::string& address);
-
-// How many it may have open.
+// Returns the limit on open descriptors.
 uint64_t MostDescriptors();
+
+// Raises that limit to the hard limit.
+void RaiseDescriptorLimit();
 
 }  // namespace hulld::server
 

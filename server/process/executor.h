@@ -8,22 +8,22 @@
 
 namespace hulld::server {
 
-// The one thread that opens OpenMP regions, for pairs whose textbook axes are worth a team: OpenMP
-// keeps a team for each thread that opens one, so a second opener would double the threads. Pairs
-// are answered in slices, each on the whole team: those of single calls first, in the turns of
-// their clients, then those of batches. At the end of a region the team waits for its slowest
-// thread, so only work that lasts far longer than that wait belongs here.
+// The only thread that opens OpenMP regions, for pairs with enough textbook axes to justify a team:
+// OpenMP keeps a team for each thread that opens one, so a second one would double the threads.
+// Pairs are answered in slices, each on the whole team: single calls first, in turns of their
+// clients, then batches. A region ends with a wait for the slowest thread, so only work that takes
+// far longer than that wait belongs here.
 class Executor {
  public:
-  // How long a slice may take: far longer than that wait, and too short for others to notice.
+  // Duration of a slice: far longer than that wait, and too short for other calls to notice.
   static constexpr std::chrono::microseconds kSliceTime{20'000};
 
-  // threads: how many the team has. metrics: told of the batches that wait. Requires threads > 0.
+  // threads: size of the team. metrics: metrics of the queue of batches. Requires threads > 0.
   explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 
-  // The size of the team.
+  // Size of the team.
   int threads() const { return threads_; }
-  // The one thread.
+  // The pool with the only opening thread.
   TaskPool& opener() { return opener_; }
 
  private:

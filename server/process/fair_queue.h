@@ -11,14 +11,13 @@
 
 namespace hulld::server {
 
-// The client that asks for work, as far as threads are shared: a token or, without tokens, an
-// address.
+// Unit of fair scheduling: a token or, without tokens, an address.
 using ClientId = uint64_t;
 // The server itself.
 inline constexpr ClientId kNoClient = 0;
 
-// What waits, in turns: clients take turns, one item each, and the items of one client come in
-// their order. So a client that asks for much waits for itself. All operations cost O(1). Not
+// A queue with fair scheduling: clients take turns, one item each, and the items of a client stay
+// in order. A client with many items therefore delays only itself. All operations cost O(1). Not
 // thread-safe.
 template <typename Item>
 class FairQueue {
@@ -33,7 +32,7 @@ class FairQueue {
     ++size_;
   }
 
-  // The item whose turn it is. Requires that there is one.
+  // Removes and returns the next item. Requires a non-empty queue.
   Item Pop() {
     HULLD_CHECK(!turns_.empty());
     const ClientId client = turns_.front();
@@ -51,7 +50,7 @@ class FairQueue {
   }
 
  private:
-  // Holds only clients that have something here.
+  // Holds only clients with queued items.
   std::unordered_map<ClientId, std::deque<Item>> waiting_;
   std::deque<ClientId> turns_;
   size_t size_ = 0;

@@ -11,15 +11,16 @@
 namespace hulld::server {
 namespace {
 
-// Bytes that malloc may keep. A choice: ordinary work leaves less behind.
+// Free bytes that malloc may keep. A choice: ordinary work leaves fewer.
 constexpr size_t kWorthIt = 64 << 20;
-// Blocks from this size on are mapped, and unmapped, by themselves. A choice: above the lists of a
+// Blocks of at least this size are mapped and unmapped individually. A choice: above the lists of a
 // message of some MiB, which double as they grow.
 constexpr int kMappedBytes = 8 << 20;
-// What an arena may keep free at its end. A choice: what a call with a message of some MiB takes.
+// Bytes that an arena may keep free at its end. A choice: the memory of a call with a message of
+// some MiB.
 constexpr int kKeptBytes = 32 << 20;
 
-// Memory of this process that is resident and no file's; 0 where the system does not tell.
+// Returns the resident anonymous memory of this process; 0 if the system does not report it.
 size_t AnonymousBytes() {
   std::FILE* const file = std::fopen("/proc/self/statm", "r");
   if (file == nullptr) return 0;

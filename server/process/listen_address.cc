@@ -42,7 +42,7 @@ absl::Status Malformed(const char* flag, const std::string& text, const char* wh
       absl::StrCat(flag, " is \"", text, "\": ", why, "; give host:port, [v6]:port or unix:path"));
 }
 
-// 0, or the errno of binding.
+// Returns 0, or the errno of binding.
 int TryBind(const addrinfo& info) {
   const Socket socket(info.ai_family, info.ai_protocol);
   if (socket.fd() < 0) return errno;

@@ -7,7 +7,7 @@
 
 namespace hulld::server {
 
-// Where the server listens.
+// Address on which the server listens.
 struct ListenAddress {
   // Without brackets; empty for a unix socket.
   std::string host;
@@ -17,26 +17,24 @@ struct ListenAddress {
   std::string path;
 
   bool is_unix() const { return !path.empty(); }
-  // Whether only this machine can reach it: unix sockets, 127.0.0.0/8, ::1 and localhost.
+  // True if only this machine can reach it: unix sockets, 127.0.0.0/8, ::1 and localhost.
   bool is_local() const;
-  // As gRPC and people write it, with `bound_port` in place of the port.
+  // Formats the address as gRPC and people write it, with `bound_port` in place of the port.
   std::string Format(int bound_port) const;
 };
 
-// Reads "host:port", "[v6]:port" or "unix:path". INVALID_ARGUMENT names the flag
-// that the text was given to.
+// Parses "host:port", "[v6]:port" or "unix:path". INVALID_ARGUMENT names the flag of the text.
 absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text,
                                                  const char* flag = "--listen");
 
-// INVALID_ARGUMENT when others can reach the address, which would be without TLS, and `insecure`
-// does not allow that.
+// INVALID_ARGUMENT: other machines can reach the address without TLS, and `insecure` is false.
 absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure);
 
-// OK when no server listens on this unix socket (gRPC would take it over without a word), and for
-// TCP.
+// Returns an error if a server listens on this unix socket (gRPC would silently take it over). OK
+// for TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);
 
-// Why the address could not be bound, by trying again: UNAVAILABLE with what to do.
+// Finds the reason of a bind failure by retrying: UNAVAILABLE with a remedy.
 absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag = "--listen");
 
 }  // namespace hulld::server

@@ -17,8 +17,8 @@
 namespace hulld::server {
 namespace {
 
-// The fields of the event that this thread is logging: spdlog's messages hold text alone, and its
-// sinks run where LogEvent is called.
+// Fields of the event that this thread is logging: spdlog's messages hold only text, and its sinks
+// run on the thread of LogEvent.
 thread_local const LogFields* current_fields = nullptr;
 bool is_json = false;
 
@@ -31,7 +31,7 @@ std::string FormatJson(const LogFields& fields) {
   return text;
 }
 
-// Quoted unless it is one word.
+// Quotes a value unless it is one word.
 std::string FormatText(const LogFields& fields) {
   std::string text;
   for (const LogField& field : fields) {
@@ -82,7 +82,7 @@ class JsonFormatter : public spdlog::formatter {
   }
 };
 
-// Both budgets live as long as the process: libraries log while it ends, too.
+// Both budgets live as long as the process, because libraries log during exit, too.
 LineBudget& BudgetOf(const char* library) {
   static auto* const kGrpc = new LineBudget(kLibraryLines, std::chrono::minutes(1));
   static auto* const kProtobuf = new LineBudget(kLibraryLines, std::chrono::minutes(1));
@@ -112,7 +112,7 @@ void LogForGrpc(gpr_log_func_args* arguments) {
   LogForLibrary("grpc", LevelOf(arguments->severity), arguments->message);
 }
 
-// What it calls errors are mostly those of clients. After a fatal one it ends the process itself.
+// Protobuf's errors are mostly caused by clients. After a fatal one it aborts the process itself.
 void LogForProtobuf(google::protobuf::LogLevel level, const char* file, int line,
                     const std::string& message) {
   if (level == google::protobuf::LOGLEVEL_FATAL) {
@@ -125,7 +125,7 @@ void LogForProtobuf(google::protobuf::LogLevel level, const char* file, int line
       message);
 }
 
-// Length of the UTF-8 character that starts at text[at]; 0 when there is none.
+// Returns the length of the UTF-8 character at text[at]; 0 if it is invalid.
 size_t CharacterLength(const std::string& text, size_t at) {
   const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char lead = byte(at);

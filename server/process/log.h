@@ -16,16 +16,16 @@ namespace hulld::server {
 // (UTC, RFC 3339), level and message, and the fields of LogEvent.
 void SetUpLog(const std::string& level, const std::string& format);
 
-// How many lines may be written in each stretch of time: clients that send malformed messages make
-// libraries log a line for each. Thread-safe.
+// Limits the log lines per period: clients that send malformed messages make libraries log a line
+// for each. Thread-safe.
 class LineBudget {
  public:
   using Clock = std::chrono::steady_clock;
 
   LineBudget(int lines, Clock::duration stretch) : lines_(lines), stretch_(stretch) {}
 
-  // nullopt: no line may be written at `now`. Otherwise one may, and this many were left out since
-  // the last.
+  // Returns nullopt if no line may be written at `now`. Otherwise returns the number of lines
+  // suppressed since the last one.
   std::optional<uint64_t> Spend(Clock::time_point now);
 
  private:
@@ -37,14 +37,14 @@ class LineBudget {
   uint64_t left_out_ = 0;
 };
 
-// Sends what gRPC and protobuf log to spdlog's default logger, each within a budget of
-// kLibraryLines a minute. For the whole process; before any other thread logs.
+// Routes the logs of gRPC and protobuf to spdlog's default logger, each within a budget of
+// kLibraryLines a minute. Applies to the whole process; call before any other thread logs.
 inline constexpr int kLibraryLines = 20;
 void RouteLibraryLogs();
 
 enum class LogLevel { kDebug, kInfo, kWarn, kError };
 
-// One fact of a line, as in code=NOT_FOUND.
+// A field of a line, as in code=NOT_FOUND.
 struct LogField {
   LogField(const char* field, std::string text) : name(field), value(std::move(text)) {}
   LogField(const char* field, uint64_t number)
@@ -60,12 +60,12 @@ using LogFields = std::vector<LogField>;
 
 bool IsLogged(LogLevel level);
 
-// Logs a message with fields: as " name=value" after it, quoted where spaces or quotes ask for it,
-// or as members of the JSON object.
+// Logs a message with fields: appended as " name=value", quoted if necessary, or as members of the
+// JSON object.
 void LogEvent(LogLevel level, const std::string& message, const LogFields& fields);
 
-// `text` as the inside of a JSON string: quotes, backslashes and control characters escaped, bytes
-// that are not UTF-8 replaced by U+FFFD.
+// Escapes `text` for a JSON string: escapes quotes, backslashes and control characters, and
+// replaces invalid UTF-8 by U+FFFD.
 std::string JsonEscape(const std::string& text);
 
 }  // namespace hulld::server

@@ -18,13 +18,13 @@ namespace {
 using prometheus::Family;
 using Buckets = prometheus::Histogram::BucketBoundaries;
 
-// The names of rungs, in the order of the enum.
+// Names of the rungs, in the order of the enum.
 constexpr std::array<const char*, kRungCount> kRungNames = {"bounds", "cached", "floating_point",
                                                             "exact"};
 constexpr std::array<Rpc, 4> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
                                               Rpc::kStreamCollisions, Rpc::kWatchCollisions};
 
-// Seconds: from what a loopback round trip takes to what a patient client waits.
+// Seconds: from a loopback round trip to the wait of a patient client.
 Buckets LatencyBuckets() {
   return {50e-6,  100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3,
           100e-3, 200e-3, 500e-3, 1,      2,    5,    10,   20,    60};
@@ -99,7 +99,7 @@ StoreMetrics AddStore(prometheus::Registry& registry) {
   };
 }
 
-// Resident memory of this process; 0 when /proc is not there.
+// Returns the resident memory of this process; 0 without /proc.
 double ResidentBytes() {
   const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen("/proc/self/statm", "r"),
                                                    [](FILE* f) { return f ? fclose(f) : 0; });
@@ -255,6 +255,11 @@ void Metrics::CountPairs(const RungCounts& counts) {
 
 PoolMetrics Metrics::AddPool(const std::string& pool) {
   return {queue_tasks_.Add({{"pool", pool}}), queue_wait_.Add({{"pool", pool}}, LatencyBuckets())};
+}
+
+prometheus::Counter& Metrics::AddCounter(const std::string& name, const std::string& help,
+                                         const std::map<std::string, std::string>& labels) {
+  return AddCounters(registry_, name.c_str(), help.c_str()).Add(labels);
 }
 
 prometheus::Gauge& Metrics::AddGauge(const std::string& name, const std::string& help) {

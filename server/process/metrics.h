@@ -25,17 +25,17 @@
 
 namespace hulld::server {
 
-// What the store and the cache of hulls report. Names as Prometheus shows them in the comments.
+// Metrics of the store and of the hull cache. Comments give the names in Prometheus.
 struct StoreMetrics {
-  // hulld_store_commit_duration_seconds: from handing a change over until it is acknowledged.
+  // hulld_store_commit_duration_seconds: from submission of a change to its acknowledgement.
   prometheus::Histogram& commit_seconds;
-  // hulld_store_commit_changes: changes that one write to the store commits together.
+  // hulld_store_commit_changes: changes per batch written to the store.
   prometheus::Histogram& commit_changes;
   // hulld_store_failures_total{operation="write"|"sync"|"read"}.
   prometheus::Counter& write_failures;
   prometheus::Counter& sync_failures;
   prometheus::Counter& read_failures;
-  // hulld_store_damaged_records_total: records whose checksum or content was wrong.
+  // hulld_store_damaged_records_total: records with a wrong checksum or content.
   prometheus::Counter& damaged_records;
   // hulld_store_read_only: 1 while changes are refused.
   prometheus::Gauge& read_only;
@@ -43,35 +43,35 @@ struct StoreMetrics {
   prometheus::Counter& cache_hits;
   prometheus::Counter& cache_misses;
   prometheus::Counter& cache_evictions;
-  // hulld_cache_bytes: what counts against the limit, and hulld_cache_reading_bytes and
-  // hulld_cache_writing_bytes, its parts; hulld_cache_limit_bytes: --memory-limit.
+  // hulld_cache_bytes: memory counted against the limit; hulld_cache_reading_bytes and
+  // hulld_cache_writing_bytes: its parts; hulld_cache_limit_bytes: --memory-limit.
   prometheus::Gauge& cache_bytes;
   prometheus::Gauge& cache_reading_bytes;
   prometheus::Gauge& cache_writing_bytes;
   prometheus::Gauge& cache_limit_bytes;
-  // hulld_snapshot_duration_seconds: making the canonical snapshot of a version.
+  // hulld_snapshot_duration_seconds: building the canonical snapshot of a version.
   prometheus::Histogram& snapshot_seconds;
-  // hulld_store_disk_bytes: all files. hulld_store_log_bytes: the log among them.
-  // hulld_store_free_bytes: what the disk has left.
+  // hulld_store_disk_bytes: all files. hulld_store_log_bytes: log files. hulld_store_free_bytes:
+  // free space of the disk.
   prometheus::Gauge& disk_bytes;
   prometheus::Gauge& log_bytes;
   prometheus::Gauge& free_bytes;
-  // hulld_store_stalls_total: how often the store slowed down or stopped changes, as it could not
-  // keep up; hulld_store_stalled: 1 while it does.
+  // hulld_store_stalls_total: number of times that the store slowed down or stopped changes because
+  // it could not keep up; hulld_store_stalled: 1 while it does.
   prometheus::Counter& stalls;
   prometheus::Gauge& stalled;
 };
 
-// What one pool of threads reports.
+// Metrics of a pool of threads.
 struct PoolMetrics {
-  // hulld_queue_tasks{pool=...}: tasks that wait.
+  // hulld_queue_tasks{pool=...}: queued tasks.
   prometheus::Gauge& waiting;
-  // hulld_queue_wait_seconds{pool=...}: how long a task waited before a thread took it.
+  // hulld_queue_wait_seconds{pool=...}: wait of a task for a thread.
   prometheus::Histogram& wait_seconds;
 };
 
-// Everything that a running server counts and times, and its exposition to Prometheus. One per
-// server; it outlives all that reports to it. Thread-safe; a report costs some tens of nanoseconds.
+// All metrics of a running server, and their exposition to Prometheus. One per server; it outlives
+// everything that updates it. Thread-safe; an update costs some tens of nanoseconds.
 class Metrics : public prometheus::Collectable {
  public:
   Metrics();
@@ -80,44 +80,46 @@ class Metrics : public prometheus::Collectable {
 
   // hulld_requests_total{rpc,code}, hulld_request_duration_seconds{rpc}.
   void CountCall(Rpc rpc, absl::StatusCode code, std::chrono::steady_clock::duration duration);
-  // hulld_message_duration_seconds{rpc}: one message of a stream that lasts as long as its client
-  // likes, from its arrival until its answer is ready. rpc: AppendPoints, ReplaceHull or
-  // StreamCollisions.
+  // hulld_message_duration_seconds{rpc}: one message of a stream of unlimited duration, from its
+  // arrival until its answer is ready. rpc: AppendPoints, ReplaceHull or StreamCollisions.
   void CountMessage(Rpc rpc, std::chrono::steady_clock::duration duration);
-  // hulld_limits_hit_total: the limit is named like its flag, as in "max-hulls".
+  // hulld_limits_hit_total: the limit has the name of its flag, as in "max-hulls".
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is "unauthenticated" or "permission_denied".
   void CountAuthFailure(const std::string& reason);
-  // hulld_token_requests_total{token}: nothing is counted without a name. Beyond kMostTokens names
-  // the rest are "other": a file may name any number of tokens.
+  // hulld_token_requests_total{token}: does not count an empty name. Beyond kMostTokens names,
+  // further ones count as "other", because a file may name any number of tokens.
   void CountToken(const std::string& token);
   static constexpr size_t kMostTokens = 100;
-  // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of one committed chunk.
+  // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of a committed chunk.
   void CountPoints(const PointCounts& counts);
   // hulld_pairs_total{rung}, hulld_exact_fallbacks_total.
   void CountPairs(const RungCounts& counts);
 
   StoreMetrics& store() { return store_; }
-  // The pool is named once.
+  // Requires a new name.
   PoolMetrics AddPool(const std::string& pool);
 
-  // hulld_requests_running{rpc}: calls that run now, open streams included.
+  // hulld_requests_running{rpc}: running calls, including open streams.
   prometheus::Gauge& RunningCalls(Rpc rpc) { return *running_[static_cast<size_t>(rpc)]; }
 
-  // hulld_backup_saved_timestamp_seconds: when the last backup was read to its end, Unix time; 0
+  // hulld_backup_saved_timestamp_seconds: Unix time at which the last backup was read completely; 0
   // before the first.
   prometheus::Gauge& BackupSaved() { return backup_saved_; }
 
-  // A gauge that others keep up to date.
+  // Adds a counter of a family. The family has the help text of its first counter.
+  prometheus::Counter& AddCounter(const std::string& name, const std::string& help,
+                                  const std::map<std::string, std::string>& labels);
+  // Adds a gauge that the caller updates.
   prometheus::Gauge& AddGauge(const std::string& name, const std::string& help);
-  // A gauge that is read whenever Prometheus asks. What `read` uses must outlive the exposition.
+  // Adds a gauge read at each exposition. State used by `read` must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
 
-  // Called before each exposition, to bring up to date what others count themselves. What it uses
-  // must outlive the exposition.
+  // Adds a callback that runs before each exposition and updates metrics counted elsewhere. Its
+  // state must outlive the exposition.
   void AddRefresh(std::function<void()> refresh);
 
-  // What Prometheus reads.
+  // Returns the metrics for Prometheus.
   std::vector<prometheus::MetricFamily> Collect() const override;
 
  private:
@@ -145,7 +147,7 @@ class Metrics : public prometheus::Collectable {
   prometheus::Counter& points_inside_;
   StoreMetrics store_;
   prometheus::Gauge& backup_saved_;
-  // Bring up to date what is only read when asked for.
+  // Callbacks that update metrics at each exposition.
   mutable std::mutex refresh_mutex_;
   std::vector<std::function<void()>> refresh_;
 };

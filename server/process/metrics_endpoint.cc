@@ -26,15 +26,15 @@ using boost::system::error_code;
 using tcp = boost::asio::ip::tcp;
 
 constexpr char kFlag[] = "--metrics-address";
-// A scraper or two and a person need few; others are closed at once.
+// Enough for a few scrapers and people; further connections are closed immediately.
 constexpr size_t kMostConnections = 64;
 constexpr uint32_t kMostHeaderBytes = 8 << 10;
-// For a request to come, and for its reply to be taken.
+// Timeout for receiving a request, and for sending its reply.
 constexpr std::chrono::seconds kTimeout{20};
-// After descriptors ran out.
+// Pause after running out of descriptors.
 constexpr std::chrono::milliseconds kAcceptPause{100};
 
-// One connection. It owns itself while something is awaited of it.
+// A connection. Owns itself while an operation is pending.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
   Connection(tcp::socket socket, const Metrics& metrics, size_t& connections)
@@ -52,7 +52,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     stream_.expires_after(kTimeout);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t /*size*/) {
-                       // What is malformed or too long is not answered.
+                       // Malformed or oversized requests get no answer.
                        if (!error) self->Answer();
                      });
   }
@@ -97,7 +97,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
 }  // namespace
 
-// The port and its thread. All but the constructor and the destructor runs on that thread.
+// The port and its thread. All functions except constructor and destructor run on that thread.
 class MetricsEndpoint::Listener {
  public:
   explicit Listener(const Metrics& metrics) : metrics_(metrics) {}
@@ -106,7 +106,7 @@ class MetricsEndpoint::Listener {
     if (thread_.joinable()) thread_.join();
   }
 
-  // The port; none when it cannot be bound.
+  // Returns the port; nullopt if it cannot be bound.
   std::optional<int> Listen(const ListenAddress& address) {
     error_code error;
     const auto found =
@@ -139,7 +139,7 @@ class MetricsEndpoint::Listener {
 
   const Metrics& metrics_;
   size_t connections_ = 0;
-  // Destroys the connections that are left, which count themselves.
+  // Destroys the remaining connections, which update the count.
   asio::io_context context_{1};
   tcp::acceptor acceptor_{context_};
   asio::steady_timer pause_{context_};

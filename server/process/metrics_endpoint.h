@@ -11,17 +11,17 @@
 
 namespace hulld::server {
 
-// INVALID_ARGUMENT: --metrics-address is malformed, or not local although not `exposed`.
+// INVALID_ARGUMENT: --metrics-address is malformed, or not local although `exposed` is false.
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed);
 
-// Where Prometheus reads the metrics over HTTP: GET /metrics, neither encrypted nor authenticated.
-// One thread serves a bounded number of connections, none of which holds up another: requests
-// without a body, of a few KiB, and each in limited time.
+// HTTP endpoint for Prometheus: GET /metrics, neither encrypted nor authenticated. One thread
+// serves a bounded number of connections that do not delay each other: requests without a body, of
+// a few KiB, each in limited time.
 class MetricsEndpoint {
  public:
-  // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: whether other machines
-  // may reach it. The metrics must outlive this.
-  // INVALID_ARGUMENT: as ParseMetricsAddress. UNAVAILABLE: it cannot be bound.
+  // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: true if other machines
+  // may reach it. The metrics must outlive this. INVALID_ARGUMENT: as ParseMetricsAddress.
+  // UNAVAILABLE: it cannot be bound.
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& address,
                                                                 bool exposed,
                                                                 const Metrics& metrics);
@@ -30,7 +30,7 @@ class MetricsEndpoint {
   MetricsEndpoint& operator=(const MetricsEndpoint&) = delete;
   ~MetricsEndpoint();
 
-  // With the port that was chosen.
+  // The address with the chosen port.
   const std::string& address() const { return address_; }
 
  private:

@@ -5,7 +5,7 @@
 
 namespace hulld::server {
 
-// 128 random bits as 32 hexadecimal digits: unique for all practical purposes.
+// Returns 128 random bits as 32 hexadecimal digits: unique for all practical purposes.
 std::string RandomId();
 
 }  // namespace hulld::server

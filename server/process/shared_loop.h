@@ -15,13 +15,13 @@
 
 namespace hulld::server {
 
-// A loop over [0, count) that several threads share: each takes the next `step` of it.
+// A loop over [0, count) shared by several threads: each takes the next `step` indices.
 class SharedLoop {
  public:
-  // Runs `work` on ranges that together are [0, count), each once, on this thread and on up to
-  // `most_helpers` threads of a pool that come free meanwhile. Waits for what these have begun, and
-  // for none that has not, so it may be called on any thread that may wait. `work` is called by
-  // several threads at a time. Requires step > 0.
+  // Runs `work` on disjoint ranges that cover [0, count), on this thread and on up to
+  // `most_helpers` free threads of a pool. Waits for started helpers, and not for queued ones, so
+  // it may be called on any thread that may block. Several threads call `work` concurrently.
+  // Requires step > 0.
   static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step,
                   std::function<void(size_t begin, size_t end)> work) {
     HULLD_CHECK(step > 0);
@@ -39,7 +39,7 @@ class SharedLoop {
       : count_(count), step_(step), work_(std::move(work)) {}
 
  private:
-  // Works until no step is left to take.
+  // Works until no step is left.
   void TakePart() {
     for (size_t begin = next_.fetch_add(step_); begin < count_; begin = next_.fetch_add(step_)) {
       const size_t end = std::min(count_, begin + step_);
@@ -57,7 +57,7 @@ class SharedLoop {
 
   const size_t count_;
   const size_t step_;
-  // Not called once all is done, although helpers that come late still hold it.
+  // Not called after the loop is done, although late helpers still hold it.
   const std::function<void(size_t begin, size_t end)> work_;
   std::atomic<size_t> next_ = 0;
   Mutex mutex_;

@@ -6,10 +6,10 @@
 #include <mutex>
 #include <thread>
 
-// What threads wait with, and by what clock: for the registry and what it runs on, and for all else
-// whose interleavings are explored. tests/server/schedules/ compiles the same sources against a
-// header of the same name, in which a seeded scheduler decides who goes on. So code that is
-// explored uses these names, not those of the standard library.
+// Synchronization primitives and clock of the registry, and of all other code with explored
+// interleavings. tests/server/schedules/ compiles the same sources against a header of the same
+// name, in which a seeded scheduler decides which thread runs. Explored code must use these names
+// instead of the standard library's.
 namespace hulld::server {
 
 using Mutex = std::mutex;

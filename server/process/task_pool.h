@@ -17,13 +17,13 @@
 
 namespace hulld::server {
 
-// The threads that compute answers, at the priority of the process. They take tasks from two
-// queues. Single calls come first: clients take turns, and the calls of one client come in the
-// order in which they arrived. Slices of long calls come next: each long call has a lane, clients
-// take turns, and the lanes of one client too, one slice each. A slice lasts about kSliceTime, so a
-// single call waits for at most one slice, and no thread waits for another.
+// Threads that compute answers, at the priority of the process. They take tasks from two queues.
+// Single calls come first: clients take turns, and the calls of a client stay in order of arrival.
+// Slices of long calls come next: each long call has a lane; clients take turns, and so do the
+// lanes of a client, one slice each. A slice takes about kSliceTime, so a single call waits for at
+// most one slice, and no thread waits for another.
 //
-// Tasks must neither block nor wait; work that does belongs to a WorkerPool.
+// Tasks must neither block nor wait; blocking work belongs in a WorkerPool.
 class TaskPool {
  private:
   struct Task {
@@ -33,21 +33,21 @@ class TaskPool {
   };
 
  public:
-  // How long a slice may take. A choice: an answer of a single call takes about as long over the
-  // wire, and a switch of tasks (observed: 2 us) costs a hundredth.
+  // Duration of a slice. A choice: the answer of a single call takes about as long over the wire,
+  // and a task switch (**observed**: 2 us) costs a hundredth.
   static constexpr std::chrono::microseconds kSliceTime{250};
-  // While single calls arrive, and this long after, slices leave one thread's core to them: the
-  // system lets a thread that computes go on for some milliseconds (a tick of Linux is 1 to 10 ms)
-  // before gRPC's threads, which bring the calls, get their turn.
+  // While single calls arrive, and for this long after, slices leave one thread's core to them: the
+  // system runs a computing thread for some milliseconds (a tick of Linux is 1 to 10 ms) before it
+  // schedules gRPC's threads, which bring the calls.
   static constexpr std::chrono::milliseconds kReserveTime{20};
-  // Meanwhile a thread pauses this long after each slice: the system gives its core to the threads
-  // of gRPC, and of clients on this machine, that wait for one, and would otherwise let this thread
-  // go on until the next tick. Observed on two cores: single calls beside batches have a p99 of 2.2
-  // to 3.0 times idle, without pauses 7 to 9 times; batches make a third to a half fewer pairs
-  // meanwhile (tests/bench/results/server_overload_*.csv).
+  // During that time a thread pauses this long after each slice: the system gives its core to
+  // waiting threads of gRPC, and of clients on this machine, and would otherwise run this thread
+  // until the next tick. **Observed** on two cores: the p99 of single calls during batches is 2.2
+  // to 3.0 times that of an idle server, without pauses 7 to 9 times; batches then answer a third
+  // to a half fewer pairs (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
-  // The slices of one long call. Destroyed with none of them waiting: let each hold its owner.
+  // Slices of a long call. Requires at destruction: no slice is queued; let each hold its owner.
   class Lane {
    public:
     // The pool must outlive this.
@@ -56,47 +56,47 @@ class TaskPool {
     Lane& operator=(const Lane&) = delete;
     ~Lane();
 
-    // Slices of a lane start in the order in which they were submitted, on any thread; several may
-    // run at the same time. client: the one that waits for it, the same for all of a lane.
+    // Queues a slice. Slices of a lane start in order of submission, on any thread; several may run
+    // concurrently. client: the client that waits for it, the same for all slices of a lane.
     void Submit(std::function<void()> slice, ClientId client = kNoClient);
 
    private:
     friend class TaskPool;
 
     TaskPool& pool_;
-    // The rest is guarded by the pool's mutex.
+    // The pool's mutex guards the members below.
     ClientId client_ = kNoClient;
-    // The lane takes part in the turns while there are any.
+    // The lane is in the turns unless this is empty.
     std::deque<Task> slices_;
   };
 
-  // metrics: where to report what waits, single calls and slices apart. Requires threads > 0.
+  // metrics: metrics of the queues of single calls and of slices. Requires threads > 0.
   explicit TaskPool(int threads, std::optional<PoolMetrics> single_metrics = std::nullopt,
                     std::optional<PoolMetrics> slice_metrics = std::nullopt);
   TaskPool(const TaskPool&) = delete;
   TaskPool& operator=(const TaskPool&) = delete;
-  // Runs what is queued, then ends.
+  // Runs the queued tasks, then ends.
   ~TaskPool();
 
   int threads() const { return static_cast<int>(threads_.size()); }
 
-  // Queues the answer of a single call ahead of all slices. client: the one that waits for it.
+  // Queues the answer of a single call ahead of all slices. client: the client that waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
-  // Says that a single call was answered without this pool, so that slices leave it a core.
-  // Cost: ~30 ns.
+  // Records a single call answered without this pool, so that slices leave it a core. Cost: ~30 ns.
   void NoteSingleCall();
 
-  // Single calls that wait for a thread.
+  // Number of single calls waiting for a thread.
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
-  // Whether a single call came less than kReserveTime ago.
+  // True if a single call arrived less than kReserveTime ago.
   bool IsReserved() const;
   void SubmitSlice(Lane& lane, std::function<void()> slice, ClientId client);
   void Work();
-  // The rest requires the mutex.
-  // The task whose turn it is; none when none may run now.
+  // The functions below require the mutex.
+  //
+  // Returns the next task; nullopt if none may run now.
   std::optional<Task> Next();
   bool MayRunSlice() const;
   void NoteWaiting();
@@ -105,7 +105,7 @@ class TaskPool {
   std::optional<PoolMetrics> slice_metrics_;
   std::atomic<std::chrono::steady_clock::duration> last_single_call_;
   std::mutex mutex_;
-  // The rest is guarded by the mutex, `waiting_` for changes.
+  // The mutex guards the members below, and changes of `waiting_`.
   std::condition_variable ready_;
   FairQueue<Task> single_calls_;
   // Lanes with slices.

@@ -33,7 +33,7 @@ void WorkerPool::Submit(std::function<void()> task, ClientId client) {
 
 void WorkerPool::NoteWaiting() {
   const size_t before = waiting_.exchange(tasks_.size(), std::memory_order_relaxed);
-  // Other pools may report to the same gauge, which tells their sum.
+  // Pools may share the gauge, which shows their sum.
   if (metrics_.has_value()) {
     metrics_->waiting.Increment(static_cast<double>(tasks_.size()) - static_cast<double>(before));
   }
@@ -52,7 +52,7 @@ void WorkerPool::Work() {
       metrics_->wait_seconds.Observe(std::chrono::duration<double>(waited).count());
     }
     task.run();
-    task.run = nullptr;  // what it holds goes before the lock is taken again
+    task.run = nullptr;  // destroys captured objects before the lock is acquired again
     lock.lock();
   }
 }

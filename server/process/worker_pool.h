@@ -14,24 +14,24 @@
 
 namespace hulld::server {
 
-// A few threads that run tasks at the priority of the process: clients in turns, and those of one
-// client in the order in which they came.
-// gRPC calls back on as few as two threads, which must stay free to move bytes. Work that may wait
-// for the store or for a file runs here; work that only computes an answer, on a TaskPool.
+// A few threads that run tasks at the priority of the process: clients take turns, and the tasks of
+// a client stay in order. gRPC calls back on as few as two threads, which must stay free to move
+// bytes. Work that may wait for the store or for a file runs here; pure computation runs on a
+// TaskPool.
 class WorkerPool {
  public:
-  // metrics: where to report what waits. Requires threads > 0.
+  // metrics: metrics of the queue. Requires threads > 0.
   explicit WorkerPool(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
-  // Runs what is queued, then ends.
+  // Runs the queued tasks, then ends.
   ~WorkerPool();
 
-  // client: the one that waits for it.
+  // client: the client that waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   size_t threads() const { return threads_.size(); }
-  // Tasks that wait for a thread.
+  // Number of tasks waiting for a thread.
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
@@ -41,7 +41,7 @@ class WorkerPool {
   };
 
   void Work();
-  // Requires the mutex (unchecked: a Mutex does not tell).
+  // Requires the mutex (not checked: a Mutex does not know its holder).
   void NoteWaiting();
 
   std::optional<PoolMetrics> metrics_;

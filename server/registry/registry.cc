@@ -19,7 +19,7 @@ Limits WithMemoryLimit(Limits limits) {
   return limits;
 }
 
-// The rest is for writers, whose hulls stay in memory where no store keeps them.
+// The rest is reserved for writers: without a store that keeps hulls, their hulls stay in memory.
 uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
 }
@@ -62,11 +62,11 @@ Registry::~Registry() {
     const Locked locked(mutex_);
     preparer_.Stop(locked);
   }
-  // Its thread takes over what other servers did, into what is closed here.
+  // The committer's thread applies peer changes to the parts that are destroyed below.
   committer_.End();
   preparer_.End();
   loaders_.reset();
-  // Closed sessions may hold hulls for longer.
+  // Closed sessions may outlive this while they hold hulls.
   const std::lock_guard lock(mutex_);
   for (const auto& [id, hull] : catalog_.hulls().entries()) {
     if (hull.awake() != nullptr) hull.awake()->account.Close();
@@ -92,7 +92,7 @@ absl::Status Registry::Load() {
   if (!status.ok()) return status;
   if (!catalog_.is_cache()) status = bodies_.Load(locked);
   if (!status.ok() || !store_.is_shared()) return status;
-  // What was read was not of one moment.
+  // The pages read span more than one revision.
   const SteadyClock::time_point asked = SteadyClock::now();
   const absl::Status followed = store_.Follow();
   takeover_.Take(locked, store_.TakeOthers());
@@ -137,11 +137,6 @@ absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::st
     page.hulls.push_back({std::move(hull.record), hull.damaged});
   }
   return page;
-}
-
-void Registry::Hold(std::shared_ptr<CommitHold> hold) {
-  const Locked locked(mutex_);
-  committer_.Hold(locked, std::move(hold));
 }
 
 HoldStatistics Registry::Holds() const {

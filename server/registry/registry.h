@@ -40,48 +40,48 @@
 
 namespace hulld::server {
 
-// Keeps hulls by ID, and bodies, whose IDs are of the same namespace, and answers from one revision
-// at a time. This class puts its parts together and passes each call to the one whose job it is:
+// Stores hulls and bodies by ID, in one namespace, and answers each request at one revision. This
+// class owns the parts below and forwards each call to the part that handles it:
 //
-//   Catalog        what is known: tables of hulls and bodies, the revision, how many there are
-//   RecordReader   makes known what is under an ID, where the store finds records; RecordLister
-//                  lists what is not known; RecordGate keeps both from mixing revisions
-//   FreshnessGate  lets a call go on once what is here is as fresh as it asks
-//   HullReader     gives readers hulls of one moment; Preparer makes what is asked often faster
-//   HullLifecycle  begins and ends hulls; HullAppender lets them grow; HullChanges brings both to
-//   the
-//                  Committer, in order
+//   Catalog        in-memory tables of hulls and bodies, the revision, and the counts
+//   RecordReader   loads records into the catalog if the store finds records; RecordLister
+//                  lists records that are not loaded; RecordGate keeps revisions from mixing
+//   FreshnessGate  blocks a call until the catalog satisfies its freshness
+//   HullReader     serves hulls of a single snapshot; Preparer speeds up frequent reads
+//   HullLifecycle  creates, deletes and replaces hulls; HullAppender appends points; HullChanges
+//                  submits both
+//   Committer      commits changes to the store in batches, in the order of submission
 //   BodyRegistry   puts, deletes, finds and lists bodies
-//   Takeover       puts what other servers committed in the place of what was known
-//   Watches        tells watches what is there, and what changes, as ChangeFeed notes it
-//   MemoryBudget   says what is dropped
+//   Takeover       applies changes committed by peer servers to the catalog
+//   Watches        sends the initial state and then every change, as noted by ChangeFeed
+//   MemoryBudget   decides evictions
 //
-// A change is made in two steps. It is decided, or built, and submitted to the committer; only when
-// the store has kept it does it become visible, as a whole and in the order of submission, and is
-// answered. Chunks of one hull may be in flight together, each built on those before it. Creation,
-// deletion, replacement and chunks with a condition on the revision wait until no change of their
-// hull is in flight, since what they find must be committed. Where another server was first, a
-// change is made anew of what there is by then, so callers do not hear of it.
+// A change has two steps. It is validated or built, then submitted to the committer. After the
+// store has committed it, it becomes visible atomically and in the order of submission, and its
+// caller is answered. Several chunks of a hull may be in flight, each built on its predecessors.
+// Creation, deletion, replacement, and chunks with a condition on the revision wait until their
+// hull has no change in flight, because they depend on its committed state. If a peer server
+// committed a conflicting change first, the change is retried on the new state, transparently to
+// the caller.
 //
-// Readers and writers never wait for each other. A writer appends to a LiveHull, without the mutex;
-// a mark says up to where that is committed, and readers get the version at the mark. What is not
-// in memory is read back from the store at first use. Where the store finds records, not even the
-// records are read when a server starts: a call that depends on what there is under an ID first
-// makes that known, and looks again when it is done with waiting.
+// Readers and writers never wait for each other. A writer appends to a LiveHull without holding the
+// mutex; a mark records the committed prefix, and readers get the version at the mark. Evicted data
+// is read back from the store at first use. If the store finds records, a starting server does not
+// load them: a call that depends on an ID loads its record first, and looks again after each wait.
 //
-// One mutex, of this class, guards the state of all parts and is held for moments only
-// (kMostLookupsPerHold). A Locked, which is passed along, shows that it is held.
+// One mutex, owned by this class, guards the state of all parts and is held only briefly
+// (kMostLookupsPerHold). Passing a Locked proves that it is held.
 //
-// Lock order: first that mutex; then that of the committer's queue, of the budget, of a pool or
-// within a LiveHull. None of the latter is held while another lock is taken. Callbacks run without
-// any. The committer completes each batch under the mutex (its header says why); the budget evicts
-// under it, since what it drops belongs to hulls; a MemoryCharge takes the budget's mutex alone.
-// Thread-safe.
+// Lock order: this mutex first; then the mutex of the committer's queue, of the budget, of a pool,
+// or of a LiveHull. No other lock is taken while one of the latter is held. Callbacks run without
+// locks. The committer completes each batch under the mutex (its header explains the reason). The
+// budget evicts under it, because the evicted data belongs to hulls. A MemoryCharge takes only the
+// budget's mutex. Thread-safe.
 class Registry {
  public:
-  // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
-  // no chunk be pending when it is destroyed. preparers, loaders: where to report what waits to be
-  // prepared, and to be read from the store.
+  // Chunks are applied on `writers`. Store and pool must outlive this. Requires at destruction: no
+  // call is running and no chunk is pending. preparers, loaders: metrics of the queues of hulls to
+  // prepare and to read from the store.
   Registry(Store& store, const Limits& limits, WorkerPool& writers,
            std::optional<PoolMetrics> preparers = std::nullopt,
            std::optional<PoolMetrics> loaders = std::nullopt);
@@ -89,12 +89,12 @@ class Registry {
   Registry& operator=(const Registry&) = delete;
   ~Registry();
 
-  // Reads the records of all hulls and bodies that the store holds, unless it finds records; before
-  // any other call. Damaged ones are logged, and answered with DATA_LOSS later.
+  // Loads the records of all hulls and bodies, unless the store finds records. Must precede all
+  // other calls. Damaged records are logged; later calls on them get DATA_LOSS.
   absl::Status Load();
-  // How many records of hulls, and small ones of bodies, a registry over a store that finds them
-  // keeps in memory while nobody uses them, instead of what a part of --memory-limit holds. Before
-  // Load; for tests.
+  // Maximum number of unused hull records, and of small body records, kept in memory over a store
+  // that finds records. Replaces the default derived from --memory-limit. Call before Load; for
+  // tests.
   void KeepRecords(size_t most) {
     catalog_.hulls().KeepAtMost(most);
     catalog_.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
@@ -102,37 +102,36 @@ class Registry {
 
   const Store& store() const { return store_; }
   const Limits& limits() const { return limits_; }
-  // For what calls hold for long (MemoryCharge).
+  // Budget for memory that calls hold for long (MemoryCharge).
   MemoryBudget& memory() { return memory_; }
 
-  // Registers an empty hull and calls `done` once that is committed or refused, on this or another
-  // thread. Requires a valid ID (unchecked: CheckHullId checks it where the call arrives).
+  // Registers an empty hull. Calls `done`, on this or another thread, after it is committed or
+  // refused. Requires: a valid ID (not checked here; CheckHullId runs on arrival of the call).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
   void Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
     lifecycle_.Create(id, if_absent, std::move(done));
   }
 
-  // Removes a hull; its sessions hear of it. Replies with the store's revision, as above.
+  // Removes a hull and notifies its sessions. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done) {
     lifecycle_.Delete(id, if_revision, std::move(done));
   }
 
-  // Puts a hull in the place of another, at once for all readers. It is a new incarnation: sessions
-  // of the former one end. Replies as above. Requires a builder. Copies the vertices, hence not for
-  // gRPC's threads.
-  // NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
-  // --max-hulls, or the disk is full; UNAVAILABLE: as above.
+  // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
+  // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
+  // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
+  // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, Reply<ReplaceResult> done) {
     lifecycle_.Replace(std::move(replacement), std::move(done));
   }
 
-  // Puts a body in the place of another or of none, at once for all readers; its revisions are
-  // given here. Replies as above. Requires valid IDs and poses (unchecked), and pieces, at most
-  // --max-pieces-per-body. The hulls of the pieces need not exist.
-  // ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
-  // --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: as above.
+  // Creates or replaces a body atomically for all readers, and assigns its revisions. Replies as
+  // above. Requires: valid IDs and poses (not checked), and between one and --max-pieces-per-body
+  // pieces. The hulls of the pieces need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED:
+  // if_revision does not match; RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is
+  // full; UNAVAILABLE: as above.
   void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done) {
     bodies_.Put(std::move(body), if_revision, std::move(done));
   }
@@ -142,125 +141,113 @@ class Registry {
                   Reply<uint64_t> done) {
     bodies_.Delete(id, if_revision, std::move(done));
   }
-  // As List. A page may hold less than page_size although there are more.
+  // As List. A page may hold fewer than page_size bodies although more follow.
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
                                       size_t page_size,
                                       const std::function<bool()>& should_stop = {}) {
     return bodies_.List(prefix, after, page_size, should_stop);
   }
-  // What is not known is read from the store, hence not for gRPC's threads. The status:
-  // UNAVAILABLE: it cannot be read; CANCELLED: should_stop said so; RESOURCE_EXHAUSTED: it would
-  // have to be, and readers hold more than their share of --memory-limit. Cost: O(log n) each, and
-  // a question to the store for each kMostLookupsPerHold; others pass in between.
+  // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
+  // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
+  // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
+  // query per kMostLookupsPerHold; the mutex is released in between.
   FoundBodies FindBodies(std::span<const std::string> ids,
                          const std::function<bool()>& should_stop = {}) {
     return bodies_.Find(ids, should_stop);
   }
-  // The same, but nullopt, at once, where the store would have to be read.
+  // As FindBodies, but returns nullopt without blocking if the store would have to be read.
   std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids) {
     return bodies_.TryFind(ids);
   }
-  // Whether there may be a body. Takes no lock.
+  // False if no body exists. Takes no lock.
   bool has_bodies() const { return catalog_.BodyCount() > 0; }
 
-  // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
-  // Where the store finds records, it is asked, hence not for gRPC's threads then. UNAVAILABLE: it
-  // cannot be read. CANCELLED: should_stop said so.
+  // Returns at most `page_size` hulls with IDs that start with `prefix` and follow `after` in byte
+  // order. Queries the store if it finds records, so it must not run on a gRPC thread then.
+  // UNAVAILABLE: the store cannot be read. CANCELLED: should_stop returned true.
   absl::StatusOr<HullPage> List(const std::string& prefix, const std::string& after,
                                 size_t page_size, const std::function<bool()>& should_stop = {});
 
-  // Where the store is shared, waits until all that other servers had committed by the time of the
-  // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
-  // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
-  // question to the store, one for all that wait; nothing where it is not shared.
+  // Read barrier for a shared store: blocks until all changes that peer servers committed before
+  // the call are applied. Required before functions without a freshness of their own (List,
+  // FindBodies, ListBodies). Not for gRPC threads. CANCELLED: should_stop returned true.
+  // UNAVAILABLE: the store cannot be queried. Cost: one store query shared by all waiting calls;
+  // none if the store is not shared.
   absl::Status AwaitOthers(const std::function<bool()>& should_stop) {
     return freshness_.AwaitOthers(should_stop);
   }
-  // Waits until what is here is as fresh as this, in the same way, and tells how stale it may be:
-  // before what does not do so itself. FAILED_PRECONDITION: the store has not given that revision.
-  // Otherwise as AwaitOthers. Cost: a question to the store only where it is not.
+  // Blocks likewise until the catalog satisfies `freshness`, and returns the bound on its
+  // staleness. Required before functions without a freshness of their own. FAILED_PRECONDITION: the
+  // store has not assigned that revision. Other errors as AwaitOthers. Cost: a store query only if
+  // the catalog is too stale.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
                                                       const std::function<bool()>& should_stop) {
     return freshness_.AwaitFresh(freshness, should_stop);
   }
-  // The same, but nullopt, at once, where it would have to wait.
+  // As AwaitFresh, but returns nullopt instead of blocking.
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness) {
     return freshness_.TryFresh(freshness);
   }
-  // Has what other servers had committed by now taken over, and calls `done` then, once, on this
-  // or another thread, without any lock: for a caller that asks several registries at once.
-  // UNAVAILABLE: as AwaitOthers. Cost: as that, but nobody waits.
-  void StartFollow(std::function<void(const absl::Status&)> done) {
-    freshness_.StartFollow(std::move(done));
-  }
-  // The same where what is here is not as fresh as this; false, and nothing, where it is.
+  // If the catalog does not satisfy `freshness`, requests the changes committed by peer servers so
+  // far and calls `done` exactly once after they are applied, on this or another thread, without
+  // any lock. Returns false and does nothing if it does. UNAVAILABLE: as AwaitOthers. Cost: as
+  // AwaitOthers, but without blocking.
   bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done) {
     return freshness_.StartFresh(freshness, std::move(done));
   }
 
-  // Has nothing committed here for a while (Committer::Hold). What is resolved meanwhile of what is
-  // here (Freshness::OfWhatIsHere) is what the store holds all the while.
-  void Hold(std::shared_ptr<CommitHold> hold);
-
-  // Hulls and bodies of other registries, which count against --max-hulls with those that are here.
-  // Called under the mutex, and takes none. Before any other call.
-  void CountAlso(std::function<uint64_t()> held_elsewhere) {
-    catalog_.CountAlso(std::move(held_elsewhere));
-  }
-  // How many hulls and bodies are here. Takes no lock.
-  uint64_t held() const { return catalog_.HullCount() + catalog_.BodyCount(); }
-
   RegistrySizes Sizes() const;
-  // How long, and for how much, the mutex of the records was held.
+  // Hold times and work per hold of the registry's mutex.
   HoldStatistics Holds() const;
   CacheStatistics Cache() const;
   CommitStatistics Commits() const { return committer_.Statistics(); }
-  // Where each batch is timed and counted; set before the first change, and outlives this.
+  // Sets the metrics of batches. Call before the first change; `metrics` must outlive this.
   void SetMetrics(StoreMetrics& metrics) {
     reader_.SetMetrics(metrics.snapshot_seconds);
     committer_.SetMetrics(metrics);
   }
-  // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
+  // RESOURCE_EXHAUSTED: this use holds more than its share of --memory-limit.
   absl::Status CheckMemory(MemoryUse use);
 
-  // The hulls, ready to be served, all current at one revision of the store, as fresh as the plan
-  // says. May read from the store and prepare, hence not for gRPC's threads. CANCELLED when
-  // should_stop said so. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
-  // RESOURCE_EXHAUSTED: hulls would have to be read from the store, or are more than
-  // kMostLookupsPerHold, and what readers hold is beyond their share of --memory-limit; without a
-  // time to retry, if these hulls are most of it.
+  // Returns the hulls, ready to be served, all at one revision of the store that satisfies the
+  // plan's freshness. May read the store and prepare hulls, so it must not run on a gRPC thread.
+  // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
+  // RESOURCE_EXHAUSTED: hulls must be read from the store, or number more than kMostLookupsPerHold,
+  // while readers exceed their share of --memory-limit; without a retry delay if these hulls
+  // account for most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
-  // The same, but nullopt, at once, where it would have to ask or read the store, or to prepare.
+  // As Resolve, but returns nullopt without blocking if it would have to query or read the store,
+  // or to prepare a hull.
   std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {}) {
     return reader_.TryResolve(ids, plan);
   }
-  // As Resolve, for a caller that asks for the same hulls again and again: `known` is kept in
-  // between, and only what changed since is looked up.
+  // As Resolve, for a caller that repeatedly requests the same hulls: `known` persists between
+  // calls, and only hulls changed since are looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {}) {
     return reader_.Refresh(ids, known, should_stop, plan);
   }
-  // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
+  // Resolves one hull; NOT_FOUND and DATA_LOSS become the status.
   absl::StatusOr<std::pair<AsOf, HullView>> Resolve(const std::string& id,
                                                     const std::function<bool()>& should_stop,
                                                     const Freshness& freshness = {});
 
-  // The canonical snapshot of what was resolved, made if nobody needed it before; it lives as long
-  // as view.served. Not for gRPC's threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
-  // said so. RESOURCE_EXHAUSTED: it is not made yet, and readers hold more than their share of
-  // --memory-limit. Cost: that of building the hull.
+  // Returns the canonical snapshot of a resolved hull, built at first use; it lives as long as
+  // view.served. Not for gRPC threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
+  // returned true. RESOURCE_EXHAUSTED: it is not built yet, and readers exceed their share of
+  // --memory-limit. Cost: building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
                                         const std::function<bool()>& should_stop) {
     return reader_.Canonical(view, should_stop);
   }
 
-  // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
-  // thread, with the reason when the hull is deleted or replaced before the session is closed.
+  // Opens a session; `done` runs on this or another thread. `on_gone` is called at most once, on
+  // any thread, with the reason if the hull is deleted or replaced before the session is closed.
   // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: takes turns with others for a thread.
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: shares threads fairly with other clients.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
                   ClientId client = kNoClient) {
@@ -270,64 +257,64 @@ class Registry {
 
   void CloseAppend(const AppendSession& session) { appender_.CloseAppend(session); }
 
-  // Queues a chunk. `on_built`, which may be empty, is called once its points are no longer held:
-  // the next one may be queued then. `done` is called once it is committed or refused. Both come
-  // once, on other threads, in either order; what is committed is reported in the order of the
-  // sequences, a refusal possibly before what goes before it.
-  // Refusals, which change nothing: FAILED_PRECONDITION: a gap in the sequence, or the hull is
-  // gone; ABORTED: if_revision does not match; INVALID_ARGUMENT: a point is not finite;
-  // RESOURCE_EXHAUSTED: --max-vertices-per-hull, --max-points-per-hull, --max-writers-per-hull,
-  // --memory-limit, or the disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the
-  // store is damaged; CANCELLED: should_stop said so.
+  // Queues a chunk. `on_built`, which may be empty, is called when its points are released and the
+  // next chunk may be queued. `done` is called after it is committed or refused. Each is called
+  // exactly once, on another thread, in either order. Commits are reported in the order of the
+  // sequences; a refusal may precede earlier chunks. Refusals, which change nothing:
+  // FAILED_PRECONDITION: a gap in the sequence, or the hull is gone; ABORTED: if_revision does not
+  // match; INVALID_ARGUMENT: a point is not finite; RESOURCE_EXHAUSTED: --max-vertices-per-hull,
+  // --max-points-per-hull, --max-writers-per-hull, --memory-limit, or the disk is full;
+  // UNAVAILABLE: the store cannot be written; DATA_LOSS: the store is damaged; CANCELLED:
+  // should_stop returned true.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done) {
     appender_.Append(session, std::move(chunk), std::move(should_stop), std::move(on_built),
                      std::move(done));
   }
 
-  // Begins to tell of changes (ChangeFeed). `on_ready` is called on the feed's thread, once after
-  // each piece that waits. RESOURCE_EXHAUSTED: --memory-limit.
+  // Starts a watch (ChangeFeed). `on_ready` is called on the feed's thread, once after each piece
+  // that waits. RESOURCE_EXHAUSTED: --memory-limit.
   absl::StatusOr<std::shared_ptr<ChangeWatch>> OpenWatch(const WatchTarget& target,
                                                          const WatchStart& start,
                                                          std::function<void()> on_ready) {
     return watches_.Open(target, start, std::move(on_ready));
   }
-  // What is to be told next; may be nothing. UNAVAILABLE once EndWatches was called. Requires that
-  // the watch does not wait. Cost: O(kMostPerPiece).
+  // Returns the next piece of changes, possibly empty. UNAVAILABLE after EndWatches. Requires: the
+  // watch does not wait. Cost: O(kMostPerPiece).
   absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch) { return watches_.Take(watch); }
-  // What changes of `added` from now on is told, too, and what changes of `dropped`, which were
-  // added before, no more. Requires a target that varies. Cost: a hash for each ID.
+  // Adds `added` to the watched IDs and removes `dropped`, which must have been added before.
+  // Applies to later changes. Requires a target that varies. Cost: one hash per ID.
   void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
                  std::span<const std::string> dropped) {
     watches_.Extend(watch, added, dropped);
   }
-  // The watch waits no more than until its on_ready is called, although nothing changed.
+  // Schedules the watch's on_ready although nothing changed.
   void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Nudge(watch); }
-  // An on_ready that is due by then still comes.
+  // Closes a watch. An on_ready that is already due is still called.
   void CloseWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Close(watch); }
-  // Every watch is to end: nudges them all.
+  // Nudges every watch so that it ends.
   void EndWatches() { watches_.EndAll(); }
 
  private:
   Store& store_;
-  // With the memory limit in force.
+  // Limits with the memory limit in force.
   const Limits limits_;
   MemoryBudget memory_;
 
-  // Guards the rest, but what is thread-safe by itself (the budget, the committer, pools), and all
-  // of a RegisteredHull but a builder that a thread owns.
+  // Guards the members below except thread-safe ones (budget, committer, pools), and every
+  // RegisteredHull except a builder owned by a thread.
   mutable FairMutex mutex_;
   Catalog catalog_;
   AfterOthers after_others_;
   ChangeFeed feed_;
 
-  // Their threads use all the rest, so they end before anything else does (~Registry).
+  // Their threads use all other members, so they end first (~Registry).
   Committer committer_;
   Preparer preparer_;
-  // These read records, and help readers that read many hulls from the store.
+  // Threads that read records, and help readers that load many hulls.
   std::optional<WorkerPool> loaders_;
 
-  // In the order in which they build on each other.
+  // In the order of their dependencies.
   FreshnessGate freshness_;
   RecordGate gate_;
   RecordReader records_;

@@ -15,7 +15,7 @@ namespace hulld::server {
 namespace {
 
 constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
-// Answers hold the index of a piece as a signed one.
+// Answers hold the index of a piece as a signed number.
 constexpr uint64_t kMaxPieceIndex = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 
@@ -24,7 +24,7 @@ std::string EnvironmentName(std::string flag) {
   return "HULLD_" + flag;
 }
 
-// Empty when `text` is a number of seconds up to a day; NaN is none.
+// Returns an empty string if `text` is a number of seconds up to a day; NaN is not.
 std::string CheckSeconds(const std::string& text) {
   double seconds = -1;
   const char* end = text.data() + text.size();
@@ -52,7 +52,7 @@ class Parser {
         "'hulld migrate --help' how to move one.");
   }
 
-  // The arguments that stand for the variables that are set.
+  // Returns the environment variables as arguments.
   std::vector<std::string> FromEnvironment(const Environment& environment) const {
     std::vector<std::string> arguments;
     for (const CLI::Option* option : app_.get_options()) {
@@ -66,13 +66,12 @@ class Parser {
     return arguments;
   }
 
-  // Lets Parse use its arguments alone. CLI11 would read the variables of all options that they
-  // leave unset.
+  // Restricts Parse to its arguments. CLI11 would also read the variables of all unset options.
   void ForgetEnvironment() {
     for (CLI::Option* option : app_.get_options()) option->envname("");
   }
 
-  // OK with print set for --help and --version; INVALID_ARGUMENT with the parser's words.
+  // Returns OK, with `print` set for --help and --version. INVALID_ARGUMENT: the parser's error.
   absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
     try {
@@ -151,8 +150,6 @@ class Parser {
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
         "File of the connection string of --store postgres, which only hulld may read");
-    Add("postgres-shards", config_.postgres_shards,
-        "Instead: a file that spreads hulls over several databases, with --postgres-servers many");
     Add("postgres-servers", config_.postgres_servers,
         "With --store postgres: one server at a time is active over a database, and others wait, "
         "or many are at once, all with this setting")
@@ -230,6 +227,13 @@ class Parser {
   void AddCallLimits() {
     Limits& limits = config_.limits;
     constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
+    AddLimit("max-connections", limits.max_connections,
+             "Open connections; beyond them the one that has been idle longest is closed", kAny);
+    AddLimit("max-connections-per-address", limits.max_connections_per_address,
+             "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt",
+             kAny);
+    AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
+             "Open streams of reflection, which need no token", kAny);
     AddLimit("max-calls", limits.max_calls, "Calls that run at a time, open streams included",
              kAny);
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
@@ -280,26 +284,12 @@ std::string DefaultDataDir(const Environment& environment) {
   return "hulld-data";
 }
 
-// What settings of the store say together.
+// Checks combinations of settings of the store.
 absl::Status CheckStore(const Config& config) {
   const bool is_postgres = config.store == "postgres";
-  const bool is_sharded = !config.postgres_shards.empty();
-  if (is_postgres && config.postgres_conninfo_file.empty() && !is_sharded) {
+  if (is_postgres && config.postgres_conninfo_file.empty()) {
     return absl::InvalidArgumentError(
-        "--store postgres needs --postgres-conninfo-file, which tells where the database is, or "
-        "--postgres-shards, which names several");
-  }
-  if (is_sharded && !is_postgres) {
-    return absl::InvalidArgumentError("--postgres-shards is for --store postgres");
-  }
-  if (is_sharded && !config.postgres_conninfo_file.empty()) {
-    return absl::InvalidArgumentError(
-        "--postgres-shards takes the place of --postgres-conninfo-file; give one of them");
-  }
-  if (is_sharded && config.postgres_servers != "many") {
-    return absl::InvalidArgumentError(
-        "--postgres-shards needs --postgres-servers many: servers that wait for each other's end "
-        "would each take a part of the databases");
+        "--store postgres needs --postgres-conninfo-file, which tells where the database is");
   }
   if (is_postgres && config.durability != "sync") {
     return absl::InvalidArgumentError(
@@ -337,7 +327,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
                                              const Environment& environment) {
   CommandLine result;
   const std::vector<std::string> variables = Parser().FromEnvironment(environment);
-  // Each variable alone first, so that an error can say where the value came from.
+  // Each variable is parsed alone first, so that an error can name it.
   for (const std::string& variable : variables) {
     if (variable.starts_with("--config=")) continue;
     Parser parser;

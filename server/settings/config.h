@@ -17,14 +17,14 @@ class Env;
 
 namespace hulld::server {
 
-// What one caller may ask for; the error that names a limit names its flag.
+// Limits of calls and of the store. The error of a limit names its flag.
 struct Limits {
   // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
   // pairs at their defaults.
   uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
-  // Points that one hull takes in its life. The default is what a double counts exactly, which no
-  // hull reaches.
+  // Points that one hull takes in its life. A double counts up to the default exactly; no hull
+  // reaches it.
   uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
@@ -43,20 +43,29 @@ struct Limits {
   // Bytes that requests may take from when they are parsed until they are answered, and the same
   // again for those that are on their way.
   uint64_t request_memory = 128 << 20;
-  // Calls that run, open streams included, and those of them that wait for a thread.
+  // Open connections: all, and of one address, IPv6 by its first 64 bits. Each takes two
+  // descriptors and some 50 KB. Not bounded by address on a unix socket.
+  uint64_t max_connections = 4096;
+  uint64_t max_connections_per_address = 512;
+  // Running calls that need no token (reflection); one client may have one in kAnonymousShare of
+  // them.
+  uint64_t max_anonymous_calls = 64;
+  static constexpr uint64_t kAnonymousShare = 8;
+  // Running calls, including open streams; and running calls that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
   // One call in this many, of max_calls and of max_calls_per_client, is kept for single calls:
   // calls that last cannot fill either.
   static constexpr uint64_t kKeptForSingleCalls = 4;
-  // Calls of one client that run, open streams included: fewer than max_waiting_calls, so that no
-  // client by itself can cause others to be refused. A client is a token or, without tokens, a peer
-  // address.
+  // Running calls of one client, including open streams. Fewer than max_waiting_calls, so that no
+  // single client can cause refusals of other clients. A client is a token or, without tokens, a
+  // peer address.
   uint64_t max_calls_per_client = 512;
   // Calls of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and reflection, and watches,
   // that one client has open.
   uint64_t max_streams_per_client = 256;
-  // BatchCheckCollisions and FindCollisions that run; they take turns. All, and of one client.
+  // Running calls of BatchCheckCollisions and FindCollisions, which take turns: in total, and of
+  // one client.
   uint64_t max_concurrent_batches = 32;
   uint64_t max_batches_per_client = 16;
   // The longest time of one request, or of one message of StreamCollisions and WatchCollisions;
@@ -72,8 +81,8 @@ struct Config {
   std::string listen = "127.0.0.1:50551";
   // Allows addresses that other machines can reach without TLS.
   bool insecure = false;
-  // PEM files: the certificate that the server shows with those that lead to its authority, its
-  // private key, and the authorities of clients; the last makes clients need a certificate.
+  // PEM files: the server's certificate with the chain to its authority, its private key, and the
+  // authorities of clients. The last one requires a certificate of every client.
   std::string tls_cert;
   std::string tls_key;
   std::string tls_client_ca;
@@ -81,21 +90,19 @@ struct Config {
   std::string tokens_file;
   // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
   int threads = 0;
-  // Where hulls live: "rocksdb", "postgres" or "memory".
+  // Kind of store: "rocksdb", "postgres", or "memory".
   std::string store = "rocksdb";
   // The directory of "rocksdb". Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state; without a
   // home, hulld-data where the server is started; ParseCommandLine puts that in its place.
   std::string data_dir;
   // The file that holds the connection string of "postgres".
   std::string postgres_conninfo_file;
-  // Instead: the file that spreads IDs over several databases.
-  std::string postgres_shards;
   // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
   // on the command line only, as servers that always did this would take it from each other.
   bool take_over = false;
   // Whether servers over one database of "postgres" are active together: "one" or "many".
   std::string postgres_servers = "one";
-  // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
+  // Durability of an acknowledged change: "sync" (on disk) or "relaxed" (written, and synced within
   // kRelaxedSyncInterval).
   std::string durability = "sync";
   // The file system of a durable store; null: the operating system's. For tests.
@@ -114,17 +121,19 @@ struct Config {
 
   bool has_tls() const { return !tls_cert.empty() || !tls_key.empty() || !tls_client_ca.empty(); }
 
-  // How often the files of certificates and tokens are looked at.
+  // Interval of checks of the files of certificates and tokens.
   static constexpr std::chrono::milliseconds kReloadInterval{1000};
   static constexpr std::chrono::milliseconds kRelaxedSyncInterval{500};
-  // How often a watch is told that the store's revision moved on, while nothing changes that it
-  // watches.
+  // Interval of progress messages of a watch without changes.
   static constexpr std::chrono::milliseconds kWatchMarkInterval{1000};
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
-  // Calls that one connection may have open; its client makes others wait.
-  static constexpr int kCallsPerConnection = 1024;
+  // Open calls of one connection; its client delays further calls. RFC 9113 (6.5.2) recommends no
+  // fewer, and each costs memory from its first header on.
+  static constexpr int kCallsPerConnection = 100;
+  // Bound of the time until TLS and the settings of HTTP/2 are agreed on.
+  static constexpr std::chrono::milliseconds kHandshakeTimeout{10'000};
   // Long replies are cut into messages of about this size.
   static constexpr size_t kReplyMessageBytes = 1 << 20;
   // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
@@ -134,18 +143,18 @@ struct Config {
   // for the same clients. One of SEPARATED takes some 50 bytes, one of TOUCHING some 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
-  // The same of one row among many, which may come last in a message that is nearly full.
+  // The limit of one row among many, which may end up in a nearly full message.
   static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;
 };
 
-// What a command line asks for: to run with `config`; or, when `print` is not empty, to print
-// it and end (--help, --version).
+// A parsed command line: run with `config`, or print `print` and exit if it is not empty (--help,
+// --version).
 struct CommandLine {
   Config config;
   std::string print;
-  // --check-config: to check the settings, print them and end.
+  // --check-config: check the settings, print them, and exit.
   bool check = false;
   // Every setting in force, as lines of the TOML file.
   std::string settings;

@@ -11,13 +11,12 @@ namespace hulld::server {
 
 inline constexpr uint64_t kNoGroupLimit = std::numeric_limits<uint64_t>::max();
 
-// The limit that one group's directory holds, kNoGroupLimit where it holds none.
+// Returns the limit in the directory of one group, or kNoGroupLimit.
 using GroupLimit = std::function<uint64_t(const std::filesystem::path& directory)>;
 
-// The least limit among the control group of this process and the groups that hold it, as a group's
-// own says nothing of those above it, which bind it too; of version 2 and of version 1, where both
-// are in use. controller: its name in version 1, as "memory". root: where /proc and /sys/fs/cgroup
-// are. Source: cgroups(7).
+// Returns the least limit of the control group of this process and its ancestors, which bind it,
+// too, of versions 1 and 2. controller: its name in version 1, as in "memory". root: parent of
+// /proc and /sys/fs/cgroup. Source: cgroups(7).
 uint64_t LeastGroupLimit(const std::filesystem::path& root, const std::string& controller,
                          const GroupLimit& version_2, const GroupLimit& version_1);
 

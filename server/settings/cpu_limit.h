@@ -7,25 +7,26 @@
 
 namespace hulld::server {
 
-// How many processors' time this process may use.
+// Processor time available to this process.
 struct CpuLimit {
-  // Those that the process may run on: all of the machine, or those of its affinity, which taskset
-  // and cpusets set. At least 1.
+  // Processors of the affinity mask, which taskset and cpusets restrict. At least 1.
   int processors = 1;
-  // What the control groups grant, in processors; infinity: there is no such limit.
+  // Quota of the control groups, in processors; infinity: no quota.
   double quota = std::numeric_limits<double>::infinity();
 
-  // As many threads as can run at a time: the lesser of both, rounded up, at least 1.
+  // Returns the number of threads that can run concurrently: the lesser of both, rounded up, at
+  // least 1.
   int threads() const;
-  // For the log: "2, as the control group grants 1.5 of 64 processors".
+  // Returns a text for the log: "2, as the control group grants 1.5 of 64 processors".
   std::string Describe() const;
 };
 
-// quota is the least of the control group of this process and the groups that hold it: cpu.max of
-// version 2, the CFS quota of version 1. root: where /proc and /sys/fs/cgroup are, for tests.
+// Reads both limits. The quota is the least one of the control group of this process and its
+// ancestors: cpu.max of version 2, the CFS quota of version 1. root: parent of /proc and
+// /sys/fs/cgroup, for tests.
 CpuLimit ReadCpuLimit(const std::filesystem::path& root = "/");
 
-// ReadCpuLimit().threads() when it was first asked.
+// Returns ReadCpuLimit().threads() as of the first call.
 int DefaultThreads();
 
 }  // namespace hulld::server

@@ -6,13 +6,12 @@
 
 namespace hulld::server {
 
-// The least limit of memory among the control group of this process and the groups that hold it;
-// that of version 2 and of version 1, where both are in use. UINT64_MAX: there is none. Bytes.
-// root: where /proc and /sys/fs/cgroup are, for tests.
+// Returns the least memory limit of the control group of this process and its ancestors, in bytes,
+// of versions 1 and 2. UINT64_MAX: no limit. root: parent of /proc and /sys/fs/cgroup, for tests.
 uint64_t ControlGroupMemory(const std::filesystem::path& root = "/");
 
-// Half of the memory that this process may use: the machine's, or ControlGroupMemory() where that
-// is less. Bytes.
+// Returns half of the memory that this process may use, in bytes: that of the machine, or
+// ControlGroupMemory() if it is less.
 uint64_t DefaultMemoryLimit();
 
 }  // namespace hulld::server

@@ -11,7 +11,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "values are copied as they are");
 
-// What is kept, one after the other: numbers as they are, texts with their length before them.
+// Encoding of a body: numbers in binary, strings with their length first.
 class Writer {
  public:
   template <typename Number>

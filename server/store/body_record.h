@@ -16,7 +16,7 @@ namespace hulld::server {
 // A body without its pieces.
 struct BodyRecord {
   std::string body_id;
-  // The store's revision at which it was created, and that at which its pieces were put last.
+  // Store revisions of its creation and of the last put of its pieces.
   uint64_t create_revision = 0;
   uint64_t revision = 0;
 };
@@ -28,20 +28,20 @@ struct StoredPiece {
   Pose X_BP;
 };
 
-// All of a body.
+// A body with its pieces.
 struct StoredBody {
   BodyRecord record;
-  // The hulls of the pieces, each once, in the order in which they come first.
+  // Distinct hulls of the pieces, in order of first use.
   std::vector<std::string> hull_ids;
   std::vector<StoredPiece> pieces;
 
-  // In memory.
+  // Bytes of memory.
   size_t MemoryBytes() const;
 };
 
-// All but the body's ID, which is the key.
+// Encodes all fields but the ID, which is the key.
 std::string EncodeStoredBody(const StoredBody& body);
-// DATA_LOSS: it cannot be.
+// DATA_LOSS: no body has this encoding.
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);
 
 }  // namespace hulld::server

@@ -9,14 +9,14 @@
 
 namespace hulld::server {
 
-// Puts a value with its checksum.
+// Adds a value with its checksum to the batch.
 void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string value);
 
-// Puts what a change does to the keys of the store (store_keys.h), all but the store's revision.
+// Adds the effect of a change on the keys of the store (store_keys.h), except the store's revision.
 void EncodeChange(rocksdb::WriteBatch& batch, const Change& change);
 
-// Whether the change deletes or replaces a hull of which no more than the ID is known, as its
-// record is damaged: what else is kept of it is not found by EncodeChange.
+// Returns true if the change deletes or replaces a hull with a damaged record. EncodeChange does
+// not find the other values of such a hull.
 bool EndsUnknown(const Change& change);
 
 }  // namespace hulld::server

@@ -7,7 +7,7 @@
 namespace hulld::server {
 namespace {
 
-// What the changes so far make of the revisions of hulls.
+// Revisions of hulls after the changes so far.
 using Grown = std::unordered_map<const HullRevisions*, HullRevisions>;
 
 void NumberBody(Change& change) {

@@ -3,18 +3,24 @@
 
 #include <string>
 
-// Where things are in --data-dir.
+// Paths in --data-dir.
 namespace hulld::server {
 
 inline std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
 
-// Ours alone, and nothing in it outlives the server: what else lies in the data directory is not
-// ours to touch.
+// A directory of hulld alone, emptied at each start. Other files in the data directory are not
+// touched.
 inline std::string ScratchDirectory(const std::string& data_dir) {
   return data_dir + "/hulld-scratch";
 }
 
-// 'hullctl backup restore' leaves this file in the directory that it makes.
+// The high-water mark of the write-ahead logs (files/log_mark.h).
+inline std::string LogMarkPath(const std::string& data_dir) { return data_dir + "/hulld-log-mark"; }
+
+// The reserve for a full disk (files/disk_reserve.h).
+inline std::string ReservePath(const std::string& data_dir) { return data_dir + "/hulld-reserve"; }
+
+// A file that 'hullctl backup restore' leaves in its new directory.
 inline std::string RestoredMark(const std::string& data_dir) { return data_dir + "/restored"; }
 
 }  // namespace hulld::server

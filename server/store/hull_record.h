@@ -22,8 +22,8 @@ struct HullRecord {
   friend bool operator==(const HullRecord&, const HullRecord&) = default;
 };
 
-// How a store keeps the vertices of a hull: as a base, and a delta for each change since, which
-// holds what the change added. The hull is that of base and deltas together.
+// Layout of the stored vertices of a hull: a base, and a delta of the added vertices for each
+// change since. The hull is that of the base and all deltas.
 struct VertexLayout {
   // 0: no base.
   uint64_t base_revision = 0;
@@ -35,7 +35,7 @@ struct VertexLayout {
   friend bool operator==(const VertexLayout&, const VertexLayout&) = default;
 };
 
-// What a store keeps of a hull beside its vertices and its writers' sequences.
+// Stored state of a hull without its vertices and its writers' sequences.
 struct StoredHull {
   HullRecord record;
   // Writers that committed a chunk.
@@ -44,8 +44,8 @@ struct StoredHull {
   friend bool operator==(const StoredHull&, const StoredHull&) = default;
 };
 
-// The revisions of one incarnation of a hull that change as it grows: those of its creation, of the
-// last change of its vertex set, and of its base.
+// Revisions of one incarnation of a hull: of its creation, of the last change of its vertex set,
+// and of its base.
 struct HullRevisions {
   uint64_t create = 0;
   uint64_t change = 0;
@@ -62,8 +62,8 @@ inline void SetRevisions(const HullRevisions& revisions, StoredHull* hull) {
   hull->layout.base_revision = revisions.base;
 }
 
-// Two versions of one incarnation of a hull. They have the same base, so that all that came between
-// them is in deltas.
+// Two versions of one incarnation of a hull with the same base: all growth between them is in
+// deltas.
 struct HullGrowth {
   StoredHull before;
   StoredHull after;

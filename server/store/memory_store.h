@@ -11,7 +11,7 @@
 
 namespace hulld::server {
 
-// Keeps nothing beside what the registry holds in memory; a new store at each start.
+// A store without storage: the registry holds everything in memory. Each start is a new store.
 class MemoryStore : public Store {
  public:
   std::string kind() const override { return "memory"; }

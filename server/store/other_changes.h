@@ -15,38 +15,37 @@
 
 namespace hulld::server {
 
-// What other servers made of one ID.
+// Peers' changes of one ID.
 struct OtherChange {
-  // The store's revision at the last change that can be seen: the revision of what there is by now,
-  // or the one at which it ended.
+  // Revision of the latest change: that of the present hull or body, or the one at which it ended.
   uint64_t revision = 0;
-  // The revision at which an incarnation ended last; 0: none did.
+  // Revision at which the latest incarnation ended; 0: none ended.
   uint64_t ended_at = 0;
-  // create_revision of the first incarnation that ended, and whether it was a body's; 0: none did,
-  // or that is not known.
+  // create_revision of the first incarnation that ended, or 0 if none ended or it is unknown; and
+  // its kind.
   uint64_t former_began = 0;
   bool former_was_body = false;
-  // What there is by now: one of the two, or nothing. DATA_LOSS: it is damaged.
+  // The present hull or body, if any. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
-  // The points that make the hull that is known here what there is by now, where they were asked
-  // for (Store::LoadGrowth) and could be had. Otherwise the hull is to be read anew.
+  // Points that turn the known version of the hull into the present one (Store::LoadGrowth). None:
+  // the hull must be read again.
   std::optional<std::vector<Vector>> growth;
 };
 
-// What a store holds, counted.
+// Numbers of stored objects.
 struct StoreTotals {
   uint64_t hulls = 0;
   uint64_t vertices = 0;
   uint64_t bodies = 0;
 };
 
-// What other servers committed to a store that is shared (Store::is_shared), up to a moment.
+// Changes that peers committed to a shared store (Store::is_shared), up to a revision.
 struct OtherChanges {
-  // The store's revision at that moment; 0: there is nothing that was not known.
+  // That revision; 0: no new changes.
   uint64_t revision = 0;
   std::map<std::string, OtherChange> by_id;
-  // What the store held at that moment, where it finds records (Store::finds_records).
+  // Totals at that revision, if Store::finds_records().
   StoreTotals totals;
 };
 

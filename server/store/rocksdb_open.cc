@@ -1,12 +1,17 @@
-// How a store is opened: its directories, its format, and what the last run left.
+// Opening a store: directories, format, and recovery from the last run.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <rocksdb/cache.h>
 #include <rocksdb/table.h>
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstdarg>
+#include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <utility>
 
 #include "server/contract/status_map.h"
@@ -20,7 +25,26 @@
 namespace hulld::server {
 namespace {
 
-// What a server that was killed left behind.
+// RocksDB's diagnostics, in the server's log. It would write them to a file of its own, and abort
+// once the disk is full and that file cannot be written (observed: an assertion of 7.8).
+class Diagnostics : public rocksdb::Logger {
+ public:
+  Diagnostics() : Logger(rocksdb::InfoLogLevel::WARN_LEVEL) {}
+
+  __attribute__((format(printf, 2, 0))) void Logv(const char* /*format*/,
+                                                  va_list /*arguments*/) override {}
+  __attribute__((format(printf, 3, 0))) void Logv(rocksdb::InfoLogLevel level, const char* format,
+                                                  va_list arguments) override {
+    const bool is_error =
+        level == rocksdb::InfoLogLevel::ERROR_LEVEL || level == rocksdb::InfoLogLevel::FATAL_LEVEL;
+    if (!is_error && level != rocksdb::InfoLogLevel::WARN_LEVEL) return;
+    char text[1024];
+    std::vsnprintf(text, sizeof text, format, arguments);
+    spdlog::log(is_error ? spdlog::level::warn : spdlog::level::debug, "RocksDB: {}", text);
+  }
+};
+
+// Removes the remains of a killed server.
 void ClearScratch(const std::string& data_dir) {
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(ScratchDirectory(data_dir), error)) {
@@ -35,23 +59,29 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
     return absl::InvalidArgumentError("--data-dir is empty; name the directory of the store");
   }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
-  if (!store->options_.read_only) {
-    if (absl::Status s = store->MakeDirectories(); !s.ok()) return s;
-  }
-  if (absl::Status s = store->OpenDb(); !s.ok()) return s;
+  const bool read_only = store->options_.read_only;
+  if (absl::Status s = read_only ? store->Lock() : store->MakeDirectories(); !s.ok()) return s;
+  if (absl::Status s = store->OpenDbInRoom(); !s.ok()) return s;
   if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
-  if (!store->options_.read_only) ClearScratch(store->options_.data_dir);
-  if (store->options_.durability == Durability::kRelaxed && !store->options_.read_only) {
-    store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
-  }
+  if (read_only) return store;
+  ClearScratch(store->options_.data_dir);
+  if (absl::Status s = store->StartMark(); !s.ok()) return s;
+  store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
   return store;
 }
 
-RocksDbStore::RocksDbStore(RocksDbOptions options) : options_(std::move(options)) {
-  rocksdb::Env* base = options_.env != nullptr ? options_.env : rocksdb::Env::Default();
-  files_ =
-      std::make_shared<LogFileSystem>(base->GetFileSystem(), DatabaseDirectory(options_.data_dir));
-  env_ = rocksdb::NewCompositeEnv(files_);
+RocksDbStore::RocksDbStore(RocksDbOptions options)
+    : options_(std::move(options)),
+      files_(std::make_shared<LogFileSystem>(
+          (options_.env != nullptr ? options_.env : rocksdb::Env::Default())->GetFileSystem(),
+          DatabaseDirectory(options_.data_dir))),
+      env_(rocksdb::NewCompositeEnv(files_)),
+      reserve_(*files_, ReservePath(options_.data_dir), options_.reserve_bytes) {
+  files_->OnLocked([this] {
+    logs_checked_ = CheckLogs();
+    return logs_checked_.ok() ? rocksdb::IOStatus::OK()
+                              : rocksdb::IOStatus::Corruption("see logs_checked_");
+  });
 }
 
 RocksDbStore::~RocksDbStore() {
@@ -62,8 +92,10 @@ RocksDbStore::~RocksDbStore() {
   sync_wake_.notify_all();
   if (syncer_.joinable()) syncer_.join();
   if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
-  // Once more, if what a failed write left could not be cut off when it failed.
+  // Retries to cut off the remains of a failed write.
   db_ = nullptr;
+  if (lock_ != nullptr) env_->UnlockFile(lock_).PermitUncheckedError();
+  files_->SyncMark().PermitUncheckedError();
   if (failure_.ok() || files_->CutUncommitted().ok()) return;
   spdlog::error("the log in {} may hold changes that were refused", options_.data_dir);
 }
@@ -73,23 +105,20 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.env = env_.get();
   options.create_if_missing = !options_.read_only;
   options.paranoid_checks = true;
-  // A record that the end of its log cuts short is dropped: if the disk keeps what it synced, the
-  // record was being written, and a store that syncs had not acknowledged it. All else that does
-  // not match its checksum is refused, what was not synced when the power went out too (in a store
-  // that syncs, the last record at most): its pages may have reached the disk in another order, but
-  // it may as well have been acknowledged and damaged since, and the log does not tell which.
-  options.wal_recovery_mode = options_.cut_log
+  // An incomplete record at the end of a log is dropped: it lies beyond the mark of the log, so it
+  // was not acknowledged. Any other mismatch of a checksum is refused. If power was lost during a
+  // write, pages may have reached the disk out of order (with kSync, of the last record at most);
+  // an acknowledged record that was damaged since looks the same.
+  options.wal_recovery_mode = options_.accept_loss
                                   ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
                                   : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
-  // Coordinates do not compress, and what is not compressed can be read around damage.
+  // Coordinates do not compress, and uncompressed blocks can be read around damage.
   options.compression = rocksdb::kNoCompression;
   options.write_buffer_size = 16 << 20;
   options.max_total_wal_size = 256 << 20;
   options.max_background_jobs = 2;
   options.max_open_files = 256;
-  options.keep_log_file_num = 4;
-  options.max_log_file_size = 4 << 20;
-  options.info_log_level = rocksdb::InfoLogLevel::WARN_LEVEL;
+  options.info_log = std::make_shared<Diagnostics>();
   rocksdb::BlockBasedTableOptions table;
   table.checksum = rocksdb::kXXH3;
   table.format_version = 5;
@@ -99,15 +128,15 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   return options;
 }
 
-// A commit is only as durable as the entries of the directories that hold it. Directories above
-// that are not new are synced too: an earlier start may have made them, and been killed before
-// this. We may not be allowed to open some of those.
+// A commit is only as durable as the directory entries on its path. Existing directories are
+// synced, too: an earlier start may have been killed between making and syncing them. Some of these
+// may not be accessible, which is no error.
 absl::Status RocksDbStore::MakeDirectories() {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::path database =
       fs::absolute(DatabaseDirectory(options_.data_dir), error).lexically_normal();
-  // What a start makes once the directories are durable.
+  // Created by a start after the directories are durable.
   if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
   const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
     return absl::UnavailableError(absl::StrCat("cannot make --data-dir ", options_.data_dir, ": ",
@@ -143,13 +172,102 @@ rocksdb::Status RocksDbStore::SyncDirectory(const std::string& path) {
 }
 
 absl::Status RocksDbStore::OpenDb() {
-  const std::string directory = DatabaseDirectory(options_.data_dir);
+  logs_checked_ = absl::OkStatus();
   rocksdb::DB* db = nullptr;
-  const rocksdb::Status status = options_.read_only
-                                     ? rocksdb::DB::OpenForReadOnly(DbOptions(), directory, &db)
-                                     : rocksdb::DB::Open(DbOptions(), directory, &db);
+  const rocksdb::Status status =
+      options_.read_only
+          ? OpenForReading()
+          : rocksdb::DB::Open(DbOptions(), DatabaseDirectory(options_.data_dir), &db);
+  if (!logs_checked_.ok()) return logs_checked_;
   if (!status.ok()) return OpenError(status, options_.data_dir, options_.read_only);
-  db_.reset(db);
+  if (db != nullptr) db_.reset(db);
+  return absl::OkStatus();
+}
+
+rocksdb::Status RocksDbStore::OpenForReading() {
+  rocksdb::DB* db = nullptr;
+  rocksdb::Status status =
+      rocksdb::DB::OpenForReadOnly(DbOptions(), DatabaseDirectory(options_.data_dir), &db);
+  if (status.ok()) db_.reset(db);
+  return status;
+}
+
+absl::Status RocksDbStore::OpenDbInRoom() {
+  absl::Status opened = OpenDb();
+  if (options_.read_only) return opened;
+  if (IsDiskFull(opened) && reserve_.Release()) opened = OpenDb();
+  if (!IsDiskFull(opened)) {
+    if (opened.ok() && !reserve_.Ensure().ok()) {
+      spdlog::warn("the disk of {} is full: only deletions are taken until there are {} MiB",
+                   options_.data_dir, options_.reserve_bytes >> 20);
+    }
+    return opened;
+  }
+  if (!OpenForReading().ok()) return opened;
+  spdlog::warn("the disk of {} is full: no changes are taken until there are {} MiB",
+               options_.data_dir, options_.reserve_bytes >> 20);
+  failure_ = opened;
+  return absl::OkStatus();
+}
+
+// RocksDB takes the lock itself, except for reading. A file system that is mounted for reading
+// needs no lock: nobody can write there.
+absl::Status RocksDbStore::Lock() {
+  const std::string directory = DatabaseDirectory(options_.data_dir);
+  if (!env_->FileExists(directory + "/CURRENT").ok()) {
+    return absl::NotFoundError(
+        absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+  }
+  if (access(directory.c_str(), W_OK) != 0 && errno == EROFS) return CheckLogs();
+  const rocksdb::Status locked = env_->LockFile(directory + "/LOCK", &lock_);
+  if (!logs_checked_.ok()) return logs_checked_;
+  return locked.ok() ? absl::OkStatus() : OpenError(locked, options_.data_dir, true);
+}
+
+absl::Status RocksDbStore::CheckLogs() {
+  const std::string directory = DatabaseDirectory(options_.data_dir);
+  const std::string path = LogMarkPath(options_.data_dir);
+  absl::StatusOr<std::optional<LogMark>> mark = LogMarkFile::Read(*files_, path);
+  if (absl::IsDataLoss(mark.status())) {
+    if (options_.accept_loss) return absl::OkStatus();
+    return LogLost(options_.data_dir, std::string(mark.status().message()), std::nullopt);
+  }
+  if (!mark.ok()) return mark.status();
+  if (!mark->has_value()) return absl::OkStatus();
+  const absl::StatusOr<std::optional<LostLog>> lost = FindLostLog(*files_, directory, **mark);
+  if (!lost.ok()) return lost.status();
+  if (options_.accept_loss) {
+    return lost->has_value() ? DropLogsFrom((*lost)->number + 1) : absl::OkStatus();
+  }
+  if (lost->has_value()) return LogLost(options_.data_dir, (*lost)->finding, (*mark)->revision);
+  if (options_.read_only) return absl::OkStatus();
+  const rocksdb::IOStatus resumed = files_->ResumeMark(path, *std::move(*mark));
+  return resumed.ok() ? absl::OkStatus() : OpenError(resumed, options_.data_dir, false);
+}
+
+// Changes after a gap are dropped as well, so that the store is that of one moment.
+absl::Status RocksDbStore::DropLogsFrom(uint64_t number) {
+  const std::string directory = DatabaseDirectory(options_.data_dir);
+  std::vector<std::string> names;
+  rocksdb::Status status = env_->GetChildren(directory, &names);
+  for (const std::string& name : names) {
+    const std::optional<uint64_t> log = LogNumber(name);
+    if (status.ok() && log.has_value() && *log >= number) {
+      status = env_->DeleteFile(LogPath(directory, *log));
+    }
+  }
+  return status.ok() ? absl::OkStatus() : OpenError(status, options_.data_dir, false);
+}
+
+// A new store, one of an older hulld, and one with an accepted loss, which has its new ID by now,
+// get a new mark.
+absl::Status RocksDbStore::StartMark() {
+  if (files_->keeps_mark()) return absl::OkStatus();
+  const rocksdb::IOStatus started = files_->StartMark(LogMarkPath(options_.data_dir), revision_);
+  if (started.ok()) return absl::OkStatus();
+  const absl::Status error = OpenError(started, options_.data_dir, false);
+  if (!IsDiskFull(error)) return error;
+  spdlog::warn("the disk of {} is full: no mark of the log is kept", options_.data_dir);
   return absl::OkStatus();
 }
 
@@ -161,6 +279,7 @@ absl::Status RocksDbStore::ReadMeta() {
       return absl::NotFoundError(
           absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
     }
+    if (!failure_.ok()) return failure_;
     if (absl::Status s = InitializeMeta(); !s.ok()) return s;
     return BeginRun();
   }
@@ -171,7 +290,7 @@ absl::Status RocksDbStore::ReadMeta() {
   }
   const absl::StatusOr<std::optional<std::string>> mark = ReadMigrationMark();
   if (absl::IsUnavailable(mark.status())) return mark.status();
-  // A damaged mark is one.
+  // A damaged mark counts as a mark.
   if (!options_.migrating && (!mark.ok() || mark->has_value())) {
     return Prefixed(absl::StrCat("--data-dir ", options_.data_dir, ": "), UnfinishedMigration());
   }
@@ -185,7 +304,7 @@ absl::Status RocksDbStore::ReadMeta() {
   revision_ = **revision;
   if (options_.read_only) return absl::OkStatus();
   if (absl::Status s = BeginRun(); !s.ok()) return s;
-  return DropLostIncarnations();
+  return failure_.ok() ? DropLostIncarnations() : absl::OkStatus();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -197,29 +316,30 @@ absl::Status RocksDbStore::InitializeMeta() {
   return WriteMeta(&batch);
 }
 
-// Before anything else is served or written. A store that may have lost what it had acknowledged
-// takes an ID of its own, as the revisions of what is lost will be given to other changes: one that
-// was made of a backup, one whose log is cut, and one that ended relaxed without syncing its log.
-// The new ID and the marks in the database change together, and the mark in the directory goes
-// last: a start that was interrupted is repeated by the next.
+// Runs before anything is served or committed. A store that may lack acknowledged changes gets a
+// new ID, because their revisions will be given to other changes: a restored backup, a store with
+// an accepted loss, and a relaxed store that was not closed. The new ID and the marks in the
+// database change atomically, and the mark in the directory is removed last, so that the next start
+// repeats an interrupted one.
 absl::Status RocksDbStore::BeginRun() {
   std::error_code error;
   const std::string mark = RestoredMark(options_.data_dir);
   const bool restored = std::filesystem::exists(mark, error);
   const absl::StatusOr<std::optional<std::string>> run = Read(kRelaxedKey);
   if (absl::IsUnavailable(run.status())) return run.status();
-  // A damaged mark is one.
+  // A damaged mark counts as a mark.
   const bool cut_short = !run.ok() || run->has_value();
   const bool relaxed = options_.durability == Durability::kRelaxed;
   const std::string former_id = id_;
   rocksdb::WriteBatch batch;
-  if (options_.cut_log || restored || cut_short) {
+  if (options_.accept_loss || restored || cut_short) {
     id_ = RandomId();
     PutSealed(batch, kStoreIdKey, id_);
   }
   if (relaxed) PutSealed(batch, kRelaxedKey, "");
   if (!relaxed && cut_short) batch.Delete(kRelaxedKey);
   if (batch.Count() > 0) {
+    if (!failure_.ok()) return failure_;
     if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
   }
   relaxed_run_ = relaxed;
@@ -239,7 +359,7 @@ absl::Status RocksDbStore::BeginRun() {
   return absl::OkStatus();
 }
 
-// Syncs the log with all that was written before. If that fails, the mark stays.
+// Syncs the log, then removes the mark. If that fails, the mark stays.
 absl::Status RocksDbStore::EndRelaxedRun() {
   if (absl::Status s = SyncLog(); !s.ok()) return s;
   rocksdb::WriteBatch batch;
@@ -252,7 +372,7 @@ absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {
   options.sync = true;
   const rocksdb::Status status = db_->Write(options, batch);
   if (!status.ok()) return WriteError(status, options_.data_dir);
-  files_->Commit();
+  files_->Commit(revision_, true);
   return absl::OkStatus();
 }
 

@@ -1,4 +1,4 @@
-// How a store is read: single values, all hulls, the vertices of one.
+// Reading a store: single values, all hulls, the vertices of one hull.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -26,8 +26,7 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
       return CannotBeRead(options_.data_dir);
     }
     status = db_->Get(rocksdb::ReadOptions(), key, &sealed);
-    // A block's checksum speaks for many values; our own tells whether this one is among the
-    // damaged.
+    // A block's checksum covers many values; the checksum of the value covers only this one.
     if (status.IsCorruption()) {
       rocksdb::ReadOptions unverified;
       unverified.verify_checksums = false;
@@ -79,7 +78,7 @@ absl::Status RocksDbStore::ScanRange(
   }
   std::string next = begin;
   const rocksdb::Slice upper_bound(end);
-  // As in Read: after damage to a block go on from the last key without the blocks' checksums.
+  // As in Read: after a damaged block, the scan continues without the checksums of blocks.
   for (const bool verify : {true, false}) {
     rocksdb::ReadOptions options;
     options.verify_checksums = verify;
@@ -124,8 +123,8 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
   return std::move(assembly).Finish(std::move(status));
 }
 
-// Most hulls are one value: a base of one part, or a single delta. Whatever is not so, or is not as
-// it should be, is read alone, which tells what is wrong.
+// Most hulls are one value: a base of one part, or a single delta. Other hulls and damaged values
+// are read one by one, which gives the precise error.
 std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
     std::span<const StoredHull* const> hulls) {
   std::vector<std::string> keys;

@@ -1,4 +1,4 @@
-// How a store is written: commits, copies, and what follows an error.
+// Writing a store: commits, copies, and recovery from errors.
 #include "server/store/rocksdb_store.h"
 
 #include <absl/status/status.h>
@@ -7,6 +7,7 @@
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -22,7 +23,7 @@
 
 namespace hulld::server {
 
-// RocksDB's errors do not say whether it was a sync that failed, or when.
+// RocksDB's errors do not tell failed syncs from failed writes.
 void RocksDbStore::CountWriteFailure() {
   const uint64_t failed_syncs = files_->failed_syncs();
   const bool is_sync = seen_failed_syncs_.exchange(failed_syncs) != failed_syncs;
@@ -39,14 +40,14 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
   return ReadError(status, "cannot read");
 }
 
-// Deletes what belongs to no hull, if there may be such: a hull whose record is damaged leaves it
-// when it ends, as its incarnation is not known, and finding it takes a look at all records. Hence
-// at a start. While the record of another hull is damaged nothing is deleted, as it may belong to
-// that one. Cost, where it has to look: reads all records, and seeks once for each incarnation.
+// Deletes values of incarnations that have no hull, if kLostKey says that there may be some: a hull
+// with a damaged record leaves them when it is deleted, because its incarnation is unknown. Nothing
+// is deleted while another record is damaged, since the values may belong to that hull. Cost, with
+// kLostKey: reads all records, and seeks once per incarnation.
 absl::Status RocksDbStore::DropLostIncarnations() {
   const absl::StatusOr<std::optional<std::string>> lost = Read(kLostKey);
   if (absl::IsUnavailable(lost.status())) return lost.status();
-  // A damaged mark is one.
+  // A damaged mark counts as a mark.
   if (lost.ok() && !lost->has_value()) return absl::OkStatus();
   std::unordered_set<uint64_t> known;
   bool certain = true;
@@ -68,7 +69,7 @@ absl::Status RocksDbStore::DropLostIncarnations() {
       }
       it->Seek(end);
     }
-    // What cannot be read now is looked for again by the next start.
+    // The next start tries again.
     if (!it->status().ok()) return absl::OkStatus();
   }
   batch.Delete(kLostKey);
@@ -88,17 +89,47 @@ absl::Status RocksDbStore::Commit(std::span<Change* const> changes) {
   const std::shared_lock lock(db_mutex_);
   const std::lock_guard log_lock(log_mutex_);
   if (!failure_.ok()) return failure_;
+  if (absl::Status s = CheckRoom(changes); !s.ok()) return s;
   const rocksdb::Status status = db_->Write(options, &batch);
   if (status.ok()) {
-    files_->Commit();
+    files_->Commit(revision, options.sync);
     revision_ = revision;
+    if (!reserve_.is_made()) Compact(changes);
     return absl::OkStatus();
   }
   failure_ = WriteFailed(status);
-  // The log may hold the batch, or a part of it, although it was not synced.
+  // The log may hold the batch or a part of it, unsynced.
   const rocksdb::Status cut = files_->CutUncommitted();
   seen_failed_syncs_ = files_->failed_syncs();
   return cut.ok() ? failure_ : OutcomeUnknown(status, cut, options_.data_dir);
+}
+
+absl::Status RocksDbStore::CheckRoom(std::span<Change* const> changes) {
+  const bool only_deletes =
+      std::ranges::all_of(changes, [](const Change* change) { return change->deleted; });
+  if (only_deletes || reserve_.is_made()) return absl::OkStatus();
+  const rocksdb::IOStatus made = reserve_.Ensure();
+  return made.ok() ? absl::OkStatus() : WriteError(made, options_.data_dir);
+}
+
+// RocksDB would compact after more changes. If this fails, the disk stays full.
+void RocksDbStore::Compact(std::span<Change* const> changes) {
+  for (const Change* change : changes) {
+    const uint64_t incarnation = change->hull.record.create_revision;
+    if (change->body != nullptr || incarnation == 0) continue;
+    for (const char prefix : {kBasePrefix, kDeltaPrefix}) {
+      const std::string begin = IncarnationKey(prefix, incarnation);
+      const std::string end = IncarnationKey(prefix, incarnation + 1);
+      const rocksdb::Slice first(begin);
+      const rocksdb::Slice last(end);
+      const rocksdb::Status compacted =
+          db_->CompactRange(rocksdb::CompactRangeOptions(), &first, &last);
+      if (!compacted.ok()) {
+        spdlog::warn("cannot free the room of what was deleted: {}", compacted.ToString());
+        return;
+      }
+    }
+  }
 }
 
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
@@ -126,7 +157,7 @@ std::optional<StoreDisk> RocksDbStore::disk() const {
   std::error_code error;
   std::filesystem::directory_iterator entry(DatabaseDirectory(options_.data_dir), error);
   for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
-    // A file may go meanwhile.
+    // The file may have been deleted.
     std::error_code gone;
     const uintmax_t bytes = entry->file_size(gone);
     if (gone) continue;
@@ -135,7 +166,7 @@ std::optional<StoreDisk> RocksDbStore::disk() const {
   }
   const std::filesystem::space_info space = std::filesystem::space(options_.data_dir, error);
   if (!error) disk.free_bytes = space.available;
-  // Not while it is opened anew, which takes as long as its log is long.
+  // Skipped while the database is reopened, which takes time in proportion to its log.
   const std::shared_lock lock(db_mutex_, std::try_to_lock);
   if (!lock.owns_lock() || db_ == nullptr) return disk;
   uint64_t is_stopped = 0;
@@ -158,20 +189,26 @@ uint64_t RocksDbStore::CountStalls() const {
   return stalls;
 }
 
+// Gives up the reserve if the disk was full. Then only deletions succeed until it is back
+// (CheckRoom).
 absl::Status RocksDbStore::Recover() {
   {
     const std::lock_guard lock(log_mutex_);
     if (failure_.ok()) return absl::OkStatus();
+    if (IsDiskFull(failure_)) reserve_.Release();
   }
-  if (absl::Status s = Probe(); !s.ok()) return s;
-  return Reopen();
+  absl::Status recovered = Probe();
+  if (recovered.ok()) recovered = Reopen();
+  const std::lock_guard lock(log_mutex_);
+  failure_ = recovered;
+  return recovered;
 }
 
-// Whether a file can be written and synced.
+// Returns OK if a file can be written and synced.
 absl::Status RocksDbStore::Probe() {
   const std::string scratch = ScratchDirectory(options_.data_dir);
   const std::string path = scratch + "/probe";
-  // If it fails, so does what follows.
+  // A failure shows in the next call.
   env_->CreateDirIfMissing(scratch).PermitUncheckedError();
   std::unique_ptr<rocksdb::WritableFile> file;
   rocksdb::Status status = env_->NewWritableFile(path, &file, rocksdb::EnvOptions());
@@ -183,8 +220,8 @@ absl::Status RocksDbStore::Probe() {
   return status.ok() ? absl::OkStatus() : WriteFailed(status);
 }
 
-// RocksDB can resume by itself after some errors, but not after those of its log. If opening fails,
-// what is kept can still be read.
+// RocksDB resumes by itself after some errors, but not after errors of its log. If the database
+// cannot be opened, it is opened for reading.
 absl::Status RocksDbStore::Reopen() {
   const std::unique_lock lock(db_mutex_);
   const std::lock_guard log_lock(log_mutex_);
@@ -202,12 +239,7 @@ absl::Status RocksDbStore::Reopen() {
     spdlog::warn("the store in {} can be written again", options_.data_dir);
     return opened;
   }
-  rocksdb::DB* db = nullptr;
-  const rocksdb::Status status =
-      rocksdb::DB::OpenForReadOnly(DbOptions(), DatabaseDirectory(options_.data_dir), &db);
-  if (status.ok()) {
-    db_.reset(db);
-  } else {
+  if (const rocksdb::Status status = OpenForReading(); !status.ok()) {
     spdlog::critical("the store in {} cannot even be read: {}", options_.data_dir,
                      status.ToString());
   }
@@ -222,6 +254,8 @@ absl::Status RocksDbStore::SyncLog() {
   if (!status.ok() && !status.IsNotSupported()) {
     failure_ = WriteFailed(status);
     spdlog::error("cannot sync the log in {}: {}", options_.data_dir, status.ToString());
+  } else {
+    files_->Commit(revision_, true);
   }
   return failure_;
 }
@@ -230,7 +264,8 @@ void RocksDbStore::SyncAtIntervals() {
   std::unique_lock lock(sync_mutex_);
   while (!sync_wake_.wait_for(lock, options_.sync_interval, [this] { return ending_; })) {
     lock.unlock();
-    SyncLog().IgnoreError();
+    if (options_.durability == Durability::kRelaxed) SyncLog().IgnoreError();
+    files_->SyncMark().PermitUncheckedError();
     lock.lock();
   }
 }

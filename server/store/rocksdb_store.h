@@ -20,7 +20,8 @@
 #include <thread>
 #include <vector>
 
-#include "server/store/log_file_system.h"
+#include "server/store/files/disk_reserve.h"
+#include "server/store/files/log_file_system.h"
 #include "server/store/sealed_hull.h"
 #include "server/store/store.h"
 #include "server/store/store_keys.h"
@@ -28,33 +29,42 @@
 namespace hulld::server {
 
 struct RocksDbOptions {
-  // Made when it does not exist, and on disk before anything is acknowledged.
+  // Created if missing, and on disk before the first acknowledgement.
   std::string data_dir;
   // kSync or kRelaxed.
   Durability durability = Durability::kSync;
-  // Relaxed: how often what was written is synced.
+  // Interval of syncs of the log's mark, and of the log itself if the store is relaxed.
   std::chrono::milliseconds sync_interval{500};
-  // Looks without touching: nothing can be committed, and another process may have it open.
+  // Opens the store without changing anything. No other process may have it open.
   bool read_only = false;
-  // Opens a store whose log is damaged as it was before the first damaged record: what was
-  // acknowledged after that is lost, and the store takes a new ID.
-  bool cut_log = false;
-  // Opens a store that a migration has not finished, too.
+  // Opens a store with a damaged or incomplete log, without all changes after the first damaged
+  // record or incomplete log. These acknowledged changes are lost, and the store gets a new ID.
+  bool accept_loss = false;
+  // Also opens the destination of an unfinished migration.
   bool migrating = false;
-  // Null: the file system.
+  // Disk space that is reserved for deletions and for a start on a full disk. The default covers
+  // the writes of opening a store (**proven** from DbOptions): two memtables of 16 MiB as
+  // tables, 17.6 MiB that are reserved for the new log, and 4 MiB for the manifest; the rest is for
+  // the logs of deletions.
+  uint64_t reserve_bytes = uint64_t{64} << 20;
+  // Null: the real file system.
   rocksdb::Env* env = nullptr;
 };
 
-// Keeps hulls in a RocksDB database under <data-dir>/rocksdb. See store_keys.h for what is in it.
+// Keeps hulls in a RocksDB database under <data-dir>/rocksdb, with the keys of store_keys.h.
 //
-// A batch of changes is one write to the log, synced once, before it is acknowledged. What is read
-// is checked twice: by the checksums of RocksDB's blocks, and by our own of each value, which name
-// the hull that is damaged.
+// A batch of changes is one write to the log and one sync, before it is acknowledged. Reads are
+// checked twice: by the checksums of RocksDB's blocks, and by a checksum of each value, which
+// identifies the damaged hull.
 class RocksDbStore : public Store {
  public:
+  // On a full disk the store is opened with the space of the reserve: for deletions if possible,
+  // otherwise for reads.
+  //
   // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or a newer
-  // hulld wrote it; DATA_LOSS: its log or its files are damaged; NOT_FOUND: read_only, and there is
-  // none; UNAVAILABLE: the file system refuses.
+  // hulld wrote it; DATA_LOSS: its log or its files are damaged or incomplete, and nothing was
+  // touched; NOT_FOUND: read_only, and there is none; RESOURCE_EXHAUSTED: the disk is full, and the
+  // store needs a new ID or does not exist yet; UNAVAILABLE: the file system refuses.
   static absl::StatusOr<std::unique_ptr<RocksDbStore>> Open(RocksDbOptions options);
 
   ~RocksDbStore() override;
@@ -67,7 +77,7 @@ class RocksDbStore : public Store {
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
-  // Asks for the first values of all at once, so that a block that holds several is read once.
+  // Reads the first values of all hulls together, so that a block with several values is one read.
   std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
       std::span<const StoredHull* const> hulls) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
@@ -83,16 +93,15 @@ class RocksDbStore : public Store {
 
   std::optional<StoreDisk> disk() const override;
 
-  // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
+  // The copy consists of hard links in <data-dir>/hulld-scratch/copy-..., a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
 
-  // For a migration: writes what it copies, on disk before this returns; and the value of its mark
-  // (kMigrationKey), if that is there.
+  // For a migration: writes a batch and syncs it; and returns the value of kMigrationKey, if any.
   absl::Status Import(rocksdb::WriteBatch* batch) { return WriteMeta(batch); }
   absl::StatusOr<std::optional<std::string>> ReadMigrationMark() { return Read(kMigrationKey); }
 
   const std::string& data_dir() const { return options_.data_dir; }
-  // RocksDB's own, for tests that damage what is kept.
+  // For tests that damage stored values.
   rocksdb::DB& db() { return *db_; }
 
  private:
@@ -102,9 +111,22 @@ class RocksDbStore : public Store {
   absl::Status MakeDirectories();
   rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
-  // As one of a sync when one failed since the last that was counted.
+  // OpenDb, with the room of the reserve if the disk is full.
+  absl::Status OpenDbInRoom();
+  // Opens the database for reading, without its lock.
+  rocksdb::Status OpenForReading();
+  absl::Status Lock();
+  // Compares the logs with their mark. Requires: this process holds the database's lock.
+  absl::Status CheckLogs();
+  absl::Status DropLogsFrom(uint64_t number);
+  absl::Status StartMark();
+  // Returns DISK_FULL if a change is no deletion and the reserve cannot be made.
+  absl::Status CheckRoom(std::span<Change* const> changes);
+  // Frees the disk space of deleted hulls.
+  void Compact(std::span<Change* const> changes);
+  // Counts a failed sync if one failed since the last count, else a failed write.
   void CountWriteFailure();
-  // Counts a failure, and says what it means.
+  // Counts the failure, and returns its error for the client.
   absl::Status WriteFailed(const rocksdb::Status& status);
   absl::Status ReadFailed(const rocksdb::Status& status);
   absl::Status ReadMeta();
@@ -112,10 +134,11 @@ class RocksDbStore : public Store {
   absl::Status BeginRun();
   absl::Status EndRelaxedRun();
   absl::Status WriteMeta(rocksdb::WriteBatch* batch);
-  // The value of a key, without its checksum; nullopt: there is none. DATA_LOSS, UNAVAILABLE.
+  // Returns the value of a key without its checksum, if any. DATA_LOSS: it is damaged. UNAVAILABLE:
+  // it cannot be read.
   absl::StatusOr<std::optional<std::string>> Read(const std::string& key);
   absl::StatusOr<std::optional<uint64_t>> ReadNumber(const std::string& key);
-  // Visits the sealed values of these keys, by index, as far as they are there and can be read.
+  // Visits the sealed values of these keys, by index. Missing and unreadable values are skipped.
   void FindValues(std::span<const std::string> keys,
                   const std::function<void(size_t, std::string_view)>& visit);
   absl::Status ScanRange(
@@ -124,7 +147,7 @@ class RocksDbStore : public Store {
   absl::Status DropLostIncarnations();
   absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
-  // Stalls of the database that is open.
+  // Returns the stalls of the open database.
   uint64_t CountStalls() const;
   absl::Status Probe();
   absl::Status Reopen();
@@ -134,21 +157,26 @@ class RocksDbStore : public Store {
   const RocksDbOptions options_;
   std::shared_ptr<LogFileSystem> files_;
   std::unique_ptr<rocksdb::Env> env_;
+  DiskReserve reserve_;
+  // The database's lock if the store is read-only; otherwise RocksDB holds it.
+  rocksdb::FileLock* lock_ = nullptr;
+  // Result of CheckLogs, which runs inside of RocksDB's Open.
+  absl::Status logs_checked_;
   std::string id_;
   uint64_t revision_ = 0;
-  // Whether kRelaxedKey is there, and ours to remove.
+  // True if this run wrote kRelaxedKey and must delete it.
   bool relaxed_run_ = false;
 
   // Shared while db_ is used, exclusive in Reopen.
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
-  // The stalls of the databases that were open here before this one, as each counts its own.
+  // Stalls before the database was last reopened, which resets its own count.
   uint64_t former_stalls_ = 0;
 
   // Held while the log is written or synced.
   std::mutex log_mutex_;
-  // Once writing the log failed it must not be touched again: only reading goes on, until Recover
-  // opens the database anew.
+  // The error after which the log must not be written: only reads go on, until Recover reopens the
+  // database.
   absl::Status failure_;
 
   std::atomic<uint64_t> seen_failed_syncs_ = 0;

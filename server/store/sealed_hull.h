@@ -12,22 +12,22 @@
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 
-// What a store keeps of one hull or body, read back and checked. Every store that keeps hulls seals
-// its values as store_keys.h says, wherever it puts them.
+// Decoding and checking of stored hulls and bodies. Every durable store seals its values as
+// described in store_keys.h.
 namespace hulld::server {
 
-// A hull's record. DATA_LOSS naming the hull: it is damaged.
+// Returns the record of a hull. DATA_LOSS naming the hull: it is damaged.
 absl::StatusOr<StoredHull> UnsealStoredHull(const std::string& hull_id, std::string_view sealed);
 
-// The same for a body.
+// Returns a body. DATA_LOSS naming the body: it is damaged.
 absl::StatusOr<StoredBody> UnsealStoredBody(const std::string& body_id, std::string_view sealed);
 
-// The sequence of a writer of the hull; key: as WriterKey makes it. DATA_LOSS, as for the record.
+// Returns the sequence of a writer of the hull. key: WriterKey of both. DATA_LOSS naming the hull:
+// it is damaged.
 absl::StatusOr<uint64_t> UnsealSequence(const std::string& hull_id, std::string_view key,
                                         std::string_view sealed);
 
-// Puts the vertices of a hull together: first the parts of its base in their order, then its
-// deltas.
+// Assembles the vertices of a hull: first the parts of its base, then its deltas, in order.
 class VertexAssembly {
  public:
   // `hull` must outlive this.
@@ -36,13 +36,13 @@ class VertexAssembly {
   bool wants_base_part() const { return vertices_.size() < hull_.layout.base_vertices; }
   // The number of the next part.
   uint32_t next_part() const { return next_part_; }
-  // value: without its checksum, or why there is none, which is returned.
+  // value: without its checksum. An error in its place is returned.
   absl::Status AddBasePart(const absl::StatusOr<std::string_view>& value);
-  // The same. Requires all parts of the base, which Finish checks.
+  // Adds a delta in the same way. Requires: all parts of the base were added (checked by Finish).
   absl::Status AddDelta(uint64_t revision, const absl::StatusOr<std::string_view>& value);
 
-  // The vertices. status: that of reading them. DATA_LOSS naming the hull: something is damaged, or
-  // it is not what the hull's record says.
+  // Returns the vertices. status: the result of reading them. DATA_LOSS naming the hull: a value is
+  // damaged or contradicts the hull's record.
   absl::StatusOr<std::vector<Vector>> Finish(absl::Status status) &&;
 
  private:

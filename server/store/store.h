@@ -20,11 +20,11 @@
 
 namespace hulld::server {
 
-// What a committed change survives.
+// Durability of a committed change.
 enum class Durability {
-  kMemory,   // nothing: it is lost when the server ends
-  kRelaxed,  // the end of the server, but not that of the machine within some time
-  kSync,     // both: it is on disk
+  kMemory,   // lost when the server ends
+  kRelaxed,  // survives the end of the server; that of the machine only after some time
+  kSync,     // on disk: survives both
 };
 
 struct WriterSequence {
@@ -34,44 +34,43 @@ struct WriterSequence {
   friend bool operator==(const WriterSequence&, const WriterSequence&) = default;
 };
 
-// What a change means for the vertices that are kept of its hull.
+// Effect of a change on the stored vertices of its hull.
 enum class VertexChange {
   kNone,
-  // Change::vertices are one more delta.
+  // Appends Change::vertices as a delta.
   kAdded,
-  // Change::vertices are the new base and take the place of all that is kept.
+  // Replaces all stored vertices by Change::vertices, the new base.
   kReplaced,
 };
 
-// One hull, or one body, created, changed or deleted. The store gives it its revisions as it
-// commits it (NumberChanges); until then those in `hull`, in its layouts and in `body` mean
-// nothing, but for what is deleted or replaced.
+// A hull or body that is created, changed, or deleted. The store assigns the revisions as it
+// commits the change (NumberChanges). Until then the revisions in `hull`, in its layouts, and in
+// `body` have no meaning, except the revisions of a deleted or replaced hull.
 struct Change {
-  // The hull after the change; what is deleted if it is.
+  // The hull after the change, or the deleted hull.
   StoredHull hull;
   // The store's revision after the change; hull.record.revision is lower where no vertex changed.
   uint64_t revision = 0;
-  // Whether that is a new one: not where points came and no vertex changed.
+  // True if the change gets a new revision. False for points that change no vertex.
   bool takes_revision = true;
-  // Whether this is a new incarnation of the hull, or the beginning of the body.
+  // True if this is a new incarnation of the hull, or the first version of the body.
   bool begins = false;
   bool deleted = false;
-  // For a body that begins: whether it takes the place of one, such as one that is damaged.
+  // For a body that begins: true if it replaces a body, for example a damaged one.
   bool replaces_body = false;
-  // A change of a hull that neither begins nor ends: its revisions when all changes that were
-  // submitted before are committed, and those of the same batch are not.
+  // For a change within an incarnation: the hull's revisions after all batches before this one.
   std::shared_ptr<const HullRevisions> before;
-  // How many vertices the hull had before, where it neither begins nor ends.
+  // For a change within an incarnation: the number of vertices before the change.
   uint64_t former_vertices = 0;
-  // How the hull's vertices were kept before.
+  // Layout of the hull's vertices before the change.
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
   std::vector<Vector> vertices;
-  // The writer of the chunk, if the change is one.
+  // The writer, if the change is a chunk.
   std::optional<WriterSequence> writer;
-  // The incarnation that this one takes the place of, if there is one.
+  // The incarnation that this one replaces, if any.
   std::optional<StoredHull> replaced;
-  // The body after the change, or what is deleted if it is. Then no field about a hull is used.
+  // The body after the change, or the deleted body. If set, the fields about a hull are unused.
   std::shared_ptr<StoredBody> body;
 
   const std::string& id() const {
@@ -79,74 +78,75 @@ struct Change {
   }
 };
 
-// A hull that a store holds: its ID, and the rest, or DATA_LOSS naming the hull when what is kept
-// of it is damaged.
+// Receives the ID of a stored hull, and its record, or DATA_LOSS naming the hull if the record is
+// damaged.
 using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<StoredHull>)>;
 
-// The same for bodies.
+// Receives a stored body in the same way.
 using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<StoredBody>)>;
 
-// What a store holds of hulls and bodies that were asked for, all of it of one moment.
+// Records of hulls and bodies at one revision.
 struct FoundRecords {
-  // The store's revision at that moment.
+  // The store's revision.
   uint64_t revision = 0;
-  // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull, or the body.
+  // Existing records by ID, or DATA_LOSS naming the hull or body.
   std::map<std::string, absl::StatusOr<StoredHull>> hulls;
   std::map<std::string, absl::StatusOr<StoredBody>> bodies;
-  // For a list: whether there are others after these.
+  // For a list: true if more records follow.
   bool more = false;
 };
 
-// What a list is of.
+// Kinds of records in a list.
 struct RecordKinds {
   bool hulls = false;
   bool bodies = false;
 };
 
-// Operations that failed so far, each counted once, by what the system refused.
+// Failed operations so far, each counted once, by the refused system call.
 struct StoreFailures {
-  // Writing, and opening anew after an error.
+  // Writes, and reopening the store after an error.
   uint64_t write = 0;
   uint64_t sync = 0;
-  // What could not be read; what was read and is damaged is not among them.
+  // Failed reads. Damaged values that could be read do not count.
   uint64_t read = 0;
 };
 
-// What a store takes of its disk, and whether it keeps up with what is written.
+// Use of the disk, and write stalls.
 struct StoreDisk {
-  // All its files, and the log among them.
+  // Bytes of all files, including the log.
   uint64_t bytes = 0;
   uint64_t log_bytes = 0;
-  // What the disk has left for it; none where that is not known.
+  // Free bytes of the disk, if known.
   std::optional<uint64_t> free_bytes;
-  // How often changes were slowed down or stopped since the store was opened, which never goes
-  // back, and whether they are.
+  // Number of times that changes were slowed down or stopped since the store was opened
+  // (monotonic), and the present state.
   uint64_t stalls = 0;
   bool is_stalled = false;
 };
 
-// Where changes are kept, beside the registry that serves them. Any thread may read.
+// Keeps committed changes for the registry. Reads may run on any thread.
 class Store {
  public:
   virtual ~Store() = default;
 
-  // As in --store.
+  // The value of --store.
   virtual std::string kind() const = 0;
-  // Random per store.
+  // A random ID, one per store.
   virtual std::string id() const = 0;
   virtual Durability durability() const = 0;
-  // Whether hulls can be read back: what the registry holds of them is then a copy.
+  // True if hulls can be read back, so that the registry may evict its copies.
   virtual bool keeps_hulls() const = 0;
-  // The last one committed. Never while Commit runs.
+  // The last committed revision. Not concurrent with Commit.
   virtual uint64_t revision() const = 0;
 
-  // Every hull, in byte order of the IDs.
+  // Visits every hull in byte order of the IDs.
   virtual absl::Status ForEachHull(const StoredHullVisitor& visit) = 0;
-  // Every body, likewise.
+  // Visits every body in the same order.
   virtual absl::Status ForEachBody(const StoredBodyVisitor& visit) = 0;
-  // Points whose hull `hull` is. DATA_LOSS naming the hull: something is missing or damaged.
+  // Returns points with the convex hull `hull`. DATA_LOSS naming the hull: values are missing or
+  // damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
-  // The same of each, in their order. Holds all that it read until it returns.
+  // Returns LoadVertices of each hull, in order. Holds all results until it returns.
   virtual std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
       std::span<const StoredHull* const> hulls) {
     std::vector<absl::StatusOr<std::vector<Vector>>> loaded;
@@ -154,91 +154,85 @@ class Store {
     for (const StoredHull* const hull : hulls) loaded.push_back(LoadVertices(*hull));
     return loaded;
   }
-  // The writer's last committed sequence; 0 when there is none.
+  // Returns the writer's last committed sequence, or 0.
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;
 
-  // Whether records can be looked up one by one at little cost, so that nobody needs to read all of
-  // them at first. What is found holds everything that was committed by the time of the call, by
-  // this server or another. UNAVAILABLE: the store cannot be read.
+  // True if single records can be looked up at low cost, so that a start need not read them all.
+  // Results of the following two include everything committed before the call, by any server.
+  // UNAVAILABLE: the store cannot be read.
   virtual bool finds_records() const { return false; }
-  // What there is under these IDs, hulls and bodies.
+  // Returns the hulls and bodies with these IDs.
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
     return absl::UnimplementedError("this store does not find records");
   }
-  // At most `most` records, of these kinds, whose IDs start with `prefix` and come after `after`,
-  // in byte order. Fewer, but one at least, where they take more than kMostListedBytes.
+  // Returns up to `most` records of these kinds in byte order, with IDs that start with `prefix`
+  // and follow `after`. Returns fewer, but at least one, if they take more than kMostListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {
     return absl::UnimplementedError("this store does not find records");
   }
   static constexpr uint64_t kMostListedBytes = 16 << 20;
-  // What there is at revision(), where records are found. Never while Commit runs.
+  // Totals at revision(), if finds_records(). Not concurrent with Commit.
   virtual StoreTotals totals() const { return {}; }
 
-  // Every writer of the hull, in byte order of the IDs; as many as are there. FAILED_PRECONDITION:
-  // nothing is kept.
+  // Returns the writers of the hull in byte order of the IDs. FAILED_PRECONDITION: the store keeps
+  // nothing.
   virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& /*hull*/) {
     return absl::FailedPreconditionError("this store keeps no writers to read back");
   }
 
-  // Gives changes their revisions, and keeps them, all or none, before anyone can see them: one
-  // call at a time, in the order in which they take effect. An error refuses them all, and what is
-  // kept is as before, also for a process that opens the store after this one was killed; unless
-  // the error is UNAVAILABLE and says that this is not known: then the next process may find them,
-  // until Recover succeeds.
+  // Assigns revisions to a batch of changes and commits it atomically, before any reader sees it.
+  // Calls are sequential, in commit order. An error refuses the whole batch and leaves the store
+  // unchanged, also for a process that opens it after this one was killed. Exception: UNAVAILABLE
+  // with a message that the outcome is unknown. Then the next process may find the batch, until
+  // Recover succeeds. RESOURCE_EXHAUSTED: the disk is full; a batch of deletions alone may succeed.
   virtual absl::Status Commit(std::span<Change* const> changes) = 0;
-  // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
+  // Makes Commit possible again after an error, or returns the cause. Not concurrent with Commit.
   virtual absl::Status Recover() = 0;
 
   virtual StoreFailures failures() const { return {}; }
 
-  // None where nothing is on disk. Cost: O(files), some 10 us each.
+  // None for a store without files. Cost: O(files), some 10 us each.
   virtual std::optional<StoreDisk> disk() const { return std::nullopt; }
 
-  // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
-  // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.
+  // Makes a consistent copy of the store, as of some moment during the call. Returns its directory,
+  // which the caller removes. FAILED_PRECONDITION: the store keeps nothing.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
 
-  // Whether other servers may commit to the same store while this one is open. Then Commit leaves
-  // out, of the changes that it is given, all of an ID that is in what TakeOthers is about to give:
-  // they were made from a state that is no longer the last. LoadVertices and LoadSequence answer
-  // ABORTED where the hull was changed since. Follow finds out what others have committed by the
-  // time of the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
+  // True if peer servers may commit to the same store. Then Commit skips the changes of all IDs
+  // that are in the next result of TakeOthers, since they were made from a stale state, and
+  // LoadVertices and LoadSequence return ABORTED for a hull that changed since. Follow fetches the
+  // changes that peers committed before the call. Not concurrent with Commit or Recover.
+  // UNAVAILABLE: the store cannot be reached.
   virtual bool is_shared() const { return false; }
   virtual absl::Status Follow() { return absl::OkStatus(); }
-  // Sends what the next Follow asks, which then finds out what others have committed by the time of
-  // this call. Waits for nothing, so on any thread; Follow comes before anything else that may not
-  // run while it does. Where it cannot be sent, Follow asks as ever.
+  // Sends the query of the next Follow, which then fetches the changes committed before this call.
+  // Does not block, so any thread may call it. The next call that excludes Follow must
+  // be Follow. If the query cannot be sent, Follow sends it.
   virtual void StartFollow() {}
-  // What Commit and Follow found, whether they failed or not, since this was called last.
+  // Returns the peers' changes that Commit and Follow found since the last call, also if they
+  // failed.
   virtual OtherChanges TakeOthers() { return {}; }
-  // For each hull the points of its deltas between the two versions, in their order; none where
-  // they are not there as the versions say, as after the hull was given a new base, or cannot be
-  // read. All of them are asked for at once. Never while Commit, Recover or Follow runs.
+  // Returns for each hull the points of its deltas between the two versions, in order; none if the
+  // deltas are gone, for example after a new base, or cannot be read. Sends one query for all
+  // hulls. Not concurrent with Commit, Recover, or Follow.
   virtual std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
       std::span<const HullGrowth> hulls) {
     return std::vector<std::optional<std::vector<Vector>>>(hulls.size());
   }
-  // From when this returns OK until ReleaseOthers, no other server commits; what they had committed
-  // is found as by Follow. The store may let them go on earlier if that does not come soon. Never
-  // while Commit, Recover or Follow runs, nor may these run in between. UNAVAILABLE: the store
-  // cannot be asked, or others hold it.
-  virtual absl::Status HoldOthers() { return absl::OkStatus(); }
-  // Requires that HoldOthers returned OK. Returns whether nobody has committed since; false also
-  // where that is not known.
-  virtual bool ReleaseOthers() { return true; }
-  // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
+  // Registers a callback that runs, on any thread, soon after a peer committed: a reason to Follow.
   virtual void OnOthers(std::function<void()> /*others*/) {}
 
-  // `ended` is called, on any thread, once nothing can be committed or read here any more because
-  // another server took the store over; at once if that is so already. The process is to end then.
+  // Registers a callback that runs, on any thread, when a peer has taken over the store, so that
+  // this server can neither commit nor read; immediately if that has happened. The process must end
+  // then.
   virtual void OnEnded(std::function<void()> /*ended*/) {}
 
-  // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the
-  // deltas outgrew the base, so that all bases together are as large as all deltas, a few times at
-  // most. Each kept delta costs kDeltaBytes beside its vertices.
+  // Returns true if the next change should write a new base instead of a delta of `new_vertices`:
+  // the deltas have outgrown the base. So all bases together take at most a few times the bytes of
+  // all deltas. A stored delta costs kDeltaBytes in addition to its vertices.
   static bool WantsBase(const VertexLayout& layout, uint64_t new_vertices) {
     constexpr uint64_t kDeltaBytes = 64;
     constexpr uint64_t kSmallBytes = 64 << 10;

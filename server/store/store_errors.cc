@@ -1,19 +1,40 @@
 #include "server/store/store_errors.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
+
+#include <cerrno>
+#include <cstring>
 
 #include "server/contract/error_info.h"
 
 namespace hulld::server {
 
+namespace {
+
+// Also where RocksDB knows only the text of the system's error.
+bool SaysDiskFull(const rocksdb::Status& status) {
+  const std::string cause = status.ToString();
+  return status.IsNoSpace() || absl::StrContains(cause, std::strerror(ENOSPC)) ||
+         absl::StrContains(cause, std::strerror(EDQUOT));
+}
+
+absl::Status DiskFull(const std::string& cause, const std::string& data_dir) {
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the disk that holds --data-dir ", data_dir, " is full (", cause,
+          "); nothing was changed; delete hulls or make room, then repeat it; no restart is "
+          "needed")),
+      v1::ERROR_REASON_DISK_FULL);
+}
+
+}  // namespace
+
+bool IsDiskFull(const absl::Status& status) { return absl::IsResourceExhausted(status); }
+
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
-  if (status.IsNoSpace()) {
-    return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                          "the disk that holds --data-dir ", data_dir, " is full (", cause,
-                          "); nothing was changed; make room and repeat it, no restart is needed")),
-                      v1::ERROR_REASON_DISK_FULL);
-  }
+  if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
   return absl::UnavailableError(absl::StrCat(
       "cannot write to --data-dir ", data_dir, " (", cause,
       "); nothing was changed; repeat it once that is repaired, no restart is needed"));
@@ -47,16 +68,29 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
                      "); stop that one, or name another directory"));
   }
   if (status.IsCorruption()) {
-    return absl::DataLossError(absl::StrCat(
-        "--data-dir ", data_dir, " is damaged (", cause,
-        "); restore a backup into another directory, or see 'hulld doctor --cut-log'"));
+    return absl::DataLossError(absl::StrCat("--data-dir ", data_dir, " is damaged (", cause,
+                                            "); restore a backup into another directory, or accept "
+                                            "the loss with 'hulld doctor --accept-loss'"));
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
         absl::StrCat("--data-dir ", data_dir, " holds no store (", cause, ")"));
   }
+  if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
   return absl::UnavailableError(
       absl::StrCat("cannot open the store in --data-dir ", data_dir, ": ", cause));
+}
+
+absl::Status LogLost(const std::string& data_dir, const std::string& finding,
+                     std::optional<uint64_t> revision) {
+  const std::string changes =
+      revision.has_value()
+          ? absl::StrCat("changes up to revision ", *revision, " were acknowledged, and ")
+          : "";
+  return absl::DataLossError(absl::StrCat(
+      "--data-dir ", data_dir, " may lack acknowledged changes (", changes, finding,
+      "); nothing was changed; put the file back, restore a backup into another directory, or "
+      "accept the loss with 'hulld doctor --accept-loss'"));
 }
 
 absl::Status UnfinishedMigration() {

@@ -4,30 +4,37 @@
 #include <absl/status/status.h>
 #include <rocksdb/status.h>
 
+#include <cstdint>
+#include <optional>
 #include <string>
 
-// What RocksDB's errors mean for those who called hulld, and what they can do. data_dir: the
-// setting's value.
+// Errors of RocksDB, as statuses for clients that say what to do. data_dir: the setting.
 namespace hulld::server {
 
-// A write failed, and nothing is left of it. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE:
-// anything else.
+// For a failed write that left nothing behind. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE:
+// any other cause.
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir);
-// UNAVAILABLE: a write failed, and so did taking back what it may have left in the log (`cut`).
+// UNAVAILABLE: a write failed, and cutting its remains off the log failed, too (`cut`).
 absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
                             const std::string& data_dir);
-// A read failed. DATA_LOSS: what was read is damaged. UNAVAILABLE: anything else. what: what was
-// tried.
+// For a failed read. DATA_LOSS: the value is damaged. UNAVAILABLE: any other cause. what: the
+// failed operation.
 absl::Status ReadError(const rocksdb::Status& status, const std::string& what);
-// UNAVAILABLE: the database could not be opened again after an error, not even for reading.
+// UNAVAILABLE: the database could not be reopened after an error, not even for reading.
 absl::Status CannotBeRead(const std::string& data_dir);
-// The database could not be opened. FAILED_PRECONDITION: another process has it open. DATA_LOSS: it
-// is damaged. NOT_FOUND: read_only, and there is none. UNAVAILABLE: anything else.
+// For a database that could not be opened. FAILED_PRECONDITION: another process has it open.
+// DATA_LOSS: it is damaged. NOT_FOUND: read_only, and there is none. RESOURCE_EXHAUSTED: the disk
+// is full. UNAVAILABLE: any other cause.
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only);
-// FAILED_PRECONDITION: a migration has not copied all of its source there yet, so nobody is served
-// from it.
+// True for the error that WriteError and OpenError make of a full disk.
+bool IsDiskFull(const absl::Status& status);
+// DATA_LOSS: the logs hold less than was acknowledged, up to this revision if it is known.
+// finding: names the file.
+absl::Status LogLost(const std::string& data_dir, const std::string& finding,
+                     std::optional<uint64_t> revision);
+// FAILED_PRECONDITION: a migration to this store is unfinished.
 absl::Status UnfinishedMigration();
-// DATA_LOSS: what is kept of this hull is damaged. finding: what is wrong with it.
+// DATA_LOSS: the stored hull, or body, is damaged. finding: the damage.
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding);
 absl::Status DamagedBody(const std::string& body_id, const std::string& finding);
 

@@ -14,14 +14,14 @@
 
 namespace hulld::server {
 
-// Keys and values of the durable store, format version 2. A store takes that version with its first
-// body; until then it is of version 1, so that a hulld which knows no bodies can open it. Numbers
-// in keys are big endian, so that byte order is theirs; numbers in values are little endian.
+// Keys and values of the durable store, format version 2. A store gets that version with its first
+// body. Until then it has version 1, which a hulld without bodies can open. Numbers in keys are big
+// endian, so that byte order is numeric order; numbers in values are little endian.
 //
 //   m/format, m/store_id, m/revision     of the store
 //   m/relaxed                            while --durability=relaxed has it open; without a value
-//   m/lost                               while vertices or writers of hulls that ended with a
-//                                        damaged record may be there; without a value
+//   m/lost                               while vertices or writers of deleted hulls with damaged
+//                                        records may exist; without a value
 //   m/migration                          while a migration fills the store: the revision of its
 //                                        source, and that store's ID
 //   h<hull ID>                           a StoredHull
@@ -30,10 +30,10 @@ namespace hulld::server {
 //   d<incarnation><revision>             vertices of a delta
 //   p<body ID>                           a StoredBody, from format version 2 on
 //
-// An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that a
-// value that was damaged, or that belongs to another key, is recognized where it is used.
+// An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that
+// readers recognize a value that is damaged or belongs to another key.
 
-// The latest, and that of a store that never had a body.
+// The latest version, and the version of a store that never had a body.
 inline constexpr uint64_t kStoreFormat = 2;
 inline constexpr uint64_t kFormatWithoutBodies = 1;
 inline constexpr char kFormatKey[] = "m/format";
@@ -52,25 +52,26 @@ inline constexpr size_t kBasePartVertices = 32768;
 
 std::string HullKey(std::string_view hull_id);
 std::string BodyKey(std::string_view body_id);
-// Where an incarnation's keys of one kind start; they end before those of incarnation + 1.
+// Lower bound of an incarnation's keys of one kind. IncarnationKey(prefix, incarnation + 1) is the
+// upper bound.
 std::string IncarnationKey(char prefix, uint64_t incarnation);
-// The incarnation in any of the keys below.
+// Returns the incarnation in any of the keys below.
 uint64_t IncarnationOf(std::string_view key);
 std::string WriterKey(uint64_t incarnation, std::string_view writer_id);
 std::string BaseKey(uint64_t incarnation, uint64_t revision, uint32_t part);
 std::string DeltaKey(uint64_t incarnation, uint64_t revision);
-// The revision in a DeltaKey.
+// Returns the revision in a DeltaKey.
 uint64_t DeltaRevision(std::string_view key);
 
-// A value with its checksum.
+// Returns the value with its checksum appended.
 std::string Seal(std::string_view key, std::string value);
-// The value without its checksum; DATA_LOSS when it does not match.
+// Returns the value without its checksum. DATA_LOSS: the checksum does not match.
 absl::StatusOr<std::string_view> Unseal(std::string_view key, std::string_view sealed);
 
 std::string EncodeNumber(uint64_t number);
-// DATA_LOSS when the size does not fit; so the others.
+// DATA_LOSS: the value has another size. So for the following decoders.
 absl::StatusOr<uint64_t> DecodeNumber(std::string_view value);
-// All but the hull's ID, which is the key.
+// Encodes all fields but the ID, which is the key.
 std::string EncodeStoredHull(const StoredHull& hull);
 absl::StatusOr<StoredHull> DecodeStoredHull(std::string_view hull_id, std::string_view value);
 std::string EncodeVertices(std::span<const Vector> vertices);

@@ -13,12 +13,12 @@
 namespace hulld::server {
 namespace {
 
-// Bytes of an element of a repeated message field beside its own: a tag and a length.
+// Overhead per element of a repeated message field: a tag and a length.
 constexpr size_t kElementOverhead = 5;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kWitnessNumbers = 6;
 
-// Why the last row has no answer.
+// Adds the reason why the last row has no answer.
 size_t AddProblem(const absl::Status& status, v1::AnswerColumns* columns) {
   v1::PairProblem* const problem = columns->add_pair_problems();
   problem->set_row(static_cast<uint64_t>(columns->relations_size()) - 1);
@@ -35,7 +35,7 @@ void AddWitness(const Witness& witness, v1::AnswerColumns* columns) {
   columns->add_witness_errors(witness.error);
 }
 
-// Fills the columns of fixed size.
+// Fills the fixed-size columns.
 size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   size_t bytes = 0;
   if (wanted.separation()) {
@@ -57,7 +57,7 @@ size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColu
   return bytes;
 }
 
-// As EncodeAxis, but a feature that is too large leaves the pair without an answer.
+// As EncodeAxis, but leaves the pair without an answer if a feature is too large.
 size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b,
                v1::AnswerColumns* columns) {
   v1::Axis* const axis = columns->mutable_axes(columns->axes_size() - 1);

@@ -11,26 +11,27 @@
 
 namespace hulld::server {
 
-// The size at which a message of such rows is full. The row that exceeds it may be as large as an
-// answer can be (Config::kMaxFeatureVertices); the message still stays under the 4 MiB that every
-// gRPC client takes.
+// Size at which a message of such rows is full. The row that exceeds it may have the maximum size
+// of an answer (Config::kMaxFeatureVertices); the message still stays below the 4 MiB that every
+// gRPC client accepts.
 size_t FullMessageBytes(const v1::Wanted& wanted);
 
-// Both functions add one row: an entry to each column that is wanted. They return the bytes that
-// the row adds to the message, estimated from above, framing counted.
+// Both functions add one row: an entry to each wanted column. They return an upper estimate of the
+// bytes that the row adds to the message, including framing.
 
-// The answer for hulls a and b, or why there is none. Requires canonical hulls where the answer
-// names vertices.
+// Adds the answer for hulls a and b, or its error. Requires canonical hulls if the answer names
+// vertices.
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
-// The same for an answer where the relation is all that is wanted.
+// As AddAnswer if only the relation is wanted.
 size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns);
 
-// Whether something in the columns names a row, so that they cannot follow the rows of others.
+// True if an entry refers to a row by index, so that the columns cannot be appended to other
+// columns.
 bool NamesRows(const v1::AnswerColumns& columns);
 
-// No answer; the reply gives the cause elsewhere, with the placement.
+// Adds a row without an answer; the reply gives the reason elsewhere, with the placement.
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 }  // namespace hulld::server

@@ -9,14 +9,15 @@
 
 namespace hulld::server {
 
-// Encodes consecutive answers of a batch as columns, cut into messages of about 1 MiB.
+// Encodes consecutive answers of a batch as columns, split into messages of about 1 MiB.
 class BatchColumns {
  public:
-  // head: the message that the columns start in. first_pair: the pair that comes first.
+  // head: the message in which the columns start. first_pair: index of the first pair.
   BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                uint64_t first_pair);
 
-  // The next pair: `add_row` adds its row to the columns and returns its size, as AddAnswer does.
+  // Adds the next pair: `add_row` adds its row to the columns and returns its size, as AddAnswer
+  // does.
   template <typename AddRow>
   void Add(AddRow add_row) {
     bytes_ += add_row(ColumnsForNext());
@@ -26,13 +27,13 @@ class BatchColumns {
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 
  private:
-  // The columns of the message that takes the next row.
+  // Columns of the message for the next row.
   v1::AnswerColumns* ColumnsForNext();
 
   const v1::Wanted wanted_;
   uint64_t next_pair_;
   std::vector<v1::BatchCheckCollisionsResponse> messages_;
-  // Size of the last message, estimated.
+  // Estimated size of the last message.
   size_t bytes_;
 };
 

@@ -2,7 +2,6 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <chrono>
@@ -17,7 +16,7 @@
 namespace hulld::server {
 namespace {
 
-// Three numbers each.
+// Three numbers per point.
 std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<double>& xyz) {
   static_assert(sizeof(Vector) == 3 * sizeof(double));
   std::vector<Vector> points(static_cast<size_t>(xyz.size()) / 3);
@@ -49,42 +48,19 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
   return ToPoints(coordinates);
 }
 
-absl::Status OtherStore(std::span<const std::string> store_ids) {
-  const std::string ids = absl::StrJoin(store_ids, ",");
-  const std::string known = store_ids.size() == 1
-                                ? absl::StrCat("is not that of this store, which is \"", ids)
-                                : absl::StrCat("is not that of one of these stores, \"", ids);
-  return WithReason(absl::FailedPreconditionError(absl::StrCat(
-                        "freshness.store_id ", known,
-                        "\": the revision means something else here, as after the store was put "
-                        "back to an earlier time; read without at_least_revision")),
-                    v1::ERROR_REASON_OTHER_STORE, {{"store_id", ids}});
-}
-
-// A condition for one of the shards.
-absl::Status AddLeast(const std::string& store_id, uint64_t revision,
-                      std::span<const std::string> store_ids, ShardsFreshness* freshness) {
-  const auto store = std::ranges::find(store_ids, store_id);
-  if (store == store_ids.end()) return OtherStore(store_ids);
-  if (store_ids.size() == 1) {
-    freshness->at_least_revision = std::max(freshness->at_least_revision, revision);
-    return absl::OkStatus();
-  }
-  const auto shard = static_cast<size_t>(store - store_ids.begin());
-  auto& all = freshness->at_least;
-  const auto place = std::ranges::lower_bound(all, shard, {}, &ShardRevision::shard);
-  if (place != all.end() && place->shard == shard) {
-    place->revision = std::max(place->revision, revision);
-  } else if (revision > 0) {
-    all.insert(place, {shard, revision});
-  }
-  return absl::OkStatus();
+absl::Status OtherStore(const Store& store) {
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          "freshness.store_id is not that of this store, which is \"", store.id(),
+          "\": the revision means something else here, as after the store was put back to an "
+          "earlier time; read without at_least_revision")),
+      v1::ERROR_REASON_OTHER_STORE, {{"store_id", store.id()}});
 }
 
 absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
     const google::protobuf::Duration& message) {
   constexpr int64_t kNanosPerSecond = 1'000'000'000;
-  // Far more than a server runs, and far from overflow.
+  // Far longer than a server runs, and far from overflow.
   constexpr int64_t kMostSeconds = kNanosPerSecond;
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
     return absl::InvalidArgumentError(
@@ -141,33 +117,21 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   return pose;
 }
 
-absl::StatusOr<ShardsFreshness> DecodeFreshness(const v1::Freshness& message,
-                                                std::span<const std::string> store_ids,
-                                                SteadyClock::time_point began) {
-  ShardsFreshness freshness;
+absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
+                                          SteadyClock::time_point began) {
+  Freshness freshness;
   freshness.began = began;
+  freshness.at_least_revision = message.at_least_revision();
   if (message.at_least_revision() > 0 && message.store_id().empty()) {
     return absl::InvalidArgumentError(
         "freshness.at_least_revision needs store_id; give that of the same header");
   }
-  if (!message.store_id().empty()) {
-    const absl::Status added =
-        AddLeast(message.store_id(), message.at_least_revision(), store_ids, &freshness);
-    if (!added.ok()) return added;
-  }
-  for (const v1::ShardRevision& least : message.at_least()) {
-    if (least.store_id().empty()) {
-      return absl::InvalidArgumentError(
-          "freshness.at_least holds a revision without store_id; give shards of a header");
-    }
-    const absl::Status added = AddLeast(least.store_id(), least.revision(), store_ids, &freshness);
-    if (!added.ok()) return added;
-  }
+  if (!message.store_id().empty() && message.store_id() != store.id()) return OtherStore(store);
   if (message.has_max_staleness()) {
     absl::StatusOr<std::chrono::nanoseconds> bound = DecodeStaleness(message.max_staleness());
     if (!bound.ok()) return bound.status();
     freshness.max_staleness = *bound;
-  } else if (freshness.at_least_revision > 0 || !freshness.at_least.empty()) {
+  } else if (freshness.at_least_revision > 0) {
     freshness.max_staleness = std::nullopt;
   }
   return freshness;

@@ -17,28 +17,28 @@
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/registry/registry.h"
-#include "server/shards/shard_types.h"
 
 namespace hulld::server {
 
-// The points of a block; they may still hold NaN or infinity, which the builder finds.
-// INVALID_ARGUMENT: both fields of points set, or a number of coordinates that is no multiple of
+// Decodes a block of points. They may be NaN or infinite, which the builder checks.
+// INVALID_ARGUMENT: both point fields are set, or the number of coordinates is not a multiple of
 // three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points);
 
-// The chunk of a message; its points may still hold NaN or infinity, which the builder finds.
-// INVALID_ARGUMENT: sequence 0, both fields of points set, or a number of coordinates that is no
-// multiple of three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
+// Decodes a chunk. Its points may be NaN or infinite, which the builder checks. INVALID_ARGUMENT:
+// sequence 0, both point fields are set, or the number of coordinates is not a multiple of three.
+// RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points);
 
-// A pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in "rotation.w".
+// Decodes a pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in
+// "rotation.w".
 absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
-// The same without a check.
+// As DecodePose without validation.
 Pose ReadPose(const v1::Pose& message);
 
-// Poses in a row have seven numbers each: quaternion w x y z and translation x y z.
+// Packed poses have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
-// The i-th of such poses, without a check (ValidatePose). Cost: 2 ns.
+// Returns the i-th packed pose without validation (ValidatePose). Cost: 2 ns.
 inline Pose ReadPose(const google::protobuf::RepeatedField<double>& poses, size_t i) {
   const double* const numbers = poses.data() + kPoseNumbers * i;
   return {{numbers[0], numbers[1], numbers[2], numbers[3]},
@@ -50,15 +50,13 @@ inline void WritePose(const Pose& pose, size_t i, google::protobuf::RepeatedFiel
   for (int k = 0; k < 3; ++k) numbers[4 + k] = pose.t[k];
 }
 
-// How fresh the answer to a read must be that began at this time; an empty message means
-// linearizable, as an absent one does. store_ids: those of all shards. INVALID_ARGUMENT: a negative
-// or malformed duration, or a revision without the store. FAILED_PRECONDITION: a revision is of
-// another store.
-absl::StatusOr<ShardsFreshness> DecodeFreshness(const v1::Freshness& message,
-                                                std::span<const std::string> store_ids,
-                                                SteadyClock::time_point began);
+// Returns the freshness required by a read of this store that started at `began`. An empty or
+// absent message means linearizable. INVALID_ARGUMENT: a negative or malformed duration, or a
+// revision without a store ID. FAILED_PRECONDITION: the revision is of another store.
+absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
+                                          SteadyClock::time_point began);
 
-// INVALID_ARGUMENT: a number that means no method.
+// INVALID_ARGUMENT: unknown method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);
 
 }  // namespace hulld::server

@@ -27,12 +27,12 @@ absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature
   return absl::OkStatus();
 }
 
-// (Integer::str() trips a false warning of GCC 12.)
+// (Integer::str() triggers a false warning of GCC 12.)
 std::string Decimal(const Integer& number) {
   if (number.is_zero()) return "0";
   const Integer base = 1'000'000'000'000'000'000;
   Integer rest = abs(number);
-  std::string digits;  // last first
+  std::string digits;  // least significant first
   while (!rest.is_zero()) {
     auto part = static_cast<uint64_t>(Integer(rest % base));
     rest /= base;
@@ -75,21 +75,6 @@ void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* mes
   if (as_of.staleness.count() > 0) EncodeDuration(as_of.staleness, message->mutable_staleness());
 }
 
-void EncodeHeader(std::span<const std::string> store_ids, const ShardsAsOf& as_of,
-                  v1::ResponseHeader* message) {
-  if (as_of.revisions.size() == 1) {
-    message->set_store_id(store_ids[as_of.revisions.front().shard]);
-    message->set_revision(as_of.revisions.front().revision);
-  } else {
-    for (const ShardRevision& part : as_of.revisions) {
-      v1::ShardRevision* const shard = message->add_shards();
-      shard->set_store_id(store_ids[part.shard]);
-      shard->set_revision(part.revision);
-    }
-  }
-  if (as_of.staleness.count() > 0) EncodeDuration(as_of.staleness, message->mutable_staleness());
-}
-
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);
@@ -99,12 +84,11 @@ void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   EncodeCounts(record.counts, message->mutable_counts());
 }
 
-void EncodeVersion(const std::string& store_id, const HullRecord& record,
-                   v1::HullVersion* message) {
+void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion* message) {
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);
   message->set_revision(record.revision);
-  message->set_store_id(store_id);
+  message->set_store_id(store.id());
 }
 
 void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message) {

@@ -4,8 +4,6 @@
 #include <absl/status/status.h>
 
 #include <chrono>
-#include <span>
-#include <string>
 
 #include "core/hull/hull.h"
 #include "core/query/body/piece_certification.h"
@@ -15,21 +13,16 @@
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/registry/registry.h"
-#include "server/shards/shard_types.h"
 
 namespace hulld::server {
 
 void EncodeVector(const Vector& vector, v1::Vector3* message);
 void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
 void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
-// The same of a read.
+// Adds the revision and staleness of a read.
 void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message);
-// The same of one shard or several. store_ids: those of all shards.
-void EncodeHeader(std::span<const std::string> store_ids, const ShardsAsOf& as_of,
-                  v1::ResponseHeader* message);
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message);
-// store_id: the ID of the store that keeps the hull.
-void EncodeVersion(const std::string& store_id, const HullRecord& record, v1::HullVersion* message);
+void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion* message);
 void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message);
 
 v1::Relation EncodeRelation(Relation relation);
@@ -37,12 +30,12 @@ v1::Rung EncodeRung(Rung rung);
 v1::AxisKind EncodeAxisKind(AxisKind kind);
 v1::Durability EncodeDurability(Durability durability);
 
-// a, b: the hulls that the axis separates.
-// RESOURCE_EXHAUSTED: a feature holds more vertices than one message can carry.
+// a, b: the hulls separated by the axis. RESOURCE_EXHAUSTED: a feature has more vertices than one
+// message can carry.
 absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
                         v1::Axis* message);
 void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::Analysis* message);
-// a, b: the hulls whose vertices the pairs name.
+// a, b: the hulls of the pairs' vertices.
 void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
                        v1::Certificate* message);
 // a, b: the hulls of its pieces.

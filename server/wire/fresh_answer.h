@@ -8,26 +8,26 @@
 #include <utility>
 
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {
 
-// Ends a unary call (UnaryCall) whose request has a freshness with what `answer` gives, once the
-// shards are as fresh, all of them: at once where they are, otherwise on `pool`. answer: takes how
-// stale that may be. is_quick: whether it may run on gRPC's threads; otherwise it runs on `pool`.
+// Ends a unary call (UnaryCall) with the result of `answer` after the registry satisfies the
+// request's freshness: immediately if it already does, otherwise on `pool`. answer: takes the
+// staleness. is_quick: `answer` may run on gRPC's threads; otherwise it runs on `pool`.
 template <typename UnaryCall, typename Answer>
-void EndFresh(Shards& shards, WorkerPool& pool, UnaryCall* call, Answer answer,
+void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answer,
               bool is_quick = true) {
-  const absl::StatusOr<ShardsFreshness> freshness =
-      DecodeFreshness(call->request().freshness(), shards.store_ids(), call->call().arrival());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
   if (is_quick) {
-    if (const auto staleness = shards.TryFresh(*freshness)) return call->End(answer(*staleness));
+    if (const auto staleness = registry.TryFresh(*freshness)) return call->End(answer(*staleness));
   }
-  call->EndOn(pool, [&shards, call, freshness = *freshness, answer = std::move(answer)] {
+  call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        shards.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        registry.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }

@@ -2,38 +2,47 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
+
+#include <vector>
 
 #include "server/contract/hull_id.h"
 
 namespace hulld::server {
 namespace {
 
-// No ID holds a NUL.
+// IDs contain no NUL.
 constexpr char kSeparator = '\0';
 
 }  // namespace
 
-std::string EncodePageToken(const std::string& prefix, const std::string& last_id) {
-  return absl::WebSafeBase64Escape(prefix + kSeparator + last_id);
+std::string EncodePageToken(Rpc rpc, const std::string& prefix, const std::string& last_id) {
+  return absl::WebSafeBase64Escape(std::string(RpcName(rpc)) + kSeparator + prefix + kSeparator +
+                                   last_id);
 }
 
-absl::StatusOr<std::string> DecodePageToken(const std::string& token, const std::string& prefix) {
+absl::StatusOr<std::string> DecodePageToken(Rpc rpc, const std::string& token,
+                                            const std::string& prefix) {
   if (token.empty()) return std::string();
+  const absl::Status malformed = absl::InvalidArgumentError(
+      "page_token is malformed; pass next_page_token of the previous page, or none");
   std::string plain;
-  const bool decoded = absl::WebSafeBase64Unescape(token, &plain);
-  const size_t separator = plain.rfind(kSeparator);
-  if (!decoded || separator == std::string::npos) {
-    return absl::InvalidArgumentError(
-        "page_token is malformed; pass next_page_token of the previous page, or none");
+  if (!absl::WebSafeBase64Unescape(token, &plain)) return malformed;
+  const std::vector<std::string> parts = absl::StrSplit(plain, kSeparator);
+  if (parts.size() != 3) return malformed;
+  if (parts[0] != RpcName(rpc)) {
+    return absl::InvalidArgumentError(absl::StrCat("page_token belongs to another call than ",
+                                                   RpcName(rpc),
+                                                   "; list with the call of the first page"));
   }
-  if (plain.substr(0, separator) != prefix) {
+  if (parts[1] != prefix) {
     return absl::InvalidArgumentError(
         "page_token belongs to another prefix; list with the prefix of the first page");
   }
-  const std::string last_id = plain.substr(separator + 1);
+  const std::string& last_id = parts[2];
   if (!CheckHullIdSyntax(last_id, "page_token").ok() || !last_id.starts_with(prefix)) {
-    return absl::InvalidArgumentError(
-        "page_token is malformed; pass next_page_token of the previous page, or none");
+    return malformed;
   }
   return last_id;
 }

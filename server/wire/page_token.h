@@ -5,14 +5,18 @@
 
 #include <string>
 
+#include "server/contract/rpc.h"
+
 namespace hulld::server {
 
-// The opaque token of the page of IDs with `prefix` that starts after `last_id`.
-std::string EncodePageToken(const std::string& prefix, const std::string& last_id);
+// Returns the opaque token of the page that starts after `last_id`, in this RPC's list of the IDs
+// with `prefix`.
+std::string EncodePageToken(Rpc rpc, const std::string& prefix, const std::string& last_id);
 
-// The last_id of a token made for the same prefix; the empty string for an empty token.
-// INVALID_ARGUMENT: malformed, or made for another prefix.
-absl::StatusOr<std::string> DecodePageToken(const std::string& token, const std::string& prefix);
+// Returns the last_id of a token of the same RPC and prefix; the empty string for an empty token.
+// INVALID_ARGUMENT: the token is malformed, or belongs to another RPC or prefix.
+absl::StatusOr<std::string> DecodePageToken(Rpc rpc, const std::string& token,
+                                            const std::string& prefix);
 
 }  // namespace hulld::server
 

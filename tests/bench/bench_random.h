@@ -10,7 +10,7 @@
 
 namespace hulld::bench {
 
-// Numbers that are the same on every platform, unlike those of the standard distributions.
+// Random numbers equal on every platform, unlike those of the standard distributions.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
@@ -20,7 +20,7 @@ class Random {
   }
   size_t Below(size_t n) { return engine_() % n; }
 
-  // By Marsaglia's rejection.
+  // Marsaglia's rejection method.
   Vector UnitVector() {
     for (;;) {
       const Vector v(Between(-1, 1), Between(-1, 1), Between(-1, 1));
@@ -29,7 +29,7 @@ class Random {
     }
   }
 
-  // A quaternion of about unit length.
+  // Returns a quaternion of about unit length.
   std::array<double, 4> Rotation() {
     for (;;) {
       std::array<double, 4> q;

@@ -15,7 +15,7 @@ constexpr const char* kCompiler = "clang++ " __clang_version__ " " HULLD_BENCH_F
 constexpr const char* kCompiler = "g++ " __VERSION__ " " HULLD_BENCH_FLAGS;
 #endif
 
-// Every counter there is, in the order of the columns.
+// All counters, in the order of the columns.
 constexpr const char* kCounters[] = {"points",
                                      "vertices",
                                      "vertices_missing_or_extra",
@@ -38,14 +38,14 @@ constexpr const char* kCounters[] = {"points",
                                      "cached_share",
                                      "pairs"};
 
-// The two last parts of "suite/workload/library", with a comma between.
+// Returns the last two parts of "suite/workload/library", separated by a comma.
 std::string WorkloadAndLibrary(const std::string& name) {
   const size_t library = name.rfind('/');
   const size_t workload = name.rfind('/', library - 1) + 1;
   return name.substr(workload, library - workload).append(",").append(name.substr(library + 1));
 }
 
-// A count in full, a measure in six digits.
+// Writes a count in full, a measurement in six digits.
 void Write(std::ostream& out, double value) {
   if (value == std::floor(value) && std::abs(value) < 1e15) {
     out << static_cast<int64_t>(value);
@@ -62,8 +62,7 @@ bool IsFinal(const benchmark::BenchmarkReporter::Run& run) {
 }  // namespace
 
 std::string CpuName() {
-  // The fields of the first processor. Where a machine is virtual its name may leave the generation
-  // out.
+  // Fields of the first processor. On a virtual machine its name may omit the generation.
   std::map<std::string, std::string> values;
   std::ifstream in("/proc/cpuinfo");
   for (std::string line; std::getline(in, line) && !line.empty();) {
@@ -114,7 +113,7 @@ void CsvReporter::ReportRuns(const std::vector<Run>& runs) {
 }
 
 int RunBenchmarks(int argc, char** argv) {
-  // The CSV is only written where a file is asked for.
+  // The CSV is written only if a file is requested.
   bool has_file = false;
   for (int i = 1; i < argc; ++i) {
     has_file |= std::string(argv[i]).starts_with("--benchmark_out=");

@@ -8,10 +8,10 @@
 
 namespace hulld::bench {
 
-// Writes the file of --benchmark_out as the CSV that tests/bench/results/ keeps: one row for each
-// benchmark called "suite/workload/library", its median where it was repeated, with what was
-// counted, the compiler and the CPU in the row of the time. Time is CPU time of the measuring
-// thread, or real time where the benchmark asks for it.
+// Writes the file of --benchmark_out as the CSV kept in tests/bench/results/: one row for each
+// benchmark named "suite/workload/library", its median if repeated, with its counters, the
+// compiler, and the CPU in the time's row. Time is CPU time of the measuring thread, or real time
+// if the benchmark requests it.
 class CsvReporter : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override;
@@ -20,15 +20,16 @@ class CsvReporter : public benchmark::BenchmarkReporter {
  private:
   void WriteHeader(const Run& run);
 
-  // The counters of the first row, which all rows have.
+  // Counters of the first row, which all rows have.
   std::vector<std::string> columns_;
 };
 
-// Columns that every file has: what compiled the benchmark, and where it runs.
+// Columns of every file: the compiler of the benchmark, and its machine.
 std::string CompilerName();
 std::string CpuName();
 
-// Runs what is registered: a table on the console, and the CSV in --benchmark_out. The exit code.
+// Runs the registered benchmarks: a table on the console, and the CSV in --benchmark_out. Returns
+// the exit code.
 int RunBenchmarks(int argc, char** argv);
 
 }  // namespace hulld::bench

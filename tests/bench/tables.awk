@@ -1,6 +1,8 @@
-# Makes the tables of the pages from the rows of results/: awk -v table=NAME -v machine=MACHINE -f tables.awk. See tables.sh.
+# Makes the tables of the pages from the rows of results/: awk -v table=NAME -v machine=MACHINE -f
+# tables.awk. See tables.sh.
 
-# read_rows(FILE): the rows of a file, by the names in its head: cell[workload, library, column].
+# read_rows(FILE): reads the rows of a file, by the names in its header: cell[workload, library,
+# column].
 function read_rows(file,   path, line, fields, names, count, i, key) {
   path = "results/" file ".csv"
   while ((getline line < path) > 0) {
@@ -19,8 +21,8 @@ function read_rows(file,   path, line, fields, names, count, i, key) {
   cite(file)
 }
 
-# For files whose rows are told apart by their place alone: next_row(FILE, FIELDS) reads the next
-# one after the head. False after the last; then again from the first.
+# For files with rows identified by position only: next_row(FILE, FIELDS) reads the next row after
+# the header. Returns false after the last, then starts over.
 function next_row(file, fields,   path, line) {
   path = "results/" file ".csv"
   if (!(file in opened) && (getline line < path) <= 0) unreadable(path)
@@ -37,7 +39,7 @@ function unreadable(path) {
   exit 1
 }
 
-# Names the file below the table (measured), once, and where it was measured.
+# Cites the file and its origin below the table (measured), without repetition.
 function cite(file,   link, origin) {
   link = "[`" file ".csv`](" results file ".csv)"
   if (index(files, link) > 0) return
@@ -47,7 +49,7 @@ function cite(file,   link, origin) {
   if (index(origins, origin) == 0) origins = origins (origins == "" ? "" : ", and ") origin
 }
 
-# The processor and the compiler that the first row of a file names; empty where it names none.
+# Returns the processor and the compiler named by the first row of a file; empty if it names none.
 function origin_of(file,   command, line, names, fields, count, i, cpu, compiler) {
   command = "head -2 results/" file ".csv"
   if ((command | getline line) > 0) count = split_row(line, names)
@@ -61,15 +63,14 @@ function origin_of(file,   command, line, names, fields, count, i, cpu, compiler
   return cpu == "" ? "" : "a virtual " cpu ", " compiler
 }
 
-# The origin of rows that name none: that of the hulls, but for the generation, which may be
-# another.
+# The origin of rows that name none: that of the hulls, without the generation, which may differ.
 function usual_origin(   origin) {
   origin = origin_of("hull_build_" machine)
   sub(/ family [0-9]+ model [0-9]+/, "", origin)
   return origin
 }
 
-# Splits at commas that are not within quotes.
+# Splits at commas outside quotes.
 function split_row(line, fields,   count, text, quoted, i, c) {
   count = 1
   text = ""
@@ -90,10 +91,10 @@ function head(text,   part, count, i) {
   print "|"
 }
 
-# Where the rows above come from.
+# Prints the origin of the rows above.
 function measured() { printf "\n*Measured on %s; rows in %s.*\n", origins, files }
 
-# Nanoseconds, or "-".
+# Returns nanoseconds, or "-".
 function short(value) {
   if (value == "") return "-"
   value += 0
@@ -103,11 +104,11 @@ function short(value) {
   return sprintf("%.1fM", value / 1e6)
 }
 function three(x) { x += 0; return x < 1 ? sprintf("%.2f", x) : x < 100 ? sprintf("%.3g", x) : sprintf("%d", x) }
-# Three digits at least, and no exponent.
+# At least three digits, and no exponent.
 function digits(x) { x += 0; return x < 1000 ? sprintf("%.3g", x) : sprintf("%d", x) }
 function times(x) { x += 0; return x < 100 ? sprintf("%.2g", x) : sprintf("%.0f", x) }
 function million(x) { x += 0; return (x < 2e6 ? sprintf("%.2f", x / 1e6) : sprintf("%.1f", x / 1e6)) " million/s" }
-# A time in the unit that suits it.
+# Returns a time in a suitable unit.
 function unit(ns) {
   ns += 0
   if (ns < 999.5) return sprintf("%.3g ns", ns)
@@ -186,7 +187,7 @@ function set_name(set) {
   sub(/^sphere:/, "", set)
   return set
 }
-# The same, short, where the vertices are told elsewhere; for a scene, "N of SET".
+# As set_name, short, if the vertices are given elsewhere; for a scene, "N of SET".
 function set_label(set) {
   sub(/of sphere:64/, "of 64 vertices", set)
   sub(/of ur5/, "UR5 links", set)
@@ -228,7 +229,7 @@ function touching(   s, p, n, key) {
   split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5,mating:8,mating:64", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet", peers, ",")
   for (s = 1; s <= 7; s++) {
-    # Measured since these sets exist.
+    # Not measured before these sets existed.
     if (!((sets[s] " contact" SUBSEP "hulld", "ns") in cell)) continue
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
@@ -240,7 +241,7 @@ function touching(   s, p, n, key) {
   measured()
 }
 
-# Percent of all, or "0".
+# Returns percent of all, or "0".
 function share(part, all) { return part == 0 ? "0" : sprintf("%.2g %%", 100 * part / all) }
 
 function lengths(question,   s, p, n, m, key) {
@@ -376,7 +377,7 @@ function overload(   fields) {
   measured()
 }
 
-# One row per workload and size: hulld's step, Bullet's, and how many times faster hulld is.
+# One row per workload and size: hulld's step, Bullet's, and hulld's speedup.
 function live(   fields, key, order_of, i, n, part) {
   head("| a step | vertices | hulld: p50 | p99 | Bullet: p50 | with its box | hulld faster | with its box |")
   while (next_row("query_live_" machine, fields)) {
@@ -407,7 +408,7 @@ function live_service(   fields, reader) {
   measured()
 }
 
-# p99 is left out where there are too few times for it.
+# Omits p99 if too few times exist.
 function live_work(   fields, enough) {
   head("| work | | p50 | p99 | p50 / first | p99 / first | a second |")
   while (next_row("server_live_work_" machine, fields)) {
@@ -428,7 +429,7 @@ function busy(   fields) {
   measured()
 }
 
-# One row of the summary; times in nanoseconds. wrong: what hulld and the peer got wrong.
+# One row of the summary; times in nanoseconds. wrong: errors of hulld and the peer.
 function compare(what, ours, peer, theirs, wrong) {
   printf "| %s | %s | %s: %s | %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours), wrong
 }
@@ -446,21 +447,20 @@ function pair(what, set,   peers, n, i, best) {
           share(cell[set, "hulld", "wrong"], cell[set, "hulld", "questions"]) " / " \
           share(cell[set, best, "wrong"], cell[set, best, "questions"]))
 }
-# One point and one question of a growing hull.
+# One point and one query of a growing hull.
 function grown(vertices,   fields, step) {
   while (next_row("query_live_" machine, fields)) {
     if (fields[1] == "1 point, 1 question" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
   }
   compare("one point more, then a question, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
 }
-# Over PostgreSQL: what a row of results/postgres/ is called.
+# Over PostgreSQL: returns the name of a row of results/postgres/.
 function store_name(row) {
   sub(/^rocksdb/, "RocksDB", row)
   sub(/ bounded$/, ", BOUNDED", row)
   sub(/ linearizable$/, ", LINEARIZABLE", row)
   sub(/^one/, "one server", row)
   sub(/^many/, "many servers", row)
-  sub(/^shard/, "many servers, one shard in a file", row)
   sub(/^libpq as one$/, "libpq alone, as one server", row)
   sub(/^libpq as many$/, "libpq alone, as many servers", row)
   sub(/^libpq question$/, "libpq alone, the question of LINEARIZABLE", row)
@@ -475,7 +475,7 @@ function postgres_commit(   i, key, floor, both) {
   head("| a chunk of one point | p50 | p99 | p50 / libpq | p50 / gRPC, then libpq | CPU of hulld | of the database |")
   for (i = 1; i <= rows; i++) {
     key = order[i]
-    floor = key ~ /(^| )one$/ ? "libpq as one" : key ~ /many|shard/ ? "libpq as many" : ""
+    floor = key ~ /(^| )one$/ ? "libpq as one" : key ~ /many/ ? "libpq as many" : ""
     both = "gRPC and " floor
     printf "| %s | %s | %s | %s | %s | %s | %s |\n", store_name(key), micro(cell[key, "p50_us"]), micro(cell[key, "p99_us"]),
            floor == "" ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[floor, "p50_us"]),
@@ -539,7 +539,7 @@ function summary(   one) {
   hull("hull of 100000 points in a ball", "ball:100000")
   hull("hull of 100000 points on a sphere", "sphere:100000")
   one = "sphere:100000"
-  # 100000 points, milliseconds: 10 ns a point for each.
+  # 100000 points, milliseconds: 10 ns per point for each.
   compare("insert a point, mean over 100000 on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
           10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
           cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \

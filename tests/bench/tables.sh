@@ -1,13 +1,13 @@
 #!/bin/bash
-# Keeps the tables of measurements in the pages the same as the rows in tests/bench/results/.
+# Keeps the tables of measurements in the pages equal to the rows in tests/bench/results/.
 #
 #   tables.sh --write [MACHINE]   writes them into the pages
-#   tables.sh --check [MACHINE]   fails, and says how, where a page differs
+#   tables.sh --check [MACHINE]   fails with a message if a page differs
 #   tables.sh TABLE [MACHINE]     prints one
 #
-# MACHINE names the files, as in hull_build_MACHINE.csv; epyc_gcc12 by default. A table stands in a
-# page between <!-- table NAME --> and <!-- end of table -->; tables.awk knows their names. A table
-# of another machine says so: <!-- table NAME of MACHINE -->.
+# MACHINE names the files, as in hull_build_MACHINE.csv; epyc_gcc12 by default. In a page, a table
+# is between <!-- table NAME --> and <!-- end of table -->; tables.awk defines the names. A table of
+# another machine is marked <!-- table NAME of MACHINE -->.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 export LC_ALL=C
@@ -15,7 +15,7 @@ export LC_ALL=C
 what=${1:---help}
 machine=${2:-epyc_gcc12}
 
-# Pages, and where results/ lies as seen from each.
+# Pages, and the path of results/ relative to each.
 readonly pages=(../../README.md README.md)
 results_of() { [[ $1 == README.md ]] && echo results/ || echo tests/bench/results/; }
 
@@ -24,7 +24,7 @@ made_table() {
   awk -v table="$1" -v machine="${3:-$machine}" -v results="$(results_of "$2")" -f tables.awk </dev/null
 }
 
-# rewritten PAGE: the page with its tables made anew.
+# rewritten PAGE: prints the page with its tables regenerated.
 rewritten() {
   local page=$1 line
   while IFS= read -r line; do

@@ -12,7 +12,7 @@
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
-namespace {
+namespace appender_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -25,6 +25,7 @@ class AppenderTest : public testing::Test {
     ClientOptions options;
     options.server = fake_.address();
     options.timeout = timeout;
+    options.retry.max_attempts = 4;
     options.retry.wait = [this](std::chrono::milliseconds wait) {
       waits_.push_back(wait);
       if (before_reconnect_) before_reconnect_();
@@ -34,7 +35,7 @@ class AppenderTest : public testing::Test {
     return appender.ok() ? *std::move(appender) : nullptr;
   }
 
-  // A block of one point whose coordinates are all `value`.
+  // Returns a single-point block with all coordinates equal to `value`.
   static v1::PointBlock Block(double value) {
     v1::PointBlock block;
     for (int i = 0; i < 3; ++i) block.add_xyz(value);
@@ -96,7 +97,7 @@ TEST_F(AppenderTest, WritersHaveNamesOfTheirOwnByDefault) {
 TEST_F(AppenderTest, ChunksAreSentAheadOfTheirAcksUpToTheBound) {
   options_.max_in_flight_chunks = 3;
   StreamScript script;
-  // Would end in a deadline if fewer were sent ahead.
+  // Exceeds the deadline if fewer were pipelined.
   script.ack_every = 3;
   fake_.ScriptStreams({script});
   const auto appender = Open();
@@ -260,8 +261,8 @@ TEST_F(AppenderTest, LeavingWithoutFinishEndsTheStream) {
   auto appender = Open();
   ASSERT_TRUE(appender->Append(Block(1)).ok());
   appender = nullptr;
-  // The fake's destructor would wait for ever for a stream that goes on.
+  // The fake's destructor would wait forever for an open stream.
 }
 
-}  // namespace
+}  // namespace appender_test
 }  // namespace hulld

@@ -9,7 +9,7 @@
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
-namespace {
+namespace client_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -20,6 +20,7 @@ class ClientTest : public testing::Test {
     ClientOptions options;
     options.server = fake_.address();
     options.timeout = timeout;
+    options.retry.max_attempts = 4;
     options.retry.wait = [](std::chrono::milliseconds) {};
     return Client(options);
   }
@@ -71,7 +72,7 @@ TEST_F(ClientTest, CallsThatAreNotSafeToRepeatAreNotRepeated) {
   EXPECT_EQ(fake_.calls("CreateHull"), 1);
 }
 
-TEST_F(ClientTest, RepeatingStopsAfterFourAttempts) {
+TEST_F(ClientTest, RepeatingStopsAfterTheAttemptsAllowed) {
   fake_.FailNext("GetStatus", std::vector<grpc::Status>(10, unavailable_));
   EXPECT_EQ(MakeClient().GetStatus().status(), absl::UnavailableError("draining"));
   EXPECT_EQ(fake_.calls("GetStatus"), 4);
@@ -86,6 +87,7 @@ TEST_F(ClientTest, AServerThatDoesNotAnswerMeetsTheDeadline) {
 TEST_F(ClientTest, NobodyThereIsUnavailable) {
   ClientOptions options;
   options.server = "127.0.0.1:1";
+  options.retry.max_attempts = 2;
   options.retry.wait = [](std::chrono::milliseconds) {};
   EXPECT_TRUE(absl::IsUnavailable(Client(options).GetStatus().status()));
 }
@@ -110,7 +112,7 @@ TEST_F(ClientTest, ListingFollowsPagesUpToTheLimit) {
 TEST_F(ClientTest, PagesThatMayBeStaleAreOfAtLeastTheRevisionOfTheFirst) {
   for (const char* id : {"a", "b", "c", "d", "e", "f", "g"}) fake_.PutHull(id, {});
   ClientOptions options = MakeClient().options();
-  // Linearizable pages, by saying nothing or nothing of weight, stay so.
+  // Pages stay linearizable by default and with empty freshness options.
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(Client(options).ListAllHulls("").ok());
     for (const v1::ListHullsRequest& request : fake_.list_requests()) {
@@ -212,5 +214,5 @@ TEST_F(ClientTest, HealthIsWhatTheServerSays) {
   EXPECT_TRUE(absl::IsFailedPrecondition(client.CheckHealth()));
 }
 
-}  // namespace
+}  // namespace client_test
 }  // namespace hulld

@@ -7,8 +7,8 @@
 
 namespace hulld {
 
-// The messages of a watch up to the next that ends a round, as one; what there was before a
-// failure, which fails the test.
+// Returns the messages of a watch up to the end of the round, merged. After a failure, fails the
+// test and returns the messages so far.
 inline v1::WatchCollisionsResponse Round(CollisionWatch& watch) {
   v1::WatchCollisionsResponse all;
   while (true) {

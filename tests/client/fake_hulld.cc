@@ -132,7 +132,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     fake_.list_requests_.push_back(*request);
     response->mutable_header()->set_store_id("store");
     response->mutable_header()->set_revision(100 + fake_.list_requests_.size());
-    // Pages are small, so that clients have several to follow.
+    // Pages are small, so that clients follow several.
     const int asked = static_cast<int>(request->page_size());
     const int size = asked == 0 ? 3 : std::min(3, asked);
     auto at = request->page_token().empty() ? fake_.hulls_.lower_bound(request->prefix())
@@ -171,7 +171,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     return {grpc::StatusCode::UNAVAILABLE, "Socket closed"};
   }
 
-  // Requires the lock.
+  // Requires: the lock.
   void Create(const std::string& hull_id) {
     FakeHull& hull = fake_.hulls_[hull_id];
     hull.create_revision = hull.revision = ++fake_.revision_;
@@ -256,7 +256,7 @@ class FakeHulld::Collisions final : public v1::CollisionService::Service {
     return grpc::Status::OK;
   }
 
-  // Every pair is TOUCHING, but those with a placement of a hull that does not exist.
+  // Every pair is TOUCHING, except pairs with a missing hull.
   grpc::Status BatchCheckCollisions(
       grpc::ServerContext*, const v1::BatchCheckCollisionsRequest* request,
       grpc::ServerWriter<v1::BatchCheckCollisionsResponse>* writer) override {
@@ -278,7 +278,7 @@ class FakeHulld::Collisions final : public v1::CollisionService::Service {
       problem.set_code(grpc::StatusCode::NOT_FOUND);
       problem.set_message("hull \"" + placement.hull_id() + "\" not found");
     }
-    // As where the table of hulls is long: the answers begin in another message.
+    // As with a long table of hulls: the answers begin in another message.
     writer->Write(response);
     response.Clear();
     v1::AnswerColumns& columns = *response.mutable_columns();

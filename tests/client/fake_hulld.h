@@ -21,11 +21,11 @@
 
 namespace hulld {
 
-// An error as hulld gives it: with a reason and metadata in its details.
+// Returns an error in hulld's format: with a reason and metadata in its details.
 grpc::Status HulldError(grpc::StatusCode code, const std::string& message, v1::ErrorReason reason,
                         const std::map<std::string, std::string>& metadata = {});
 
-// What the fake server holds of a hull: every point, as if each were a vertex.
+// The fake server's state of a hull: every point, as if each were a vertex.
 struct FakeHull {
   uint64_t create_revision = 0;
   uint64_t revision = 0;
@@ -34,26 +34,25 @@ struct FakeHull {
   std::map<std::string, uint64_t> last_sequence;
 };
 
-// What happens to the next append stream; the default is that all goes well.
+// Behavior of the next append stream; by default it succeeds.
 struct StreamScript {
-  // The stream breaks as if the connection did, after this many chunks were committed...
+  // Breaks the stream like a lost connection after this many chunks were committed.
   std::optional<int> break_after;
-  // ... and their acknowledgements are lost.
+  // Loses their acks.
   bool lose_acks = false;
-  // It ends with RESOURCE_EXHAUSTED instead, as if the server had too much to do.
+  // Ends the stream with RESOURCE_EXHAUSTED instead, like an overloaded server.
   bool exhausted = false;
-  // When the server says that the client may come again.
+  // Delay until the client may retry, as sent by the server.
   std::optional<std::chrono::milliseconds> retry_hint;
-  // Only each n-th chunk is acknowledged, with those before it.
+  // Acknowledges each n-th chunk, together with the chunks before it.
   int ack_every = 1;
-  // Every chunk but no acknowledgement is taken, until Release().
+  // Accepts every chunk but sends no ack until Release().
   bool hold_acks = false;
-  // The chunk with this sequence is refused.
+  // Refuses the chunk with this sequence.
   uint64_t refuse_sequence = 0;
 };
 
-// A server without geometry on a free port of 127.0.0.1: remembers what it is told, fails when it
-// is told to.
+// A server without geometry on a free port of 127.0.0.1. It records requests, and fails on demand.
 class FakeHulld final {
  public:
   FakeHulld();
@@ -61,9 +60,9 @@ class FakeHulld final {
 
   const std::string& address() const { return address_; }
 
-  // The next calls of a method ("GetHull") end with these statuses, one after another.
+  // Ends the next calls of a method ("GetHull") with these statuses, in order.
   void FailNext(const std::string& method, std::vector<grpc::Status> statuses);
-  // Calls of a method wait for Release().
+  // Blocks calls of a method until Release().
   void Hang(const std::string& method);
   void Release();
   void ScriptStreams(std::vector<StreamScript> scripts);
@@ -73,10 +72,10 @@ class FakeHulld final {
   FakeHull hull(const std::string& hull_id);
   void PutHull(const std::string& hull_id, FakeHull hull);
   void RemoveHull(const std::string& hull_id);
-  // The most chunks that any stream had received without acknowledging them.
+  // Returns the maximum number of unacknowledged chunks of any stream.
   int most_unacknowledged();
 
-  // Replaces the parts of every mesh; the relations of every batch.
+  // Override the parts of every mesh and the relations of every batch.
   std::vector<v1::GetHullMeshResponse> mesh_parts;
   v1::GetHullMeshRequest last_mesh_request;
   std::optional<std::vector<v1::BatchCheckCollisionsResponse>> batch_answers;
@@ -91,7 +90,7 @@ class FakeHulld final {
   class Collisions;
   class Status;
 
-  // Counts the call; returns the status that was asked for, or OK if none was.
+  // Counts the call; returns the status set for it, or OK.
   grpc::Status Enter(const std::string& method);
 
   std::mutex mutex_;

@@ -1,4 +1,4 @@
-// The client against a real server that has too much to do.
+// The client against an overloaded real server.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {
-namespace {
+namespace overload_test {
 
 using std::chrono::milliseconds;
 using ::testing::ElementsAre;
@@ -53,5 +53,5 @@ TEST_F(Overload, ARefusalThatWillNotPassIsNotTriedAgain) {
   EXPECT_NE(RequestIdOf(status), "");
 }
 
-}  // namespace
+}  // namespace overload_test
 }  // namespace hulld

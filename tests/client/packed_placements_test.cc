@@ -1,4 +1,4 @@
-// Packed placements are the same as a list of placements, in every call that takes them.
+// Packed placements are equivalent to a list of placements, in every call that takes them.
 
 #include "client/packed_placements.h"
 
@@ -12,7 +12,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace packed_placements_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
@@ -20,7 +20,7 @@ using Placements = google::protobuf::RepeatedPtrField<v1::Placement>;
 
 class Packed : public ServerTest {
  protected:
-  // Hulls that are there, one that is not, and an ID that is none.
+  // Existing hulls, a missing one, and an invalid ID.
   Placements SomePlacements() {
     Put("cube", Cube());
     Put("ball", Sphere(40));
@@ -43,7 +43,7 @@ class Packed : public ServerTest {
     }
     placements.Mutable(0)->mutable_pose()->clear_rotation();
     placements.Mutable(4)->clear_pose();
-    // A quaternion of zeros.
+    // A zero quaternion.
     placements.Mutable(1)->mutable_pose()->mutable_rotation()->Clear();
     return placements;
   }
@@ -72,7 +72,7 @@ class Packed : public ServerTest {
     return relations;
   }
 
-  // The same problems, in other words.
+  // Returns the problems without their wording.
   template <typename Problems>
   static std::vector<std::pair<uint32_t, int>> Causes(const Problems& problems) {
     std::vector<std::pair<uint32_t, int>> causes;
@@ -155,7 +155,7 @@ TEST_F(Packed, StreamsAnswerTheSame) {
   v1::StreamCollisionsRequest packed = request;
   *packed.mutable_open()->mutable_packed_placements() = PackPlacements(open->placements());
   packed.mutable_open()->clear_placements();
-  // The placement whose quaternion was of zeros gets a pose.
+  // The placement with the zero quaternion gets a pose.
   v1::StreamCollisionsRequest update;
   update.mutable_update()->add_placements(1);
   for (const double number : {1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}) {
@@ -219,5 +219,5 @@ TEST_F(Packed, HullsAndPlacementsAreLimited) {
   EXPECT_THAT(BatchError(request), HasSubstr("4 hull_ids; the limit is 3 (--max-placements)"));
 }
 
-}  // namespace
+}  // namespace packed_placements_test
 }  // namespace hulld::server

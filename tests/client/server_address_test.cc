@@ -11,7 +11,7 @@
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
-namespace {
+namespace server_address_test {
 
 using testing::HasSubstr;
 
@@ -79,13 +79,13 @@ class SeveralServers : public testing::Test {
     options.own_connection = true;
     client_ = std::make_unique<Client>(options);
   }
-  // Throws where the call fails, so that no loop goes on.
+  // Throws if the call fails, which ends any loop.
   void Call() const {
     const absl::Status status = client_->GetStatus().status();
     if (!status.ok()) throw std::runtime_error(status.ToString());
   }
   int CallsOf(size_t i) { return servers_[i]->calls("GetStatus"); }
-  // Calls until none of 20 in turn reaches server `i`: it takes a moment until the client knows.
+  // Calls until 20 consecutive calls miss server `i`: the client notices with a delay.
   void CallUntilNoneReaches(size_t i) {
     for (int before = -1; before != CallsOf(i);) {
       before = CallsOf(i);
@@ -121,5 +121,5 @@ TEST_F(SeveralServers, AreNotMissedWhenTheyGo) {
   EXPECT_GE(CallsOf(2), 20);
 }
 
-}  // namespace
+}  // namespace server_address_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// Watches whose server goes and comes again.
+// Watches across a restart of the server.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
@@ -17,7 +17,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {
-namespace {
+namespace watch_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -36,7 +36,7 @@ class Watches : public server::ServerTest {
     config_.listen = absl::StrCat("unix:", (directory_ / "socket").string());
     Restart(config_);
     options_.server = server_->address();
-    // The client waits once it has lost the server: time for another one to start.
+    // The client waits after it loses the server, which gives another one time to start.
     options_.retry.wait = [this](std::chrono::milliseconds wait) {
       ++waits_;
       now_ += wait;
@@ -51,8 +51,8 @@ class Watches : public server::ServerTest {
     server_.reset();
     std::filesystem::remove_all(directory_);
   }
-  // Has `options_` go by a clock that moves when this moves it, and while the client waits; with a
-  // patience of 2 s.
+  // Gives `options_` a clock that advances under the test's control and while the client waits;
+  // with a patience of 2 s.
   void UseOwnClock() {
     options_.timeout = std::chrono::seconds(2);
     options_.retry.now = [this] {
@@ -60,7 +60,7 @@ class Watches : public server::ServerTest {
       return now_;
     };
   }
-  // Ends the server; the next one is started by the watch that misses it.
+  // Stops the server; the watch's wait starts the next one.
   void Lose(std::function<void()> meanwhile) {
     meanwhile_ = std::move(meanwhile);
     TearDown();
@@ -89,12 +89,25 @@ class Watches : public server::ServerTest {
   ClientOptions options_;
   std::unique_ptr<Client> client_;
   std::function<void()> meanwhile_;
-  // Whether a server that is missed is started again.
+  // True if a lost server is restarted.
   bool comes_again_ = true;
   int waits_ = 0;
   Deadline now_;
   int clock_readings_ = 0;
 };
+
+TEST_F(Watches, OutliveARestartAsEverySafeCallDoes) {
+  Put("a", server::Cube());
+  int waits = 0;
+  options_.retry.wait = [&](std::chrono::milliseconds) {
+    if (++waits == 10) Restart(config_);
+  };
+  const Client client(options_);
+  TearDown();
+  const auto hull = client.GetHull("a");
+  EXPECT_TRUE(hull.ok()) << hull.status();
+  EXPECT_GE(waits, 10);
+}
 
 TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
   Put("a", server::Cube());
@@ -111,13 +124,13 @@ TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
     EXPECT_FALSE(message->anew());
     for (const v1::HullEvent& event : message->events()) told.push_back(event.hull().hull_id());
   } while (!message->synced());
-  // Once for its creation and for its points, or once for both.
+  // One event for its creation and one for its points, or one for both.
   EXPECT_THAT(told, testing::AnyOf(ElementsAre("c"), ElementsAre("c", "c")));
   EXPECT_GT(waits_, 0);
 }
 
-// The patience is for a server that is gone, not for one that has nothing to tell: it begins with
-// the first failure, so that while all is well nobody looks at the clock.
+// The patience applies to a missing server, not to an idle one: it starts with the first failure,
+// so the clock is unused before that.
 TEST_F(Watches, QuietForLongGoOn) {
   UseOwnClock();
   const Client client(options_);
@@ -158,14 +171,14 @@ TEST_F(Watches, OfAServerThatStaysAwayEndWithThePatience) {
   EXPECT_THAT(Events(Round(*pairs)), ElementsAre("ENTER 0 1"));
   comes_again_ = false;
   TearDown();
-  // Waits of 100, 200, 400 and 800 ms fit, one of 1600 more does not.
+  // Waits of 100, 200, 400 and 800 ms fit, another of 1600 does not.
   EXPECT_TRUE(absl::IsUnavailable(hulls->Next().status()));
   EXPECT_EQ(std::exchange(waits_, 0), 4);
   EXPECT_TRUE(absl::IsUnavailable(pairs->Next().status()));
   EXPECT_EQ(waits_, 4);
 }
 
-// Cubes of side 1 along x, as placements one by one and packed.
+// Cubes of side 1 along x, as listed and as packed placements.
 class CollisionWatches : public Watches, public ::testing::WithParamInterface<bool> {
  protected:
   void SetUp() override {
@@ -191,8 +204,8 @@ class CollisionWatches : public Watches, public ::testing::WithParamInterface<bo
 };
 
 TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
-  // 0 and 1 overlap and stay so; 2 and 3 touch, and will overlap; 4 and 5 overlap until 5 goes; 6
-  // and 7 overlap, until 7 moves away.
+  // 0 and 1 overlap throughout; 2 and 3 touch, and will overlap; 4 and 5 overlap until 5 is
+  // deleted; 6 and 7 overlap until 7 moves away.
   const auto watch = client_->WatchCollisions(OpenOf({{"cube", 0},
                                                       {"cube", 0.5},
                                                       {"grows", 10},
@@ -204,7 +217,7 @@ TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
                                                       {"cube", 50}}));
   EXPECT_THAT(Events(Round(*watch)),
               UnorderedElementsAre("ENTER 0 1", "TOUCH 2 3", "ENTER 4 5", "ENTER 6 7"));
-  // Without a change, too, an update is told of.
+  // An update is acknowledged even without a change.
   ASSERT_TRUE(watch->Update(MoveTo(8, 60)).ok());
   EXPECT_EQ(Round(*watch).update(), 1u);
   Lose([&] {
@@ -261,5 +274,5 @@ INSTANTIATE_TEST_SUITE_P(Placements, CollisionWatches, testing::Bool(), [](const
   return packed.param ? std::string("packed") : std::string("one_by_one");
 });
 
-}  // namespace
+}  // namespace watch_test
 }  // namespace hulld

@@ -10,8 +10,8 @@
 
 namespace hulld::fuzz {
 
-// The bytes of a program in order, zeros after their end. Read each in a statement of its own:
-// compilers differ in the order of operands.
+// Reads the bytes of a program in order, then zeros. Read each in a separate statement: compilers
+// differ in the evaluation order of operands.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const uint8_t> bytes) : rest_(bytes) {}
@@ -23,13 +23,13 @@ class ByteReader {
     rest_ = rest_.subspan(1);
     return byte;
   }
-  // A number in [0, n).
+  // Returns a number in [0, n).
   size_t Below(size_t n) { return Byte() % n; }
-  // True for one of `n` bytes; false after the end.
+  // True with probability 1/n; false after the end.
   bool OneOf(size_t n) { return Below(n) == n - 1; }
-  // -4 ... 3.
+  // Returns an integer in [-4, 3].
   double SmallInteger() { return static_cast<double>(Byte() % 8) - 4; }
-  // -128 ... 127.
+  // Returns an integer in [-128, 127].
   double SignedByte() { return static_cast<double>(static_cast<int8_t>(Byte())); }
   uint64_t Bits() {
     uint64_t bits = 0;
@@ -37,7 +37,7 @@ class ByteReader {
     return bits;
   }
   double Raw() { return std::bit_cast<double>(Bits()); }
-  // From the least subnormal to the largest power of two that leaves SignedByte finite.
+  // Returns a power of two from the least subnormal to the largest that leaves SignedByte finite.
   double PowerOfTwo() {
     constexpr int kExponents[] = {-1074, -1022, -700, -360, -307, -100, -3,
                                   0,     3,     100,  326,  331,  700,  1016};
@@ -48,7 +48,7 @@ class ByteReader {
   std::span<const uint8_t> rest_;
 };
 
-// A small generator for what one seed byte stands for.
+// A small generator that expands one seed byte.
 class Scatter {
  public:
   explicit Scatter(uint32_t seed) : state_(seed * 2654435761u + 1) {}

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""What the compose files of docker/ name is there: compose_test.py SOURCE HULLD
+"""Checks that the compose files of docker/ name existing things: compose_test.py SOURCE HULLD
 
-Without an engine to run them: their services, networks and volumes, the files that they mount, the
-settings of hulld that they set, and the servers that haproxy and Prometheus are told of.
+Needs no container engine. Checks the services, networks, volumes, and mounted files, the settings of
+hulld, and the servers in the configurations of haproxy and Prometheus.
 """
 
 import pathlib

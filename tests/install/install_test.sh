@@ -1,5 +1,5 @@
 #!/bin/bash
-# Installs a build and uses what was installed, as a project of somebody else does.
+# Installs a build and uses the installation as a third-party project does.
 #
 #   install_test.sh BUILD_DIRECTORY WORK_DIRECTORY COMPILER
 set -euo pipefail
@@ -16,20 +16,20 @@ for file in man/man1/hullctl.1 man/man1/hullctl-check.1 bash-completion/completi
   zsh/site-functions/_hullctl fish/vendor_completions.d/hullctl.fish; do
   [[ -s $work/prefix/share/$file ]] || { echo "share/$file is not installed"; exit 1; }
 done
-# Every header that is installed finds what it includes.
+# Every installed header compiles: all of its includes are installed.
 headers=$work/prefix/include/hulld
 find "$headers" -name '*.h' -printf '#include "%P"\n' | sort >"$work/headers.cc"
 (($(grep -c '"client/' "$work/headers.cc") > 10)) || { echo "few headers are installed"; exit 1; }
-"$compiler" -std=c++20 -fsyntax-only -I "$headers" "$work/headers.cc"
-cmake -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
+"$compiler" -std=c++20 -fsyntax-only -I "$headers" -isystem /usr/include/eigen3 "$work/headers.cc"
+cmake -G Ninja -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
-# What client/README.md tells its readers to write finds the package, too; tests/pages compiles the code.
+# The CMake code of client/README.md finds the package, too; tests/pages compiles the C++ code.
 mkdir "$work/page"
 pages=$here/../pages client_page=$here/../../client/README.md
 bash "$pages/extract_code.sh" "$client_page" cmake >"$work/page/CMakeLists.txt"
 bash "$pages/extract_code.sh" "$client_page" cpp >"$work/page/example.cc"
-cmake -S "$work/page" -B "$work/page/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
+cmake -G Ninja -S "$work/page" -B "$work/page/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/page/configure.log"
 
 "$work/prefix/bin/hulld" --store memory --listen 127.0.0.1:0 2>"$work/hulld.log" &

@@ -3,7 +3,8 @@
 #
 #   packages.sh DIRECTORY_OF_PACKAGES
 #
-# Needs root, debootstrap, and a mirror that apt reaches; without these it says so and exits with 77.
+# Requires root, debootstrap, and a mirror that apt can reach; otherwise prints the missing
+# requirement and exits with 77.
 set -euo pipefail
 
 packages=$(cd "$1" && pwd)
@@ -12,7 +13,7 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 skip() { echo "skipped: $1"; exit 77; }
 ((EUID == 0)) || skip "only root can make a root file system"
 command -v debootstrap >/dev/null || skip "debootstrap is not installed"
-# URI of the archive that apt uses here, in either format of its lists.
+# URI of the archive that apt uses on this machine, in either format of its lists.
 mirror=$({ cat /etc/apt/sources.list.d/debian.sources /etc/apt/sources.list 2>/dev/null || true; } |
   sed -n -E '/debian/s/^(URIs:|deb( \[[^]]*\])?) *([^ ]+).*/\3/p' | sed -n 1p)
 [[ -n $mirror ]] || skip "apt has no source"

@@ -10,7 +10,7 @@
 namespace hulld::oracle {
 namespace {
 
-// The hull of both sets has no vertex that is not one of `outer`.
+// True if every vertex of the hull of both sets is in `outer`.
 bool Holds(std::span<const Point> outer, std::span<const Point> inner) {
   std::vector<Point> all(outer.begin(), outer.end());
   all.insert(all.end(), inner.begin(), inner.end());

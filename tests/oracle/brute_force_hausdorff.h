@@ -7,11 +7,11 @@
 
 namespace hulld::oracle {
 
-// Whether the hull of `outer` holds that of `inner` and the Hausdorff distance of the two is at
-// most `bound`, exactly; an infinite bound leaves the first question. `inner` and `outer` are
-// finite points, those of `outer` the vertices of its hull. The distance is the largest of a vertex
-// of `outer` from the hull of `inner`. Cost: O(m n^3) exact operations for n inner and m outer
-// points, for about 40 and 40.
+// Returns true if the hull of `outer` contains the hull of `inner` and their Hausdorff distance is
+// at most `bound`, exactly. An infinite bound checks containment only. Requires: finite points;
+// `outer` holds only vertices of its hull. The distance is the largest distance of a vertex of
+// `outer` from the hull of `inner`. Cost: O(m n^3) exact operations for n inner and m outer points,
+// for about 40 of each.
 bool IsNestedWithin(std::span<const Point> inner, std::span<const Point> outer, double bound);
 
 }  // namespace hulld::oracle

@@ -29,7 +29,7 @@ bool IsExtreme(std::span<const IntegerVector> points, size_t i) {
 
 int AffineDimension(std::span<const IntegerVector> points) {
   if (points.size() < 3) return static_cast<int>(points.size()) - 1;
-  // Distinct extreme points: three or more are never on one line.
+  // Distinct extreme points: no three are on one line.
   const IntegerVector normal =
       Cross(Subtract(points[1], points[0]), Subtract(points[2], points[0]));
   for (const IntegerVector& p : points) {
@@ -38,14 +38,15 @@ int AffineDimension(std::span<const IntegerVector> points) {
   return 2;
 }
 
-// The vertices of a plane polygon from the lowest on, counter-clockwise about `normal`.
+// Returns the vertices of a plane polygon, starting at the lowest, counter-clockwise about
+// `normal`.
 std::vector<uint32_t> OrderPolygon(std::span<const IntegerVector> points,
                                    const std::vector<uint32_t>& members,
                                    const IntegerVector& normal) {
   std::vector<uint32_t> polygon = {members.front()};
   while (polygon.size() < members.size()) {
     const IntegerVector& here = points[polygon.back()];
-    // The successor has every other member on its left.
+    // The successor has all other members on its left.
     for (uint32_t candidate : members) {
       const IntegerVector step = Subtract(points[candidate], here);
       const bool is_next = std::all_of(members.begin(), members.end(), [&](uint32_t other) {
@@ -60,8 +61,8 @@ std::vector<uint32_t> OrderPolygon(std::span<const IntegerVector> points,
   return polygon;
 }
 
-// The facet on the plane through three vertices, as an ordered polygon; empty when the plane does
-// not support the hull.
+// Returns the facet on the plane through three vertices, as an ordered polygon; empty if the plane
+// does not support the hull.
 std::vector<uint32_t> FacetThrough(std::span<const IntegerVector> points, size_t i, size_t j,
                                    size_t k) {
   IntegerVector normal = Cross(Subtract(points[j], points[i]), Subtract(points[k], points[i]));

@@ -22,9 +22,10 @@ struct ConvexHull {
   friend bool operator==(const ConvexHull&, const ConvexHull&) = default;
 };
 
-// The hull of finite points, exactly. A point is a vertex iff some plane through it leaves all
-// others strictly on one side; a facet is the set of vertices on a plane through three that leaves
-// none on one of its sides. Cost: O(n^4) exact operations: for about 40 points.
+// Returns the hull of finite points, exactly. A point is a vertex iff a plane through it leaves all
+// other points strictly on one side. A facet is the set of vertices on a plane through three
+// vertices that has no vertex on one of its sides. Cost: O(n^4) exact operations, for about 40
+// points.
 ConvexHull BruteForceHull(std::span<const Point> points);
 
 }  // namespace hulld::oracle

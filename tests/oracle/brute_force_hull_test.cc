@@ -11,7 +11,7 @@
 #include "tests/oracle/origin_position.h"
 
 namespace hulld::oracle {
-namespace {
+namespace brute_force_hull_test {
 
 using testing::ElementsAre;
 
@@ -51,7 +51,7 @@ TEST(BruteForceHull, CubeHasSixSquaresSeenFromOutside) {
   EXPECT_EQ(cube.dimension, 3);
   EXPECT_EQ(cube.vertices.size(), 8u);
   EXPECT_EQ(cube.edges.size(), 12u);
-  // Vertex 4x + 2y + z, the coordinates halved.
+  // Vertex 4x + 2y + z, with halved coordinates.
   EXPECT_THAT(cube.facets, ElementsAre(ElementsAre(0, 1, 3, 2), ElementsAre(0, 2, 6, 4),
                                        ElementsAre(0, 4, 5, 1), ElementsAre(1, 5, 7, 3),
                                        ElementsAre(2, 3, 7, 6), ElementsAre(4, 6, 7, 5)));
@@ -67,7 +67,7 @@ TEST(BruteForceHull, HoldsFromSubnormalsToHugeCoordinates) {
   EXPECT_EQ(hull.facets.size(), 5u);
 }
 
-// A point is extreme iff it is no convex combination of the others.
+// A point is extreme iff it is not a convex combination of the other points.
 TEST(BruteForceHull, VerticesAgreeWithLinearPrograms) {
   std::mt19937_64 random(7);
   for (int round = 0; round < 200; ++round) {
@@ -115,5 +115,5 @@ TEST(CgalHull, DropsCoplanarPointsOfALattice) {
   EXPECT_EQ(CgalExtremePoints(LatticeCube(12)).size(), 8u);
 }
 
-}  // namespace
+}  // namespace brute_force_hull_test
 }  // namespace hulld::oracle

@@ -5,7 +5,7 @@
 namespace hulld::oracle {
 namespace {
 
-// |q|^2 R with |q|^2, for an integer multiple of q (which means the same rotation).
+// |q|^2 R and |q|^2, for an integer multiple of q (which denotes the same rotation).
 struct IntegerRotation {
   std::array<IntegerVector, 3> rows;
   Integer norm_squared;
@@ -24,7 +24,7 @@ IntegerRotation RotationOf(const std::array<double, 4>& q) {
           ww + xx + yy + zz};
 }
 
-// other_norm * (R p + norm * t): the world coordinates times both norms.
+// Returns other_norm * (R p + norm * t): the world coordinates times both norms.
 std::vector<IntegerVector> Place(std::span<const IntegerVector> points,
                                  const IntegerRotation& rotation, const IntegerVector& t,
                                  const Integer& other_norm) {
@@ -54,7 +54,7 @@ Relation RelationOf(OriginPosition position) {
 
 WorldPoints PlaceInWorld(std::span<const Point> a, const Placement& X_WA, std::span<const Point> b,
                          const Placement& X_WB) {
-  // One call converts all lengths, so that they share one power of two.
+  // A single call converts all lengths, so that they share the same power of two.
   std::vector<Point> lengths(a.begin(), a.end());
   lengths.insert(lengths.end(), b.begin(), b.end());
   lengths.push_back(X_WA.t);

@@ -25,12 +25,13 @@ struct WorldPoints {
 WorldPoints PlaceInWorld(std::span<const Point> a, const Placement& X_WA, std::span<const Point> b,
                          const Placement& X_WB);
 
-// The relation of the hulls of two finite point sets, exactly, by two independent ways: the polar
-// cone of all pairwise differences (at most about 200 of them), and exact linear programs.
+// Returns the relation of the hulls of two finite point sets, exactly, by two independent methods:
+// the polar cone of all pairwise differences (at most about 200 of them), and exact linear
+// programs.
 Relation RelationByPolarCone(const WorldPoints& points);
 Relation RelationByLinearProgram(const WorldPoints& points);
 
-// The same from points and placements, by the way that is faster for their number.
+// Returns the relation of placed points, by the method that is faster for their number.
 Relation BruteForceRelation(std::span<const Point> a, const Placement& X_WA,
                             std::span<const Point> b, const Placement& X_WB);
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace hulld::oracle {
-namespace {
+namespace brute_force_relation_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kRounds = 1000;
@@ -67,7 +67,7 @@ TEST(BruteForceRelation, FlatSetsOverlapOnlyWhenTheirDifferenceIsSpatial) {
 }
 
 TEST(BruteForceRelation, RotationsAreExactAndScaleFree) {
-  // (2, 1, 0, 0) turns (0, 5, 0) into (0, 3, 4).
+  // (2, 1, 0, 0) rotates (0, 5, 0) to (0, 3, 4).
   const std::vector<Point> arm = {{0, 0, 0}, {0, 5, 0}};
   const std::vector<Point> tip = {{0, 3, 4}};
   for (double s : {1.0, -3.0, 1e-200, 0.1, kDenormal}) {
@@ -88,8 +88,8 @@ TEST(BruteForceRelation, HoldsAcrossTheWholeExponentRange) {
   EXPECT_EQ(Both(big, {}, {{0, 0, 0}}, At(1e300, 0, 0)), Relation::kTouching);
 }
 
-// Random sets of all dimensions under small integer poses: the two ways share only the pairwise
-// arithmetic, so their agreement says that both are right.
+// Random sets of all dimensions under small integer poses. The two methods share only the pairwise
+// arithmetic, so their agreement is strong evidence that both are correct.
 TEST(BruteForceRelation, PolarConeAndLinearProgramAgree) {
   const uint64_t seed = 20240502;
   std::mt19937_64 random(seed);
@@ -108,7 +108,7 @@ TEST(BruteForceRelation, PolarConeAndLinearProgramAgree) {
     };
     const auto placement = [&] {
       Placement result;
-      // Mostly quarter turns, because under these small integers often touch.
+      // Mostly quarter turns, because sets of small integers often touch under these.
       const bool quarter_turn = below(4) != 0;
       for (double& q : result.q) q = below(5) - 2;
       if (quarter_turn) result.q = {1.0, double(below(2)), 0, 0};
@@ -123,5 +123,5 @@ TEST(BruteForceRelation, PolarConeAndLinearProgramAgree) {
   for (int count : seen) EXPECT_GT(count, kRounds / 100);
 }
 
-}  // namespace
+}  // namespace brute_force_relation_test
 }  // namespace hulld::oracle

@@ -8,7 +8,7 @@
 namespace hulld::oracle {
 namespace {
 
-// All differences of the points, without repetition, and the ruler.
+// All distinct differences of the points, and the ruler.
 struct Differences {
   std::vector<IntegerVector> points;
   double unit;
@@ -17,7 +17,7 @@ struct Differences {
 
 Differences DifferencesOf(std::span<const Point> a, const Placement& X_WA, std::span<const Point> b,
                           const Placement& X_WB) {
-  // The ruler is two more points of A, of a length like the others.
+  // The ruler is two more points of A, with a length of the same magnitude as the other points.
   double size = 0;
   for (const auto& points : {a, b}) {
     for (const Point& p : points) {
@@ -40,7 +40,7 @@ Differences DifferencesOf(std::span<const Point> a, const Placement& X_WA, std::
   return result;
 }
 
-// The least of the squared lengths that it is told.
+// Minimum of the squared lengths passed to it.
 class Least {
  public:
   void Consider(const Integer& numerator, const Integer& denominator) {
@@ -59,7 +59,7 @@ class Least {
   Integer denominator_ = 1;
 };
 
-// The origin's foot on the line is strictly inside the segment.
+// Adds the distance of the origin from the line if the foot is strictly inside the segment.
 void ConsiderEdge(const IntegerVector& p, const IntegerVector& q, Least& least) {
   const IntegerVector e = Subtract(q, p);
   if (Dot(p, e) >= 0 || Dot(q, e) <= 0) return;
@@ -67,7 +67,7 @@ void ConsiderEdge(const IntegerVector& p, const IntegerVector& q, Least& least) 
   least.Consider(Dot(moment, moment), Dot(e, e));
 }
 
-// The origin's foot on the plane is strictly inside the triangle.
+// Adds the distance of the origin from the plane if the foot is strictly inside the triangle.
 void ConsiderTriangle(const IntegerVector& p, const IntegerVector& q, const IntegerVector& r,
                       Least& least) {
   const IntegerVector n = Cross(Subtract(q, p), Subtract(r, p));

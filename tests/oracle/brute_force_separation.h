@@ -8,28 +8,29 @@
 
 namespace hulld::oracle {
 
-// The absolute separation of two hulls, exactly: its square is numerator / denominator times the
-// square of `unit` over ruler_squared.
+// Absolute separation of two hulls, exactly: its square is numerator / denominator times the square
+// of `unit` over ruler_squared.
 struct SquaredLength {
   Integer numerator;
   Integer denominator;
-  // A length and the square of its image at the scale of the integers.
+  // A length, and the square of its image at the scale of the integers.
   double unit = 1;
   Integer ruler_squared;
 };
 
-// The distance of two point sets' hulls: the least distance from the origin of all vertices, edges
-// and triangles of differences of points. Cost: O(n^3) for n differences, for at most about 50.
+// Returns the distance of the hulls of two point sets: the least distance from the origin to any
+// vertex, edge, or triangle of differences of points. Cost: O(n^3) for n differences, for at most
+// about 50.
 SquaredLength BruteForceDistance(std::span<const Point> a, const Placement& X_WA,
                                  std::span<const Point> b, const Placement& X_WB);
-// The penetration depth of two overlapping hulls: the least distance from the origin of all planes
-// through three differences that have all differences on one side.
+// Returns the penetration depth of two overlapping hulls: the least distance from the origin to any
+// plane through three differences with all differences on one side.
 SquaredLength BruteForceDepth(std::span<const Point> a, const Placement& X_WA,
                               std::span<const Point> b, const Placement& X_WB);
 
-// Whether the length is within `bound` of |value|. Finite numbers.
+// Returns true if the length is within `bound` of |value|. Requires: finite numbers.
 bool IsWithin(const SquaredLength& length, double value, double bound);
-// Sign of the length minus a finite threshold >= 0.
+// Returns the sign of the length minus a finite threshold >= 0.
 int Compare(const SquaredLength& length, double threshold);
 
 }  // namespace hulld::oracle

@@ -7,7 +7,7 @@
 namespace hulld::oracle {
 namespace {
 
-// Sign of min n.B - max n.A.
+// Returns the sign of min n.B - max n.A.
 int SignOfGap(const IntegerVector& n, const WorldPoints& points) {
   Integer reach = Dot(n, points.a.front());
   for (const IntegerVector& p : points.a) reach = std::max(reach, Dot(n, p));

@@ -11,17 +11,18 @@
 
 namespace hulld::oracle {
 
-// A certificate as a stranger gets it: a direction, empty when there is none, and pairs of a vertex
-// of A and a vertex of B.
+// Certificate as received by a client: a direction, empty if absent, and pairs of a vertex of A and
+// a vertex of B.
 struct Certificate {
   std::vector<Integer> direction;
   std::vector<std::pair<uint32_t, uint32_t>> pairs;
 };
 
-// What is wrong with a certificate of a relation; empty when it proves it. Exact, and by the
-// certificate alone: SEPARATED: max n.A < min n.B, no pairs. TOUCHING: n not zero, max n.A <= min
-// n.B, and at most four pairs whose differences hold 0 in their hull. OVERLAPPING: no direction, at
-// most six pairs whose differences hold 0 strictly inside their hull.
+// Returns the defect of a certificate of a relation, or an empty string if it proves the relation.
+// Exact, from the certificate alone. SEPARATED: max n.A < min n.B, no pairs. TOUCHING: n not zero,
+// max n.A <= min n.B, and at most four pairs with differences that hold 0 in their hull.
+// OVERLAPPING: no direction, at most six pairs with differences that hold 0 strictly inside their
+// hull.
 std::string FaultOf(const Certificate& certificate, Relation relation, const WorldPoints& points);
 
 }  // namespace hulld::oracle

@@ -14,9 +14,9 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
-// quickhull triangulates coplanar regions and may use points inside facets and edges to do so.
-// A vertex of the closed convex surface is extreme iff its triangles lie in three or more planes:
-// walking round it, the plane changes three times or more.
+// quickhull triangulates coplanar regions, possibly with points inside facets and edges. A vertex
+// of the closed convex surface is extreme iff its triangles lie in three or more planes: around it,
+// the plane changes three times or more.
 bool IsExtreme(const Mesh& mesh, Mesh::Vertex_index vertex) {
   int plane_changes = 0;
   for (Mesh::Halfedge_index h : mesh.halfedges_around_target(mesh.halfedge(vertex))) {

@@ -8,12 +8,12 @@
 
 namespace hulld::oracle {
 
-// Whether CGAL was there when this was built; tests that need it skip otherwise.
+// Returns true if CGAL was available at build time; tests that need it skip otherwise.
 bool CgalIsAvailable();
 
-// The extreme points of a point set of dimension 3, in lexicographic order, by CGAL's quickhull
-// with exact predicates. Requires CgalIsAvailable(), and coordinates whose differences and products
-// of four neither overflow nor underflow: within about 1e+-70.
+// Returns the extreme points of a point set of dimension 3, in lexicographic order, by CGAL's
+// quickhull with exact predicates. Requires: CgalIsAvailable(); differences of coordinates, and
+// products of four of them, that neither overflow nor underflow: within about 1e+-70.
 std::vector<Point> CgalExtremePoints(std::span<const Point> points);
 
 }  // namespace hulld::oracle

@@ -28,7 +28,7 @@ std::vector<Integer> ToIntegers(std::span<const double> values) {
   for (double value : values) {
     const Dyadic dyadic = Decompose(value);
     Integer integer = dyadic.mantissa;
-    // A product, because the shift of a negative number is not defined for every backend.
+    // A product, because not every backend defines the shift of a negative number.
     if (dyadic.mantissa != 0) integer *= Integer(1) << (dyadic.exponent - least);
     result.push_back(std::move(integer));
   }

@@ -11,20 +11,20 @@ namespace hulld::oracle {
 
 using Point = std::array<double, 3>;
 
-// Integers of any length. Without expression templates, so that `auto` is always a number.
+// Integers of any length. No expression templates, so that `auto` is always a number.
 using Integer = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<>,
                                               boost::multiprecision::et_off>;
 using IntegerVector = std::array<Integer, 3>;
 
-// A finite double, exactly: mantissa * 2^exponent, the mantissa odd; zero is 0 * 2^0.
+// Exact value of a finite double: mantissa * 2^exponent, with an odd mantissa; zero is 0 * 2^0.
 struct Dyadic {
   int64_t mantissa = 0;
   int exponent = 0;
 };
 Dyadic Decompose(double value);
 
-// The values, all times the same power of two: the least one that makes integers of them all. Signs
-// of homogeneous expressions are those of the values. Requires finite values.
+// Returns the values times a common power of two: the least one that makes them all integers. Signs
+// of homogeneous expressions are preserved. Requires: finite values.
 std::vector<Integer> ToIntegers(std::span<const double> values);
 std::vector<IntegerVector> ToIntegerVectors(std::span<const Point> points);
 

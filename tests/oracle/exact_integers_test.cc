@@ -10,7 +10,7 @@
 #include "tests/oracle/linear_program.h"
 
 namespace hulld::oracle {
-namespace {
+namespace exact_integers_test {
 
 TEST(ExactIntegers, DecompositionGivesTheDoubleBack) {
   std::mt19937_64 random(20240501);
@@ -62,5 +62,5 @@ TEST(LinearProgram, FindsWeightsIffTheyExist) {
   EXPECT_FALSE(HasNonnegativeSolution({{1, 2}, {2, 4}}, {3, 7}));
 }
 
-}  // namespace
+}  // namespace exact_integers_test
 }  // namespace hulld::oracle

@@ -6,8 +6,8 @@
 namespace hulld::oracle {
 namespace {
 
-// The basis starts as one artificial column per row; artificial columns are numbered after the real
-// ones and never come back. Their sum is what phase one drives to zero.
+// The basis starts as one artificial column per row. Artificial columns are numbered after the real
+// ones and never re-enter the basis. Phase one drives their sum to zero.
 class PhaseOne {
  public:
   PhaseOne(const std::vector<std::vector<Integer>>& columns, const std::vector<Integer>& rhs)
@@ -42,7 +42,7 @@ class PhaseOne {
     return true;
   }
 
-  // determinant * B^-1 * column.
+  // Returns determinant * B^-1 * column.
   std::vector<Integer> TimesInverse(size_t column) const {
     std::vector<Integer> result(rows_, Integer(0));
     for (size_t i = 0; i < rows_; ++i) {
@@ -53,7 +53,7 @@ class PhaseOne {
     return result;
   }
 
-  // The first column that lowers the sum of the artificials.
+  // Returns the first column that lowers the sum of the artificials.
   std::optional<size_t> EnteringColumn() const {
     std::vector<Integer> price(rows_, Integer(0));
     for (size_t i = 0; i < rows_; ++i) {
@@ -68,8 +68,8 @@ class PhaseOne {
     return std::nullopt;
   }
 
-  // The row that first reaches zero; among ties, that of the lowest column. One exists, because the
-  // sum of the artificials is bounded below.
+  // Returns the row that first reaches zero, or the one with the lowest column among ties. A row
+  // exists, because the sum of the artificials is bounded below.
   size_t LeavingRow(const std::vector<Integer>& direction) const {
     std::optional<size_t> best;
     for (size_t i = 0; i < rows_; ++i) {

@@ -7,9 +7,9 @@
 
 namespace hulld::oracle {
 
-// Whether weights w >= 0 exist with sum(w[j] * columns[j]) == rhs, exactly. Phase one of the
-// revised simplex method with Bland's rule (Bland 1977), hence finite; the basis inverse is kept as
-// integers over a common determinant (Edmonds 1967), hence no fractions.
+// Returns true if weights w >= 0 exist with sum(w[j] * columns[j]) == rhs, exactly. Uses phase one
+// of the revised simplex method with Bland's rule (Bland 1977), which is finite, and keeps the
+// basis inverse as integers over a common determinant (Edmonds 1967), which avoids fractions.
 // columns: each as long as rhs. Cost: O(columns) per pivot.
 bool HasNonnegativeSolution(const std::vector<std::vector<Integer>>& columns,
                             std::vector<Integer> rhs);

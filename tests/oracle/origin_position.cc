@@ -30,13 +30,14 @@ bool IsNull(const Vec<Int>& a) {
   return a[0] == 0 && a[1] == 0 && a[2] == 0;
 }
 
-// The polar cone within the span of the points: the sum of its extreme rays.
+// Polar cone within the span of the points: the sum of its extreme rays.
 template <typename Int>
 class PolarCone {
  public:
   explicit PolarCone(const std::vector<Vec<Int>>& points) : points_(points) {}
 
-  // `ray` is perpendicular to points that leave one line for it: it or its opposite may be extreme.
+  // Requires: `ray` is perpendicular to points that leave a single line for it. It or its opposite
+  // may be extreme.
   void Try(const Vec<Int>& ray) {
     if (IsNull(ray)) return;
     bool negative = false;
@@ -79,8 +80,8 @@ OriginPosition LocateSpatial(const std::vector<Vec<Int>>& points) {
   return cone.HasStrictElement() ? OriginPosition::kOutside : OriginPosition::kBoundary;
 }
 
-// All points in one plane through the origin with this normal: the same in two dimensions, seen
-// along a coordinate axis that the plane does not contain.
+// Locates the origin if all points are in one plane through the origin with this normal: applies
+// the two-dimensional method, projected along a coordinate axis that the plane does not contain.
 template <typename Int>
 OriginPosition LocatePlanar(const std::vector<Vec<Int>>& points, const Vec<Int>& normal) {
   const int drop = normal[0] != 0 ? 0 : normal[1] != 0 ? 1 : 2;
@@ -133,8 +134,8 @@ OriginPosition LocateByPolarCone(std::span<const IntegerVector> points) {
   for (const IntegerVector& p : points) {
     for (const Integer& coordinate : p) bits = std::max(bits, BitLength(coordinate));
   }
-  // Coordinates of b bits: cross products 2b + 1, their sum over n^2 pairs 2 log2(n) more, its dot
-  // products b + 2 more; the fastest type that holds these.
+  // Coordinates have b bits, cross products 2b + 1, their sum over n^2 pairs 2 log2(n) more, its
+  // dot products b + 2 more. Selects the fastest type that holds these.
   size_t pair_bits = 0;
   while ((size_t{1} << pair_bits) < points.size() * points.size()) ++pair_bits;
   const size_t needed = 3 * bits + 3 + pair_bits;

@@ -1,7 +1,6 @@
 #!/bin/bash
-# Checks what can be read off the pages: links lead to files and headings that exist, paths in
-# `backticks` too, the first page is short, and the tables of settings, errors and commands are
-# complete.
+# Checks the pages statically: links lead to existing files and headings, paths in `backticks`
+# exist, the first page is short, and the tables of settings, errors, and commands are complete.
 #
 #   bash tests/pages/check_pages.sh PROGRAMS
 #
@@ -20,10 +19,11 @@ problem() {
 
 pages() { find . \( -name build -o -name .git \) -prune -o -name '*.md' -print | sort; }
 
-# text PAGE: its lines, blocks of code left out.
+# text PAGE: prints its lines without code blocks.
 text() { awk '/^ *```/ { inside = !inside; next } !inside' "$1"; }
 
-# anchors PAGE: what links to its headings look like: small letters, no punctuation, hyphens for spaces.
+# anchors PAGE: prints the link anchors of its headings: lower case, no punctuation, hyphens for
+# spaces.
 anchors() {
   text "$1" | sed -n 's/^#\{1,6\} *//p' | tr '[:upper:]' '[:lower:]' | sed 's/[^a-z0-9 _-]//g; s/ /-/g'
 }
@@ -52,7 +52,8 @@ check_paths() {
   done < <(text "$page" | grep -oE '`(core|server|client|docker|proto|tests)/[A-Za-z0-9_./*-]*`' | tr -d '`')
 }
 
-# check_complete PAGE WHAT LIST...: each of the list stands in the first column of a table of the page.
+# check_complete PAGE WHAT LIST...: every item of the list is in the first column of a table of the
+# page.
 check_complete() {
   local page=$1 what=$2 name
   shift 2
@@ -61,9 +62,28 @@ check_complete() {
   done
 }
 
+# Crontab blocks hold five time fields and a command, which cron cuts at a bare % and passes to sh.
+# Such a line in another kind of block would escape the check.
+check_crontabs() {
+  local page=$1 language line command
+  while IFS=$'\t' read -r language line; do
+    if ! [[ $line =~ ^([-0-9*,/]+[[:blank:]]+){5}([[:alpha:]/].*)$ ]]; then
+      [[ $language != crontab || -z $line || $line == \#* ]] ||
+        problem "$page: this is no line of a crontab: $line"
+      continue
+    fi
+    command=${BASH_REMATCH[2]//\\%/}
+    [[ $language == crontab ]] || problem "$page: put this line into a block of crontab: $line"
+    [[ $command != *%* ]] || problem "$page: cron cuts this line at its first bare %: $line"
+    sh -n <<<"$command" 2>/dev/null || problem "$page: sh cannot parse the command of: $line"
+  done < <(awk '/^ *```/ { language = inside ? "" : substr($1, 4); inside = !inside; next }
+    inside { print (language == "" ? "text" : language) "\t" $0 }' "$page")
+}
+
 for page in $(pages); do
   check_links "$page"
   check_paths "$page"
+  check_crontabs "$page"
 done
 
 bytes=$(wc -c <README.md)

@@ -1,6 +1,6 @@
-# Compares what a command printed with what a page says: compare_output.awk EXPECTED ACTUAL. In the
-# page "..." stands for any part of a line, and alone on a line for any number of lines. Times,
-# durations, random IDs and the server's port may differ. Prints the first difference; fails then.
+# Compares the output of a command with the output in a page: compare_output.awk EXPECTED ACTUAL. In
+# the page, "..." stands for any part of a line or, alone on a line, for any number of lines. Times,
+# durations, random IDs, and the server's port may differ. Prints the first difference and fails.
 function normal(line) {
   gsub(/[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]T[0-9:.]+\+00:00/, "<time>", line)
   gsub(/[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]T[0-9:.]+Z/, "<time>", line)
@@ -9,12 +9,12 @@ function normal(line) {
        "<random>", line)
   gsub(/[0-9.]+ (ns|us|ms|s)( |$)/, "<duration> ", line)
   sub(/ +$/, "", line)
-  # Columns are as wide as what they hold.
+  # Column widths depend on the values.
   gsub(/  +/, "  ", line)
   return line
 }
 
-# Whether the parts between the dots come in this order, the first and the last at the ends.
+# Returns true if the parts between the dots occur in order, the first and the last at the ends.
 function matches(pattern, text,   parts, count, i, at) {
   count = split(pattern, parts, /\.\.\./)
   if (count == 1) return pattern == text

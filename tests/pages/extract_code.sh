@@ -1,5 +1,5 @@
 #!/bin/bash
-# Prints the N-th block of a language of a page, the first by default:
+# Prints the N-th code block in a language of a page, the first by default:
 #
 #   bash tests/pages/extract_code.sh PAGE LANGUAGE [N]
 set -euo pipefail

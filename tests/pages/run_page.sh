@@ -1,14 +1,14 @@
 #!/bin/bash
-# Does what a page tells its reader to do, and compares what is printed with what the page says.
+# Executes the instructions of a page and compares the output with the page.
 #
 #   bash tests/pages/run_page.sh PAGE PROGRAMS WORK
 #
-# PROGRAMS: the directory of hulld and hullctl, which the commands find on their PATH. WORK: a
-# directory for the page's files, made anew. Commands stand in blocks of "console", after "$ ", and
-# in blocks of "sh"; page_steps.awk tells how a page says that a block is a file, or why it is not
-# run. A command that starts a server is left running until the next one starts, on a free port that
-# hullctl finds in HULLCTL_SERVER. A console command may fail where the page shows what it says then.
-# Exit code 77: something that the page needs is missing here.
+# PROGRAMS: the directory of hulld and hullctl, which is added to PATH. WORK: a directory for the
+# page's files, recreated by each run. Commands are in "console" blocks, after "$ ", and in "sh"
+# blocks; page_steps.awk defines how a page marks a block as a file or as not run. A command that
+# starts a server is left running until the next one starts, on a free port that hullctl finds in
+# HULLCTL_SERVER. A console command may fail if the page shows its output in that case. Exit code
+# 77: a requirement of the page is missing.
 set -uo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -54,12 +54,12 @@ fail() {
   failures=$((failures + 1))
 }
 
-# is_server COMMAND: whether it runs until it is stopped.
+# is_server COMMAND: true if it runs until it is stopped.
 is_server() {
   [[ $1 =~ ^hulld( |$) && ! $1 =~ (--check-config|--help|--version|hulld doctor|\|) ]]
 }
 
-# start_server COMMAND OUTPUT: returns once it listens, or has ended.
+# start_server COMMAND OUTPUT: returns when the server listens or has ended.
 start_server() {
   local line
   stop_server
@@ -89,7 +89,7 @@ for place in "$work"/steps/*.place; do
   else
     ran=$((ran + 1))
     touch "$step.expected"
-    # What a page says listens on the default port, listens elsewhere here.
+    # Pages use the default port; replaces it by the port of this run.
     command=$(sed "s/127\.0\.0\.1:50551/${HULLCTL_SERVER:-127.0.0.1:50551}/g" "$step.command")
     if is_server "$command"; then
       start_server "$command" "$step.actual"

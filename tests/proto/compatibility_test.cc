@@ -1,11 +1,11 @@
-// What clients of v1 rely on, line by line in v1.txt: messages, fields with number, type and
-// presence, enum values, RPCs, and numbers that nothing may use again. A line that is recorded must
-// stay true; new ones may come. After an addition, record it:
+// Contract of v1 with its clients, line by line in v1.txt: messages, fields with number, type, and
+// presence, enum values, RPCs, and numbers that must never be reused. A recorded line must stay
+// true; new lines may be added. After an addition, record it:
 //
 //   HULLD_RECORD_CONTRACT=1 build/release/bin/proto_test --gtest_filter='Compatibility.*'
 //
-// which refuses while a recorded line is not true. Only a new version of the contract (hulld.v2)
-// may break one.
+// This refuses while a recorded line is not true. Only a new version of the contract (hulld.v2) may
+// break one.
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -23,7 +23,7 @@
 #include "tests/source_tree.h"
 
 namespace hulld {
-namespace {
+namespace compatibility_test {
 
 using google::protobuf::Descriptor;
 using google::protobuf::DescriptorProto;
@@ -53,7 +53,7 @@ std::string PresenceOf(const FieldDescriptor& field) {
   return field.has_presence() && field.message_type() == nullptr ? "optional " : "";
 }
 
-// Both ends included.
+// Both ends are inclusive.
 std::string RangeText(int first, int last) {
   return first == last ? std::to_string(first)
                        : std::to_string(first) + " to " + std::to_string(last);
@@ -67,7 +67,7 @@ void Describe(const Descriptor& message, Lines* lines) {
                      PresenceOf(field) + TypeOf(field));
   }
   for (int i = 0; i < message.reserved_range_count(); ++i) {
-    // Without its end.
+    // The end is exclusive.
     const Descriptor::ReservedRange& range = *message.reserved_range(i);
     lines->push_back("reserved " + message.full_name() + ": " +
                      RangeText(range.start, range.end - 1));
@@ -81,7 +81,7 @@ void Describe(const EnumDescriptor& type, Lines* lines) {
                      std::to_string(type.value(i)->number()) + ": " + type.full_name());
   }
   for (int i = 0; i < type.reserved_range_count(); ++i) {
-    // With its end.
+    // The end is inclusive.
     const EnumDescriptor::ReservedRange& range = *type.reserved_range(i);
     lines->push_back("reserved " + type.full_name() + ": " + RangeText(range.start, range.end));
   }
@@ -97,7 +97,7 @@ void Describe(const ServiceDescriptor& service, Lines* lines) {
   }
 }
 
-// Everything that clients can rely on, in the order of the files.
+// Returns all properties that clients can rely on, in the order of the files.
 Lines DescribeContract(const ContractFiles& contract) {
   Lines lines;
   for (const FileDescriptor* file : contract.files()) {
@@ -115,7 +115,7 @@ Lines ReadRecord() {
   return lines;
 }
 
-// Those of `lines` that are not among `others`.
+// Returns the elements of `lines` that are not in `others`.
 Lines Missing(const Lines& lines, const Lines& others) {
   const std::set<std::string> known(others.begin(), others.end());
   Lines missing;
@@ -141,7 +141,7 @@ TEST(Compatibility, WhatIsRecordedOfV1StaysTrue) {
       << "additions; record them, so that they stay: see the top of compatibility_test.cc";
 }
 
-// The check itself: each of these changes breaks a line, an addition none.
+// Tests the check: each of these changes breaks a line, an addition breaks none.
 TEST(Compatibility, ChangesAreFoundAndAdditionsAreNot) {
   google::protobuf::FileDescriptorProto file;
   file.set_name("a.proto");
@@ -194,5 +194,5 @@ TEST(Compatibility, ChangesAreFoundAndAdditionsAreNot) {
             0);
 }
 
-}  // namespace
+}  // namespace compatibility_test
 }  // namespace hulld

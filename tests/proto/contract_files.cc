@@ -29,7 +29,7 @@ ContractFiles::ContractFiles() {
   google::protobuf::FileDescriptorSet set;
   std::ifstream file(HULLD_CONTRACT_DESCRIPTORS, std::ios::binary);
   EXPECT_TRUE(set.ParseFromIstream(&file)) << HULLD_CONTRACT_DESCRIPTORS;
-  // Each comes after those that it imports.
+  // Each file follows its imports.
   for (const google::protobuf::FileDescriptorProto& proto : set.file()) {
     const FileDescriptor* const built = pool_.BuildFile(proto);
     EXPECT_NE(built, nullptr) << proto.name();

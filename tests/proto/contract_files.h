@@ -10,10 +10,10 @@ namespace hulld {
 // The files of the contract (proto/hulld/v1) with their comments, as protoc reads them.
 class ContractFiles {
  public:
-  // Empty, and a failure of the test, when the descriptors cannot be read.
+  // Fails the test and stays empty if the descriptors cannot be read.
   ContractFiles();
 
-  // In alphabetical order of their names.
+  // In alphabetical order by name.
   const std::vector<const google::protobuf::FileDescriptor*>& files() const { return files_; }
 
  private:
@@ -21,7 +21,7 @@ class ContractFiles {
   std::vector<const google::protobuf::FileDescriptor*> files_;
 };
 
-// All messages and enums of a file, nested ones too, each before what is nested in it.
+// Return all messages and enums of a file, including nested ones, in pre-order.
 std::vector<const google::protobuf::Descriptor*> MessagesOf(
     const google::protobuf::FileDescriptor& file);
 std::vector<const google::protobuf::EnumDescriptor*> EnumsOf(

@@ -1,6 +1,6 @@
-// The style of the contract: the rules of buf's category STANDARD, each under its name there, and
-// a few of our own. Not checked, as nothing of the contract could break them: the PACKAGE_SAME_*
-// rules about options (no file sets one) and PROTOVALIDATE (it is not used).
+// Style of the contract: the rules of buf's category STANDARD, each under its name there, and a few
+// of the project's own. Not checked, because the contract cannot break them: the PACKAGE_SAME_*
+// rules about options (no file sets one) and PROTOVALIDATE (not used).
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.pb.h>
@@ -18,7 +18,7 @@
 #include "tests/source_tree.h"
 
 namespace hulld {
-namespace {
+namespace style_test {
 
 using google::protobuf::Descriptor;
 using google::protobuf::EnumDescriptor;
@@ -168,7 +168,7 @@ TEST_F(ContractStyle, EachRpcHasARequestAndAResponseOfItsOwn) {
   EXPECT_GE(rpcs, 13);
 }
 
-// From buf's category COMMENTS: COMMENT_SERVICE and COMMENT_RPC.
+// Rules of buf's category COMMENTS: COMMENT_SERVICE and COMMENT_RPC.
 TEST_F(ContractStyle, ServicesAndRpcsAreExplained) {
   ForEachService([](const ServiceDescriptor& service) {
     EXPECT_NE(CommentOf(service), "") << service.full_name();
@@ -176,7 +176,7 @@ TEST_F(ContractStyle, ServicesAndRpcsAreExplained) {
   ForEachRpc([](const MethodDescriptor& rpc) { EXPECT_NE(CommentOf(rpc), "") << rpc.full_name(); });
 }
 
-// A client that meets a reason looks here for what it comes with.
+// The comment of a reason is its reference for clients, so it must state the code.
 TEST_F(ContractStyle, EveryErrorReasonSaysItsCode) {
   const std::regex code(
       " (INVALID_ARGUMENT|NOT_FOUND|ALREADY_EXISTS|ABORTED|FAILED_PRECONDITION|"
@@ -206,5 +206,5 @@ TEST_F(ContractStyle, LinesHoldAHundredCharactersAtMost) {
   EXPECT_GT(lines, 500);
 }
 
-}  // namespace
+}  // namespace style_test
 }  // namespace hulld

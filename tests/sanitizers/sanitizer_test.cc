@@ -11,7 +11,7 @@
 #include "tests/sanitizers/planted_errors.h"
 
 namespace hulld {
-namespace {
+namespace sanitizer_test {
 
 #ifdef __SANITIZE_ADDRESS__
 #error "this file is to be compiled as the tests of the service are, without sanitizers"
@@ -53,5 +53,5 @@ TEST(SanitizerDeathTest, ALibraryThatOverflowsAnIntegerIsFound) {
   EXPECT_DEATH(planted::Successor(std::numeric_limits<int>::max()), "signed integer overflow");
 }
 
-}  // namespace
+}  // namespace sanitizer_test
 }  // namespace hulld

@@ -1,5 +1,5 @@
-// The alerts of docker/prometheus, tried against faults that a running server is made to have: its
-// metrics are read as Prometheus would read them, and promtool evaluates the rules over them.
+// Tests of the alerts in docker/prometheus. Faults are injected into a running server, its metrics
+// are scraped as by Prometheus, and promtool evaluates the rules over them.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -25,7 +25,7 @@
 #include "tests/source_tree.h"
 
 namespace hulld::server {
-namespace {
+namespace alerts_test {
 
 using Fault = FaultyFileSystem::Fault;
 
@@ -34,7 +34,7 @@ std::string RulesFolder() { return (SourceTree() / "docker/prometheus/").string(
 constexpr int kStepSeconds = 15;
 constexpr int kStepsPerMinute = 60 / kStepSeconds;
 
-// What `command` says, and whether it succeeds.
+// Returns true if `command` succeeds, and its output.
 std::pair<bool, std::string> RunCommand(const std::string& command) {
   FILE* const pipe = popen((command + " 2>&1").c_str(), "r");
   if (pipe == nullptr) return {false, "cannot run it"};
@@ -68,8 +68,8 @@ class Alerts : public ServerTest {
     return config;
   }
 
-  // Reads the metrics this many times, at steps of the clock that the rules go by, with `act`
-  // before each.
+  // Scrapes the metrics for this many minutes, at the rules' steps, calling `act` before each
+  // scrape.
   void Scrape(int minutes, const std::function<void()>& act) {
     for (int i = 0; i < minutes * kStepsPerMinute; ++i, ++steps_) {
       act();
@@ -85,7 +85,7 @@ class Alerts : public ServerTest {
     }
   }
 
-  // Expects that these alerts fire at the last step, and no other.
+  // Expects that exactly these alerts fire at the last step.
   void ExpectFiring(const std::vector<std::string>& alerts) {
     const std::string path = directory_ + "/test.yml";
     std::ofstream file(path);
@@ -115,7 +115,7 @@ class Alerts : public ServerTest {
   std::string directory_;
   const std::shared_ptr<FaultyFileSystem> files_ = std::make_shared<FaultyFileSystem>();
   const std::unique_ptr<rocksdb::Env> env_ = rocksdb::NewCompositeEnv(files_);
-  // What was read of each series, one value for each step; "_" before it was there.
+  // By series, one value for each step; "_" before the series exists.
   std::map<std::string, std::vector<std::string>> series_;
   size_t steps_ = 0;
 };
@@ -149,7 +149,7 @@ TEST_F(Alerts, AFullDiskIsReported) {
   Scrape(3, [this] { EXPECT_FALSE(Delete("cube").ok()); });
   ExpectFiring({"HulldStoreFailing", "HulldStoreReadOnly"});
   files_->SetFault(Fault::kNone);
-  // The first change after that is taken; five minutes later nothing is left of it.
+  // The next change succeeds; five minutes later the alert has cleared.
   EXPECT_TRUE(Delete("cube").ok());
   Scrape(7, [] {});
   ExpectFiring({});
@@ -196,5 +196,5 @@ TEST_F(Alerts, DescriptorsThatRunOutAreReported) {
   ExpectFiring({"HulldDescriptors"});
 }
 
-}  // namespace
+}  // namespace alerts_test
 }  // namespace hulld::server

@@ -11,7 +11,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace concurrency_test {
 
 using Concurrency = ServerTest;
 
@@ -64,7 +64,7 @@ TEST_F(Concurrency, ManyWritersAndReadersOfOneHullSeeRevisionsGrow) {
   const v1::GetHullResponse hull = Get("shared");
   EXPECT_EQ(hull.hull().counts().received(), kWriters * kChunks * 100);
 
-  // The same points in one chunk give the same hull.
+  // One chunk with all points gives the same hull.
   Coordinates all;
   for (int w = 0; w < kWriters; ++w) {
     std::mt19937 random(w);
@@ -145,7 +145,7 @@ TEST_F(Concurrency, BatchesOfHullsThatKeepChangingAnswerFromOneRevision) {
   for (const v1::BatchCheckCollisionsResponse& head : heads) {
     ASSERT_EQ(head.hulls_size(), kHulls);
     for (int h = 0; h < kHulls; ++h) {
-      // Each hull as it was at the revision of the header: its last change up to there.
+      // Each hull is at its last change up to the header's revision.
       EXPECT_EQ(head.hulls(h).revision(),
                 *std::prev(revisions[h].upper_bound(head.header().revision())));
     }
@@ -179,5 +179,5 @@ TEST_F(Concurrency, DeletesInTheMidstOfWritesEndEveryStream) {
   EXPECT_EQ(status.vertex_count(), 0);
 }
 
-}  // namespace
+}  // namespace concurrency_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// hulld killed while clients call it, and started again on the same store, many times.
+// Kills hulld many times while clients call it, and restarts it on the same store.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -29,9 +29,9 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace crash_test {
 
-// How often the server is killed: HULLD_CRASHES in the environment, hundreds by hand.
+// Returns the number of kills: HULLD_CRASHES in the environment; use hundreds in manual runs.
 int Crashes() {
   const char* given = std::getenv("HULLD_CRASHES");
   if (given != nullptr) return std::atoi(given);
@@ -47,7 +47,7 @@ constexpr int kWriters = 8;
 constexpr int kReaders = 8;
 constexpr int kHulls = 5;
 
-// Over each store that keeps hulls: "rocksdb", "postgres".
+// Runs over each persistent store: "rocksdb", "postgres".
 class Crash : public RestartableServer, public ::testing::WithParamInterface<const char*> {
  protected:
   Crash() {
@@ -65,7 +65,7 @@ class Crash : public RestartableServer, public ::testing::WithParamInterface<con
               cluster.WriteConninfo(cluster.MakeDatabase())};
   }
 
-  // Clients call until the server is killed, which is when about `calls` more have been answered.
+  // Runs clients until the server is killed, after about `calls` more answers.
   void CallUntilKilled(uint64_t calls) {
     const uint64_t end = answered_ + calls;
     std::vector<std::thread> threads;
@@ -86,8 +86,8 @@ class Crash : public RestartableServer, public ::testing::WithParamInterface<con
     history_.Settle();
   }
 
-  // Clients call, and go on calling, while the database is killed and started again, each time when
-  // about `calls` more have been answered.
+  // Runs clients continuously while the database is killed and restarted, each time after about
+  // `calls` more answers.
   void CallWhileTheDatabaseIsKilled(int kills, uint64_t calls) {
     std::atomic<bool> ending = false;
     std::vector<std::thread> threads;
@@ -140,8 +140,8 @@ class Crash : public RestartableServer, public ::testing::WithParamInterface<con
 INSTANTIATE_TEST_SUITE_P(Stores, Crash, ::testing::Values("rocksdb", "postgres"),
                          [](const auto& kind) { return std::string(kind.param); });
 
-// Every call that was answered is there after the next start, exactly once, and what was not
-// answered is there wholly or not at all: the history over all lives of the store is linearizable.
+// Every answered call survives the restart exactly once; an unanswered one survives completely or
+// not at all. The history over all lives of the store is linearizable.
 TEST_P(Crash, NothingAcknowledgedIsLostOverManyKills) {
   RecordProperty("seed", std::to_string(Seed()));
   std::mt19937_64 random(Seed());
@@ -180,7 +180,7 @@ class DatabaseCrash : public Crash {};
 INSTANTIATE_TEST_SUITE_P(Stores, DatabaseCrash, ::testing::Values("postgres"),
                          [](const auto& kind) { return std::string(kind.param); });
 
-// The server lives on, and so do the calls that wait meanwhile.
+// The server keeps running, and so do the calls that wait during the outage.
 TEST_P(DatabaseCrash, NothingAcknowledgedIsLostWhenTheDatabaseIsKilled) {
   RecordProperty("seed", std::to_string(Seed()));
   StartServer();
@@ -195,7 +195,7 @@ TEST_P(DatabaseCrash, NothingAcknowledgedIsLostWhenTheDatabaseIsKilled) {
   EXPECT_GT(audited_, 0);
 }
 
-// `count` blocks of points in a ball that grows from block to block, so that each changes the hull.
+// Returns `count` blocks of points in a growing ball, so that each block changes the hull.
 std::vector<std::vector<Vector>> GrowingBall(int count, int points) {
   std::mt19937_64 random(Seed() + 77);
   std::uniform_real_distribution<double> coordinate(-1, 1);
@@ -219,7 +219,7 @@ class Interrupted : public RestartableServer {
  protected:
   Client MakeClient() const {
     ClientOptions options;
-    // Patient enough for any restart; the waits are short, so that little time is lost.
+    // Retries through any restart, with short waits to lose little time.
     options.retry.max_attempts = std::numeric_limits<int>::max();
     options.retry.initial_backoff = std::chrono::milliseconds(5);
     options.retry.max_backoff = std::chrono::milliseconds(20);
@@ -228,8 +228,7 @@ class Interrupted : public RestartableServer {
                                                      ReconnectAtOnce()));
   }
 
-  // Checks that the hull is the one of these points, to the last bit, and has been given each of
-  // them once.
+  // Expects that the hull is bitwise that of these points, each received exactly once.
   void ExpectHullOf(const std::string& hull_id, const std::vector<std::vector<Vector>>& blocks) {
     HullBuilder builder;
     uint64_t points = 0;
@@ -258,7 +257,7 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
     AppendOptions options;
     options.create_if_absent = true;
     options.writer_id = "survivor";
-    // Few, so that most kills meet chunks on their way.
+    // Few, so that most kills hit chunks in flight.
     options.max_in_flight_chunks = 4;
     auto appender = client.OpenAppend("interrupted/append", options);
     ASSERT_TRUE(appender.ok()) << appender.status();
@@ -280,12 +279,12 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
   };
   std::thread writer([&] {
     write();
-    // Whatever came of it: nobody is to wait for more.
+    // Releases the waiting thread, whatever the outcome.
     sent = blocks.size();
     sent.notify_all();
   });
   for (int kill = 1; kill <= kills; ++kill) {
-    // After a number of chunks and not a time; the last kill may come when all are sent.
+    // After a number of chunks, not a time; all may be sent by the last kill.
     const size_t enough =
         blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1);
     for (size_t now = sent; now < enough; now = sent) sent.wait(now);
@@ -296,8 +295,8 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
   ExpectHullOf("interrupted/append", blocks);
 }
 
-// Clients that vanish in the middle of a stream: what the server has committed by then stands, and
-// the next client of that name goes on from there.
+// Clients disappear in the middle of a stream. Everything committed stays, and the next client with
+// the same writer ID continues from there.
 TEST_F(Interrupted, ClientsThatVanishLeaveWholeChunks) {
   const std::vector<std::vector<Vector>> blocks = GrowingBall(60, 300);
   StartServer();
@@ -311,7 +310,7 @@ TEST_F(Interrupted, ClientsThatVanishLeaveWholeChunks) {
     EXPECT_GE(appender.opened().last_sequence(), committed);
     committed = appender.opened().last_sequence();
     EXPECT_EQ(appender.opened().hull().counts().received(), committed * 300);
-    // Sends without waiting for acks, and is gone.
+    // Sends without waiting for acks, then disappears.
     const uint64_t end = std::min<uint64_t>(blocks.size(), committed + 1 + random() % 5);
     for (uint64_t i = committed; i < end; ++i) {
       ASSERT_TRUE(appender.Send(ChunkMessage(i + 1, Flat(blocks[i]))));
@@ -339,7 +338,7 @@ TEST_F(Interrupted, AServerStoppedInTheMiddleOfABatchEndsItAndItself) {
       ASSERT_TRUE(appender.Finish().ok());
     }
     v1::BatchCheckCollisionsRequest request;
-    // The slowest there is, so that it cannot be done before the signal.
+    // The slowest method, so that it cannot finish before the signal.
     request.set_method(v1::METHOD_TEXTBOOK_SAT);
     *request.add_placements() = PlacementOf("interrupted/batch");
     *request.add_placements() = PlacementOf("interrupted/batch", 0.5);
@@ -359,5 +358,5 @@ TEST_F(Interrupted, AServerStoppedInTheMiddleOfABatchEndsItAndItself) {
   }
 }
 
-}  // namespace
+}  // namespace crash_test
 }  // namespace hulld::server

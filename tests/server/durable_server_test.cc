@@ -1,4 +1,4 @@
-// A server on a durable store, over the contract: restarts, replacement, backups, the doctor.
+// API tests of a server on a durable store: restarts, replacement, backups, and the doctor.
 
 #include <gmock/gmock.h>
 #include <prometheus/text_serializer.h>
@@ -17,7 +17,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace durable_server_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -71,7 +71,7 @@ TEST_F(DurableServer, FailuresOfTheStoreShowInMetrics) {
   Config config = DurableConfig("faulty");
   config.store_env = env.get();
   Restart(config);
-  // More than the block that holds the records, which is read when the store is opened.
+  // Larger than the block with the records, which is read when the store opens.
   Put("h", Sphere(1000));
   Restart(config);
   const auto failures = [this] {
@@ -101,7 +101,7 @@ TEST_F(DurableServer, FailuresOfTheStoreShowInMetrics) {
   EXPECT_THAT(failures(), Contains("operation=\"write\"} 1"));
   files->SetFault(FaultyFileSystem::Fault::kNone);
   EXPECT_TRUE(Delete("h").ok());
-  // Before the file system goes.
+  // Before the file system is destroyed.
   TearDown();
 }
 
@@ -163,7 +163,7 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   });
   EXPECT_THAT(std::string(broken.status().message()), HasSubstr("the file ends early"));
   EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
-  // A stream that is cut off looks like one that its client has ended, but for the last message.
+  // A severed stream differs from one ended by its client only in the missing last message.
   grpc::ClientContext context;
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);
@@ -181,10 +181,10 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   EXPECT_TRUE(Replace(open, Cube())->created());
 }
 
-// They take as long as the data is large: a client's patience with other calls is not meant.
+// Their duration grows with the data, so the default deadline of other calls does not apply.
 TEST_F(DurableServer, ReplacingAndSavingHaveADeadlineOnlyWhereOneIsGiven) {
   Put("h", Cube());
-  // No call can be in time.
+  // A deadline that has already passed.
   constexpr std::chrono::milliseconds kPassed = std::chrono::hours(-1);
   ClientOptions options;
   options.server = server_->address();
@@ -220,7 +220,7 @@ TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/backup";
   SaveBackup(file);
-  // The server goes on, and what comes later is not in the backup.
+  // The server continues, and later changes are not in the backup.
   ASSERT_TRUE(Delete("sphere").ok());
   const auto restored = RestoreBackup(file, directory_ + "/restored");
   ASSERT_TRUE(restored.ok()) << restored.status();
@@ -230,7 +230,7 @@ TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
   const v1::GetHullResponse after = Get("sphere");
   EXPECT_EQ(after.hull().SerializeAsString(), before.hull().SerializeAsString());
   EXPECT_EQ(after.header().revision(), before.header().revision());
-  // From here on both may give the same revision to different changes.
+  // From here on both may assign the same revision to different changes.
   EXPECT_NE(after.header().store_id(), before.header().store_id());
   Restart(DurableConfig("restored"));
   EXPECT_EQ(Get("sphere").header().store_id(), after.header().store_id());
@@ -301,15 +301,15 @@ TEST_F(DurableServer, ABackupIsRestoredWithinADirectoryThatIsThere) {
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/backup";
   SaveBackup(file);
-  // A mount point cannot be replaced, and a user who owns no more than the mount point can make
-  // nothing beside it.
+  // A mount point cannot be replaced, and a user who owns only the mount point cannot create
+  // siblings of it.
   const std::string target = directory_ + "/mounted";
   std::filesystem::create_directories(target + "/lost+found");
-  // What a restoring that was killed left behind.
+  // Remains of a killed restore.
   std::filesystem::create_directories(target + "/restoring/rocksdb");
   std::ofstream(target + "/restoring/rocksdb/CURRENT") << "half";
   std::ofstream(target + "/restored").close();
-  // Somebody else's.
+  // Belongs to another user.
   std::filesystem::create_directories(target + ".restoring/mine");
   const auto inode = [&target] {
     struct stat status = {};
@@ -359,5 +359,5 @@ TEST_F(ServerTest, AStoreInMemoryHasNoBackup) {
   EXPECT_THAT(status.error_message(), HasSubstr("--store=memory"));
 }
 
-}  // namespace
+}  // namespace durable_server_test
 }  // namespace hulld::server

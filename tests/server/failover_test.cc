@@ -1,4 +1,4 @@
-// Two processes over one PostgreSQL database: the second waits, and takes over.
+// Two processes over one PostgreSQL database: the second waits as a standby and takes over.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace failover_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -74,7 +74,7 @@ TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneIsKilled) {
   EXPECT_EQ(Received(*stub), 9);
 }
 
-// One writer and one reader, who were told of both servers and never learn which one serves.
+// A writer and a reader, given both addresses, never learn which server is active.
 TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
   const std::string addresses[] = {UnusedAddress(), UnusedAddress()};
   std::unique_ptr<Process> active = Start({}, addresses[0]);
@@ -109,7 +109,7 @@ TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
   EXPECT_GE((*appender)->totals().reconnects, 1);
 }
 
-// It may run again at any later time: then it changes nothing, and ends.
+// The suspended process may resume at any later time: then it changes nothing and exits.
 TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneStandsStill) {
   const std::unique_ptr<Process> active = Start();
   const auto former = Connect(*active);
@@ -158,5 +158,5 @@ TEST_F(Failover, NoLineOfTheLogHoldsThePassword) {
   }
 }
 
-}  // namespace
+}  // namespace failover_test
 }  // namespace hulld::server

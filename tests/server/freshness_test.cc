@@ -1,4 +1,5 @@
-// Several servers over one PostgreSQL database, and reads that say how fresh their answers must be.
+// Several servers over one PostgreSQL database, and reads that specify the freshness of their
+// answers.
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -24,7 +25,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace freshness_test {
 
 int NumberIn(const char* variable, int otherwise) {
   const char* const text = std::getenv(variable);
@@ -50,7 +51,7 @@ class FreshReads : public ::testing::Test {
       const std::string line = server->ReadLineWith("listening on ");
       ASSERT_FALSE(line.empty());
       addresses_.push_back(AddressIn(line));
-      // What it says is read, or it would wait for that once it has said much.
+      // Drains the server's log, so that the server never blocks on it.
       readers_.emplace_back([&server] { server->ReadToEnd(); });
     }
   }
@@ -64,7 +65,7 @@ class FreshReads : public ::testing::Test {
     own.SetInt("hulld.test.channel", channel);
     return grpc::CreateCustomChannel(addresses_[server], grpc::InsecureChannelCredentials(), own);
   }
-  // Appends a point through this server; the header of its acknowledgement.
+  // Appends a point through this server; returns the header of its ack.
   v1::ResponseHeader Append(size_t server, const std::string& hull_id, uint64_t sequence) const {
     const auto stub = v1::HullService::NewStub(Connect(server));
     Appender appender(*stub, hull_id, "w", true);
@@ -74,7 +75,7 @@ class FreshReads : public ::testing::Test {
     return ack.has_value() ? ack->header() : v1::ResponseHeader();
   }
 
-  // Nobody reads the row of the store as long as this is there.
+  // Blocks reads of the store's row until the handle is destroyed.
   std::shared_ptr<void> HoldStore() const {
     return PostgresCluster::Shared().HoldTable(database_, "hulld.store");
   }
@@ -94,7 +95,7 @@ class FreshReads : public ::testing::Test {
   std::vector<std::thread> readers_;
 };
 
-// What a server was told to remember, the next one has seen.
+// Every server sees a revision acknowledged by any server.
 TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
   for (uint64_t sequence = 1; sequence <= 20; ++sequence) {
     const v1::ResponseHeader header = Append(sequence % kServers, "h", sequence);
@@ -114,7 +115,7 @@ TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
   }
 }
 
-// They wait without a thread; what they hold is given back although the store does not answer.
+// They wait without a thread and release their resources although the store does not answer.
 TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   Append(0, "h", 1);
   const auto collisions = v1::CollisionService::NewStub(Connect(0));
@@ -138,7 +139,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
     EXPECT_TRUE(queue.Next(&tag, &ok));
     return static_cast<Call*>(tag);
   };
-  // One more than may run: the first that ends is refused, and the others wait.
+  // One more than may run: the first to end is refused, and the rest wait.
   std::vector<Call> calls(kCallsPerClient + 1);
   for (Call& call : calls) ask(call);
   EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -154,7 +155,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   for (int i = 0; i < kCallsPerClient; ++i) {
     EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::CANCELLED);
   }
-  // As soon as the server noticed, another may call; it is refused before.
+  // After the server notices a cancellation, it admits another call; before that, it refuses it.
   const auto hulls = v1::HullService::NewStub(Connect(0));
   grpc::Status asked;
   do {
@@ -166,7 +167,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
     asked = hulls->GetHull(&context, request, &response);
   } while (asked.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_TRUE(asked.ok()) << asked.error_message();
-  // The store has not answered meanwhile.
+  // The store has not answered in the meantime.
   EXPECT_EQ(unanswered(), first);
   holder.reset();
   Call last;
@@ -174,7 +175,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   EXPECT_TRUE(next()->status.ok()) << last.status.error_message();
 }
 
-// Those that wait without a thread count as those that wait for one.
+// Queries that wait without a thread count as those that wait for one.
 TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
   constexpr int kMost = 8;
   constexpr int kSent = 200;
@@ -225,11 +226,11 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
     return call.status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
            call.status.error_message().find("--max-waiting-calls") != std::string::npos;
   };
-  // A pair waits without a thread, and GetHull on one or for one.
+  // A pair waits without a thread; GetHull waits on a thread or for one.
   for (const bool is_pair : {true, false}) {
     auto holder = HoldStore();
-    // A few more are let in than may wait: while others that were are not counted yet, and once
-    // threads took some of those that were.
+    // Admits slightly more than the limit: some admitted calls are not counted yet, and threads may
+    // have dequeued some.
     std::list<Call> calls(kSent);
     for (Call& call : calls) ask(call, is_pair);
     size_t ended = 0;
@@ -241,7 +242,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
     };
     while (ended < kSurelyRefused && others == 0) end_one();
     EXPECT_EQ(others, 0);
-    // Those that waited are answered, and give way to others.
+    // The waiting calls are answered and make room for new ones.
     holder.reset();
     while (ended < calls.size()) end_one();
     EXPECT_GE(others, kMost);
@@ -253,15 +254,15 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
   }
 }
 
-// Every call that reads takes it: a revision that nobody was told of, and another store, are told
-// apart from each other and from what is malformed.
+// All reads check freshness. An unassigned revision, another store, and a malformed value give
+// distinct errors.
 TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
   const v1::ResponseHeader header = Append(0, "h", 1);
   const auto channel = Connect(1);
   const auto hulls = v1::HullService::NewStub(channel);
   const auto bodies = v1::BodyService::NewStub(channel);
   const auto collisions = v1::CollisionService::NewStub(channel);
-  // Nothing comes before the refusal.
+  // No message precedes the refusal.
   const auto finish = [](const auto& reader) { return reader->Finish(); };
   const auto expect_refusal = [&](const v1::Freshness& freshness, grpc::StatusCode code,
                                   const std::string& text) {
@@ -350,7 +351,7 @@ TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
   for (int run = first; run < first + runs; ++run) {
     HullHistory history;
     HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
-    // No server goes back behind this, so the probe is never missing.
+    // No server reads an older state than this, so the probe always exists.
     for (size_t server = 0; server < kServers; ++server) ASSERT_TRUE(Knows(server, kProbeHull));
     const std::string prefix = absl::StrCat("run-", run);
     std::vector<std::thread> clients;
@@ -375,10 +376,10 @@ TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
       }
     }
   }
-  // They hold what they are to test.
+  // The histories cover the intended cases.
   EXPECT_GT(from_the_past, static_cast<size_t>(runs) * 20);
   EXPECT_GT(of_a_revision, static_cast<size_t>(runs) * 20);
 }
 
-}  // namespace
+}  // namespace freshness_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// The program itself: started, talked to, ended by a signal.
+// Tests of the hulld program: start, calls, termination by a signal.
 
 #include "tests/server/harness/hulld_process.h"
 
@@ -23,7 +23,7 @@
 #include "hulld/v1/status.grpc.pb.h"
 
 namespace hulld::server {
-namespace {
+namespace hulld_process_test {
 
 using ::testing::HasSubstr;
 
@@ -50,7 +50,7 @@ TEST_P(HulldProcess, ServesOnTheLoggedAddressAndEndsCleanlyOnASignal) {
 
 INSTANTIATE_TEST_SUITE_P(Signals, HulldProcess, ::testing::Values(SIGTERM, SIGINT));
 
-// The fields of a line of /proc/PID/stat after the name, which may hold anything.
+// Returns the fields of /proc/PID/stat after the name, which may contain any character.
 std::vector<std::string> StatFields(const std::filesystem::path& path) {
   std::ifstream file(path);
   std::string text;
@@ -59,15 +59,15 @@ std::vector<std::string> StatFields(const std::filesystem::path& path) {
   return {std::istream_iterator<std::string>(rest), {}};
 }
 
-// A thread of lower priority gets next to nothing beside another busy program, and all that wait
-// for it with it.
+// A thread of lower priority starves when another program is busy, and so does every thread that
+// waits for it.
 TEST(HulldProgram, EveryThreadHasThePriorityOfTheProcess) {
   constexpr size_t kNice = 16;
   Process hulld({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   const auto stub = v1::CollisionService::NewStub(
       grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
-  // After a batch, as threads may be started when they are needed.
+  // After a batch, as threads may start lazily.
   grpc::ClientContext context;
   v1::BatchCheckCollisionsRequest request;
   request.add_placements()->set_hull_id("none");
@@ -122,7 +122,8 @@ TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {
   EXPECT_EQ(hulld.Wait(), 0);
 }
 
-// Calls of a client that knows both never fail meanwhile, and soon reach the other one alone.
+// Calls of a client that knows both servers never fail during the drain, and soon use the second
+// server only.
 TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
   Process draining({"--store", "memory", "--listen", "127.0.0.1:0", "--drain-timeout", "600"});
   Process other({"--store", "memory", "--listen", "127.0.0.1:0"});
@@ -139,7 +140,7 @@ TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
   std::string second = first;
   while (second == first) second = answering_store();
 
-  // Holds the drain up until it has been seen.
+  // Delays the drain until the test has observed it.
   ClientOptions options_of_writer;
   options_of_writer.server = address;
   const Client writer(options_of_writer);
@@ -152,7 +153,7 @@ TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
   for (int in_turn = 0; in_turn < 20;) {
     in_turn = answering_store() == leaving ? 0 : in_turn + 1;
   }
-  // What runs goes on.
+  // Running calls continue.
   v1::PointBlock point;
   for (const double x : {1, 2, 3}) point.add_xyz(x);
   EXPECT_TRUE((*stream)->Append(point).ok());
@@ -161,5 +162,5 @@ TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
   EXPECT_EQ(draining.Wait(), 0);
 }
 
-}  // namespace
+}  // namespace hulld_process_test
 }  // namespace hulld::server

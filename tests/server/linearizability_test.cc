@@ -1,4 +1,4 @@
-// Concurrent clients of few hulls; what they saw is checked against the specification.
+// Concurrent clients on few hulls; their history is checked against the specification.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -17,13 +17,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace linearizability_test {
 
 using ::testing::HasSubstr;
 using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
 
-// An answered operation on the incarnation that CreateAt makes.
+// An answered operation on the incarnation that CreateAt creates.
 Operation AnsweredOf(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
   Operation operation = Answered(kind, invoked, returned, revision);
   operation.create_revision = 1;
@@ -36,7 +36,7 @@ Operation CreateAt(uint64_t invoked, uint64_t returned) {
   return operation;
 }
 
-// One chunk of one point, which was new.
+// A chunk of one new point.
 Operation AppendAt(uint64_t invoked, uint64_t returned, uint64_t revision, int point,
                    uint64_t vertex_count, const std::string& writer = "w", uint64_t sequence = 1) {
   Operation operation = AnsweredOf(Kind::kAppend, invoked, returned, revision);
@@ -60,7 +60,7 @@ Operation MeshAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSe
   return operation;
 }
 
-// A hull that took `points` points, each of them a vertex.
+// A hull that received `points` points, all vertices.
 Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t create_revision,
                 uint64_t points) {
   Operation operation = AnsweredOf(Kind::kGet, invoked, returned, revision);
@@ -92,7 +92,7 @@ TEST(LinearizabilityCheck, AChangeWithoutAnAnswerMayOrMayNotHaveHappened) {
   lost.outcome = Outcome::kUnknown;
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), lost, ProbeAt(8, 9, 1, 5, false)}), "");
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), lost, ProbeAt(8, 9, 4, 5, true)}), "");
-  // But not happen and then not have happened.
+  // An effect cannot be visible and later disappear.
   EXPECT_NE(LinearizabilityFault(
                 {CreateAt(1, 2), lost, ProbeAt(8, 9, 4, 5, true), ProbeAt(10, 11, 1, 5, false)}),
             "");
@@ -132,7 +132,7 @@ TEST(LinearizabilityCheck, RefusesAStaleRead) {
 }
 
 TEST(LinearizabilityCheck, RefusesALostUpdate) {
-  // Two acknowledged appends, and a hull with one of them.
+  // Two acknowledged appends, and a hull with only one of them.
   Operation get = AnsweredOf(Kind::kGet, 10, 11, 3);
   get.received = get.outside = get.vertex_count = 1;
   EXPECT_NE(LinearizabilityFault(
@@ -156,8 +156,8 @@ TEST(LinearizabilityCheck, RefusesARevisionThatFalls) {
             "");
 }
 
-// Chunks with points 5 and 6, sent at once, and acknowledged so: the first at tick `returned`, the
-// second at the next.
+// Pipelined chunks with points 5 and 6 and a joint ack: the first at tick `returned`, the second at
+// the next.
 TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
   Operation first = AppendAt(3, 20, 0, 5, 0);
   first.is_untold = true;
@@ -172,7 +172,7 @@ TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
   EXPECT_EQ(fault_of({}), "");
   EXPECT_EQ(fault_of({ProbeAt(5, 6, 2, 5, true), GetAt(7, 8, 3, 1, 2)}), "");
   EXPECT_EQ(fault_of({ProbeAt(5, 6, 1, 5, false)}), "");
-  // Not one without the one before, nor one of them not at all.
+  // The second chunk without the first, or a missing chunk, is refused.
   EXPECT_NE(fault_of({MeshAt(5, 6, 2, 0x40)}), "");
   EXPECT_NE(fault_of({ProbeAt(22, 23, 3, 5, false)}), "");
   EXPECT_NE(fault_of({GetAt(22, 23, 2, 1, 1)}), "");
@@ -181,7 +181,7 @@ TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
   second.vertex_count = 3;
   EXPECT_NE(fault_of({}), "");
   EXPECT_EQ(fault_of({AppendAt(5, 6, 2, 7, 2, "v")}), "");
-  // The second may have been sent before, which the first was not.
+  // The second may have been sent before; the first was not.
   second.vertex_count = 2;
   second.sequence = 1;
   EXPECT_EQ(fault_of({ProbeAt(7, 8, 3, 5, true)}), "");
@@ -195,7 +195,7 @@ TEST(LinearizabilityCheck, RefusesAConditionThatDidNotHold) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
   conditional.if_revision = 2;
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
-  // And a refusal of one that did.
+  // A refusal of a condition that held is refused as well.
   conditional.outcome = Outcome::kAborted;
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
 }
@@ -230,9 +230,9 @@ TEST(LinearizabilityCheck, AReplaceWithoutAnAnswerMayOrMayNotHaveHappened) {
   const Operation lost = Unanswered(ReplaceAt(5, 6, 0, 0xc0));
   EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 2, 0x20), MeshAt(9, 10, 2, 0x20)})), "");
   EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 2, 0x20), MeshAt(9, 10, 4, 0xc0)})), "");
-  // But not happen and then not have happened.
+  // An effect cannot be visible and later disappear.
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), MeshAt(9, 10, 2, 0x20)})), "");
-  // Its revision is that of the creation, until vertices come.
+  // Its revision equals the create revision until vertices are added.
   EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), GetAt(9, 10, 4, 4, 2)})), "");
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), GetAt(9, 10, 4, 3, 2)})), "");
 }
@@ -243,22 +243,22 @@ TEST(LinearizabilityCheck, RefusesAReplaceThatWasLost) {
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(7, 8, 3, 0x20)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, ProbeAt(7, 8, 3, 5, true)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, GetAt(7, 8, 3, 1, 1)})), "");
-  // What was appended to the former hull counts for nothing, and nothing is appended to it.
+  // Appends to the former hull have no effect on the new one, and none succeeds later.
   EXPECT_NE(LinearizabilityFault(After({replace, AppendAt(7, 8, 4, 8, 3, "w", 2)})), "");
 }
 
 TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
   const Operation replace = ReplaceAt(5, 8, 3, 0xc0);
-  // New points are missing, before the answer or after it; or former ones are still there.
+  // New points are missing before or after the answer, or former ones remain.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(6, 7, 3, 0x40)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0x80)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xe0)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0)})), "");
-  // So for one that nobody answered.
+  // Also for an unanswered replacement.
   const Operation lost = Unanswered(replace);
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0x40)})), "");
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0xe0)})), "");
-  // The points are new, and the counts or the incarnation are not.
+  // The points are new, but the counts or the incarnation are not.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 3, 3)})),
             "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 1, 2)})),
@@ -273,7 +273,7 @@ TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
 }
 
 TEST(LinearizabilityCheck, RefusesAReplaceThatWasAppliedTwice) {
-  // Seen, then another change, then seen again.
+  // Visible, then another change, then visible again.
   Operation chunk = AppendAt(9, 10, 4, 8, 3);
   chunk.incarnation = 3;
   const std::vector<Operation> twice = {MeshAt(7, 8, 3, 0xc0), chunk, MeshAt(11, 12, 5, 0xc0)};
@@ -286,9 +286,9 @@ TEST(LinearizabilityCheck, RefusesAReplaceThatWasAppliedTwice) {
     operations.push_back(Unanswered(ReplaceAt(6, 7, 0, 0xc0)));
     EXPECT_EQ(LinearizabilityFault(operations), "");
   }
-  // Again at once, which only the revision shows.
+  // Applied twice in a row, which only the revision shows.
   EXPECT_NE(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), GetAt(7, 8, 4, 4, 2)})), "");
-  // Or with the counts of both.
+  // Counts of both hulls.
   EXPECT_NE(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), GetAt(7, 8, 3, 3, 4)})), "");
 }
 
@@ -301,7 +301,7 @@ TEST(LinearizabilityCheck, AReplaceHappensOnlyWhereItsConditionHolds) {
               revision != 2);
     EXPECT_NE(LinearizabilityFault(After({Refused(replace, Outcome::kNotFound)})), "");
   }
-  // Where there is no hull: 0 alone holds, and it is made only where that was asked for.
+  // Without a hull, only condition 0 holds, and the hull is created only if requested.
   replace = ReplaceAt(1, 2, 1, 0xc0);
   for (const uint64_t revision : {0, 1}) {
     for (const bool if_absent : {false, true}) {
@@ -335,8 +335,8 @@ TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
   EXPECT_THAT(HistoryFault(history), HasSubstr("the store told revision 0 at tick 3"));
 }
 
-// A hull with point 5 since tick 102, as after revision 2, and a probe at ticks 200 to 201 that is
-// answered from this long ago, of this revision of the hull and of the store.
+// A hull with point 5 since tick 102, at revision 2, and a probe at ticks 200 to 201 with this
+// staleness, hull revision, and store revision.
 Operation PastProbe(std::optional<uint64_t> bound, uint64_t staleness, uint64_t revision,
                     bool touching) {
   Operation probe = ProbeAt(200, 201, revision, 5, touching);
@@ -355,7 +355,7 @@ TEST(FreshnessCheck, ABoundedReadMayBeAnsweredFromAsLongAgoAsItSays) {
   EXPECT_EQ(FaultOf(PastProbe(150, 150, 2, true)), "");
   // The change was acknowledged before that.
   EXPECT_NE(FaultOf(PastProbe(150, 97, 1, false)), "");
-  // An answer from before the hull was there.
+  // An answer from before the hull existed.
   Operation too_early = PastProbe(199, 199, 1, false);
   EXPECT_EQ(FaultOf(too_early), "");
   too_early.outcome = Outcome::kNotFound;
@@ -376,7 +376,7 @@ TEST(FreshnessCheck, ARevisionThatWasAskedForIsSeen) {
   EXPECT_EQ(FaultOf(probe), "");
   probe.at_least_revision = 2;
   EXPECT_THAT(FaultOf(probe), HasSubstr("to one who wants at least 2"));
-  // Nor is a hull that was created by then missing.
+  // A hull created by that time cannot be missing.
   probe.outcome = Outcome::kNotFound;
   probe.store_revision = 0;
   EXPECT_NE(FaultOf(probe), "");
@@ -384,7 +384,7 @@ TEST(FreshnessCheck, ARevisionThatWasAskedForIsSeen) {
   EXPECT_EQ(FaultOf(probe), "");
 }
 
-// The answer claims what it does not hold.
+// The answer names a revision whose changes it lacks.
 TEST(FreshnessCheck, RefusesAnAnswerThatLacksAChangeOfItsOwnRevision) {
   Operation probe = PastProbe(150, 150, 1, false);
   probe.store_revision = 2;
@@ -410,7 +410,7 @@ TEST_F(Linearizability, ConcurrentClientsSeeOneHullAtATime) {
     std::vector<std::thread> threads;
     for (int i = 0; i < kClients; ++i) {
       threads.emplace_back([&, i] {
-        // A channel of its own, so that calls of clients overtake each other.
+        // Separate channels, so that calls of clients overtake each other.
         grpc::ChannelArguments own;
         own.SetInt("hulld.test.client", i);
         HistoryClient client(
@@ -436,12 +436,12 @@ TEST_F(Linearizability, ConcurrentClientsSeeOneHullAtATime) {
   RecordProperty("acknowledged", static_cast<int>(acknowledged));
   RecordProperty("replaced", static_cast<int>(replaced));
   RecordProperty("replaces_refused", static_cast<int>(replaces_refused));
-  // The histories hold what they are to test.
+  // The histories cover the intended cases.
   EXPECT_GT(acknowledged, size_t{kRounds * kClients * kCalls / 2});
   EXPECT_GT(refused, size_t{kRounds * 10});
   EXPECT_GT(replaced, size_t{kRounds * 20});
   EXPECT_GT(replaces_refused, size_t{kRounds * 2});
 }
 
-}  // namespace
+}  // namespace linearizability_test
 }  // namespace hulld::server

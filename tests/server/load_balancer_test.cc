@@ -1,4 +1,4 @@
-// docker/haproxy/haproxy.cfg, tried: haproxy in front of several processes.
+// Tests of docker/haproxy/haproxy.cfg: haproxy in front of several processes.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
@@ -21,10 +21,10 @@
 #include "tests/source_tree.h"
 
 namespace hulld::server {
-namespace {
+namespace load_balancer_test {
 
 constexpr char kHaproxy[] = "/usr/sbin/haproxy";
-// Two servers and a third that nobody started.
+// Two servers, and the address of a third that is not running.
 class LoadBalancer : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -44,7 +44,7 @@ class LoadBalancer : public ::testing::Test {
     std::ofstream(settings_) << settings;
     haproxy_ =
         std::make_unique<Process>(kHaproxy, std::vector<std::string>{"-db", "-f", settings_});
-    // The last of its findings; the first check of the third server comes within a second.
+    // haproxy's last finding: it checks the third server first within a second.
     EXPECT_NE(haproxy_->ReadLineWith("hulld-3 is DOWN"), "");
   }
   void TearDown() override {
@@ -55,7 +55,7 @@ class LoadBalancer : public ::testing::Test {
     return std::make_unique<Process>(std::vector<std::string>{
         "--store", "memory", "--listen", "127.0.0.1:0", "--drain-timeout", "600"});
   }
-  // Over a connection of its own.
+  // Connects over a separate connection.
   static Client Connect(const std::string& address) {
     ClientOptions options;
     options.server = address;
@@ -85,7 +85,7 @@ TEST_F(LoadBalancer, ConnectionsAreSpreadOverThoseThatServe) {
   EXPECT_EQ(stores.size(), 2);
 }
 
-// Its streams go on; the calls after them find another server, and none fails.
+// Streams on the draining server continue; later calls go to another server, and none fails.
 TEST_F(LoadBalancer, AServerThatDrainsIsLeft) {
   const Client client = Connect(address_);
   const std::string leaving = StoreOf(client);
@@ -109,5 +109,5 @@ TEST_F(LoadBalancer, AServerThatDrainsIsLeft) {
   EXPECT_EQ(server.Wait(), 0);
 }
 
-}  // namespace
+}  // namespace load_balancer_test
 }  // namespace hulld::server

@@ -1,5 +1,5 @@
-// Several processes that are active at once over one PostgreSQL database. Clients go from one to
-// another, and what they saw is checked against the specification.
+// Several active processes over one PostgreSQL database. Clients switch between them, and their
+// history is checked against the specification.
 
 #include "tests/server/harness/postgres/many_servers.h"
 
@@ -24,7 +24,7 @@
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
 namespace hulld::server {
-namespace {
+namespace many_servers_test {
 
 using Cut = CuttingProxy::Cut;
 
@@ -35,10 +35,10 @@ uint64_t NumberIn(const char* variable, uint64_t otherwise) {
 
 class ManyServers : public ManyServersTest {
  protected:
-  // What comes next arrives when its connection is gone.
+  // The next piece arrives after its connection is gone.
   static void Delay(CuttingProxy& proxy, Cut cut) {
     proxy.CutNext(cut);
-    // Clients may have no more changes for it.
+    // Clients may have no changes left for it.
     proxy.DeliverOnceHeld(std::chrono::seconds(1));
   }
   Client ClientOf(size_t server) {
@@ -47,7 +47,7 @@ class ManyServers : public ManyServersTest {
     options.own_connection = true;
     return Client(options);
   }
-  // Few runs unless HULLD_MANY_RUNS says otherwise, each with a seed of its own.
+  // Runs a few times, or HULLD_MANY_RUNS times, each with a different seed.
   void ForEachRun(const std::function<void(uint64_t seed)>& run) {
     const uint64_t first = NumberIn("HULLD_TEST_SEED", 0);
     const uint64_t end = first + NumberIn("HULLD_MANY_RUNS", 2);
@@ -80,7 +80,7 @@ TEST_F(ManyServers, TheOthersGoOnWhenOneIsKilled) {
   });
 }
 
-// One store: whatever the freshness, all of an answer is of one revision, a page of a list too.
+// One store: at any freshness, all of an answer, including a list page, has one revision.
 TEST_F(ManyServers, BatchesStreamsAndListsAreOfOneRevisionOfTheStore) {
   size_t batches = 0;
   size_t whole = 0;
@@ -122,9 +122,8 @@ TEST_F(ManyServers, OneThatStoodStillFindsWhatTheOthersDid) {
   ExpectLinearizable(history, 2000);
 }
 
-// Each server reaches the database through a network that loses a COMMIT, or the answer to one,
-// delivers either when its connection is gone, or is down for a while. Two clients each
-// write under one ID.
+// Each server reaches the database through a network that loses a COMMIT or its answer, delivers
+// either after its connection is gone, or is down for a while. Pairs of clients share a writer ID.
 TEST_F(ManyServers, NothingIsLostBehindANetworkThatCuts) {
   constexpr int kFaults = 8;
   ForEachRun([this](uint64_t seed) {
@@ -179,9 +178,9 @@ TEST_F(ManyServers, ThoseThatStartAtOnceOverAnEmptyDatabaseServeOneStore) {
   ExpectLinearizable(history, 4000);
 }
 
-// Two servers append to a hull at the same time, a third asks, and what tells the first of the
-// others is lost now and then. Every answer is proven, and all say at the end what a server does
-// that was given all points at once.
+// Two servers append to a hull concurrently while a third is queried; the first sometimes loses its
+// notifications of peer changes. Every answer is proven, and at the end all servers agree with a
+// server that received all points together.
 TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
   constexpr int kRounds = 60;
   PostgresCluster& cluster = PostgresCluster::Shared();
@@ -192,7 +191,7 @@ TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
   const Client clients[] = {ClientOf(0), ClientOf(1), ClientOf(2)};
   std::mt19937_64 random(7);
   v1::PointBlock all;
-  // Most are outside of the hull before.
+  // Most points lie outside the previous hull.
   const auto make_points = [&](int round) {
     std::uniform_int_distribution<int> coordinate(-10 - round, 10 + round);
     v1::PointBlock points;
@@ -215,7 +214,7 @@ TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
     ASSERT_TRUE(finished.ok()) << finished;
   };
   append(clients[1], "cube", cube);
-  // Its chunks are on their way while the others are appended.
+  // Its chunks are in flight while the other clients append.
   const auto stream = clients[0].OpenAppend("grown", options);
   ASSERT_TRUE(stream.ok()) << stream.status();
   std::set<v1::Relation> relations;
@@ -230,7 +229,7 @@ TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
     request.mutable_wanted()->set_certificate(true);
     const auto checked = CheckCollisionVerified(clients[round % 3 == 0 ? 2 : 0], request);
     ASSERT_TRUE(checked.ok()) << checked.status();
-    // Another change may come whenever a hull is fetched to check the answer.
+    // Another change may commit whenever the check fetches a hull.
     if (checked->verification.verdict == Verdict::kMoved) continue;
     EXPECT_EQ(checked->verification.verdict, Verdict::kValid) << checked->verification.reason;
     relations.insert(checked->response.relation());
@@ -253,5 +252,5 @@ TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
   }
 }
 
-}  // namespace
+}  // namespace many_servers_test
 }  // namespace hulld::server

@@ -1,7 +1,7 @@
-// Several hulld over a PostgreSQL primary with a synchronous standby, under load: either database
-// stands still, or is lost for good with all that it has not sent to the other.
+// Several hulld over a PostgreSQL primary with a synchronous standby, under load. Either database
+// is suspended or permanently lost, with all data not yet sent to the other.
 //
-// HULLD_FAILOVERS: how often the primary is lost; HULLD_TEST_SEED: the seed.
+// HULLD_FAILOVERS: number of losses of the primary. HULLD_TEST_SEED: the seed.
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -17,7 +17,7 @@
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
 namespace hulld::server {
-namespace {
+namespace standby_test {
 
 uint64_t NumberIn(const char* variable, uint64_t otherwise) {
   const char* const text = std::getenv(variable);
@@ -37,7 +37,7 @@ class Standby : public ManyServersTest {
     Begin(std::vector<std::string>(kServers, primary_->WriteConninfo(database, hosts)));
   }
 
-  // Neither closes a connection nor answers, so that every change waits.
+  // Suspends it: it neither closes connections nor answers, so every change waits.
   void StandStill(PostgresCluster& cluster) {
     cluster.Suspend();
     ExpectNoAnswer(0);
@@ -49,7 +49,7 @@ class Standby : public ManyServersTest {
     for (int call = 0; call < 5; ++call) client.CallAtRandom("shared/a");
     server(i).Signal(SIGCONT);
   }
-  // The primary's machine is gone, and the standby takes its place.
+  // Kills the primary's machine and promotes the standby.
   void FailOver() {
     primary_->KillAll();
     standby_->Promote();
@@ -60,7 +60,7 @@ class Standby : public ManyServersTest {
   std::unique_ptr<PostgresCluster> standby_;
 };
 
-// What was acknowledged is on both.
+// Acknowledged changes are on both databases.
 TEST_F(Standby, NothingAcknowledgedIsLostWhenItTakesThePlaceOfThePrimary) {
   const uint64_t seed = NumberIn("HULLD_TEST_SEED", 0);
   const uint64_t failovers = NumberIn("HULLD_FAILOVERS", 1);
@@ -78,5 +78,5 @@ TEST_F(Standby, NothingAcknowledgedIsLostWhenItTakesThePlaceOfThePrimary) {
   ExpectLinearizable(history, seed);
 }
 
-}  // namespace
+}  // namespace standby_test
 }  // namespace hulld::server

@@ -15,17 +15,17 @@ namespace hulld {
 
 using Pieces = google::protobuf::RepeatedPtrField<v1::Placement>;
 
-// "HULL" or "HULL@POSE", the pose as ParsePose reads it.
+// Parses "HULL" or "HULL@POSE", with a pose as in ParsePose.
 absl::StatusOr<v1::Placement> ParsePiece(const std::string& text);
 
-// Adds the pieces of a JSON file, which 'hullctl body get --output json' writes: {"pieces":[...]};
+// Adds the pieces of a JSON file, as written by 'hullctl body get --output json': {"pieces":[...]};
 // "-" is standard input. INVALID_ARGUMENT and NOT_FOUND name the file.
 absl::Status ReadPieces(const std::string& path, Pieces* pieces);
 
-// The numbers of a pose; what it does not say moves nothing.
+// Returns the numbers of a pose; missing parts are the identity.
 RigidPose NumbersOf(const v1::Pose& pose);
 
-// A pose as ParsePose reads it, in the fewest numbers; empty for the identity.
+// Returns a pose in the form of ParsePose, in the fewest numbers; empty for the identity.
 std::string PoseText(const v1::Pose& pose);
 
 }  // namespace hulld

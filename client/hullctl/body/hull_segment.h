@@ -6,12 +6,12 @@
 
 namespace hulld {
 
-// `name` as a segment of a hull's ID: at most 100 bytes of [A-Za-z0-9._-] that start with a letter
-// or digit. Any other byte becomes "_", and "x" goes in front where the name starts with neither.
+// Returns `name` as a segment of a hull ID: at most 100 bytes of [A-Za-z0-9._-], starting with a
+// letter or digit. Any other byte becomes "_"; "x" is prepended if the name starts with neither.
 std::string HullSegment(std::string name);
 
-// The same, unlike all in `taken`, to which it is added: "-2", "-3" and so on follow where names
-// are alike.
+// Returns a segment that differs from all in `taken`, and adds it there: duplicates get the
+// suffixes "-2", "-3", and so on.
 std::string UniqueHullSegment(const std::string& name, std::set<std::string>* taken);
 
 }  // namespace hulld

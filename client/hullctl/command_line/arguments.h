@@ -13,17 +13,17 @@
 
 namespace hulld {
 
-// "30s", "500ms", "2m"; a number alone is seconds. Positive, at most a day.
+// Parses "30s", "500ms", "2m"; a plain number is seconds. Positive, at most a day.
 absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text);
 
-// "x,y,z".
+// Parses "x,y,z".
 absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text);
 
-// "w,x,y,z,tx,ty,tz", or "tx,ty,tz" for a pose without rotation. Each number becomes the nearest
-// double.
+// Parses "w,x,y,z,tx,ty,tz", or "tx,ty,tz" for a pose without rotation. Each number becomes the
+// nearest double.
 absl::StatusOr<v1::Pose> ParsePose(const std::string& text);
 
-// The same from numbers: 3 or 7.
+// Makes a pose of 3 or 7 numbers.
 absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers);
 
 }  // namespace hulld

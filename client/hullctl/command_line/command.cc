@@ -144,23 +144,6 @@ Option Command::AddParsed(const std::string& name,
   return Option(app_->add_option_function<std::string>(name, take, help), description);
 }
 
-Option Command::AddParsedEach(const std::string& name,
-                              std::function<absl::Status(const std::string&)> parse,
-                              const std::string& help) {
-  const auto take = [name = LongName(name),
-                     parse = std::move(parse)](const std::vector<std::string>& texts) {
-    for (const std::string& text : texts) {
-      const absl::Status parsed = parse(text);
-      if (!parsed.ok()) throw CLI::ValidationError(name, std::string(parsed.message()));
-    }
-  };
-  OptionDescription* const description = Describe(name, help);
-  description->value_name = "TEXT";
-  CLI::Option* const option = app_->add_option_function<std::vector<std::string>>(name, take, help);
-  option->allow_extra_args(false);
-  return Option(option, description);
-}
-
 Option Command::AddNumber(const std::string& name, uint64_t least, uint64_t most,
                           const std::string& help, std::function<void(uint64_t)> take) {
   const auto parse = [least, most, take = std::move(take)](const std::string& text) {
@@ -239,7 +222,7 @@ const CommandDescription& CommandLine::LastGiven() const {
 std::string CommandLine::Explain(const std::string& text) const {
   const CommandDescription& command = LastGiven();
   const std::vector<std::string> rest = app_->remaining(/*recurse=*/true);
-  // CLI11 says that a command is missing also when there is one that it does not know.
+  // For an unknown command, CLI11 also reports a missing one.
   const bool needs_command = LastApp(*app_).get_require_subcommand_min() > 0;
   if (needs_command && !rest.empty() && !IsOption(rest.front())) {
     const std::vector<std::string> known = CommandNames(command);
@@ -268,7 +251,7 @@ std::string CommandLine::Explain(const std::string& text) const {
 
 std::optional<ExitCode> CommandLine::Parse(const std::vector<std::string>& arguments,
                                            std::ostream& out, std::ostream& err) {
-  // CLI11 takes the arguments from the back.
+  // CLI11 expects the arguments in reverse.
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   std::string problem;
   try {

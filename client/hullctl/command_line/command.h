@@ -15,7 +15,7 @@
 #include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/help/command_description.h"
 
-// CLI11 parses; command.cc alone includes its header, which takes 20 s to compile.
+// CLI11 parses. Only command.cc includes its header, which takes 20 s to compile.
 namespace CLI {
 class App;
 class Option;
@@ -25,21 +25,21 @@ namespace hulld {
 
 inline constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
 
-// A declared option or argument, for further properties.
+// A declared option or argument; sets further properties.
 class Option {
  public:
   Option& Required();
-  // How the help names the value.
+  // Sets the name of the value in the help.
   Option& ValueName(const std::string& name);
-  // What completion offers for the value.
+  // Sets the kind of values that completion offers.
   Option& Completes(ValueKind kind);
-  // The environment variable that the help names; the code that declares the option reads it.
+  // Sets the environment variable named in the help; the declaring code reads it.
   Option& Variable(const std::string& variable);
-  // Only these values are allowed.
+  // Allows only these values.
   Option& OneOf(const std::vector<std::string>& values);
-  // Refuses values for which `check` returns a text, which says why.
+  // Rejects values for which `check` returns a nonempty reason.
   Option& Check(std::function<std::string(const std::string&)> check);
-  // Allowed only together with `other`.
+  // Allows the option only together with `other`.
   Option& Needs(const Option& other);
 
  private:
@@ -51,55 +51,50 @@ class Option {
   OptionDescription* description_;
 };
 
-// hullctl or one of its commands, while it is declared. A handle: copies stand for the same
-// command.
+// The declaration of hullctl or one of its commands. A handle: copies refer to the same command.
 //
-// Names of options are as in "--out" and "-o,--out"; a name without a dash is an argument. The
-// variables that values go to must outlive the parsing.
+// Option names have the forms "--out" and "-o,--out"; a name without a dash is an argument.
+// Variables that receive values must outlive the parsing.
 class Command {
  public:
-  // Commands that are added from here on stand under this heading in the help.
+  // Lists commands added from here on under this heading in the help.
   void BeginGroup(const std::string& title);
-  // A command below this one. Options of this one may stand behind it, too.
+  // Adds a subcommand. Options of this command are also accepted after it.
   Command AddCommand(const std::string& name, const std::string& help);
-  // One of the commands below must be given.
+  // Requires one of the subcommands.
   void RequireCommand();
 
   Option AddText(const std::string& name, std::string* value, const std::string& help);
   Option AddTexts(const std::string& name, std::vector<std::string>* values,
                   const std::string& help);
-  // An option that may be given again and again, one value each time.
+  // Adds an option that may be repeated, one value each.
   Option AddRepeated(const std::string& name, std::vector<std::string>* values,
                      const std::string& help);
-  // `parse` takes the value; the message of its error is shown behind the option's name.
+  // Adds an option with a custom parser; the message of its error is shown after the option's name.
   Option AddParsed(const std::string& name, std::function<absl::Status(const std::string&)> parse,
                    const std::string& help);
-  // The same, and it may be given again and again, one value each time.
-  Option AddParsedEach(const std::string& name,
-                       std::function<absl::Status(const std::string&)> parse,
-                       const std::string& help);
-  // A decimal whole number from `least` to `most`. (CLI11 itself reads 010 as eight.)
+  // Adds an option for a decimal integer from `least` to `most`. (CLI11 itself reads 010 as eight.)
   Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
                    std::function<void(uint64_t)> take);
-  // A finite length of at least 0.
+  // Adds an option for a finite length of at least 0.
   Option AddLength(const std::string& name, const std::string& help,
                    std::function<void(double)> take);
   Option AddFlag(const std::string& name, bool* value, const std::string& help);
   Option AddFlag(const std::string& name, std::function<void()> set, const std::string& help);
 
-  // What the help says behind the options.
+  // Sets the help text after the options.
   void SetDetails(const std::string& text);
   void SetExamples(std::vector<Example> examples);
-  // Neither help nor completion names it.
+  // Hides the command from help and completion.
   void Hide();
-  // Called at the end of the parsing when this command was given.
+  // Called at the end of the parsing if this command was given.
   void OnGiven(std::function<void()> callback);
 
  private:
   friend class CommandLine;
   Command(CLI::App* app, CommandDescription* description) : app_(app), description_(description) {}
 
-  // The description of an option that is being added.
+  // Adds the description of a new option.
   OptionDescription* Describe(const std::string& names, const std::string& help);
 
   CLI::App* app_;
@@ -113,22 +108,22 @@ class CommandLine {
   CommandLine(const std::string& name, const std::string& version, const std::string& help);
   ~CommandLine();
 
-  // The program itself.
+  // Returns the program itself.
   Command root();
 
-  // All that was declared.
+  // Returns all declarations.
   const CommandDescription& description() const { return description_; }
 
-  // Parses the arguments that follow the program's name and calls what is to be called. Prints
-  // help, version and errors, and then returns the code that the program is to end with; without a
-  // code, the program is to go on.
+  // Parses the arguments after the program's name and calls the callbacks of the given commands.
+  // Prints help, version, or errors, and then returns the exit code; returns nullopt if the program
+  // continues.
   std::optional<ExitCode> Parse(const std::vector<std::string>& arguments, std::ostream& out,
                                 std::ostream& err);
 
  private:
-  // The last of the commands that were given.
+  // Returns the last command given.
   const CommandDescription& LastGiven() const;
-  // What is wrong with the arguments; CLI11's words where nothing better is known.
+  // Returns an explanation of an argument error; CLI11's text if no better one is known.
   std::string Explain(const std::string& text) const;
 
   std::unique_ptr<CLI::App> app_;

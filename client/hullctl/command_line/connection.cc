@@ -17,7 +17,7 @@ namespace {
 
 constexpr char kContextVariable[] = "HULLCTL_CONTEXT";
 
-// The context that holds where no option says which: its name, and what told it.
+// The context in force without --context: its name and the source of that name.
 struct NamedContext {
   std::string name;
   std::string told_by;

@@ -8,13 +8,13 @@
 
 namespace hulld {
 
-// Declares --server, --context and what goes with them; they fill invocation->flags and
+// Declares --server, --context, and the related options; they set invocation->flags and
 // invocation->context.
 void AddConnectionOptions(Command command, Invocation* invocation);
 
-// After parsing: chooses each setting from options, environment, context and default, in this
-// order, and reads the files that they name. A context that is named by --context stands before the
-// environment. INVALID_ARGUMENT: a file cannot be read, or settings do not go together.
+// Resolves the connection after parsing: takes each setting from options, environment, context, or
+// default, in this order, and reads the files they name. A context from --context precedes the
+// environment. INVALID_ARGUMENT: a file cannot be read, or settings conflict.
 absl::Status ResolveConnection(Invocation* invocation);
 
 }  // namespace hulld

@@ -10,9 +10,9 @@
 
 namespace hulld {
 
-// Whether a person at the terminal says that these are to be deleted; the question tells how many
-// there are and which come first. `one`, `many`: what they are, as in "hull" and "hulls".
-// INVALID_ARGUMENT, advising --yes: there is no terminal.
+// Returns true if the user at the terminal confirms the deletion. The question states the number of
+// items and the first ones. `one`, `many`: nouns such as "hull" and "hulls". INVALID_ARGUMENT,
+// advising --yes: no terminal.
 absl::StatusOr<bool> ConfirmDeletion(const Invocation& run, const std::vector<std::string>& ids,
                                      const std::string& one, const std::string& many);
 

@@ -3,21 +3,21 @@
 
 namespace hulld {
 
-// What hullctl tells the shell. A collision is an answer, not an error.
+// Exit codes. A collision is an answer, not an error.
 enum class ExitCode {
   kDone = 0,
-  // The server refused the request or failed, or an audit found something.
+  // The server refused the request or failed, or an audit found defects.
   kRequestFailed = 1,
-  // The command line or an input file is wrong, or an output file cannot be written.
+  // The command line or an input file is invalid, or an output file cannot be written.
   kUsage = 2,
-  // No answer: the server is not there, is draining, or did not answer in time.
+  // No answer: the server is unreachable, is draining, or did not answer in time.
   kUnreachable = 3,
-  // Some of many items have no answer; the others have.
+  // Some of many items failed; the rest succeeded.
   kSomeFailed = 4,
   // A certificate does not prove its answer.
   kInvalidCertificate = 5,
-  // A certificate could not be checked, as its hulls have changed or are gone, or the answer is one
-  // that has none.
+  // A certificate could not be checked: its hulls have changed or were deleted, or the answer has
+  // none.
   kCannotCheck = 6,
 };
 

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// The freshness of the invocation, for options to fill.
+// Returns the freshness of the invocation for options to fill.
 v1::Freshness* FreshnessOf(Invocation* invocation) {
   if (!invocation->freshness.has_value()) invocation->freshness.emplace();
   return &*invocation->freshness;
@@ -40,16 +40,8 @@ absl::Status TakeRevision(const std::string& text, v1::Freshness* freshness) {
                      " is not STORE:REVISION, the storeId and the revision of an answer's header "
                      "(--output json)"));
   }
-  const std::string store_id = text.substr(0, colon);
-  // The first goes where a server that knows only one store looks.
-  if (freshness->store_id().empty()) {
-    freshness->set_store_id(store_id);
-    freshness->set_at_least_revision(revision);
-    return absl::OkStatus();
-  }
-  v1::ShardRevision* const least = freshness->add_at_least();
-  least->set_store_id(store_id);
-  least->set_revision(revision);
+  freshness->set_store_id(text.substr(0, colon));
+  freshness->set_at_least_revision(revision);
   return absl::OkStatus();
 }
 
@@ -66,13 +58,13 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           "one store (default: all that was acknowledged)")
       .ValueName("TIME");
   command
-      .AddParsedEach(
+      .AddParsed(
           "--at-least",
           [invocation](const std::string& text) {
             return TakeRevision(text, FreshnessOf(invocation));
           },
           "Be content with this revision of the store, or a later one, as the header of an earlier "
-          "answer names it; repeated, of several stores")
+          "answer names it")
       .ValueName("STORE:REVISION");
 }
 

@@ -11,11 +11,11 @@
 namespace hulld {
 namespace {
 
-// What is counted in the event: a signal, or the end.
+// Increments of the event counter: a signal, or the end.
 constexpr uint64_t kSignal = 1;
 constexpr uint64_t kEnd = uint64_t{1} << 32;
 
-// Where the handler, which may do little, tells of a signal.
+// Event descriptor. The signal handler, which may call few functions, adds to its counter.
 std::atomic<int> event = -1;
 
 void Count(uint64_t what) {
@@ -40,7 +40,7 @@ Interrupt::Interrupt(std::function<void()> on_interrupt) {
   });
   struct sigaction action = {};
   action.sa_handler = TellOfSignal;
-  // The second one finds what was there before.
+  // The second signal has its previous action.
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, &before_int_);
   sigaction(SIGTERM, &action, &before_term_);

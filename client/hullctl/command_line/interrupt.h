@@ -8,9 +8,9 @@
 
 namespace hulld {
 
-// While this lives, SIGINT (Ctrl-C) and SIGTERM do not end the process but call a function, on a
-// thread of its own, so that a command which lasts until then can end as it should. A second signal
-// ends the process. One at a time.
+// While it exists, SIGINT (Ctrl-C) and SIGTERM do not end the process but call a function on a
+// separate thread, so that a long-running command can end cleanly. A second signal ends the
+// process. At most one instance may exist.
 class Interrupt {
  public:
   explicit Interrupt(std::function<void()> on_interrupt);

@@ -25,7 +25,7 @@ std::string ExplainConnectionFailure(const std::string& message, const std::stri
 std::string Explain(const absl::Status& status, const std::string& server,
                     std::chrono::milliseconds timeout, const ConnectionSecurity& security) {
   const std::string message(status.message().data(), status.message().size());
-  // Errors without a reason are gRPC's own.
+  // Errors without a reason come from gRPC itself.
   const v1::ErrorReason reason = ReasonOf(status);
   const bool is_hulld = reason != v1::ERROR_REASON_UNSPECIFIED;
   switch (status.code()) {
@@ -59,7 +59,7 @@ std::string Explain(const absl::Status& status, const std::string& server,
                           id.empty() ? "" : " for request ", id);
     }
     case absl::StatusCode::kResourceExhausted:
-      // gRPC refuses messages that are too large before the server can name its limit.
+      // gRPC rejects oversized messages before the server can name its limit.
       if (is_hulld) return message;
       return WithHint(message, "the server's --max-message-bytes; send less at once");
     case absl::StatusCode::kFailedPrecondition:
@@ -76,6 +76,8 @@ Client Invocation::MakeClient() const {
   ClientOptions options;
   options.server = server;
   options.timeout = timeout;
+  // Without --timeout, an unreachable server is reported within a second.
+  if (!given_timeout.has_value()) options.retry.max_attempts = 4;
   options.security = security;
   options.freshness = freshness;
   return Client(std::move(options));

@@ -19,53 +19,53 @@
 
 namespace hulld {
 
-// What answers look like.
+// Output formats.
 enum class OutputForm {
   // For people.
   kTable,
-  // The same with more columns, where there are more.
+  // A table with more columns, if the command has more.
   kWide,
-  // Names alone, one a line: IDs of hulls, relations of answers.
+  // Names only, one per line: IDs of hulls, relations of answers.
   kName,
-  // The contract's messages, one a line where there are many.
+  // Messages of the contract; one per line if a command prints several.
   kJson,
 };
 
-// One run of hullctl: the options that all commands share, where output goes, and what to do.
+// One run of hullctl: common options, output streams, and the action.
 struct Invocation {
   explicit Invocation(std::ostream& out_stream, std::ostream& err_stream)
       : out(out_stream), err(err_stream) {}
 
-  // Answers go to `out`; errors, warnings and progress to `err`.
+  // Answers go to `out`; errors, warnings, and progress to `err`.
   std::ostream& out;
   std::ostream& err;
 
-  // What options say about the server, and --context, if they are given.
+  // Connection settings from options, and --context, if given.
   ConnectionSettings flags;
   std::string context;
-  // Whether the command talks to a server at all.
+  // True if the command uses a server.
   bool needs_server = true;
-  // The settings in force and where each comes from; then what they amount to. See
+  // The settings in force with their sources, then the values derived from them. See
   // ResolveConnection.
   std::map<std::string, ChosenSetting> connection;
   std::string server = kDefaultServer;
   ConnectionSecurity security;
 
   std::chrono::milliseconds timeout{30000};
-  // The value of --timeout, if given. It bounds calls that take time in proportion to the data.
+  // The value of --timeout, if given. Also bounds calls with a duration proportional to the data.
   std::optional<std::chrono::milliseconds> given_timeout;
-  // How fresh the answers to reads must be, if options say so.
+  // Freshness of reads, if set by options.
   std::optional<v1::Freshness> freshness;
   OutputForm form = OutputForm::kTable;
   // Colours for `out`.
   Painter paint;
-  // `err` is a terminal.
+  // True if `err` is a terminal.
   bool shows_progress = false;
 
-  // All commands, and how to run another command line; set before the action runs.
+  // All commands, and a function that runs another command line; set before the action runs.
   const CommandDescription* program = nullptr;
   std::function<int(const std::vector<std::string>& arguments)> run_line;
-  // Set by the command that was named.
+  // Set by the given command.
   std::function<ExitCode()> action;
 
   bool json() const { return form == OutputForm::kJson; }
@@ -74,11 +74,11 @@ struct Invocation {
 
   Client MakeClient() const;
 
-  // Says what failed and what to do about it; returns the exit code for the status of a call.
+  // Reports a failed call with its remedy; returns the exit code for its status.
   ExitCode Fail(const absl::Status& status) const;
-  // The same for input and output files and arguments.
+  // Reports errors of input and output files and arguments.
   ExitCode FailUsage(const absl::Status& status) const;
-  // Says why a certificate is not valid; returns the exit code for the verdict.
+  // Reports why a certificate is not valid; returns the exit code for the verdict.
   ExitCode Judge(const Verification& verification) const;
 };
 

@@ -9,8 +9,8 @@
 
 namespace hulld {
 
-// Lets `write` fill the file `path`, or `standard` when the path is empty or "-". INVALID_ARGUMENT
-// when the file cannot be opened or not all of it could be written.
+// Lets `write` fill the file `path`, or `standard` if the path is empty or "-". INVALID_ARGUMENT if
+// the file cannot be opened or not fully written.
 absl::Status WriteOutput(const std::string& path, std::ostream& standard,
                          const std::function<void(std::ostream&)>& write);
 

@@ -1,5 +1,6 @@
 #include "client/hullctl/command_line/point_input.h"
 
+#include <absl/strings/str_cat.h>
 #include <sys/stat.h>
 
 #include <utility>
@@ -10,6 +11,8 @@ void AddPointInput(Command command, PointInput* input) {
   command.AddTexts("FILE", &input->files, "Files of points; - is standard input").Required();
   command.AddFlag("--skip-nonfinite", &input->skip_nonfinite,
                   "Leave out and count points with a coordinate that is NaN or infinite");
+  command.AddFlag("--skip-zero", &input->skip_zero,
+                  "Leave out and count points at exactly (0, 0, 0), the holes of depth cameras");
   command
       .AddText("--format", &input->format,
                "Format of the files (default: by extension; standard input: xyz)")
@@ -18,6 +21,15 @@ void AddPointInput(Command command, PointInput* input) {
   command.AddNumber("--chunk-points", 1, uint64_t{100} << 20,
                     "Points per message (default: about 1 MiB)",
                     [input](uint64_t number) { input->chunk_points = number; });
+}
+
+std::vector<std::string> SkippedTexts(const ReadCounts& counts) {
+  std::vector<std::string> texts;
+  if (counts.skipped > 0) {
+    texts.push_back(absl::StrCat(counts.skipped, " points that are not finite"));
+  }
+  if (counts.zeros > 0) texts.push_back(absl::StrCat(counts.zeros, " points at (0, 0, 0)"));
+  return texts;
 }
 
 v1::PointBlock ToProto(const PointBlock& block) {
@@ -50,13 +62,14 @@ absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint
     } else {
       known = false;
     }
-    // A pipe is opened once only: its writer would see it closed.
+    // A pipe is opened only once: its writer would see it closed.
     if (path != "-" && !S_ISFIFO(info.st_mode)) {
       if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
     }
     ReadRequest request{path, *format, {}, {}};
     request.options.points_per_block = input.chunk_points;
     request.options.skip_nonfinite = input.skip_nonfinite;
+    request.options.skip_zero = input.skip_zero;
     plan.push_back(std::move(request));
   }
   if (!known) *total_bytes = 0;

@@ -13,22 +13,27 @@
 
 namespace hulld {
 
-// The files of points that a command reads, and how.
+// Point files of a command, and read options.
 struct PointInput {
   std::vector<std::string> files;
   bool skip_nonfinite = false;
+  bool skip_zero = false;
   // Empty: by extension.
   std::string format;
   // 0: about 1 MiB.
   uint64_t chunk_points = 0;
 };
 
-// Declares FILE..., --skip-nonfinite, --format and --chunk-points. `input` must outlive the
-// command.
+// Declares FILE..., --skip-nonfinite, --skip-zero, --format, and --chunk-points. `input` must
+// outlive the command.
 void AddPointInput(Command command, PointInput* input);
 
-// The files to read, in order. Checks that they can be read before anything is sent, so that a
-// mistyped name changes nothing. total_bytes: the size of all files, 0 when that is not known.
+// Returns the numbers of skipped points by reason: "3 points that are not finite", "5 points at (0,
+// 0, 0)".
+std::vector<std::string> SkippedTexts(const ReadCounts& counts);
+
+// Returns the files to read, in order. Checks that all are readable before anything is sent, so
+// that a mistyped name changes nothing. total_bytes: the size of all files, 0 if unknown.
 absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint64_t* total_bytes);
 
 v1::PointBlock ToProto(const PointBlock& block);

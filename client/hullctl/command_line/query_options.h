@@ -8,23 +8,23 @@
 
 namespace hulld {
 
-// What a command asks for beyond the relation, as options that several commands share.
+// Requests beyond the relation, as options shared by several commands.
 struct QueryWishes {
   v1::Wanted wanted;
   std::optional<double> tolerance;
   v1::Method method = v1::METHOD_UNSPECIFIED;
-  // Check each answer's certificate; it is wanted then.
+  // Checks each answer's certificate; implies a request for it.
   bool verify = false;
 
-  // Puts them over what a file wishes.
+  // Overrides the requests of a file.
   void Apply(v1::Wanted* file_wanted, double* file_tolerance) const;
 };
 
-// Declares --axis, --report, --certificate, --separation, --max-error, --witness, --clearance and
+// Declares --axis, --report, --certificate, --separation, --max-error, --witness, --clearance, and
 // --tolerance. `wishes` must outlive the parsing.
 void AddWantedOptions(Command command, QueryWishes* wishes);
 
-// The same with --textbook and --verify.
+// Declares the same options plus --textbook and --verify.
 void AddQueryOptions(Command command, QueryWishes* wishes);
 
 }  // namespace hulld

@@ -52,13 +52,13 @@ Owned<SSL_CTX> MakeContext(const ConnectionSecurity& security) {
   return context;
 }
 
-// Null when nothing answers.
+// Returns null if the server does not answer.
 Owned<BIO> Connect(const std::string& server) {
   Owned<BIO> bio(BIO_new_connect(server.c_str()));
   if (bio == nullptr || BIO_do_connect_retry(bio.get(), kPatienceSeconds, 50) != 1) return nullptr;
   int fd = -1;
   BIO_get_fd(bio.get(), &fd);
-  // BIO_do_connect_retry leaves the socket as it is; waiting is bounded from here on.
+  // BIO_do_connect_retry leaves the socket unchanged; bounds waiting from here on.
   BIO_socket_nbio(fd, 0);
   const timeval patience = {kPatienceSeconds, 0};
   setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
@@ -105,8 +105,8 @@ std::string ExplainVerification(long result, const ConnectionSecurity& security)
   }
 }
 
-// Whether the server ended the connection over our certificate. Under TLS 1.3 that comes only after
-// the handshake; otherwise its first bytes come.
+// Explains a refusal of our certificate by the server; empty if it was accepted. With TLS 1.3 the
+// refusal arrives only after the handshake, in place of the first bytes.
 std::string ExplainRefusal(SSL* ssl, const ConnectionSecurity& security) {
   char byte = 0;
   if (SSL_read(ssl, &byte, 1) > 0 || ERR_GET_LIB(ERR_peek_error()) != ERR_LIB_SSL) return "";

@@ -7,8 +7,8 @@
 
 namespace hulld {
 
-// Why a connection to `server` (host:port) with this security fails, and what to try; empty when
-// TLS is not the reason. gRPC does not distinguish an expired certificate from an unknown
+// Explains why a connection to `server` (host:port) with this security fails, with a remedy; empty
+// if TLS is not the cause. gRPC does not distinguish an expired certificate from an unknown
 // authority, or a server without TLS from a dead one, so this performs a handshake of its own.
 // Takes a few seconds at most.
 std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& security);

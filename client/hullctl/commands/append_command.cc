@@ -18,12 +18,12 @@ struct AppendArguments {
   bool create = false;
   bool resume = false;
   std::string writer;
-  // Empty, "names" or "components".
+  // Empty, "names", or "components".
   std::string split;
 };
 
-// Sends files to one hull. The stream opens, and with --create the hull comes into being, once
-// there are points: files that cannot be read leave nothing behind.
+// Appends files to one hull. The stream opens, and --create creates the hull, when the first points
+// are read: unreadable files have no effect.
 class FileAppender {
  public:
   FileAppender(const Invocation& run, const AppendArguments& arguments, uint64_t total_bytes)
@@ -31,7 +31,7 @@ class FileAppender {
         client_(run.MakeClient()),
         bar_(run.err, run.shows_progress, "points", total_bytes) {}
 
-  // Either the file or the stream fails; the other status is OK then.
+  // Either the file or the stream fails; the other status is then OK.
   struct Outcome {
     absl::Status file;
     absl::Status stream;
@@ -51,15 +51,15 @@ class FileAppender {
     });
     bytes_before_ += file_bytes;
     if (counts.ok()) {
-      skipped_ += counts->skipped;
+      skipped_.skipped += counts->skipped;
+      skipped_.zeros += counts->zeros;
     } else if (outcome.stream.ok()) {
       outcome.file = counts.status();
     }
     return outcome;
   }
 
-  // Waits for the last acknowledgement. Files without a point still ask whether there is such a
-  // hull.
+  // Waits for the last acknowledgement. Without points, still checks that the hull exists.
   absl::Status Finish() {
     absl::Status status;
     if (appender_ == nullptr) status = Open();
@@ -70,18 +70,19 @@ class FileAppender {
 
   void Clear() { bar_.Clear(); }
 
-  // Removes the hull if this command created it and nothing was committed to it since.
+  // Removes the hull if this command created it and nothing has been committed to it since.
   absl::Status RemoveIfEmpty() const {
     if (!created_.has_value()) return absl::OkStatus();
     const absl::Status status =
         client_.DeleteHull(arguments_.hull_id, created_->create_revision()).status();
-    // Points that arrived although their acknowledgement did not keep the hull.
+    // Points that were committed without an acknowledgement keep the hull.
     return absl::IsAborted(status) || absl::IsNotFound(status) ? absl::OkStatus() : status;
   }
 
-  // Null until there are points.
+  // Null before the first points.
   const Appender* appender() const { return appender_.get(); }
-  uint64_t skipped() const { return skipped_; }
+  // Counts of the skipped points alone.
+  const ReadCounts& skipped() const { return skipped_; }
   uint64_t resumed_points() const { return resumed_points_; }
 
  private:
@@ -116,16 +117,16 @@ class FileAppender {
   const AppendArguments& arguments_;
   const Client client_;
   std::unique_ptr<Appender> appender_;
-  // The hull, when this command created it.
+  // The hull, if this command created it.
   std::optional<v1::HullInfo> created_;
   uint64_t to_skip_ = 0;
   ProgressBar bar_;
   uint64_t bytes_before_ = 0;
-  uint64_t skipped_ = 0;
+  ReadCounts skipped_;
   uint64_t resumed_points_ = 0;
 };
 
-// What the server said: `opened`, then all acknowledgements as one, as they may come.
+// Prints `opened`, then the sum of all acknowledgements, as messages of the contract.
 void PrintJson(const Appender& appender, std::ostream& out) {
   v1::AppendPointsResponse opened;
   *opened.mutable_opened() = appender.opened();
@@ -138,14 +139,15 @@ void PrintJson(const Appender& appender, std::ostream& out) {
   out << MessageJson(acknowledged) << "\n";
 }
 
-// swell: as SwellOf; empty where nothing is known of it.
+// swell: see SwellOf; empty if unknown.
 void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files,
            const Swell& swell) {
   const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
-  if (files.skipped() > 0 && run.form != OutputForm::kTable && !run.wide()) {
-    run.err << "hullctl: " << files.skipped() << " points that are not finite were left out\n";
+  const std::vector<std::string> skipped = SkippedTexts(files.skipped());
+  if (run.form != OutputForm::kTable && !run.wide()) {
+    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were left out\n";
   }
   if (run.json()) return PrintJson(appender, run.out);
   if (run.names()) {
@@ -159,9 +161,7 @@ void Print(const Invocation& run, const std::string& hull_id, const FileAppender
       .Row({"outside", std::to_string(counts.outside())})
       .Row({"duplicate", std::to_string(counts.duplicate())})
       .Row({"inside", std::to_string(counts.inside())});
-  if (files.skipped() > 0) {
-    table.Row({"skipped", std::to_string(files.skipped()) + " points that are not finite"});
-  }
+  for (const std::string& text : skipped) table.Row({"skipped", text});
   if (files.resumed_points() > 0) {
     table.Row(
         {"resumed", std::to_string(files.resumed_points()) + " points were committed before"});
@@ -197,19 +197,19 @@ ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
   return arguments.create ? ExitCode::kUsage : ExitCode::kRequestFailed;
 }
 
-// How much larger the hull is than the mesh of the files, where that can be told.
+// Returns the volume of the hull relative to the mesh of the files, if known.
 Swell SwellOfFiles(const Invocation& run, const AppendArguments& arguments,
                    const std::vector<ReadRequest>& plan, uint64_t points) {
   const auto mesh = MeshOf(plan);
   if (!mesh.has_value()) return {};
   const auto swell = SwellOf(run.MakeClient(), arguments.hull_id, points, *mesh);
-  // The points are appended; that the hull cannot be read is no failure of that.
+  // The points are appended; a hull that cannot be read afterwards is no failure of the append.
   return swell.ok() ? *swell : Swell{};
 }
 
 ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
   const PointInput& input = arguments.input;
-  if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite ||
+  if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite || input.skip_zero ||
       !input.format.empty() || input.chunk_points != 0) {
     return run.FailUsage(absl::InvalidArgumentError(
         "--split goes with --create alone; the format is that of the file's name"));
@@ -228,7 +228,7 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
     outcome = files.Read(*request);
   }
-  // Points read before a file's error are sent already: wait for them, so that the summary is true.
+  // Points before a file's error were already sent: waits for them, so that the summary is correct.
   const bool sent = files.appender() != nullptr;
   if (outcome.ok() || (sent && outcome.stream.ok())) outcome.stream = files.Finish();
   files.Clear();
@@ -271,7 +271,9 @@ void AddAppendCommand(Command program, Invocation* invocation) {
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
-      "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf, dae.\n"
+      "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl, "
+      "gltf,\n"
+      "dae.\n"
       "--create makes the hull when there are points for it; files that are refused leave none.\n"
       "--resume needs the same files, options and writer as before.\n"
       "--split may be run again: a body that has the parts stays as it is.\n"

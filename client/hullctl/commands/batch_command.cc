@@ -24,9 +24,9 @@ struct BatchArguments {
   bool colliding = false;
 };
 
-// Asks in calls of bounded size, and prints answers as they come. A table needs of each call only
-// the placements of its pairs; the contract's messages name placements by their index, so for JSON
-// each call has all of them, and the rows count on from call to call.
+// Sends calls of bounded size and prints answers as they arrive. For a table, each call carries
+// only the placements of its pairs. JSON messages name placements by index, so each call then
+// carries all of them, and rows are numbered across calls.
 class BatchRun {
  public:
   BatchRun(const Invocation& run, const BatchArguments& arguments, const Scene& scene,
@@ -64,16 +64,16 @@ class BatchRun {
   }
 
   uint64_t failed() const { return failed_; }
-  // Pairs whose certificates do not prove them, and pairs that could not be checked.
+  // Number of pairs with an invalid certificate, and of pairs that could not be checked.
   uint64_t invalid() const { return invalid_; }
   uint64_t unchecked() const { return unchecked_; }
 
  private:
   static constexpr size_t kPairsPerCall = 100000;
-  // Causes, by placement or by pair.
+  // Problems by placement or by pair.
   using Problems = std::unordered_map<uint64_t, std::string>;
 
-  // The request for pairs [begin, end).
+  // Returns the request for pairs [begin, end).
   v1::BatchCheckCollisionsRequest RequestFor(size_t begin, size_t end) const {
     v1::BatchCheckCollisionsRequest request = base_;
     if (run_.json()) {
@@ -180,7 +180,7 @@ class BatchRun {
     return verification;
   }
 
-  // pair: among those of all calls.
+  // pair: its index across all calls.
   absl::StatusOr<Verification> CheckRow(const AnswerRow& row, size_t pair, const v1::HullVersion& a,
                                         const v1::HullVersion& b) {
     const v1::Placement at_a = scene_.PlacementOf(pairs_[2 * pair]);
@@ -196,7 +196,7 @@ class BatchRun {
                                         versions_, index(piece_a), index(piece_b)});
   }
 
-  // The hull of a placement of the request; null where the answer lacks it.
+  // Returns the hull of a placement of the request; null if the answer lacks it.
   const v1::HullVersion* VersionOf(uint32_t placement) const {
     const v1::PackedPlacements& packed = request_->packed_placements();
     if (packed.hulls_size() > 0) placement = packed.hulls(static_cast<int>(placement));
@@ -204,7 +204,7 @@ class BatchRun {
     return placement < hulls ? &head_.hulls(static_cast<int>(placement)) : nullptr;
   }
 
-  // The server's message, with rows that count on from the calls before.
+  // Prints the server's message, with rows numbered across calls.
   void PrintMessage(const v1::BatchCheckCollisionsResponse& part, size_t begin) {
     bar_.Clear();
     v1::BatchCheckCollisionsResponse message = part;
@@ -219,7 +219,7 @@ class BatchRun {
     const std::string names =
         absl::StrCat(scene_.NameOf(pairs_[2 * pair]), "\t", scene_.NameOf(pairs_[2 * pair + 1]));
     if (run_.json()) {
-      // The contract has no word for it.
+      // The contract has no field for the verification.
       if (!as_expected) {
         run_.err << "hullctl: " << names << "\t" << VerificationText(*verification, Painter())
                  << "\n";
@@ -261,7 +261,7 @@ class BatchRun {
                                               {"overlapping", v1::RELATION_OVERLAPPING},
                                               {"within_tolerance", v1::RELATION_WITHIN_TOLERANCE},
                                               {"failed", v1::RELATION_UNSPECIFIED}};
-  // A tolerance of 0 leaves no pair within it.
+  // With a tolerance of 0, no pair is within it.
   bool IsSummed(const SummaryEntry& entry) const {
     return entry.relation != v1::RELATION_WITHIN_TOLERANCE || tolerance_ > 0;
   }
@@ -273,16 +273,16 @@ class BatchRun {
   const Client client_;
   AnswerChecker checker_;
   ProgressBar bar_;
-  // What all calls have in common.
+  // Fields common to all calls.
   v1::BatchCheckCollisionsRequest base_;
   double tolerance_ = 0;
-  // The header and the hulls of the call that runs.
+  // Header and hulls of the current call.
   v1::BatchCheckCollisionsResponse head_;
-  // The hulls of the pieces of bodies, and where each is.
+  // Hulls of the pieces of bodies, and their index by ID.
   std::deque<v1::HullVersion> piece_hulls_;
   HullVersions versions_;
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
-  // Its first pair.
+  // First pair of the current call.
   size_t first_ = 0;
   Problems placement_problems_;
   std::unordered_map<int, uint64_t> counts_;

@@ -41,7 +41,7 @@ const std::map<std::string, LoadMode>& ModeNames() {
   return *kNames;
 }
 
-// What an item of a request is.
+// Returns the name of an item of a request.
 const char* ItemName(LoadMode mode) {
   switch (mode) {
     case LoadMode::kCheck:
@@ -55,8 +55,8 @@ const char* ItemName(LoadMode mode) {
   return "pairs and points";
 }
 
-// Notes SIGINT and SIGTERM while it lives, so that hulls can be deleted; a second one ends the
-// program as usual.
+// Records SIGINT and SIGTERM while it exists, so that hulls can be deleted. A second signal ends
+// the program as usual.
 class InterruptWatch {
  public:
   InterruptWatch() {
@@ -92,7 +92,7 @@ std::string RandomName() {
 
 double Seconds(std::chrono::nanoseconds time) { return 1e-9 * static_cast<double>(time.count()); }
 
-// With three digits, in the unit that fits: "950 ns", "1.23 ms".
+// Returns three digits in the fitting unit: "950 ns", "1.23 ms".
 std::string TimeText(std::chrono::nanoseconds time) {
   const auto ns = static_cast<double>(time.count());
   if (ns < 1e3) return absl::StrFormat("%.0f ns", ns);
@@ -115,7 +115,7 @@ void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
   uint64_t most = 1;
   for (const LatencyHistogram::Row& row : rows) most = std::max(most, row.count);
   for (const LatencyHistogram::Row& row : rows) {
-    // A bar is at least one character long.
+    // A bar has at least one character.
     const size_t length = (row.count * kWidth + most - 1) / most;
     out << absl::StrFormat("  %7s - %-7s %10u  %s\n", TimeText(row.from), TimeText(row.to),
                            row.count, std::string(length, '#'));
@@ -227,7 +227,7 @@ LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubj
                  });
 }
 
-// The exit code for a load.
+// Returns the exit code for a load.
 ExitCode CodeOf(const LoadResult& result) {
   if (result.failures.empty()) return ExitCode::kDone;
   if (result.latencies.count() > 0) return ExitCode::kSomeFailed;
@@ -245,7 +245,7 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   std::string& prefix = arguments.settings.prefix;
   if (prefix.empty()) prefix = absl::StrCat("bench-load/", RandomName(), "/");
   if (prefix.back() != '/') prefix += "/";
-  // A load shows what happens to each request: nothing is retried.
+  // A load measures each request as sent: no retries.
   ClientOptions connection = run.MakeClient().options();
   connection.retry.max_attempts = 1;
   connection.own_connection = true;

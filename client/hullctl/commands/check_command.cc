@@ -8,7 +8,6 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/printing/table.h"
 #include "client/verify/answer_check.h"
 
@@ -29,13 +28,13 @@ std::string PieceText(const v1::DecidingPiece& piece) {
   return std::to_string(piece.index()) + ": " + VersionText(piece.hull());
 }
 
-// For bodies, the pieces that decided.
+// Adds the deciding pieces of bodies.
 void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
   if (response.has_piece_a()) table->Row({"piece of A", PieceText(response.piece_a())});
   if (response.has_piece_b()) table->Row({"piece of B", PieceText(response.piece_b())});
 }
 
-// What proves the relation; for bodies that is a list, meant for programs.
+// Returns the proof of the relation. For bodies it is a list intended for programs.
 std::string ProofText(const v1::CheckCollisionResponse& response) {
   if (response.piece_hulls().empty()) return CertificateText(response.certificate());
   const int count = response.piece_certificates_size();
@@ -115,8 +114,8 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
     AddAnalysis(response.analysis(), &table);
   }
   if (run.wide()) {
-    table.Row({"store", StoresText(response.header())})
-        .Row({"store revision", RevisionsText(response.header())});
+    table.Row({"store", response.header().store_id()})
+        .Row({"store revision", std::to_string(response.header().revision())});
     if (response.header().has_staleness()) {
       table.Row({"stale by at most", DurationText(response.header().staleness())});
     }
@@ -124,7 +123,7 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
   table.Print(run.out);
 }
 
-// Question and answer, so that `hullctl verify` has all it needs.
+// Returns question and answer, the input of `hullctl verify`.
 std::string RecordJson(const v1::CheckCollisionRequest& request,
                        const v1::CheckCollisionResponse& response) {
   return JsonObject()
@@ -162,7 +161,7 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
     if (!response.ok()) return run.Fail(response.status());
     answer.response = *std::move(response);
   }
-  // A record on standard output takes the answer's place.
+  // A record on standard output replaces the answer.
   if (arguments.record != "-") Print(run, request, answer.response, verification);
   if (!arguments.record.empty()) {
     const absl::Status written = WriteOutput(arguments.record, run.out, [&](std::ostream& out) {

@@ -8,7 +8,7 @@
 
 namespace hulld {
 
-// Each declares one command of `program`; when it is given, parsing sets invocation->action.
+// Each declares one command of `program`; parsing sets invocation->action if it is given.
 // `invocation` must outlive the action.
 void AddCreateCommand(Command program, Invocation* invocation);
 void AddAppendCommand(Command program, Invocation* invocation);
@@ -37,10 +37,10 @@ void AddGenerateCommand(Command program, Invocation* invocation);
 // Hidden: writes man pages, for the build.
 void AddManCommand(Command program, Invocation* invocation);
 
-// Asks about the pairs of a scene that was read from `file`, as 'hullctl batch' does.
+// Queries the pairs of a scene read from `file`, as 'hullctl batch' does.
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
                      const QueryWishes& wishes, bool colliding);
-// How bodies of a scene are asked about: certificates and the textbook's test are about hulls.
+// Returns the form of bodies in queries. Certificates and the textbook's test apply to hulls only.
 BodyForm FormFor(const QueryWishes& wishes);
 
 }  // namespace hulld

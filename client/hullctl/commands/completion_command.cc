@@ -1,4 +1,4 @@
-// completion, and the hidden command that writes man pages: what shells and manuals are told.
+// `completion`, and the hidden command that writes man pages.
 #include <absl/strings/str_cat.h>
 
 #include <filesystem>
@@ -19,7 +19,7 @@ ExitCode PrintScript(const Invocation& run, const std::string& shell) {
   return ExitCode::kDone;
 }
 
-// What the program's page says beyond its help.
+// Returns the sections of the program's man page beyond its help.
 std::vector<ManSection> ProgramSections() {
   std::string variables;
   for (const ConnectionSetting& setting : kConnectionSettings) {

@@ -20,7 +20,7 @@ struct ContextArguments {
   bool none = false;
 };
 
-// What the options say, with paths that hold wherever hullctl runs.
+// Returns the settings of the options with absolute paths, valid in any working directory.
 ConnectionSettings Lasting(const ConnectionSettings& flags) {
   ConnectionSettings settings = flags;
   for (const ConnectionSetting& setting : kConnectionSettings) {
@@ -62,7 +62,7 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
                               " already; say --replace if this one is to take its place"));
   }
   const ConnectionSettings settings = Lasting(run.flags);
-  // A file that is not there, or a token that all can read, is found now.
+  // Detects a missing file, or a token readable by other users, before saving.
   const auto security = ReadSecurity(Combine({{"", settings, false}}));
   if (!security.ok()) return run.FailUsage(security.status());
   const absl::Status valid = ValidateSecurity(*security, settings.at("server"));
@@ -146,11 +146,11 @@ ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
   return ExitCode::kDone;
 }
 
-// What holds for the commands that follow, and why.
+// Shows the settings in force and their sources.
 ExitCode Show(Invocation run, const ContextArguments& arguments) {
   if (!arguments.name.empty()) run.context = arguments.name;
   const absl::Status resolved = ResolveConnection(&run);
-  // Files that cannot be read are told, behind what names them.
+  // Reports unreadable files after the settings that name them.
   if (!resolved.ok() && run.connection.empty()) return run.FailUsage(resolved);
   Table table;
   JsonObject object;

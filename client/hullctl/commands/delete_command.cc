@@ -22,14 +22,14 @@ struct DeleteArguments {
   std::optional<uint64_t> if_revision;
 };
 
-// A hull to delete; with the revision at which a list showed it, if one did.
+// A hull to delete, with its revision in the list, if it was listed.
 struct Doomed {
   std::string hull_id;
   std::optional<uint64_t> if_revision;
 };
 
-// Whether what was asked is meant. One hull that is named is; more need a yes, by option or by a
-// person at a terminal.
+// Returns true if the deletion is confirmed. A single hull given by name needs no confirmation;
+// more need --yes or a confirmation at the terminal.
 absl::StatusOr<bool> IsMeant(const Invocation& run, const DeleteArguments& arguments,
                              const std::vector<Doomed>& doomed) {
   if (arguments.yes || (doomed.size() == 1 && !arguments.has_prefix)) return true;
@@ -49,7 +49,7 @@ absl::StatusOr<std::vector<Doomed>> Choose(const Client& client, const DeleteArg
   const auto listed = client.ListAllHulls(arguments.prefix);
   if (!listed.ok()) return listed.status();
   for (const v1::HullInfo& hull : listed->hulls()) {
-    // What changed since it was listed is not what was meant; a damaged one has no revision.
+    // Keeps hulls that changed since the list. A damaged hull has no revision.
     std::optional<uint64_t> revision;
     if (!hull.damaged()) revision = hull.revision();
     doomed.push_back({hull.hull_id(), revision});
@@ -85,7 +85,7 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
       continue;
     }
     worst = run.Fail(response.status());
-    // Without a server or a right, the others would fail the same way.
+    // Without a server or a permission, the remaining hulls would fail alike.
     const bool own = gone || absl::IsAborted(response.status());
     if (!own) break;
   }

@@ -28,7 +28,7 @@ const std::map<std::string, Shape>& ShapeNames() {
   return *kNames;
 }
 
-// True when every coordinate that can come is finite.
+// Returns true if every possible coordinate is finite.
 bool IsFinite(const CloudOptions& cloud) {
   const bool round = cloud.shape == Shape::kBall || cloud.shape == Shape::kSphere;
   double reach = round ? cloud.radius : cloud.size / 2;

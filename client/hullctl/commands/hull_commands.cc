@@ -1,11 +1,10 @@
-// create and get: one hull.
+// `create` and `get`.
 #include <memory>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
@@ -51,8 +50,8 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
   table.Row({"revision", std::to_string(hull.revision())})
       .Row({"created at", std::to_string(hull.create_revision())});
   if (run.wide()) {
-    table.Row({"store", StoresText(response.header())})
-        .Row({"store revision", RevisionsText(response.header())});
+    table.Row({"store", response.header().store_id()})
+        .Row({"store revision", std::to_string(response.header().revision())});
   }
   if (response.has_audit()) {
     const bool ok = response.audit().ok();

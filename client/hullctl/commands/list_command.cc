@@ -19,7 +19,7 @@ struct ListArguments {
   bool count = false;
 };
 
-// What a list is sorted by: the largest first, but IDs ascend.
+// Sort keys of a list: largest first, but IDs ascend.
 using SortKey = std::function<uint64_t(const v1::HullInfo&)>;
 const std::map<std::string, SortKey>& SortKeys() {
   static const auto* const kKeys = new std::map<std::string, SortKey>{
@@ -35,7 +35,7 @@ void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {
   const SortKey& key = SortKeys().at(arguments.sort.empty() ? "id" : arguments.sort);
   auto begin = response->mutable_hulls()->pointer_begin();
   auto end = response->mutable_hulls()->pointer_end();
-  // They come by ID, and stay so where keys are equal.
+  // Hulls arrive in order of IDs; equal keys keep that order.
   if (key != nullptr) {
     std::stable_sort(begin, end, [&key](const v1::HullInfo* a, const v1::HullInfo* b) {
       return key(*a) > key(*b);
@@ -44,7 +44,7 @@ void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {
   if (arguments.reverse) std::reverse(begin, end);
 }
 
-// bodies: how many there are beside the hulls; lists of names do not tell of them.
+// bodies: the number of bodies; not shown in lists of names.
 void PrintCount(const Invocation& run, const v1::ListHullsResponse& response, uint64_t bodies) {
   uint64_t vertices = 0;
   uint64_t points = 0;
@@ -96,7 +96,7 @@ void PrintTable(const Invocation& run, const v1::ListHullsResponse& response) {
 }
 
 ExitCode List(const Invocation& run, const ListArguments& arguments) {
-  // What is sorted must be there as a whole before the limit cuts it.
+  // Sorting needs the complete list before the limit applies.
   const bool sorts = arguments.reverse || !arguments.sort.empty();
   auto response = run.MakeClient().ListAllHulls(arguments.prefix, sorts ? 0 : arguments.limit);
   if (!response.ok()) return run.Fail(response.status());

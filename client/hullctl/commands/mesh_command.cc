@@ -35,7 +35,7 @@ v1::GetHullMeshRequest RequestFor(const MeshArguments& arguments) {
   return request;
 }
 
-// The messages that the mesh came in, put together: header, vertices, facets.
+// Writes the mesh as the messages of its stream: header, vertices, facets.
 void WriteMessages(const HullMesh& mesh, std::ostream& out) {
   v1::GetHullMeshResponse header;
   *header.mutable_header() = mesh.header;
@@ -51,8 +51,7 @@ void WriteMessages(const HullMesh& mesh, std::ostream& out) {
   out << MessageJson(facets) << "\n";
 }
 
-// The mesh. With --verify, only one that is what it claims; otherwise its verification says why
-// not.
+// Returns the mesh. With --verify, its verification states any claim that does not hold.
 absl::StatusOr<VerifiedMesh> Fetch(const Invocation& run, const MeshArguments& arguments) {
   const v1::GetHullMeshRequest request = RequestFor(arguments);
   std::optional<ProgressBar> bar;

@@ -22,7 +22,7 @@ std::string FileName(const std::string& path) {
   return slash == std::string::npos ? path : path.substr(slash + 1);
 }
 
-// Keeps every 2^k-th point of a stream, with k as large as needed to stay within a bound.
+// Keeps every 2^k-th point of a stream, with the smallest k that stays within a bound.
 class Thinner {
  public:
   void Add(const std::array<double, 3>& p) {

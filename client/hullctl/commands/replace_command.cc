@@ -21,7 +21,12 @@ struct ReplaceArguments {
   std::optional<uint64_t> if_revision;
 };
 
-void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
+void Print(const Invocation& run, const v1::ReplaceHullResponse& response,
+           const ReadCounts& counts) {
+  const std::vector<std::string> skipped = SkippedTexts(counts);
+  if (run.form != OutputForm::kTable && !run.wide()) {
+    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were left out\n";
+  }
   if (run.json()) {
     run.out << MessageJson(response) << "\n";
     return;
@@ -33,8 +38,9 @@ void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
   }
   Table table;
   table.Row({"hull", hull.hull_id() + (response.created() ? " created" : " replaced")})
-      .Row({"points", std::to_string(hull.counts().received())})
-      .Row({"vertices", std::to_string(hull.vertex_count())})
+      .Row({"points", std::to_string(hull.counts().received())});
+  for (const std::string& text : skipped) table.Row({"skipped", text});
+  table.Row({"vertices", std::to_string(hull.vertex_count())})
       .Row({"revision", std::to_string(hull.revision())});
   table.Print(run.out);
 }
@@ -55,8 +61,9 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   open.set_create_if_absent(arguments.create);
   if (arguments.if_revision.has_value()) open.set_if_revision(*arguments.if_revision);
   ProgressBar bar(run.err, run.shows_progress, "points", total_bytes);
-  // A file that cannot be read ends the call, and the hull stays as it was.
+  // An unreadable file ends the call and leaves the hull unchanged.
   absl::Status file_error;
+  ReadCounts skipped;
   const auto feed = [&](const Client::PointSink& sink) -> absl::Status {
     uint64_t bytes_before = 0;
     uint64_t points = 0;
@@ -75,8 +82,10 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
       bytes_before += file_bytes;
       if (!stream.ok()) return stream;
       if (!counts.ok()) return file_error = counts.status();
+      skipped.skipped += counts->skipped;
+      skipped.zeros += counts->zeros;
     }
-    // What fed a pipe may have failed: nobody replaces a hull by nothing without saying so.
+    // The writer of a pipe may have failed: replacing a hull by an empty one needs --allow-empty.
     if (points == 0 && !arguments.allow_empty) file_error = NoPoints(arguments);
     return file_error;
   };
@@ -84,7 +93,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   bar.Clear();
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!response.ok()) return run.Fail(response.status());
-  Print(run, *response);
+  Print(run, *response, skipped);
   return ExitCode::kDone;
 }
 

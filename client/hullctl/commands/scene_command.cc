@@ -17,7 +17,7 @@
 namespace hulld {
 namespace {
 
-// Prints the pairs of a scene as they come.
+// Prints the pairs of a scene as they arrive.
 class SceneRun {
  public:
   SceneRun(const Invocation& run, const Scene& scene)
@@ -37,7 +37,7 @@ class SceneRun {
     return status;
   }
 
-  // Placements and pairs without answer.
+  // Number of placements and pairs without an answer.
   uint64_t failed() const { return totals_.failed() + placement_problems_; }
 
  private:
@@ -109,7 +109,7 @@ struct SceneArguments {
   QueryWishes wishes;
 };
 
-// Reads what nothing may follow.
+// Reads a scene that must end the source.
 absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryWishes& wishes) {
   const auto source = ByteSource::Open(file);
   if (!source.ok()) return source.status();
@@ -191,7 +191,7 @@ void AddSceneCommand(Command program, Invocation* invocation) {
                        {"What comes within a centimetre",
                         "hullctl scene scene.txt --clearance 0.01 --separation"}});
   command.OnGiven([=] {
-    // A command below this one has set what it does.
+    // A subcommand has already set the action.
     if (invocation->action == nullptr) {
       invocation->action = [=] { return FindInScene(*invocation, *arguments); };
     }

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// $XDG_STATE_HOME/hullctl/history, or the same under ~/.local/state.
+// Returns $XDG_STATE_HOME/hullctl/history; without the variable, the file below ~/.local/state.
 std::string HistoryFile() {
   const char* const state = std::getenv("XDG_STATE_HOME");
   if (state != nullptr && *state == '/') return absl::StrCat(state, "/hullctl/history");

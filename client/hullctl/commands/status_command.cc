@@ -2,7 +2,6 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
@@ -41,8 +40,8 @@ void Print(const Invocation& run, const v1::GetStatusResponse& status, const std
       .Row({"health", run.paint(health == "SERVING" ? Hue::kGood : Hue::kBad, health)})
       .Row({"version", status.version()})
       .Row({"uptime", UptimeText(status.uptime())})
-      .Row({"store", status.store_kind() + "  " + StoresText(status.header())})
-      .Row({"revision", RevisionsText(status.header())})
+      .Row({"store", status.store_kind() + "  " + status.header().store_id()})
+      .Row({"revision", std::to_string(status.header().revision())})
       .Row({"hulls", status.has_hull_count() ? std::to_string(status.hull_count()) : "-"})
       .Row({"vertices", status.has_vertex_count() ? std::to_string(status.vertex_count()) : "-"})
       .Row({"max points per chunk", std::to_string(limits.max_points_per_chunk())})
@@ -63,7 +62,7 @@ ExitCode Status(const Invocation& run) {
   const auto status = client.GetStatus();
   if (!status.ok()) return run.Fail(status.status());
   const absl::Status health = client.CheckHealth();
-  // A server without the health service is healthy when it answers at all.
+  // A server without the health service is healthy if it answers.
   const bool serving = health.ok() || absl::IsUnimplemented(health);
   const char* const text = health.ok() ? "SERVING" : serving ? "UNKNOWN" : "NOT_SERVING";
   if (run.json()) {

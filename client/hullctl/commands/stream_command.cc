@@ -22,7 +22,7 @@ struct StreamArguments {
   bool only_changes = false;
 };
 
-// One stream: what it is about, its answers, and how they are printed.
+// One stream: its scene, its answers, and their output.
 class StreamRun {
  public:
   StreamRun(const Invocation& run, const Scene& scene, std::vector<uint32_t> pairs)
@@ -106,11 +106,11 @@ class StreamRun {
   const Scene& scene_;
   const std::vector<uint32_t> pairs_;
   std::unique_ptr<CollisionStream> stream_;
-  // Why placements have no hull, as the last answer with hulls said.
+  // Problems of placements without a hull, from the last answer that lists hulls.
   std::unordered_map<uint32_t, std::string> problems_;
 };
 
-// The next line that is not blank.
+// Reads the next line that is not blank.
 bool NextLine(ByteSource* source, std::string* text) {
   std::string_view line;
   while (source->ReadLine(&line)) {

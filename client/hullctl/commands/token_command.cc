@@ -26,7 +26,7 @@ struct TokenArguments {
   std::string file;
 };
 
-// The hash as hulld's file of tokens holds it.
+// Returns the hash in the form of hulld's token file.
 std::string HashText(const std::string& token) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> hash = {};
   SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
@@ -34,7 +34,7 @@ std::string HashText(const std::string& token) {
                                      reinterpret_cast<const char*>(hash.data()), hash.size())));
 }
 
-// 256 random bits, so that a plain hash reveals nothing.
+// Returns 256 random bits, so that a plain hash reveals nothing.
 absl::StatusOr<std::string> RandomToken() {
   std::array<char, 32> bytes = {};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
@@ -44,7 +44,7 @@ absl::StatusOr<std::string> RandomToken() {
                       absl::WebSafeBase64Escape(absl::string_view(bytes.data(), bytes.size())));
 }
 
-// A new file, so that no token is overwritten and nobody has it open already.
+// Writes a new file: it overwrites no token, and no other process has it open.
 absl::Status WriteTokenFile(const std::string& path, const std::string& token) {
   const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd < 0) {

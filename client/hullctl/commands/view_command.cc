@@ -37,13 +37,13 @@ struct ViewArguments {
   std::string up = "y";
 };
 
-// Whether a file of that name is a scene rather than a mesh or points.
+// Returns true if the file name is that of a scene rather than a mesh or points.
 bool IsSceneName(const std::string& name) {
   return name.ends_with(".json") || name.ends_with(".yaml") || name.ends_with(".yml");
 }
 
-// A file that only this user can read and that sends a browser to the address. Other users see the
-// arguments of programs, so that the address itself must not be one.
+// A file, readable only by this user, that redirects a browser to the address. Other users can see
+// program arguments, so the address must not be one.
 class AddressFile {
  public:
   explicit AddressFile(const std::string& address) {
@@ -64,14 +64,14 @@ class AddressFile {
   AddressFile(const AddressFile&) = delete;
   AddressFile& operator=(const AddressFile&) = delete;
 
-  // Empty when it could not be written.
+  // Empty if it could not be written.
   const std::string& path() const { return path_; }
 
  private:
   std::string path_;
 };
 
-// Whether a browser was asked to open the file.
+// Returns true if a browser was asked to open the file.
 bool OpenInBrowser(const std::string& path) {
   if (path.empty()) return false;
   posix_spawn_file_actions_t quiet;
@@ -88,7 +88,7 @@ bool OpenInBrowser(const std::string& path) {
   return failed == 0;
 }
 
-// What `view` was asked to show, with the hulls that it made for it.
+// The scenes of `view`, with the temporary hulls made for them.
 class Viewing {
  public:
   Viewing(const Invocation& run, const ViewArguments& arguments)
@@ -114,7 +114,7 @@ class Viewing {
     program_.on_show = [this](const std::string& key) {
       if (key == kGrowingSceneKey) growing_->Restart();
     };
-    // Pages start with the first.
+    // Pages start with the first scene.
     if (!arguments_.scene_key.empty()) {
       const size_t chosen = static_cast<size_t>(arguments_.scene_key[0] - '0');
       std::rotate(program_.scenes.begin(), program_.scenes.begin() + chosen,
@@ -151,7 +151,7 @@ class Viewing {
     return ExitCode::kDone;
   }
 
-  // The shape of a file comes from the file, and its hull from the server.
+  // Takes the shape from the file and its hull from the server.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
     auto shape = ReadShape(path);
     if (!shape.ok()) return shape.status();
@@ -215,7 +215,8 @@ class Viewing {
 
   const Invocation& run_;
   const ViewArguments& arguments_;
-  // Until the end, so that what was put on the server is removed. Before all that starts threads.
+  // Handles signals until the end, so that temporary hulls are removed. Declared before everything
+  // that starts threads.
   std::atomic_flag interrupted_;
   const Interrupt interrupt_{[this] {
     interrupted_.test_and_set();

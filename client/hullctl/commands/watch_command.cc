@@ -1,4 +1,4 @@
-// watch: hulls as they come, change and go; pairs as they begin and end to collide.
+// watch: creations, changes, and deletions of hulls; begin and end of collisions of pairs.
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
@@ -14,7 +14,6 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
@@ -23,10 +22,10 @@ namespace {
 struct WatchOptions {
   std::string prefix;
   bool exact = false;
-  // A file; empty: hulls are watched.
+  // A file. Empty: watches hulls.
   std::string scene;
   bool until_synced = false;
-  // 0: no end.
+  // 0: unlimited.
   uint64_t events = 0;
 };
 
@@ -63,8 +62,7 @@ void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }
-  if (message.synced())
-    run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
+  if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
 }
 
 // A watch that ends at Ctrl-C.
@@ -83,11 +81,11 @@ class Ending {
  private:
   const std::unique_ptr<Watch> watch_;
   std::atomic<bool> is_ended_ = false;
-  // Last, so that nothing is called when the watch goes.
+  // Declared last, so that it is destroyed before the watch that it calls.
   const Interrupt interrupt_;
 };
 
-// Tells of what comes until the watch ends, `tell` says that it is enough, or Ctrl-C.
+// Prints messages until the watch ends, the callback returns true, or Ctrl-C.
 template <typename Watch, typename Tell>
 ExitCode TellAll(const Invocation& run, std::unique_ptr<Watch> watch, const Tell& tell) {
   Ending<Watch> ending(std::move(watch));
@@ -115,7 +113,7 @@ ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   return TellAll(run, run.MakeClient().WatchHulls(request), tell);
 }
 
-// What is watched of a scene: its poses stay.
+// Returns the watch of a scene with fixed poses.
 v1::CollisionWatchOpen OpenOf(const Scene& scene) {
   const v1::FindCollisionsRequest& request = scene.request;
   v1::CollisionWatchOpen open;
@@ -133,7 +131,7 @@ v1::CollisionWatchOpen OpenOf(const Scene& scene) {
   return open;
 }
 
-// The pieces of bodies that decided; empty where none did.
+// Returns the deciding pieces of bodies; empty if none decided.
 std::string PiecesOf(const Scene& scene, const v1::CollisionEvent& event) {
   if (!event.has_piece_a() && !event.has_piece_b()) return "";
   const auto index = [](bool has, const v1::DecidingPiece& piece) {
@@ -175,7 +173,7 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
     }
     const bool was_synced = std::exchange(is_synced, is_synced || message.synced());
     if (is_synced && !was_synced && !run.json()) {
-      run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
+      run.out << "# synced at revision " << message.header().revision() << "\n";
     }
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);

@@ -9,8 +9,8 @@
 namespace hulld {
 namespace {
 
-// Reads words as the parser does: which command they name, what its arguments are, and what is
-// still open at the end.
+// Interprets words as the parser does: the named command, its arguments, and the option left open
+// at the end.
 class WordReader {
  public:
   explicit WordReader(const CommandDescription& program) : path_{&program} {}
@@ -33,7 +33,7 @@ class WordReader {
     }
   }
 
-  // The option with that name, of the command or of one above it; null when there is none.
+  // Returns the option with that name, of the command or of an ancestor; null if none has it.
   const OptionDescription* Find(const std::string& name) const {
     for (auto command = path_.rbegin(); command != path_.rend(); ++command) {
       const OptionDescription* const option = FindOption(**command, name);
@@ -42,7 +42,7 @@ class WordReader {
     return nullptr;
   }
 
-  // The argument that the next word is; null when no more fit.
+  // Returns the argument that the next word fills; null if no further one fits.
   const OptionDescription* NextArgument() const {
     size_t left = arguments_;
     for (const OptionDescription& option : command().options) {
@@ -55,7 +55,7 @@ class WordReader {
 
   const CommandDescription& command() const { return *path_.back(); }
   const std::vector<const CommandDescription*>& path() const { return path_; }
-  // The option whose value the next word is; null: none.
+  // Returns the option that takes the next word as its value; null if none.
   const OptionDescription* open() const { return open_; }
   bool only_arguments() const { return only_arguments_; }
   bool was_given(const OptionDescription& option) const {
@@ -75,7 +75,7 @@ void Offer(const std::string& text, const std::string& help, const std::string& 
   if (absl::StartsWith(text, start)) completion->candidates.push_back({text, help});
 }
 
-// The values of an option or argument; each with `front` before it.
+// Offers the values of an option or argument, each prefixed with `front`.
 void OfferValues(const OptionDescription& option, const std::string& start,
                  const std::string& front, const ValueSource& values, Completion* completion) {
   for (const std::string& choice : option.choices) {
@@ -156,7 +156,7 @@ std::vector<std::string> ProgramOptionsIn(const CommandDescription& program,
     const size_t equals = word.find('=');
     const OptionDescription* const option = FindOption(program, word.substr(0, equals));
     if (option == nullptr || option->is_argument()) continue;
-    // They would end the program.
+    // Skips the options that would end the program.
     if (option->long_name() == "--help" || option->long_name() == "--version") continue;
     const bool takes_next = option->takes_value() && equals == std::string::npos;
     if (takes_next && i + 2 >= words.size()) break;

@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// A word that can stand where the cursor is.
+// A possible word at the cursor.
 struct Candidate {
   std::string text;
   std::string help;
@@ -17,21 +17,21 @@ struct Candidate {
 
 struct Completion {
   std::vector<Candidate> candidates;
-  // The shell's own completion of files, or of directories, applies too.
+  // Adds the shell's own completion of files, or of directories.
   bool files = false;
   bool directories = false;
 };
 
-// The values of a kind that start with a text, such as the IDs of hulls.
+// Returns the values of a kind that start with a text, such as the IDs of hulls.
 using ValueSource = std::function<std::vector<Candidate>(ValueKind kind, const std::string& start)>;
 
-// What can stand for the last of `words`, which are those behind the program's name up to the
-// cursor; the last one may be empty. `values` is asked only for what cannot be known otherwise.
+// Returns the completions of the last of `words`: the words after the program's name up to the
+// cursor. The last one may be empty. `values` is called only for values unknown to the parser.
 Completion Complete(const CommandDescription& program, const std::vector<std::string>& words,
                     const ValueSource& values);
 
-// The options of the program itself among the words, with their values, but for the last word: they
-// tell which server to ask.
+// Returns the program's own options among the words, with their values, except for the last word.
+// They determine the server to query.
 std::vector<std::string> ProgramOptionsIn(const CommandDescription& program,
                                           const std::vector<std::string>& words);
 

@@ -3,8 +3,8 @@
 namespace hulld {
 namespace {
 
-// Bash cuts words at "=" and ":", too, and puts candidates in the place of the last piece: the
-// words come from the line itself, and what stands before the last piece is cut off each candidate.
+// Bash also splits words at "=" and ":" and replaces only the last piece. So the script takes the
+// words from the line itself, and cuts the text before the last piece off each candidate.
 constexpr char kBash[] =
     R"sh(# bash completion for hullctl. Read it with: source <(hullctl completion bash)
 _hullctl() {

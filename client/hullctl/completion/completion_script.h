@@ -5,13 +5,13 @@
 
 namespace hulld {
 
-// The hidden first argument that asks for candidates: the words behind it are those behind the
-// program's name up to the cursor. Each line of the answer is a candidate, a tab and its help; the
-// last line is ":", then "files", "directories" or nothing: what the shell is to add.
+// Hidden first argument that requests completions. The remaining arguments are the words after the
+// program's name up to the cursor. Each line of the answer is a candidate, a tab, and its help; the
+// last line is ":", then "files", "directories", or nothing: the shell's own completion to add.
 inline constexpr char kCompleteCommand[] = "__complete";
 
-// What bash, zsh or fish is to read so that it completes hullctl's command lines. `shell` is one of
-// these three.
+// Returns the script that makes bash, zsh, or fish complete hullctl's command lines. `shell` is one
+// of these three names.
 std::string CompletionScript(const std::string& shell);
 
 }  // namespace hulld

@@ -14,11 +14,11 @@
 namespace hulld {
 namespace {
 
-// A person waits.
+// Bounds the delay for an interactive user.
 constexpr std::chrono::milliseconds kPatience(500);
-// The most IDs of a list, so that it takes little of that time.
+// Maximum number of listed IDs, to keep within that delay.
 constexpr uint64_t kMostListed = 20000;
-// More than fill a screen are shown by their parts.
+// Longer lists are abbreviated to ID segments, as they exceed a screen.
 constexpr size_t kMostShown = 100;
 
 std::vector<Candidate> Contexts(const std::string& start) {
@@ -31,7 +31,7 @@ std::vector<Candidate> Contexts(const std::string& start) {
   return candidates;
 }
 
-// Hulls, bodies, or both.
+// Returns hulls, bodies, or both.
 std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std::string& start) {
   if (!ResolveConnection(invocation).ok()) return {};
   ClientOptions options = invocation->MakeClient().options();
@@ -64,7 +64,7 @@ std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std:
     parts.insert(candidate.text.substr(0, candidate.text.find('/', start.size()) + 1));
   }
   many = many || candidates.size() > kMostShown;
-  // An ID without a further "/" has no part.
+  // An ID without a further "/" has no segment.
   if (!many || parts.contains("")) return candidates;
   candidates.clear();
   for (const std::string& part : parts) {

@@ -6,10 +6,9 @@
 
 namespace hulld {
 
-// Names of contexts from the file, and IDs of hulls from the server that the invocation's options
-// name. Nothing comes where the server does not answer within half a second, or refuses. When there
-// are very many IDs, only what stands before their next "/" comes. `invocation` must outlive the
-// result.
+// Returns names of contexts from the file, and IDs of hulls from the server that the invocation's
+// options name. Returns nothing if the server does not answer within half a second, or refuses.
+// Many IDs are abbreviated to their text before the next "/". `invocation` must outlive the result.
 ValueSource ValuesFor(Invocation* invocation);
 
 }  // namespace hulld

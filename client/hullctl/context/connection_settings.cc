@@ -24,7 +24,7 @@ absl::StatusOr<std::string> ReadPem(const std::string& path) {
   return text;
 }
 
-// Where an option is not itself what was given, its source is told too.
+// Returns INVALID_ARGUMENT with the option, and its source if it was not given as an option.
 absl::Status At(const std::string& name, const ChosenSetting& setting,
                 const absl::Status& problem) {
   std::string place = "--" + name;

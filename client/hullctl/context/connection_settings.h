@@ -12,19 +12,19 @@
 
 namespace hulld {
 
-// Where a server is and how to talk to it, as text: by the names of the options, "server" and so
-// on. A flag such as "tls" is "true" or "false". Files are paths, never their content.
+// Connection settings as text, keyed by option name: "server" and so on. A flag such as "tls" is
+// "true" or "false". Files are paths, never their content.
 using ConnectionSettings = std::map<std::string, std::string>;
 
 enum class SettingKind { kText, kFile, kFlag };
 
-// One of the options that say where a server is.
+// One connection option.
 struct ConnectionSetting {
   const char* name;
   // The environment variable; null: none.
   const char* variable;
   SettingKind kind;
-  // As the help names it; null for a flag.
+  // Name of the value in the help; null for a flag.
   const char* value_name;
   const char* help;
 };
@@ -48,8 +48,7 @@ inline constexpr ConnectionSetting kConnectionSettings[] = {
      "Let the token go unencrypted to other machines"},
 };
 
-// A token itself, which only the environment gives: arguments can be seen by every user of the
-// machine.
+// A token itself. Only the environment gives it, as all users of the machine can see arguments.
 inline constexpr char kTokenSetting[] = "token";
 inline constexpr char kTokenVariable[] = "HULLD_TOKEN";
 
@@ -57,22 +56,22 @@ inline constexpr char kTokenVariable[] = "HULLD_TOKEN";
 struct SettingsLayer {
   std::string source;
   ConnectionSettings settings;
-  // Left aside where an earlier layer names another server: a token or an authority must not go
-  // with a server that it is not for.
+  // True: ignored if an earlier layer names another server, so that a token or an authority is
+  // never used with the wrong server.
   bool only_for_its_server = false;
 };
 
 struct ChosenSetting {
   std::string value;
-  // Where it comes from.
+  // Source of the value.
   std::string source;
 };
 
-// What the layers together say, the first one first; with "server" always there. Where a token and
-// a file of one are both set, the earlier layer's is chosen, and within one layer the file.
+// Combines the layers, earlier ones first; the result always has "server". If both a token and a
+// token file are set, the earlier layer wins; within one layer, the file.
 std::map<std::string, ChosenSetting> Combine(const std::vector<SettingsLayer>& layers);
 
-// What the variables of the environment set.
+// Returns the settings from environment variables.
 absl::StatusOr<ConnectionSettings> SettingsOfEnvironment();
 
 // Reads the files. INVALID_ARGUMENT names the option and its source.

@@ -25,7 +25,7 @@ namespace {
 using google::protobuf::Struct;
 using google::protobuf::Value;
 
-// A file of contexts is small; what is larger is another file.
+// Maximum size of a context file; a larger one is no context file.
 constexpr size_t kMostBytes = size_t{1} << 20;
 
 absl::Status Damaged(const std::string& path, const std::string& what) {
@@ -85,7 +85,7 @@ std::string ToJson(const ContextFile& file) {
                       contexts, "\n  }\n}\n");
 }
 
-// All of it, on disk.
+// Writes the whole text and syncs it to disk.
 bool WriteAll(int descriptor, const std::string& text) {
   size_t written = 0;
   while (written < text.size()) {
@@ -101,7 +101,7 @@ bool WriteAll(int descriptor, const std::string& text) {
 
 std::string ContextFilePath() {
   const char* const config = std::getenv("XDG_CONFIG_HOME");
-  // The XDG specification: a path that is not absolute is to be ignored.
+  // The XDG specification requires relative paths to be ignored.
   if (config != nullptr && *config == '/') return absl::StrCat(config, "/hullctl/contexts.json");
   const char* const home = std::getenv("HOME");
   if (home == nullptr || *home == '\0') return "";
@@ -166,7 +166,7 @@ absl::Status WriteContextFile(const ContextFile& file) {
   }
   if (error) return problem(folder.string(), error.value());
   std::string draft = path + ".XXXXXX";
-  // mkstemp makes files that only their owner may read.
+  // mkstemp creates files that only their owner may read.
   const int descriptor = mkstemp(draft.data());
   if (descriptor < 0) return problem(draft, errno);
   const bool written = WriteAll(descriptor, ToJson(file));

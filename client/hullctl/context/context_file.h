@@ -11,29 +11,29 @@
 
 namespace hulld {
 
-// Servers by name, and the one that is used where nothing else is said.
+// Servers by name, and the default one.
 struct ContextFile {
   // Empty: none.
   std::string current;
   std::map<std::string, ConnectionSettings> contexts;
 };
 
-// $XDG_CONFIG_HOME/hullctl/contexts.json, or ~/.config/hullctl/contexts.json; empty where neither
-// variable says where.
+// Returns $XDG_CONFIG_HOME/hullctl/contexts.json, or ~/.config/hullctl/contexts.json; empty if
+// neither variable is set.
 std::string ContextFilePath();
 
-// The file at ContextFilePath(); no contexts where there is none. INVALID_ARGUMENT names the file,
-// what is wrong in it, and what to do.
+// Reads the file at ContextFilePath(); a missing file has no contexts. INVALID_ARGUMENT names the
+// file, the defect, and the remedy.
 absl::StatusOr<ContextFile> ReadContextFile();
 
-// Replaces the file at once, so that readers see the former or the new one; only its owner may read
-// it. Its folders are made. INVALID_ARGUMENT: it cannot be written.
+// Replaces the file atomically; only its owner may read it. Creates missing folders.
+// INVALID_ARGUMENT: it cannot be written.
 absl::Status WriteContextFile(const ContextFile& file);
 
-// Why the text cannot be a context's name, or nothing.
+// Returns the reason why the text cannot be a context name; empty if it can.
 std::string ContextNameProblem(const std::string& name);
 
-// The context of that name. INVALID_ARGUMENT: there is none; with those that there are.
+// Returns the context of that name. INVALID_ARGUMENT: it does not exist; lists the existing ones.
 absl::StatusOr<ConnectionSettings> FindContext(const ContextFile& file, const std::string& name);
 
 }  // namespace hulld

@@ -16,7 +16,7 @@ constexpr size_t kWidestName = 26;
 
 using Entry = std::pair<std::string, std::string>;
 
-// Words in lines of `width` characters; each line but the first is indented.
+// Wraps words at `width` characters; indents each line but the first.
 std::string Wrapped(const std::string& text, size_t indent, size_t width) {
   std::string result;
   size_t column = 0;
@@ -31,7 +31,7 @@ std::string Wrapped(const std::string& text, size_t indent, size_t width) {
   return result;
 }
 
-// Two columns under a heading; nothing when there are no entries.
+// Appends two columns under a heading; nothing without entries.
 void AppendList(const std::string& heading, const std::vector<Entry>& entries, std::string* text) {
   if (entries.empty()) return;
   size_t widest = 0;
@@ -86,7 +86,7 @@ std::string UsageText(const CommandDescription& command) {
 
 std::string OptionHeading(const OptionDescription& option) {
   if (option.is_argument()) return option.names.front() + (option.repeated ? "..." : "");
-  // Long names stand below each other.
+  // Aligns long names.
   std::string text = option.names.size() > 1 ? "" : "    ";
   absl::StrAppend(&text, absl::StrJoin(option.names, ", "));
   if (!option.value_name.empty()) absl::StrAppend(&text, " ", option.value_name);

@@ -8,20 +8,20 @@
 
 namespace hulld {
 
-// What --help prints: purpose, usage, arguments, options, commands by group, details, examples; in
-// lines of at most 100 characters, but for the caller's own.
+// Returns the text of --help: purpose, usage, arguments, options, commands by group, details, and
+// examples. Lines have at most 100 characters, except for preformatted ones.
 std::string HelpText(const CommandDescription& command);
 
-// "hullctl check A B [OPTIONS]".
+// Returns "hullctl check A B [OPTIONS]".
 std::string UsageText(const CommandDescription& command);
 
-// "-o, --out FILE".
+// Returns "-o, --out FILE".
 std::string OptionHeading(const OptionDescription& option);
 
-// What an option's help adds to its text: choices, variable.
+// Returns the help of an option with its choices and variable.
 std::string OptionHelp(const OptionDescription& option);
 
-// The commands below one, hidden ones left out, as groups in the order of their declaration.
+// The visible subcommands of a command, grouped, in the order of their declaration.
 struct CommandGroup {
   std::string title;
   std::vector<const CommandDescription*> commands;

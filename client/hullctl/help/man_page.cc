@@ -11,8 +11,8 @@
 namespace hulld {
 namespace {
 
-// Text that roff takes as it is: no line begins with a control character, and hyphens and quotes
-// can be copied from the page.
+// Escapes text for roff: no line begins with a control character, and hyphens and quotes can be
+// copied from the page.
 std::string Escaped(const std::string& text) {
   std::string result = absl::StrReplaceAll(text, {{"\\", "\\e"},
                                                   {"-", "\\-"},
@@ -24,12 +24,12 @@ std::string Escaped(const std::string& text) {
   return absl::StrReplaceAll(result, {{"\n.", "\n\\&."}});
 }
 
-// Lines as they are.
+// Keeps lines unchanged.
 std::string Verbatim(const std::string& text) {
   return absl::StrCat(".nf\n", Escaped(text), "\n.fi\n");
 }
 
-// Paragraphs flow; lines that are indented stay as they are.
+// Fills paragraphs; keeps indented lines unchanged.
 std::string Flowing(const std::string& text) {
   std::string result;
   bool verbatim = false;
@@ -59,7 +59,7 @@ void AppendHeading(const std::string& title, std::string* page) {
   absl::StrAppend(page, ".SH ", absl::AsciiStrToUpper(title), "\n");
 }
 
-// Options, details and examples of a command; with those of the commands below it.
+// Appends options, details, and examples of a command and of its subcommands.
 void AppendCommand(const CommandDescription& command, std::string* page) {
   AppendOptions(command, true, page);
   AppendOptions(command, false, page);

@@ -8,9 +8,8 @@
 
 namespace hulld {
 
-// The manual page of a program, or of one of its commands with those below it, in roff for man(7),
-// section 1. `version` stands in its footer. The program's page says what `files` holds in sections
-// of its own.
+// Returns the manual page of a program, or of a command with its subcommands, in roff for man(7),
+// section 1. The footer shows `version`. The program's page adds `files` as extra sections.
 struct ManSection {
   std::string title;
   std::string text;
@@ -18,7 +17,7 @@ struct ManSection {
 std::string ManPage(const CommandDescription& program, const CommandDescription& command,
                     const std::string& version, const std::vector<ManSection>& sections);
 
-// "hullctl-backup.1" for the command "hullctl backup".
+// Returns "hullctl-backup.1" for the command "hullctl backup".
 std::string ManPageName(const CommandDescription& command);
 
 }  // namespace hulld

@@ -9,8 +9,8 @@
 namespace hulld {
 namespace {
 
-// The number of letters to insert, delete, replace or exchange with their neighbours that makes b
-// of a.
+// Returns the minimum number of insertions, deletions, replacements, and swaps of adjacent letters
+// that turn a into b.
 size_t EditDistance(const std::string& a, const std::string& b) {
   // distance[i][j]: the distance between the first i letters of a and the first j of b.
   std::vector<std::vector<size_t>> distance(a.size() + 1, std::vector<size_t>(b.size() + 1));
@@ -27,7 +27,7 @@ size_t EditDistance(const std::string& a, const std::string& b) {
   return distance[a.size()][b.size()];
 }
 
-// Empty when none is near.
+// Empty if none is near.
 std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
   const std::string letters = absl::AsciiStrToLower(word);
   const size_t first = letters.find_first_not_of('-');

@@ -6,9 +6,9 @@
 
 namespace hulld {
 
-// `; did you mean "check"?` for a word that is none of `known`, or nothing when none is near. Near
-// is one that starts with it, or the nearest one within a third of its letters (Levenshtein's
-// distance, exchanged neighbours counted once). Case does not count.
+// Returns `; did you mean "check"?` for a word not in `known`, or nothing if none is near. A near
+// word starts with it, or is the nearest one within a third of its letters (Levenshtein distance, a
+// swap of adjacent letters counts as one). Case does not count.
 std::string Suggestion(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace hulld

@@ -7,7 +7,7 @@
 namespace hulld {
 namespace {
 
-// Buckets of each power of two, as a power of two.
+// Buckets per power of two, as a power of two.
 constexpr int kBucketBits = 7;
 constexpr uint64_t kBuckets = uint64_t{1} << kBucketBits;
 
@@ -17,7 +17,7 @@ size_t BucketOf(uint64_t value) {
   return static_cast<size_t>(shift) * kBuckets + (value >> shift);
 }
 
-// The least value of a bucket.
+// Returns the lowest value of a bucket.
 uint64_t StartOf(size_t bucket) {
   if (bucket < 2 * kBuckets) return bucket;
   const size_t shift = bucket / kBuckets - 1;

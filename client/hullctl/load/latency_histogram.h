@@ -7,8 +7,8 @@
 
 namespace hulld {
 
-// Counts of latencies in buckets that are exact below 256 ns and 1/128 of their value wide above,
-// so that a percentile is at most 0.8 % too large. Source of the layout: Tene, HdrHistogram.
+// Counts latencies in buckets that are exact below 256 ns and 1/128 of their value wide above, so
+// that a percentile is at most 0.8 % too large. Source of the layout: Tene, HdrHistogram.
 class LatencyHistogram {
  public:
   void Record(std::chrono::nanoseconds latency);
@@ -16,17 +16,17 @@ class LatencyHistogram {
 
   uint64_t count() const { return count_; }
   std::chrono::nanoseconds max() const { return max_; }
-  // The latency that this share, 0 to 1, of all do not exceed; 0 when there are none.
+  // Returns the latency not exceeded by this share, 0 to 1, of all; 0 if empty.
   std::chrono::nanoseconds Percentile(double share) const;
 
-  // A range of latencies, from <= latency < to.
+  // A range of latencies: from <= latency < to.
   struct Row {
     std::chrono::nanoseconds from;
     std::chrono::nanoseconds to;
     uint64_t count = 0;
   };
-  // Ranges with bounds 1, 2 and 5 times powers of ten, from the first that holds any to the last. A
-  // bucket counts where it starts.
+  // Returns ranges with bounds 1, 2, and 5 times powers of ten, from the first nonempty one to the
+  // last. A bucket counts in the range of its lower bound.
   std::vector<Row> Rows() const;
 
  private:

@@ -14,13 +14,13 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kPauseAfterFailure(10);
 constexpr std::chrono::milliseconds kLook(100);
 
-// What all clients of one run share.
+// State shared by all clients of a run.
 class LoadRun {
  public:
   LoadRun(const LoadPlan& plan, const std::atomic<bool>& stop)
       : plan_(plan), stop_(stop), start_(Clock::now()) {}
 
-  // Sends requests until the plan is done.
+  // Sends requests until the plan is complete.
   LoadResult Ask(const LoadRequest& request) {
     LoadResult result;
     for (;;) {
@@ -45,7 +45,7 @@ class LoadRun {
 
   uint64_t done() const { return done_.load(std::memory_order_relaxed); }
   Clock::duration elapsed() const { return Clock::now() - start_; }
-  // Requests that were due by now, or by the end of the run, and were not started.
+  // Returns the number of requests that were due by now, or by the end of the run, and not started.
   uint64_t Missed() const {
     if (!plan_.rate) return 0;
     std::chrono::duration<double> seconds = elapsed();
@@ -66,7 +66,7 @@ class LoadRun {
  private:
   bool IsOver() const { return plan_.duration && elapsed() >= *plan_.duration; }
 
-  // When request i was due; looks meanwhile whether to stop.
+  // Waits until request i is due and returns that time; checks for a stop while waiting.
   Clock::time_point WaitForTurn(uint64_t i) const {
     if (!plan_.rate) return Clock::now();
     const std::chrono::duration<double> offset(static_cast<double>(i) / *plan_.rate);

@@ -10,11 +10,12 @@
 namespace hulld {
 namespace {
 
-// Distinct requests that a client takes in turn, made before the clock starts.
+// Distinct requests of a client, used in turn and made before the clock starts.
 constexpr size_t kDistinctRequests = 256;
-// Placements of one batch, at most: a scene whose parts meet again and again.
+// Maximum number of placements per batch: a scene with parts that meet repeatedly.
 constexpr uint64_t kMostPlacements = 256;
-// Half the edge of the cube that hulls of radius 1 are placed in: about one pair in three collides.
+// Half the edge of the cube that contains the placed hulls of radius 1: about one pair in three
+// collides.
 constexpr double kHalfRoom = 1.3;
 
 v1::PointBlock MakePoints(Shape shape, uint64_t count, uint64_t seed) {
@@ -43,7 +44,7 @@ void FillPlacement(const std::string& hull_id, Xoshiro256& random, v1::Placement
   t->set_z(kHalfRoom * random.NextSigned());
 }
 
-// A connection whose answers miss none of the hulls that the load makes.
+// Returns a connection with linearizable reads, which include all hulls of the load.
 ClientOptions Linearizable(ClientOptions connection) {
   connection.freshness.reset();
   return connection;
@@ -51,7 +52,7 @@ ClientOptions Linearizable(ClientOptions connection) {
 
 }  // namespace
 
-// One client: its connection, its requests, its stream.
+// One client: its connection, its requests, and its stream.
 class LoadSubjects::LoadClient {
  public:
   LoadClient(const LoadSubjects& subjects, int index)
@@ -91,7 +92,7 @@ class LoadSubjects::LoadClient {
       case LoadMode::kMixed:
         break;
     }
-    // Eight of ten requests check, one is a batch and one appends.
+    // Eight of ten requests check, one is a batch, and one appends.
     if (i % 10 == 4) return Batch();
     if (i % 10 == 9) return Append();
     return Check(i);

@@ -20,32 +20,32 @@ enum class LoadMode { kCheck, kBatch, kAppend, kMixed };
 struct LoadSettings {
   LoadMode mode = LoadMode::kCheck;
   int clients = 1;
-  // Hulls that are asked about, and points on a sphere that each is made of.
+  // Number of queried hulls, and points on a sphere per hull.
   uint64_t hulls = 16;
   uint64_t vertices = 64;
-  // Pairs of one batch.
+  // Pairs per batch.
   uint64_t pairs = 10000;
-  // Points of one chunk of an append.
+  // Points per chunk of an append.
   uint64_t points = 10000;
-  // The prefix of the IDs of all hulls of the load; ends in "/".
+  // ID prefix of all hulls of the load; ends in "/".
   std::string prefix;
 };
 
-// The hulls of a load on a server, and the clients that ask about them.
+// The hulls of a load on a server, and the clients that query them.
 class LoadSubjects {
  public:
-  // connection: what each client connects with.
+  // connection: options of each client's connection.
   LoadSubjects(LoadSettings settings, ClientOptions connection);
 
-  // Creates the hulls that are asked about. FAILED_PRECONDITION when hulls with the prefix are
-  // there already, so that none but our own are ever deleted. CANCELLED: `stop` said so.
+  // Creates the queried hulls. FAILED_PRECONDITION: hulls with the prefix exist, which Delete would
+  // remove. CANCELLED: `stop` was set.
   absl::Status Create(const std::atomic<bool>& stop);
 
-  // One per client, each of which belongs to one thread.
+  // Returns one function per client, each for use by one thread.
   std::vector<LoadRequest> MakeClients();
 
-  // Deletes every hull of the prefix, in spite of errors, and returns the first error. Deletes
-  // nothing when Create refused.
+  // Deletes every hull of the prefix, continues after errors, and returns the first one. Deletes
+  // nothing if Create refused.
   absl::Status Delete();
 
  private:

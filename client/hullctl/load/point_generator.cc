@@ -8,7 +8,7 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// Rejection: uniform in the cube, kept when in the ball. 52 % are kept.
+// Rejection: uniform in the cube, kept if in the ball. 52 % are kept.
 Point InBall(Xoshiro256* random) {
   for (;;) {
     const Point p = {random->NextSigned(), random->NextSigned(), random->NextSigned()};

@@ -7,15 +7,15 @@
 
 namespace hulld {
 
-// Source: Blackman and Vigna 2019, Scrambled Linear Pseudorandom Number Generators: xoshiro256++,
-// its state filled by splitmix64 from the seed.
+// xoshiro256++, with its state filled by splitmix64 from the seed. Source: Blackman and Vigna 2019,
+// Scrambled Linear Pseudorandom Number Generators.
 class Xoshiro256 {
  public:
   explicit Xoshiro256(uint64_t seed);
   uint64_t Next();
-  // Uniform in [0, 1): a multiple of 2^-53.
+  // Returns a uniform number in [0, 1): a multiple of 2^-53.
   double NextUnit();
-  // Uniform in [-1, 1).
+  // Returns a uniform number in [-1, 1).
   double NextSigned() { return 2 * NextUnit() - 1; }
 
  private:
@@ -32,18 +32,18 @@ struct CloudOptions {
   double radius = 1;
   // Edge of the cube; distance between neighbours of the lattice.
   double size = 1;
-  // Centre of ball, sphere and cube; first point of the lattice.
+  // Centre of ball, sphere, and cube; first point of the lattice.
   std::array<double, 3> center = {0, 0, 0};
 };
 
-// Passes `count` points to `take`: uniform in the ball, on the sphere, in the cube, or the first
-// ones, x running fastest, of the smallest cubic lattice that has as many. The same on every
-// platform for the same options, for it uses only operations that IEEE 754 rounds correctly. Points
+// Passes `count` points to `take`: uniform in the ball, on the sphere, or in the cube; or the first
+// points, x fastest, of the smallest cubic lattice with at least that many. The same on every
+// platform for the same options, as it uses only operations that IEEE 754 rounds correctly. Points
 // of the sphere lie on it up to rounding.
 void GenerateCloud(const CloudOptions& options,
                    const std::function<void(const std::array<double, 3>&)>& take);
 
-// The smallest k with k^3 >= count.
+// Returns the smallest k with k^3 >= count.
 uint64_t LatticeSide(uint64_t count);
 
 }  // namespace hulld

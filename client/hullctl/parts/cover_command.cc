@@ -16,7 +16,7 @@
 namespace hulld {
 namespace {
 
-// How many triangles that stick out are listed, the farthest first.
+// Maximum number of listed uncovered triangles, farthest first.
 constexpr uint64_t kDefaultLimit = 10;
 
 struct CoverArguments {
@@ -25,18 +25,19 @@ struct CoverArguments {
   uint64_t limit = kDefaultLimit;
 };
 
-// Collects pieces; each hull is fetched once.
+// Collects pieces; fetches each hull once.
 class PieceFetcher {
  public:
   explicit PieceFetcher(const Client& client) : client_(client) {}
 
-  // A hull, the pieces of a body, or, where it ends in a slash, all hulls whose IDs start so.
+  // Adds a hull, the pieces of a body, or, for a word that ends in a slash, all hulls with that
+  // prefix.
   absl::Status Add(const std::string& word) {
     if (word.back() == '/') return AddAll(word);
     const absl::Status added = AddHull(word, kNoMotion);
     if (!absl::IsNotFound(added)) return added;
     const auto body = client_.GetBody(word);
-    // What is neither is told of as a hull.
+    // An unknown ID is reported as a missing hull.
     if (absl::IsNotFound(body.status())) return added;
     if (!body.ok()) return body.status();
     for (int i = 0; i < body->pieces_size(); ++i) {

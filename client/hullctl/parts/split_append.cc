@@ -57,9 +57,8 @@ absl::StatusOr<AppendTotals> Send(const Client& client, const NamedPart& named, 
   return (*stream)->totals();
 }
 
-// The body that the parts are to stand in, as it is before they are appended: without an ID where
-// there is none yet. ALREADY_EXISTS: a hull has its ID. NOT_FOUND: there is none, and it is not to
-// be created.
+// Returns the body of the parts as it is before the append; without an ID if it does not exist.
+// ALREADY_EXISTS: a hull has its ID. NOT_FOUND: it does not exist, and `create` is false.
 absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::string& id,
                                              bool create) {
   const absl::Status hull = client.GetHull(id).status();
@@ -78,8 +77,8 @@ absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::st
                                           "--create"));
 }
 
-// The body with the parts: pieces that it has stay where they are, those that it lacks come behind
-// them, as built. Empty where it lacks none.
+// Returns the body with the parts: existing pieces stay, missing parts are added after them, at the
+// identity. Nullopt if none is missing.
 std::optional<v1::PutBodyRequest> Extended(const v1::GetBodyResponse& body, const std::string& id,
                                            const std::vector<NamedPart>& parts) {
   v1::PutBodyRequest request;
@@ -110,7 +109,7 @@ absl::Status CheckPieces(const Client& client, const v1::GetBodyResponse& body,
       " (--max-pieces-per-body); make several bodies of the parts; nothing was changed"));
 }
 
-// Makes the body of the parts, and says what became of it.
+// Creates or extends the body of the parts, and prints the result.
 ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBodyResponse& found,
                    const std::string& id, const std::vector<NamedPart>& parts) {
   v1::BodyInfo body = found.body();

@@ -9,9 +9,9 @@
 
 namespace hulld {
 
-// Adds each part of the meshes to a hull of its own, ID/PART, puts those that the body of the ID
-// lacks into it, and prints what became of them. create: makes hulls, and the body, that are not
-// there. Changes nothing where a hull has the ID.
+// Appends each part of the meshes to a hull of its own, ID/PART, adds missing parts to the body of
+// the ID, and prints the results. create: creates missing hulls and the body. Changes nothing if a
+// hull has the ID.
 ExitCode AppendParts(const Invocation& run, const std::string& body_id,
                      const std::vector<std::string>& files, SplitBy split, bool create);
 

@@ -33,12 +33,12 @@ std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
     struct stat info = {};
     const bool is_file = stat(file.path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
     bytes += info.st_size;
-    // What --format says of a file, its name may not.
+    // The --format of a file may contradict its name.
     const auto named = PointFormatOfPath(file.path);
     const bool has_mesh = IsMeshFormat(file.format) && named.ok() && *named == file.format;
     if (!is_file || !has_mesh || bytes > kMostBytes) return std::nullopt;
     auto mesh = ReadMesh(file.path);
-    // The points were read; that the faces are broken is not worth an error.
+    // The points were read, so broken faces are no error.
     if (!mesh.ok()) return std::nullopt;
     const auto first = static_cast<uint32_t>(all.vertices.size());
     all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());

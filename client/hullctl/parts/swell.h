@@ -12,21 +12,23 @@
 
 namespace hulld {
 
-// From this ratio of volumes on, a hull is said to represent its mesh badly.
+// Minimum volume ratio at which a hull is reported as a poor fit for its mesh.
 inline constexpr double kSwellToWarn = 1.5;
 
-// "1.07 times the mesh", or that there is nothing to compare. ratio: see VolumeRatio.
+// Returns "1.07 times the mesh", or a text that no comparison is possible. ratio: see VolumeRatio.
 std::string SwellText(std::optional<double> ratio);
 
-// Warns where the hull is so much larger than the mesh that it represents it badly.
+// Warns if the hull is so much larger than the mesh that it fits it poorly.
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio);
 
-// The meshes of all files as one. Nothing where a file has none: not IsMeshFormat, an input that
-// is read once, or no triangle; or where they are more than 64 MiB, which would be held in memory.
+// Returns the meshes of all files as one. Nullopt if a file has none (not IsMeshFormat, an input
+// that can be read only once, or no triangle), or if they exceed 64 MiB, as they are held in
+// memory.
 std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files);
 
-// The volume of the hull over that of the mesh (see VolumeRatio). `text` is empty where there is
-// nothing to say: the hull has points of elsewhere, too, as it received others than `points`.
+// The volume of the hull divided by that of the mesh (see VolumeRatio). `text` is empty if the
+// ratio is meaningless: the hull has received more points than `points`, so it also has points of
+// another origin.
 struct Swell {
   std::string text;
   std::optional<double> ratio;

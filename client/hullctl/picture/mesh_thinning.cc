@@ -46,7 +46,8 @@ Clustering Cluster(const std::vector<DrawnPoint>& vertices,
     DrawnTriangle moved = {cluster_of[triangle[0]], cluster_of[triangle[1]],
                            cluster_of[triangle[2]]};
     if (moved[0] == moved[1] || moved[1] == moved[2] || moved[2] == moved[0]) continue;
-    // The lowest first, so that equal triangles compare equal; the orientation stays.
+    // Rotates the lowest index first, so that equal triangles compare equal; preserves the
+    // orientation.
     std::rotate(moved.begin(), std::min_element(moved.begin(), moved.end()), moved.end());
     result.triangles.push_back(moved);
   }

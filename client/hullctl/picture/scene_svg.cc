@@ -33,7 +33,7 @@ Point Normalized(const Point& a) {
   return {a[0] / length, a[1] / length, a[2] / length};
 }
 
-// Turns coordinates of any magnitude into a box within [-1, 1]^3 that is centred on 0.
+// Maps coordinates of any magnitude to a box within [-1, 1]^3 centred on 0.
 class Normalization {
  public:
   explicit Normalization(const std::vector<ScenePanel>& panels) {
@@ -53,8 +53,8 @@ class Normalization {
     for (size_t axis = 0; axis < 3; ++axis) {
       largest = std::max({largest, std::abs(low[axis]), std::abs(high[axis])});
     }
-    // Brings everything into [-1, 1] by a power of two first: later steps then cannot overflow or
-    // vanish.
+    // Scales everything into [-1, 1] by a power of two first, so that later steps cannot overflow
+    // or underflow.
     std::frexp(largest, &exponent_);
     double half_extent = 0;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -80,7 +80,7 @@ class Normalization {
   double half_extent_ = 1;
 };
 
-// Orthographic: right and up span the picture, `toward` points to the viewer.
+// Orthographic camera: right and up span the picture, `toward` points to the viewer.
 struct Camera {
   Point right;
   Point up;
@@ -92,7 +92,7 @@ Camera MakeCamera(UpAxis up_axis) {
   constexpr double kElevation = 0.42;
   const double ca = std::cos(kAzimuth), sa = std::sin(kAzimuth);
   const double ce = std::cos(kElevation), se = std::sin(kElevation);
-  // With y up; the other axes follow by cyclic exchange.
+  // For y up; the other axes follow by cyclic permutation.
   Camera camera{{ca, 0, -sa}, {-se * sa, ce, -se * ca}, {ce * sa, se, ce * ca}};
   const int shift = up_axis == UpAxis::kY ? 0 : up_axis == UpAxis::kZ ? 1 : 2;
   for (Point* axis : {&camera.right, &camera.up, &camera.toward}) {
@@ -122,7 +122,7 @@ std::string Hex(const Rgb& color) {
   return text;
 }
 
-// With at most 2 decimals, and none of them a trailing zero.
+// Returns at most 2 decimals, without trailing zeros.
 std::string Pixels(double value) {
   char buffer[32];
   const double rounded = std::round(value * 100) / 100;
@@ -141,14 +141,14 @@ std::string EscapeXml(const std::string& text) {
     } else if (c == '>') {
       escaped += "&gt;";
     } else {
-      // Names of files may hold bytes that are no UTF-8.
+      // File names may contain bytes that are not UTF-8.
       escaped += c >= ' ' && c <= '~' ? c : '?';
     }
   }
   return escaped;
 }
 
-// A polygon ready to be drawn.
+// A polygon ready for drawing.
 struct Face {
   double depth;
   int shade;
@@ -265,10 +265,10 @@ class SceneWriter {
         .append("</text>\n");
   }
 
-  // Dots in bands of depth, farther ones paler and drawn first.
+  // Writes dots in bands of depth; farther ones are paler and drawn first.
   void WriteDots(const std::vector<Point>& vertices, const Rgb& far, const Rgb& near, double size) {
     constexpr int kBands = 12;
-    // The diagonal of the box [-1, 1]^3 bounds the depth.
+    // The half diagonal of the box [-1, 1]^3 bounds the depth.
     constexpr double kReach = 1.7321;
     std::vector<std::string> bands(kBands);
     const size_t step = vertices.size() / kMaxDots + 1;
@@ -352,7 +352,7 @@ class SceneWriter {
     return face;
   }
 
-  // Light from the upper left, in front, over some light from everywhere.
+  // Light from the upper left front, plus ambient light.
   int Shade(const Point& normal) const {
     Point light;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -363,7 +363,7 @@ class SceneWriter {
     return static_cast<int>(std::lround((0.12 + 0.88 * lit) * (kShades - 1)));
   }
 
-  // Neighbours in the order that have one shade share a path.
+  // Consecutive faces of equal shade share a path.
   void WriteShaded(const std::vector<Face>& faces, const char* style) {
     for (size_t i = 0; i < faces.size();) {
       svg_.append("<path class=\"").append(style).append(std::to_string(faces[i].shade));

@@ -8,14 +8,14 @@
 
 namespace hulld {
 
-// One of the pictures that stand side by side.
+// One of several pictures side by side.
 struct ScenePanel {
   enum class Kind {
     // Dots at the vertices.
     kPoints,
-    // Opaque polygons, seen from both sides.
+    // Opaque polygons, visible from both sides.
     kMesh,
-    // Glassy convex polygons with their edges, and dots at the vertices.
+    // Translucent convex polygons with their edges, and dots at the vertices.
     kHull,
   };
   Kind kind;
@@ -23,7 +23,7 @@ struct ScenePanel {
   // Lines of text under the picture.
   std::vector<std::string> captions;
   std::vector<std::array<double, 3>> vertices;
-  // Corners per polygon, and the vertex indices of all polygons one after another, all in range.
+  // Corners per polygon, and the concatenated vertex indices of all polygons, all in range.
   std::vector<uint32_t> polygon_sizes;
   std::vector<uint32_t> polygon_indices;
 };
@@ -31,14 +31,14 @@ struct ScenePanel {
 // The direction that points up in the picture.
 enum class UpAxis { kX, kY, kZ };
 
-// An SVG image: the panels from left to right in one orthographic view and one scale, nearer things
-// drawn over farther ones. Requires finite vertices, of any
-// magnitude; unchecked, as the readers of files and the server refuse others. Coordinates are
-// rounded to 2 decimals of a pixel; more than some thousand vertices or polygons of a panel are
-// thinned out, so that the image stays near 1 MB at most.
+// Returns an SVG image: the panels from left to right in one orthographic view at one scale, nearer
+// objects over farther ones. Requires finite vertices of any magnitude; unchecked, as the file
+// readers and the server reject other values. Coordinates are rounded to 2 decimals of a pixel.
+// Panels of more than some thousand vertices or polygons are thinned out to keep the image near 1
+// MB at most.
 std::string RenderSceneSvg(const std::vector<ScenePanel>& panels, UpAxis up);
 
-// "1234567" as "1,234,567".
+// Returns "1234567" as "1,234,567".
 std::string GroupedDigits(uint64_t number);
 
 }  // namespace hulld

@@ -14,40 +14,40 @@
 
 namespace hulld {
 
-// One entry of each column of answers; null or none where the column is empty.
+// One entry of each answer column; null or absent if the column is empty.
 struct AnswerRow {
   v1::Relation relation = v1::RELATION_UNSPECIFIED;
   v1::Rung rung = v1::RUNG_UNSPECIFIED;
   const v1::Axis* axis = nullptr;
   const v1::Analysis* analysis = nullptr;
   const v1::Certificate* certificate = nullptr;
-  // For a pair with a body, instead of the certificate.
+  // For a pair with a body, in place of the certificate.
   const v1::PieceProof* proof = nullptr;
   std::optional<v1::Separation> separation;
   std::optional<v1::Witness> witness;
   std::optional<bool> within_clearance;
-  // The pieces of bodies that decided, -1 where none did; absent without bodies.
+  // The deciding pieces of bodies, -1 if none decided; absent without bodies.
   std::optional<std::pair<int32_t, int32_t>> pieces;
 };
 
-// Whether each column is empty or holds `count` entries.
+// Returns true if each column is empty or holds `count` entries.
 bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 
-// Row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked, as callers
-// ask AreParallel once for all rows.
+// Returns row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked, as
+// callers check AreParallel for all rows together.
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
-// For people, separated by tabs, the relation first. Pieces are told by their names, or by their
-// indices where those are empty.
+// Returns the row for people, separated by tabs, the relation first. Pieces are shown by name, or
+// by index if the names are empty.
 std::string RowText(const AnswerRow& row, const Painter& paint,
                     const std::array<std::string, 2>& piece_names = {});
 
-// Which pieces of bodies decided, as in "pieces leg 3": by their names, or by their indices where
-// those are empty, "-" for -1.
+// Returns the deciding pieces of bodies, as in "pieces leg 3": by name, or by index if the names
+// are empty, "-" for -1.
 std::string PiecesText(std::pair<int32_t, int32_t> pieces,
                        const std::array<std::string, 2>& piece_names);
 
-// Adds a member for each field that there is.
+// Adds a member for each present field.
 void AddRow(const AnswerRow& row, JsonObject* object);
 
 }  // namespace hulld

@@ -9,9 +9,9 @@
 
 namespace hulld {
 
-// Words for people, for the fields of a collision's answer.
+// Text for people, for the fields of a collision answer.
 
-// "SEPARATED", "TOUCHING", "OVERLAPPING"; "-" when there is none.
+// "SEPARATED", "TOUCHING", "OVERLAPPING"; "-" if unspecified.
 std::string RelationText(v1::Relation relation);
 std::string PaintedRelation(v1::Relation relation, const Painter& paint);
 // "FACET_A" and so on.

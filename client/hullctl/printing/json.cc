@@ -9,7 +9,7 @@ std::string MessageJson(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
   options.always_print_primitive_fields = true;
   std::string json;
-  // Fails only for messages with an Any of unknown type, of which the contract has none.
+  // Fails only for messages with an Any of unknown type; the contract has none.
   if (!google::protobuf::util::MessageToJsonString(message, &json, options).ok()) return "null";
   return json;
 }

@@ -5,10 +5,10 @@
 
 namespace hulld {
 
-// What a colour says. A word always says it too.
+// Meaning of a colour. The text always states it too.
 enum class Hue { kHeading, kGood, kNotable, kBad };
 
-// Puts colours round words, in terminals' escape sequences; leaves them alone unless it is on.
+// Colours words by terminal escape sequences; leaves them unchanged if disabled.
 class Painter {
  public:
   Painter() = default;
@@ -20,11 +20,11 @@ class Painter {
   bool on_ = false;
 };
 
-// Whether to paint: `when` is "always", "never" or "auto", which means on a terminal that can do
-// it, unless $NO_COLOR is set (https://no-color.org).
+// Returns true if output is coloured. `when` is "always", "never", or "auto": on a terminal that
+// supports colour, unless $NO_COLOR is set (https://no-colour.org).
 bool WantsColour(const std::string& when, bool is_terminal);
 
-// The number of columns that a text takes: escape sequences take none.
+// Returns the number of columns of a text, without escape sequences.
 size_t VisibleWidth(const std::string& text);
 
 }  // namespace hulld

@@ -12,10 +12,10 @@ namespace {
 
 constexpr std::chrono::seconds kFirst(1);
 constexpr std::chrono::milliseconds kStep(100);
-// A rate over less time says little.
+// Minimum time, in seconds, before a rate is shown.
 constexpr double kShortest = 0.1;
 
-// "950 points", "12.3k points", "4.6 MB".
+// Returns "950 points", "12.3k points", "4.6 MB".
 std::string AmountText(double amount, const std::string& unit) {
   constexpr const char* kScales[] = {"", "k", "M", "G", "T"};
   size_t scale = 0;

@@ -8,22 +8,22 @@
 
 namespace hulld {
 
-// How far something is.
+// Progress of a task.
 struct Progress {
-  // How much of `total` is done; `total` is 0 when it is not known.
+  // Completed part of `total`; `total` is 0 if unknown.
   uint64_t done = 0;
   uint64_t total = 0;
-  // What is counted, and how much there is of it: "points", or "B" for bytes.
+  // The counted amount and its unit: "points", or "B" for bytes.
   uint64_t count = 0;
   const char* unit = "";
 };
 
-// "[######----]  60 %  1200 points  400 points/s  2 s left"; without a total no bar and no time
-// left; before a tenth of a second no rate.
+// Returns "[######----]  60 %  1200 points  400 points/s  2 s left"; without a total, no bar and no
+// time left; in the first tenth of a second, no rate.
 std::string ProgressText(const Progress& progress, double seconds);
 
-// One line that is redrawn in place, at most ten times a second, and not within the first second;
-// nothing at all when not shown.
+// One line, redrawn in place at most ten times a second and not within the first second. Prints
+// nothing if not shown.
 class ProgressBar {
  public:
   // `total` 0 means unknown.
@@ -32,9 +32,9 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  // `done` of the total, and how much of the unit that is.
+  // Sets the completed part of the total, and the corresponding amount of the unit.
   void Update(uint64_t done, uint64_t count);
-  // For what is its own unit.
+  // For a total in the displayed unit.
   void Update(uint64_t done) { Update(done, done); }
   // Removes the line, so that other output can follow.
   void Clear();

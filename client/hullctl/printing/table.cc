@@ -16,7 +16,7 @@ void Table::Print(std::ostream& out) const {
   std::vector<size_t> widths;
   for (const auto& row : rows_) {
     widths.resize(std::max(widths.size(), row.size()));
-    // The last cell of a row has nothing to its right.
+    // The last cell of a row needs no padding.
     for (size_t i = 0; i + 1 < row.size(); ++i)
       widths[i] = std::max(widths[i], VisibleWidth(row[i]));
   }

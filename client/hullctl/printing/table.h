@@ -7,7 +7,7 @@
 
 namespace hulld {
 
-// Rows of text in columns that are as wide as their widest cell.
+// Rows of text in columns as wide as their widest cell.
 class Table {
  public:
   Table& Row(std::vector<std::string> cells);

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "client/hullctl/command_line/interrupt.h"
@@ -27,23 +28,47 @@ struct AcmArguments {
   std::string file;
 };
 
-// Values of the free joints, each uniform within its limits; a whole turn where there are none.
+// Returns a number for each variable: uniform within the limits of its joint, or over a full turn
+// without limits. Planar and floating joints stay at rest.
 std::vector<double> RandomValues(const Robot& robot, Xoshiro256* random) {
-  std::vector<double> values;
-  for (const int j : robot.FreeJoints()) {
-    const RobotJoint& joint = robot.joints[static_cast<size_t>(j)];
+  std::vector<double> values = RestValues(robot);
+  const std::vector<JointVariable> variables = robot.Variables();
+  for (size_t i = 0; i < values.size(); ++i) {
+    const RobotJoint& joint = robot.joints[static_cast<size_t>(variables[i].joint)];
+    if (joint.is_loose()) continue;
     const std::array<double, 2> range =
         joint.limits.value_or(std::array<double, 2>{-std::numbers::pi, std::numbers::pi});
     const double t = random->NextUnit();
-    values.push_back((1 - t) * range[0] + t * range[1]);
+    values[i] = (1 - t) * range[0] + t * range[1];
   }
   return values;
 }
 
-// In how many samples the shapes of two links collided.
+// Returns the pairs of links with a planar or floating joint between them. Their relative motion is
+// unbounded, so no sample is evidence about them.
+std::set<LinkPair> LoosePairs(const Robot& robot) {
+  // The topmost ancestor of each link without such a joint in between.
+  std::vector<int> top;
+  for (const RobotLink& link : robot.links) {
+    const int self = static_cast<int>(top.size());
+    const RobotJoint* const joint =
+        link.parent_joint < 0 ? nullptr : &robot.joints[static_cast<size_t>(link.parent_joint)];
+    const bool hangs = joint != nullptr && !joint->is_loose();
+    top.push_back(hangs ? top[static_cast<size_t>(joint->parent)] : self);
+  }
+  std::set<LinkPair> pairs;
+  for (size_t a = 0; a < top.size(); ++a) {
+    for (size_t b = a + 1; b < top.size(); ++b) {
+      if (top[a] != top[b]) pairs.insert({static_cast<int>(a), static_cast<int>(b)});
+    }
+  }
+  return pairs;
+}
+
+// Number of samples in which the shapes of two links collided.
 struct Tally {
   uint64_t colliding = 0;
-  // The last sample counted, so that several shapes of a link count once.
+  // The last counted sample, so that several shapes of a link count once.
   uint64_t last = ~uint64_t{0};
 };
 
@@ -105,18 +130,21 @@ ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
   const Interrupt interrupt([&stopped] { stopped = true; });
   const Client client = run.MakeClient();
   TemporaryHulls temporary(client, "robot");
-  absl::Status status = RegisterHulls(arguments.robot, client, &temporary, &*model);
+  absl::Status status = RegisterHulls(run, arguments.robot, client, &temporary, &*model);
   const std::set<LinkPair> adjacent = AdjacentPairs(model->robot);
-  const std::vector<uint32_t> pairs = model->PairsWithout(adjacent);
+  std::set<LinkPair> left_out = LoosePairs(model->robot);
+  left_out.insert(adjacent.begin(), adjacent.end());
+  const std::vector<uint32_t> pairs = model->PairsWithout(left_out);
   std::map<LinkPair, Tally> tallies;
   if (status.ok() && !pairs.empty()) {
     status = Sample(run, arguments, *model, client, stopped, &tallies, pairs);
   }
   if (!status.ok()) return run.Fail(status);
   const std::vector<DisabledPair> disabled = Judge(adjacent, tallies, arguments.samples);
-  const std::string comment = absl::StrCat("Adjacent: connected by a joint. Never, Always: in ",
-                                           arguments.samples, " random configurations (seed ",
-                                           arguments.seed, "), which is evidence and no proof.");
+  const std::string comment = absl::StrCat(
+      "Adjacent: connected by a joint, or through links without shapes. Never, Always: in ",
+      arguments.samples, " random configurations (seed ", arguments.seed,
+      "), which is evidence and no proof.");
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
     WriteSrdf(model->robot, disabled, comment, out);
   });
@@ -140,8 +168,12 @@ void AddRobotAcmCommand(Command robot, Invocation* invocation) {
       std::string(kRobotHelp) +
       "\nEach joint takes values uniform within its limits, or a whole turn where it has none. "
       "The\n"
-      "same options sample the same configurations. Links that a joint connects are written as\n"
-      "Adjacent and not sampled. Touching counts as colliding.");
+      "same options sample the same configurations. Links that a joint connects, or joints "
+      "through\n"
+      "links without shapes, are written as Adjacent and not sampled. Links with a planar or "
+      "floating\n"
+      "joint between them are neither sampled nor written: nothing bounds how they move. Touching\n"
+      "counts as colliding.");
   command.SetExamples({{"", "hullctl robot acm arm.urdf --samples 10000 -o arm.srdf"}});
   command.OnGiven([=] { invocation->action = [=] { return MakeAcm(*invocation, *arguments); }; });
 }

@@ -26,7 +26,7 @@
 namespace hulld {
 namespace {
 
-// Values beyond limits that are told one by one; the rest are only counted.
+// Maximum number of limit violations printed individually; the rest are only counted.
 constexpr size_t kMostWarnings = 5;
 
 struct CheckArguments {
@@ -44,14 +44,62 @@ struct CheckArguments {
   QueryWishes wishes;
 };
 
-// What the questions are about: the parts of the robot, then what stands around it.
+// Objects of the queries: the parts of the robot, then its surroundings.
 struct Cast {
   std::vector<std::string> names;
   std::vector<std::string> fixed_hulls;
   std::vector<double> fixed_poses;
 };
 
-// One run: the robot, its waypoints one after another, and what is printed about them.
+// Returns true if a joint connects the two links.
+bool AreJoined(const Robot& robot, const LinkPair& pair) {
+  const auto hangs_on = [&robot](int child, int parent) {
+    const int joint = robot.links[static_cast<size_t>(child)].parent_joint;
+    return joint >= 0 && robot.joints[static_cast<size_t>(joint)].parent == parent;
+  };
+  return hangs_on(pair.first, pair.second) || hangs_on(pair.second, pair.first);
+}
+
+// Sets a variable to a number, or all variables of a joint: a floating joint from a pose, a planar
+// one from x,y,theta.
+absl::Status SetJoint(const Robot& robot, const std::string& name, const std::string& text,
+                      const std::vector<JointVariable>& variables, std::vector<double>* values) {
+  std::vector<std::string> known;
+  for (size_t i = 0; i < variables.size(); ++i) {
+    known.push_back(variables[i].name);
+    if (variables[i].name != name) continue;
+    double* const value = &(*values)[i];
+    if (ParseDouble(text, value) == NumberText::kNumber && std::isfinite(*value)) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(name + "=" + text), " is not NAME=NUMBER"));
+  }
+  const int joint = robot.FindJoint(name);
+  const RobotJoint* const loose = joint >= 0 && robot.joints[static_cast<size_t>(joint)].is_loose()
+                                      ? &robot.joints[static_cast<size_t>(joint)]
+                                      : nullptr;
+  if (loose == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is no joint of ", robot.name,
+                                                   " with a value", Suggestion(name, known)));
+  }
+  JointValue value = {};
+  if (loose->kind == JointKind::kFloating) {
+    const auto pose = ParsePose(text);
+    if (!pose.ok()) return pose.status();
+    value = NumbersOf(*pose);
+  } else {
+    const auto triple = ParseTriple(text);
+    if (!triple.ok()) return triple.status();
+    std::copy(triple->begin(), triple->end(), value.begin());
+  }
+  for (size_t i = 0; i < variables.size(); ++i) {
+    if (variables[i].joint == joint) (*values)[i] = value[variables[i].place];
+  }
+  return absl::OkStatus();
+}
+
+// One run: the robot, its sequence of waypoints, and the output about them.
 class RobotCheck {
  public:
   RobotCheck(const Invocation& run, const CheckArguments& arguments, RobotModel model)
@@ -93,18 +141,20 @@ class RobotCheck {
   const Client client_;
   TemporaryHulls temporary_;
   ProgressBar bar_;
-  // What stands around the robot, if anything.
+  // Surroundings of the robot, if any.
   Scene scene_;
   Cast cast_;
   std::vector<uint32_t> pairs_;
-  // Pairs of links with shapes that are not asked about, and why.
+  // Number of excluded pairs of links with shapes, and the reason.
   size_t left_out_ = 0;
   std::string left_out_by_;
+  // Number of these that are adjacent through links without shapes.
+  size_t left_out_bare_ = 0;
 
   std::unique_ptr<ByteSource> source_;
   std::optional<WaypointReader> reader_;
   bool given_was_read_ = false;
-  // The first waypoints, which tell whether there is more than one: then only changes are told.
+  // The first waypoints. They show if the file has more than one; only changes are then printed.
   std::deque<Waypoint> pending_;
   bool many_ = false;
   std::vector<uint64_t> lines_;
@@ -122,7 +172,7 @@ class RobotCheck {
     v1::Relation relation;
   };
   std::optional<Contact> first_;
-  // Which pairs collided at the waypoint before.
+  // True for each pair that collided at the previous waypoint.
   std::vector<bool> collides_;
 };
 
@@ -156,6 +206,10 @@ absl::Status RobotCheck::ChoosePairs() {
   }
   pairs_ = model_.PairsWithout(out);
   left_out_ = (model_.PairsWithout({}).size() - pairs_.size()) / 2;
+  if (arguments_.srdf.empty()) {
+    std::erase_if(out, [this](const LinkPair& pair) { return AreJoined(model_.robot, pair); });
+    left_out_bare_ = (model_.PairsWithout({}).size() - model_.PairsWithout(out).size()) / 2;
+  }
   const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
   for (uint32_t a = 0; a < robot_parts; ++a) {
     for (uint32_t b = robot_parts; b < cast_.names.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
@@ -183,37 +237,33 @@ absl::Status RobotCheck::ChoosePairs() {
     }
     pairs_ = std::move(kept);
   }
-  if (pairs_.empty()) {
-    return absl::InvalidArgumentError(
-        "no pair of links is left to ask about; --adjacent asks about adjacent ones, too");
-  }
-  return absl::OkStatus();
+  if (!pairs_.empty()) return absl::OkStatus();
+  const std::string hint = !arguments_.ignored.empty() ? "--ignore leaves all of them out"
+                           : left_out_ == 0 ? "two links with shapes, or --scene, make one"
+                           : arguments_.srdf.empty()
+                               ? "--adjacent asks about adjacent ones, too"
+                               : absl::StrCat(arguments_.srdf, " disables all of them");
+  return absl::InvalidArgumentError(absl::StrCat("no pair of links is left to ask about; ", hint));
 }
 
-// Those at rest, but for what --joint says.
+// Returns the rest values, overridden by --joint.
 absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
   Waypoint values = RestValues(model_.robot);
-  const std::vector<int> free = model_.robot.FreeJoints();
+  const std::vector<JointVariable> variables = model_.robot.Variables();
   for (const std::string& given : arguments_.joint_values) {
     const size_t equals = given.find('=');
     const std::string name = given.substr(0, equals);
-    const int joint = model_.robot.FindJoint(name);
-    const auto place = std::find(free.begin(), free.end(), joint);
-    if (joint < 0 || place == free.end()) {
-      std::vector<std::string> known;
-      for (const int index : free) {
-        known.push_back(model_.robot.joints[static_cast<size_t>(index)].name);
-      }
-      return absl::InvalidArgumentError(absl::StrCat("--joint: ", Quoted(name), " is no joint of ",
-                                                     model_.robot.name, " with a value",
-                                                     Suggestion(name, known)));
-    }
-    double* const value = &values[static_cast<size_t>(place - free.begin())];
     const std::string text = equals == std::string::npos ? "" : given.substr(equals + 1);
-    if (ParseDouble(text, value) != NumberText::kNumber || !std::isfinite(*value)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--joint: ", Quoted(given), " is not NAME=NUMBER"));
+    const auto set = SetJoint(model_.robot, name, text, variables, &values);
+    if (!set.ok()) {
+      const std::string message(set.message().data(), set.message().size());
+      return absl::InvalidArgumentError(absl::StrCat("--joint: ", message));
     }
+  }
+  const std::string joint = JointWithoutRotation(model_.robot, values);
+  if (!joint.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat("--joint: the quaternion of ", Quoted(joint),
+                                                   " is 0 0 0 0, which is no rotation"));
   }
   return values;
 }
@@ -319,7 +369,7 @@ void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, con
            << (run_.names() ? RelationText(row.relation) : TextOf(pair, row)) << "\n";
 }
 
-// The answer's text; where the surroundings are a body, with its piece that decided.
+// Returns the answer's text; for surroundings that are a body, with its deciding piece.
 std::string RobotCheck::TextOf(size_t pair, const AnswerRow& row) const {
   const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
   const uint32_t b = pairs_[2 * pair + 1];
@@ -335,7 +385,7 @@ std::string RobotCheck::TextOf(size_t pair, const AnswerRow& row) const {
 
 void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
                       const std::string& problem) {
-  // With --first, what the message of the first contact holds beyond it is passed over.
+  // With --first, ignores the rest of the message with the first contact.
   if (arguments_.first && first_.has_value() && waypoint > first_->waypoint) return;
   ++counts_[row.relation];
   const bool collides =
@@ -378,9 +428,13 @@ void RobotCheck::PrintHead() {
              << " within a polyhedron that reaches at most " << ShortestText(part.hull.excess)
              << " beyond it\n";
   }
+  for (const std::string& note : model_.notes) run_.out << "# " << note << "\n";
   run_.out << "# " << pairs_.size() / 2 << " pairs";
   if (left_out_ > 0) run_.out << "; " << left_out_ << " left out by " << left_out_by_;
-  // Warnings come behind it.
+  if (left_out_bare_ > 0) {
+    run_.out << ", " << left_out_bare_ << " of them joined through links without shapes";
+  }
+  // Warnings follow.
   run_.out << "\n" << std::flush;
 }
 
@@ -412,7 +466,7 @@ ExitCode RobotCheck::Run() {
     if (absl::Status ready = (this->*prepare)(); !ready.ok()) return run_.FailUsage(ready);
   }
   const Interrupt interrupt([this] { stopped_ = true; });
-  absl::Status status = RegisterHulls(arguments_.robot, client_, &temporary_, &model_);
+  absl::Status status = RegisterHulls(run_, arguments_.robot, client_, &temporary_, &model_);
   if (!status.ok()) return run_.Fail(status);
   WaypointStream::Scope scope;
   for (const RobotPart& part : model_.parts) scope.moving.push_back(part.hull_id);
@@ -422,7 +476,7 @@ ExitCode RobotCheck::Run() {
   double tolerance = 0;
   arguments_.wishes.Apply(&scope.wanted, &tolerance);
   scope.tolerance = tolerance;
-  // One waypoint is looked at closely.
+  // A single waypoint is examined in detail.
   if (!many_ && tolerance == 0) scope.wanted.set_separation(true);
   collides_.assign(pairs_.size() / 2, false);
   PrintHead();
@@ -451,7 +505,7 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
   return RobotCheck(run, arguments, *std::move(model)).Run();
 }
 
-// Which pairs of links are asked about.
+// Adds options that select the pairs of links.
 void AddPairOptions(Command command, CheckArguments* arguments) {
   command
       .AddText(
@@ -460,10 +514,11 @@ void AddPairOptions(Command command, CheckArguments* arguments) {
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command.AddFlag("--adjacent", &arguments->adjacent,
-                  "Without --srdf: ask about links that a joint connects, too");
+                  "Without --srdf: ask about links that a joint connects, or joints through links "
+                  "without shapes, too");
 }
 
-// How the robot stands, once or many times.
+// Adds options for one configuration of the robot or many.
 void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& arguments) {
   command
       .AddText(
@@ -472,8 +527,10 @@ void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& 
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command
-      .AddRepeated("--joint", &arguments->joint_values,
-                   "Without --joints: the value of a joint; may be given again")
+      .AddRepeated(
+          "--joint", &arguments->joint_values,
+          "Without --joints: the value of a joint, a pose [w,x,y,z,]x,y,z of a floating one, "
+          "x,y,theta of a planar one; may be given again")
       .ValueName("NAME=VALUE");
   command
       .AddParsed(
@@ -487,7 +544,7 @@ void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& 
       .ValueName("POSE");
 }
 
-// What stands around the robot.
+// Adds options for the surroundings of the robot.
 void AddSceneOptions(Command command, CheckArguments* arguments) {
   command
       .AddText(
@@ -505,9 +562,12 @@ void DescribeRobotCheck(Command command) {
   command.SetDetails(
       std::string(kRobotHelp) +
       "\nPairs of shapes on one link are never asked about. Without --srdf, links that a joint\n"
-      "connects are left out, too, as MoveIt does: they touch by design. With --srdf, exactly the\n"
-      "pairs that it disables are.\n"
-      "\nA joint without a value is at 0, or in the middle of its limits where they exclude 0. A\n"
+      "connects, or joints through links without shapes, are left out, too, as MoveIt does: they\n"
+      "touch by design. Planar and floating joints connect nothing in this sense. With --srdf,\n"
+      "exactly the pairs that it disables are left out.\n"
+      "\nA joint without a value is at 0, or in the middle of its limits where they exclude 0. In\n"
+      "--joints, a planar joint J has the columns J/x, J/y and J/theta, a floating one J/trans_x,\n"
+      "J/trans_y, J/trans_z, J/rot_x, J/rot_y, J/rot_z and J/rot_w, as in MoveIt. A\n"
       "value beyond limits is warned of, not changed. One configuration prints every pair and its\n"
       "separation. Several waypoints are one stream: pairs are printed as they begin (ENTER) and\n"
       "end (LEAVE) to collide or touch, and the first contact is named. Only the waypoints "

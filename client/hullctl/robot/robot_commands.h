@@ -6,10 +6,10 @@
 
 namespace hulld {
 
-// Declares `robot` and the commands below it. `invocation` must outlive the action.
+// Declares `robot` and its subcommands. `invocation` must outlive the action.
 void AddRobotCommand(Command program, Invocation* invocation);
 
-// The commands below it; each declares itself.
+// Declare the subcommands.
 void AddRobotCheckCommand(Command robot, Invocation* invocation);
 void AddRobotAcmCommand(Command robot, Invocation* invocation);
 

@@ -1,6 +1,7 @@
 #include "client/hullctl/robot/robot_model.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -8,6 +9,8 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/hull_segment.h"
+#include "client/hullctl/parts/swell.h"
+#include "client/hullctl/robot/mesh_pieces.h"
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
@@ -19,11 +22,11 @@ const char kRobotHelp[] =
     "its\n"
     "own frame: a mesh its convex hull, a box itself, and cylinders, spheres and capsules "
     "polyhedra\n"
-    "around them; how far these reach beyond the shape is printed. The hulls are removed at the\n"
-    "end unless --prefix keeps them. Meshes are obj, stl, ply, off, gltf or dae. A "
-    "package://NAME/\n"
-    "is found by --package, in ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above "
-    "FILE.\n"
+    "around them; how far these reach beyond the shape is printed. A mesh file of several named\n"
+    "parts that are all convex, as V-HACD and CoACD write them, becomes a hull for each part;\n"
+    "--split does so with any parts. The hulls are removed at the end unless --prefix keeps them.\n"
+    "Meshes are obj, stl, ply, off, gltf or dae. A package://NAME/ is found by --package, in\n"
+    "ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above FILE.\n"
     "Metres and radians, as in URDF. Poses are computed in floating point; answers are exact for\n"
     "those poses.\n";
 
@@ -50,11 +53,66 @@ absl::StatusOr<PackagePaths> PathsOf(const RobotArguments& arguments) {
   return paths;
 }
 
-absl::StatusOr<ShapeHull> HullOf(const CollisionShape& shape, const PackagePaths& paths) {
-  if (shape.kind != ShapeKind::kMesh) return PrimitiveHull(shape);
+MeshSplit SplitOf(const RobotArguments& arguments) {
+  return arguments.split == "names"        ? MeshSplit::kNames
+         : arguments.split == "components" ? MeshSplit::kComponents
+         : arguments.split == "none"       ? MeshSplit::kNone
+                                           : MeshSplit::kAutomatic;
+}
+
+absl::StatusOr<std::vector<MeshPiece>> PiecesOf(const CollisionShape& shape,
+                                                const PackagePaths& paths, MeshSplit split) {
+  if (shape.kind != ShapeKind::kMesh) return std::vector<MeshPiece>{{PrimitiveHull(shape), {}}};
   const auto file = ResolveFile(paths, shape.mesh);
   if (!file.ok()) return file.status();
-  return MeshHull(shape, *file);
+  return MeshPieces(shape, *file, split);
+}
+
+// Adds the parts of a link to the model.
+absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths, size_t link,
+                     RobotModel* model) {
+  const RobotLink& from = model->robot.links[link];
+  const size_t first = model->parts.size();
+  for (const CollisionShape& shape : from.shapes) {
+    auto pieces = PiecesOf(shape, paths, SplitOf(arguments));
+    if (!pieces.ok()) {
+      const std::string message(pieces.status().message().data(), pieces.status().message().size());
+      return absl::Status(pieces.status().code(),
+                          absl::StrCat(arguments.urdf, ":", shape.line, ": link ",
+                                       Quoted(from.name), ": ", message));
+    }
+    if (pieces->size() > 1) {
+      model->notes.push_back(
+          absl::StrCat(from.name, ": ", pieces->size(), " pieces of ", shape.mesh));
+    }
+    for (MeshPiece& piece : *pieces) {
+      RobotPart& part = model->parts.emplace_back();
+      part.link = static_cast<int>(link);
+      part.name = from.name;
+      part.X_LS = shape.X_LS;
+      part.kind = shape.kind;
+      part.hull = std::move(piece.hull);
+      part.mesh = std::move(piece.mesh);
+    }
+  }
+  const size_t count = model->parts.size() - first;
+  for (size_t i = 0; count > 1 && i < count; ++i) {
+    absl::StrAppend(&model->parts[first + i].name, "/", i + 1);
+  }
+  return absl::OkStatus();
+}
+
+// Warns if the hull of a part is so much larger than its mesh that it fits it poorly.
+void WarnOfSwollenPart(const Invocation& run, const Client& client, const RobotPart& part) {
+  if (part.mesh.triangles.empty()) return;
+  // Failure to read the hull does not fail the check; the mesh is only compared.
+  const auto swell = SwellOf(client, part.hull_id, part.hull.xyz.size() / 3, part.mesh);
+  if (!swell.ok() || swell->ratio.value_or(1) < kSwellToWarn) return;
+  run.err
+      << "hullctl: warning: the hull of " << part.name << " has "
+      << absl::StrFormat("%.4g", *swell->ratio)
+      << " times the volume of its mesh, so it may collide where the mesh does not; use a convex "
+         "decomposition of the mesh, or --split\n";
 }
 
 }  // namespace
@@ -67,6 +125,13 @@ void AddRobotArguments(Command command, RobotArguments* arguments) {
                    "Where the package of that name is; may be given again")
       .ValueName("NAME=DIR");
   command
+      .AddText(
+          "--split", &arguments->split,
+          "Make a hull of each part of a mesh: of what its file names, or of what hangs "
+          "together; none: one hull of each mesh (default: by names where all parts are convex)")
+      .ValueName("HOW")
+      .OneOf({"names", "components", "none"});
+  command
       .AddText("--prefix", &arguments->prefix,
                "Keep the hulls of the links under this, such as arm/ (default: remove them)")
       .ValueName("PREFIX");
@@ -74,7 +139,7 @@ void AddRobotArguments(Command command, RobotArguments* arguments) {
 
 void RobotModel::AppendPoses(const RigidPose& X_WB, const std::vector<double>& free_values,
                              std::vector<double>* poses) const {
-  const std::vector<double> values = AllJointValues(robot, free_values);
+  const std::vector<JointValue> values = AllJointValues(robot, free_values);
   const std::vector<RigidPose> X_WL = LinkPoses(robot, X_WB, values);
   for (const RobotPart& part : parts) {
     const RigidPose X_WS = Compose(X_WL[static_cast<size_t>(part.link)], part.X_LS);
@@ -102,23 +167,8 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
   RobotModel model;
   model.robot = *std::move(robot);
   for (size_t link = 0; link < model.robot.links.size(); ++link) {
-    const RobotLink& from = model.robot.links[link];
-    for (size_t i = 0; i < from.shapes.size(); ++i) {
-      const CollisionShape& shape = from.shapes[i];
-      auto hull = HullOf(shape, *paths);
-      if (!hull.ok()) {
-        const std::string message(hull.status().message().data(), hull.status().message().size());
-        return absl::Status(hull.status().code(),
-                            absl::StrCat(arguments.urdf, ":", shape.line, ": link ",
-                                         Quoted(from.name), ": ", message));
-      }
-      RobotPart& part = model.parts.emplace_back();
-      part.link = static_cast<int>(link);
-      part.name = from.shapes.size() == 1 ? from.name : absl::StrCat(from.name, "/", i + 1);
-      part.X_LS = shape.X_LS;
-      part.kind = shape.kind;
-      part.hull = *std::move(hull);
-    }
+    absl::Status added = AddLink(arguments, *paths, link, &model);
+    if (!added.ok()) return added;
   }
   if (model.parts.empty()) {
     return absl::InvalidArgumentError(
@@ -127,8 +177,8 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
   return model;
 }
 
-absl::Status RegisterHulls(const RobotArguments& arguments, const Client& client,
-                           TemporaryHulls* temporary, RobotModel* model) {
+absl::Status RegisterHulls(const Invocation& run, const RobotArguments& arguments,
+                           const Client& client, TemporaryHulls* temporary, RobotModel* model) {
   std::set<std::string> taken;
   for (RobotPart& part : model->parts) {
     const std::string segment = UniqueHullSegment(part.name, &taken);
@@ -148,6 +198,8 @@ absl::Status RegisterHulls(const RobotArguments& arguments, const Client& client
       }
       part.hull_id = open.hull_id();
     }
+    WarnOfSwollenPart(run, client, part);
+    part.mesh = {};
   }
   return absl::OkStatus();
 }

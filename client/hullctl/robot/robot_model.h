@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/formats/mesh_file.h"
 #include "client/hullctl/command_line/command.h"
+#include "client/hullctl/command_line/invocation.h"
 #include "client/hullctl/view/temporary_hulls.h"
 #include "client/robot/robot.h"
 #include "client/robot/shape_hull.h"
@@ -16,51 +18,58 @@
 
 namespace hulld {
 
-// The options that say what a robot is.
+// Options that describe a robot.
 struct RobotArguments {
   std::string urdf;
   // NAME=DIR each.
   std::vector<std::string> packages;
-  // Where the hulls of the links stay; empty: they are removed at the end.
+  // Division of meshes into pieces: "names", "components", or "none"; empty: automatic.
+  std::string split;
+  // ID prefix under which the hulls of the links are kept; empty: they are removed at the end.
   std::string prefix;
 };
 
-// Declares FILE, --package and --prefix. `arguments` must outlive the parsing.
+// Declares FILE, --package, --split, and --prefix. `arguments` must outlive the parsing.
 void AddRobotArguments(Command command, RobotArguments* arguments);
-// What --help says about robots.
+// Text about robots in --help.
 extern const char kRobotHelp[];
 
-// A shape of the robot, and the hull that stands for it.
+// A shape of the robot, or a piece of a shape, and its hull.
 struct RobotPart {
   int link = 0;
-  // The link's name, followed by "/1", "/2" and so on where it has several shapes.
+  // The link's name, followed by "/1", "/2", and so on if it has several parts.
   std::string name;
   RigidPose X_LS = kNoMotion;
   ShapeKind kind = ShapeKind::kMesh;
   ShapeHull hull;
+  // Surface, as in MeshPiece; dropped by RegisterHulls.
+  TriangleMesh mesh;
   std::string hull_id;
 };
 
 struct RobotModel {
   Robot robot;
   std::vector<RobotPart> parts;
+  // Meshes with several pieces: "forearm: 5 pieces of meshes/forearm.obj".
+  std::vector<std::string> notes;
 
-  // X_WS of each part, its seven numbers appended to `poses`. free_values: one for each free joint.
+  // Appends X_WS of each part, seven numbers each, to `poses`. free_values: one per variable.
   void AppendPoses(const RigidPose& X_WB, const std::vector<double>& free_values,
                    std::vector<double>* poses) const;
-  // The pairs of parts of different links, but for those of links in `left_out`: indices into
-  // parts, two each.
+  // Returns the pairs of parts of different links, except for pairs of links in `left_out`: two
+  // indices into parts each.
   std::vector<uint32_t> PairsWithout(const std::set<LinkPair>& left_out) const;
 };
 
-// Reads the description and the meshes that it names; no server is asked. INVALID_ARGUMENT and
-// NOT_FOUND name file and line.
+// Reads the description and its meshes; uses no server. INVALID_ARGUMENT and NOT_FOUND name file
+// and line.
 absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments);
 
-// Makes the server's hulls of all parts and sets their IDs: under the prefix of the arguments,
-// where what is there is replaced, or among the temporary ones.
-absl::Status RegisterHulls(const RobotArguments& arguments, const Client& client,
-                           TemporaryHulls* temporary, RobotModel* model);
+// Creates the server's hulls of all parts and sets their IDs: under the prefix of the arguments,
+// replacing existing hulls, or as temporary hulls. Warns of each hull that is much larger than its
+// mesh (kSwellToWarn).
+absl::Status RegisterHulls(const Invocation& run, const RobotArguments& arguments,
+                           const Client& client, TemporaryHulls* temporary, RobotModel* model);
 
 }  // namespace hulld
 

@@ -7,8 +7,7 @@ namespace hulld {
 namespace {
 
 constexpr size_t kPoseNumbers = 7;
-// Enough that the round trip is small beside them. Observed, 18 pairs of a UR5: 2.4 million pairs a
-// second.
+// Enough to amortize the round trip. Observed, 18 pairs of a UR5: 2.4 million pairs per second.
 constexpr size_t kPairsPerMessage = 4096;
 constexpr size_t kMostLanes = 1024;
 

@@ -15,37 +15,36 @@
 
 namespace hulld {
 
-// Asks about the same pairs at one waypoint after another, in one stream. Several waypoints go in
-// one message, each on a lane of its own with all parts, so that a round trip is paid once for all
-// of them and the server works on them in parallel; a lane's pairs start from what decided them at
-// its waypoint before.
+// Queries the same pairs at a sequence of waypoints in one stream. One message carries several
+// waypoints, each on a lane of its own with all parts, so that they share a round trip and the
+// server processes them in parallel. A lane's pairs start from the feature that decided them at its
+// previous waypoint.
 class WaypointStream {
  public:
   struct Scope {
-    // The hulls of the parts that move, and those that stand still, with their poses (seven numbers
-    // each).
+    // Hulls of the moving parts, and of the fixed ones with their poses (seven numbers each).
     std::vector<std::string> moving;
     std::vector<std::string> fixed;
     std::vector<double> fixed_poses;
-    // Two indices each: into `moving`, then those of `fixed` counted on.
+    // Two indices each: into `moving`, then continuing into `fixed`.
     std::vector<uint32_t> pairs;
     v1::Wanted wanted;
     double tolerance = 0;
   };
 
-  // An answer: the pair's index among those of the scope, and its row. `problem` says why it has
-  // none; it is empty for an answer.
+  // Receives an answer: the pair's index in the scope, and its row. `problem` is the reason for a
+  // missing answer; empty otherwise.
   using Receiver = std::function<void(uint64_t waypoint, size_t pair, const AnswerRow& row,
                                       const std::string& problem)>;
 
   WaypointStream(const Client& client, Scope scope, Receiver receive);
 
-  // How many waypoints go in one message.
+  // Returns the number of waypoints per message.
   size_t lanes() const { return lanes_; }
 
-  // Asks about `count` waypoints, at most lanes(): the poses of all moving parts, seven numbers
-  // each, waypoint after waypoint. Answers come by waypoint, then by pair. No call may have more
-  // waypoints than the first: INTERNAL.
+  // Queries `count` waypoints, at most lanes(). poses: of all moving parts, seven numbers each,
+  // waypoint after waypoint. Answers are ordered by waypoint, then by pair. INTERNAL: more
+  // waypoints than in the first call.
   absl::Status Ask(size_t count, const std::vector<double>& poses);
 
   absl::Status Close();
@@ -62,7 +61,7 @@ class WaypointStream {
   const Receiver receive_;
   size_t lanes_;
   std::unique_ptr<CollisionStream> stream_;
-  // The lanes of the open stream.
+  // Lanes of the open stream.
   size_t open_lanes_ = 0;
   uint64_t waypoints_ = 0;
   std::unordered_map<uint32_t, std::string> placement_problems_;

@@ -40,7 +40,7 @@ constexpr char kYamlHelp[] =
     "tolerance. Coordinates of files become metres by `scale`, rounded once. Files stand beside\n"
     "the scene file.\n";
 
-// Where it was listed: only as it was then.
+// Deletes only the listed revision, if it was listed.
 absl::StatusOr<v1::ResponseHeader> Delete(const Client& client, const Kept& kept) {
   if (kept.is_body) {
     const auto deleted = client.DeleteBody(kept.id, kept.revision);
@@ -50,8 +50,8 @@ absl::StatusOr<v1::ResponseHeader> Delete(const Client& client, const Kept& kept
   return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
 }
 
-// OK: a person at the terminal says that these are to be deleted, or there is none.
-// INVALID_ARGUMENT: there is no terminal, or the answer was no; `unless` says what then was not.
+// Returns OK if the user confirms the deletion at the terminal, or if `doomed` is empty.
+// INVALID_ARGUMENT: no terminal, or the answer was no; `unless` states the consequence.
 absl::Status Confirm(const Invocation& run, const std::vector<Kept>& doomed,
                      const std::string& unless) {
   if (doomed.empty()) return absl::OkStatus();
@@ -74,15 +74,16 @@ struct SyncArguments {
   bool yes = false;
 };
 
-// Goes through a scene hull by hull, then body by body, so that a run that ended early goes on
-// where it was, and the hulls of a body are there before it.
+// Processes a scene hull by hull, then body by body, so that an interrupted run can be continued,
+// and the hulls of a body exist before it.
 class SceneSync {
  public:
   SceneSync(const Invocation& run, const SceneDescription& scene)
       : run_(run), scene_(scene), client_(run.MakeClient()) {}
 
-  // Tells what differs, and changes it where `changes` says so. `prune`: removes strangers, after a
-  // question unless `yes`. What becomes a stranger meanwhile, or changes, stays.
+  // Prints the differences, and applies them if `changes`. `prune`: deletes strangers (see
+  // Strangers), after a confirmation unless `yes`. Strangers that appear or change during the run
+  // stay.
   ExitCode Run(bool changes, bool prune, bool yes) {
     const auto strangers = Strangers(client_, scene_);
     if (!strangers.ok()) return run_.Fail(strangers.status());
@@ -192,12 +193,12 @@ ExitCode DiffScene(const Invocation& run, const SyncArguments& arguments) {
   return sync.found_differences() ? ExitCode::kRequestFailed : ExitCode::kDone;
 }
 
-// What the scene defines and the server has, bodies before the hulls that they are made of.
+// Returns the scene's definitions that exist on the server, bodies before their hulls.
 absl::StatusOr<std::vector<Kept>> DefinedAndThere(const Client& client,
                                                   const SceneDescription& scene) {
   std::vector<Kept> kept;
   const auto take = [&kept](const std::string& id, bool is_body, const absl::Status& found) {
-    // What is damaged can be deleted.
+    // Damaged hulls and bodies can be deleted.
     if (found.ok() || absl::IsDataLoss(found)) kept.push_back({id, is_body, std::nullopt});
     return absl::IsNotFound(found) || absl::IsDataLoss(found) ? absl::OkStatus() : found;
   };

@@ -10,9 +10,8 @@
 
 namespace hulld {
 
-// Declares `scene apply`, `scene diff` and `scene delete` below `scene`. `scene_file`: the FILE of
-// `scene` itself, which a second argument of these commands would be; it must be empty then. Both
-// must outlive the action.
+// Declares `scene apply`, `scene diff`, and `scene delete` below `scene`. `scene_file`: the FILE of
+// `scene` itself, which must be empty for these commands. Both must outlive the action.
 void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocation* invocation);
 
 // INVALID_ARGUMENT unless it is empty.

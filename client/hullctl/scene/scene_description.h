@@ -6,31 +6,24 @@
 #include <utility>
 #include <vector>
 
+#include "client/formats/length_scale.h"
 #include "client/pose/rigid_pose.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
 
-// What a scene file in YAML says, names resolved.
+// Content of a YAML scene file, with names resolved.
 
-// What coordinates of a file are multiplied or divided by; each is rounded once.
-struct LengthScale {
-  double factor = 1;
-  double divisor = 1;
-
-  double Apply(double x) const { return x * factor / divisor; }
-  bool is_one() const { return factor == 1 && divisor == 1; }
-};
-
-// A hull that the file defines, by the points of another file or by points that it lists itself.
+// A hull defined in the file, by a point file or by listed points.
 struct HullDefinition {
   std::string name;
-  // With the prefix.
+  // Including the prefix.
   std::string hull_id;
-  // As it can be opened, relative names already put behind the folder of the scene file.
+  // Path that can be opened: relative names are already resolved against the folder of the scene
+  // file.
   std::string file;
   LengthScale scale;
-  // Where `file` is empty: x y z each.
+  // If `file` is empty: n x 3.
   std::vector<double> xyz;
   // "NAME:LINE:COLUMN" of the definition, for errors.
   std::string where;
@@ -45,18 +38,18 @@ struct PieceDefinition {
 
 struct BodyDefinition {
   std::string name;
-  // With the prefix.
+  // Including the prefix.
   std::string body_id;
   std::vector<PieceDefinition> pieces;
 };
 
 struct PlacementDefinition {
   std::string name;
-  // One of the two.
+  // Exactly one of the two is set.
   std::string hull_id;
   int body = -1;
   RigidPose X_WO = kNoMotion;
-  // Members of a group are never asked about together. Empty: none.
+  // Pairs within a group are never queried. Empty: no group.
   std::string group;
 };
 
@@ -65,11 +58,11 @@ struct SceneDescription {
   std::vector<HullDefinition> hulls;
   std::vector<BodyDefinition> bodies;
   std::vector<PlacementDefinition> placements;
-  // Two names each, of placements or groups, that are never asked about together.
+  // Pairs of names, of placements or groups, that are never queried.
   std::vector<std::pair<std::string, std::string>> ignored;
-  // Indices of the placements that are asked about: two each.
+  // Pairs of indices of queried placements.
   std::optional<std::vector<std::pair<int, int>>> pairs;
-  // Indices of the placements one of which each pair must have. Empty: all.
+  // Indices of placements; each pair must contain one. Empty: all.
   std::vector<int> movers;
   v1::Wanted wanted;
   double tolerance = 0;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr int kPoseNumbers = 7;
 
-// Follows a JSON object piece by piece, as far as it takes to see its end and the names of its own
-// members; whether it is JSON is for the parser to say.
+// Scans a JSON object incrementally to find its end and the names of its own members. The parser
+// validates it.
 class ObjectScanner {
  public:
   void Take(std::string_view piece) {
@@ -71,7 +71,7 @@ class ObjectScanner {
   bool escaped_ = false;
 };
 
-// Fields of one name in both messages.
+// Moves the fields with the same name in both messages.
 template <typename Message>
 void TakeShared(Message* from, Scene* scene) {
   v1::FindCollisionsRequest& request = scene->request;
@@ -86,7 +86,7 @@ void TakeShared(Message* from, Scene* scene) {
   }
 }
 
-// Whether the lists of packed placements fit each other.
+// Checks that the lists of packed placements match.
 absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
   const v1::PackedPlacements& packed = request.packed_placements();
   if (request.has_packed_placements() && request.placements_size() > 0) {
@@ -105,7 +105,7 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
   return absl::OkStatus();
 }
 
-// The object as the message that its members belong to.
+// Parses the object as the message that contains its members.
 absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& scanner) {
   Scene scene;
   const bool names_pairs = scanner.has("pairs");
@@ -160,9 +160,9 @@ absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
   return absl::InvalidArgumentError(absl::StrCat(source->name(), ": ", message));
 }
 
-// The rest of the source, behind `first`, as one YAML document.
+// Reads the rest of the source, after `first`, as one YAML document.
 absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first, BodyForm form) {
-  // Lines before it count in errors.
+  // Preceding lines count in error positions.
   std::string text(static_cast<size_t>(source->line() - 1), '\n');
   text.append(first);
   for (std::string_view line; source->ReadLine(&line);) text.append("\n").append(line);
@@ -172,7 +172,7 @@ absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first,
   return ToScene(*description, source->name(), form);
 }
 
-// Which pairs of placements are never asked about together.
+// Decides which pairs of placements are excluded from queries.
 class GroupRule {
  public:
   explicit GroupRule(const v1::FindCollisionsRequest& request) : request_(request) {
@@ -243,7 +243,7 @@ std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,
   const auto name = [this](uint32_t placement, int32_t piece) -> std::string {
     const int body = placement < body_of.size() ? body_of[placement] : -1;
     if (body < 0 || piece < 0) return "";
-    // The server's body may be another than the file's.
+    // The server's body may differ from the file's.
     const std::vector<std::string>& named = piece_names[static_cast<size_t>(body)];
     return static_cast<size_t>(piece) < named.size() ? named[static_cast<size_t>(piece)] : "";
   };
@@ -283,12 +283,12 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
     return problem(
         absl::StrCat("groups holds ", request.groups_size(), " groups for ", n, " placements"));
   }
-  // A pair has at least one mover, and the lower index is one if any is.
+  // A pair has at least one mover; its lower index is one if either is.
   const uint64_t movers = request.has_movers() ? std::min<uint64_t>(request.movers(), n) : n;
   const std::string too_many =
       absl::StrCat("more than ", kMostPairs,
                    " pairs; ask for them in several files, or let 'hullctl scene' find them");
-  // Groups may leave few of very many, but finding those takes a look at each.
+  // Groups may exclude most pairs, but each pair must be examined.
   constexpr uint64_t kMostLooks = uint64_t{16} * kMostPairs;
   if (movers * n > kMostLooks) return problem(too_many);
   const GroupRule rule(request);

@@ -15,51 +15,50 @@
 
 namespace hulld {
 
-// How the bodies that a scene in YAML defines are placed.
+// Placement of the bodies that a YAML scene defines.
 enum class BodyForm {
-  // As bodies of the server, where 'hullctl scene apply' puts them; poses compose exactly.
+  // As bodies of the server, created by 'hullctl scene apply'; poses compose exactly.
   kWhole,
   // As the hulls of their pieces, named NAME/PIECE, at poses composed in floating point: for
-  // TEXTBOOK_SAT, which takes hulls alone.
+  // TEXTBOOK_SAT, which takes only hulls.
   kPieces
 };
 
-// Hulls and bodies at poses, and which pairs of them are asked about: what every format of a scene
-// comes to.
+// Hulls and bodies at poses, and their queried pairs: the common form of all scene formats.
 struct Scene {
-  // Placements, in one of their two forms; groups and movers; what is wanted, and the tolerance.
+  // Placements, in one of their two forms; groups and movers; wanted fields and the tolerance.
   v1::FindCollisionsRequest request;
-  // The pairs that the file names, two indices into the placements each. Absent: all that groups
-  // and movers leave.
+  // Pairs named in the file, two indices into the placements each. Absent: all pairs that groups
+  // and movers allow.
   std::optional<std::vector<uint32_t>> pairs;
   v1::Method method = v1::METHOD_UNSPECIFIED;
   // For a stream: answer updates by changes only.
   bool only_changes = false;
-  // The names of the placements; none where the format has none.
+  // Names of the placements; empty if the format has none.
   std::vector<std::string> names;
-  // For a scene in YAML: the body of the file that each placement stands for, -1 for none; and the
-  // names of the pieces of each body.
+  // For a YAML scene: the file's body of each placement, -1 for none; and the names of the pieces
+  // of each body.
   std::vector<int> body_of;
   std::vector<std::vector<std::string>> piece_names;
 
   uint32_t size() const;
-  // The hull of a placement; null where there is no such placement, or it names no hull.
+  // Returns the hull of a placement; null if the placement does not exist or names no hull.
   const std::string* HullOf(uint32_t placement) const;
-  // A placement, whatever form it has. Requires HullOf(placement) != nullptr; unchecked, as
-  // ReadScene and PairsOf make sure of it.
+  // Returns a placement, in either form. Requires HullOf(placement) != nullptr; unchecked, as
+  // ReadScene and PairsOf ensure it.
   v1::Placement PlacementOf(uint32_t placement) const;
-  // The placement's name, or its index and hull, as in "0:spider".
+  // Returns the placement's name, or its index and hull, as in "0:spider".
   std::string NameOf(uint32_t placement) const;
-  // The names that the file has for the pieces that decided about two placements, given by their
-  // indices; empty where it has none.
+  // Returns the file's names for the deciding pieces of two placements, given by their indices;
+  // empty if it has none.
   std::array<std::string, 2> NamesOfPieces(uint32_t a, uint32_t b,
                                            std::pair<int32_t, int32_t> pieces) const;
 };
 
-// The most pairs that one file may ask for.
+// Maximum number of pairs queried from one file.
 inline constexpr uint64_t kMostPairs = uint64_t{1} << 24;
 
-// What --help says of the formats.
+// Text about the formats in --help.
 inline constexpr char kSceneFileHelp[] =
     "FILE is a scene, as YAML ('hullctl scene apply --help' shows it), as text or as JSON.\n"
     "As text, one item a line; # starts a comment:\n"
@@ -81,18 +80,18 @@ inline constexpr char kSceneFileHelp[] =
     "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}\n"
     "Updates of a stream may follow a JSON scene, one a line: see 'hullctl stream --help'.";
 
-// Reads the scene at the front of the source, and no further: a text or YAML to its end, a JSON
-// object to the end of the line that its last brace is on. INVALID_ARGUMENT "NAME:LINE: message",
-// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for an object of several lines. YAML
-// names files and hulls that 'hullctl scene apply' puts on the server; none is opened here.
+// Reads the scene at the start of the source, and no further: text or YAML to its end, a JSON
+// object to the end of the line of its last brace. INVALID_ARGUMENT "NAME:LINE: message",
+// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for an object of several lines. Opens
+// none of the files named in a YAML scene; 'hullctl scene apply' does.
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kWhole);
 
-// The pairs of the scene, two indices each: named, or all that groups and movers leave.
-// INVALID_ARGUMENT: there are more than kMostPairs, or none; or groups do not fit the placements.
+// Returns the pairs of the scene, two indices each: the named pairs, or all that groups and movers
+// allow. INVALID_ARGUMENT: more than kMostPairs, none, or groups that do not match the placements.
 absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::string& file);
 
-// INVALID_ARGUMENT, naming the line, when updates of a stream follow the scene, for which `command`
-// has no use.
+// INVALID_ARGUMENT, naming the line: updates of a stream follow the scene, which `command` does not
+// use.
 absl::Status RefuseUpdates(ByteSource* source, const std::string& command);
 
 }  // namespace hulld

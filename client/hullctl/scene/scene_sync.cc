@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <set>
 #include <utility>
@@ -23,17 +22,16 @@ absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
   const auto format = PointFormatOfPath(hull.file);
   if (!format.ok()) return format.status();
   std::vector<double> xyz;
-  const auto counts = ReadPoints({hull.file, *format, {}, {}}, [&](const PointBlock& block) {
-    for (const double x : block.xyz) xyz.push_back(hull.scale.Apply(x));
-    for (const float x : block.xyz_float) xyz.push_back(hull.scale.Apply(static_cast<double>(x)));
+  ReadRequest request{hull.file, *format, {}, {}};
+  request.options.scale.fill(hull.scale);
+  const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+    xyz.insert(xyz.end(), block.xyz.begin(), block.xyz.end());
+    xyz.insert(xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     return absl::OkStatus();
   });
   if (!counts.ok()) return counts.status();
-  if (xyz.empty()) return absl::InvalidArgumentError(absl::StrCat(hull.file, ": holds no point"));
-  const auto is_finite = [](double x) { return std::isfinite(x); };
-  if (std::all_of(xyz.begin(), xyz.end(), is_finite)) return xyz;
-  return absl::InvalidArgumentError(
-      absl::StrCat(hull.file, ": scaled, a coordinate is beyond the largest double"));
+  if (!xyz.empty()) return xyz;
+  return absl::InvalidArgumentError(absl::StrCat(hull.file, ": holds no point"));
 }
 
 std::array<uint64_t, 7> BitsOf(const v1::Pose& pose) {
@@ -63,7 +61,7 @@ absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
 absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body) {
   const auto found = client.GetBody(body.body_id);
   if (absl::IsNotFound(found.status())) return Change::kCreate;
-  // A damaged one is mended by putting it anew.
+  // Replacing a damaged hull repairs it.
   if (absl::IsDataLoss(found.status())) return Change::kReplace;
   if (!found.ok()) return found.status();
   const v1::PutBodyRequest defined = BodyRequest(body);

@@ -89,7 +89,7 @@ absl::StatusOr<Scene> TextSceneReader::Finish() {
       named.push_back(placed->second);
     }
   }
-  // All pairs hold the named ones.
+  // `all` includes the named pairs.
   if (!all_ && !pairs_.empty()) scene_.pairs = std::move(named);
   return std::move(scene_);
 }

@@ -17,12 +17,12 @@ namespace hulld {
 // Reads a scene in the text format of kSceneFileHelp, line by line.
 class TextSceneReader {
  public:
-  // `source` tells where errors are.
+  // `source` gives the positions of errors.
   explicit TextSceneReader(const ByteSource* source) : source_(source) {}
 
-  // The line that was last read from the source.
+  // Takes the line last read from the source.
   absl::Status TakeLine(std::string_view line);
-  // After the last line.
+  // Call after the last line.
   absl::StatusOr<Scene> Finish();
 
  private:
@@ -39,7 +39,7 @@ class TextSceneReader {
   Scene scene_;
   std::unordered_map<std::string, uint32_t> index_;
   std::vector<NamedPair> pairs_;
-  // `all` was there.
+  // True after the keyword `all`.
   bool all_ = false;
 };
 

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// What a scene may weigh; many placements are for JSON and its packed form.
+// Maximum size of a scene. Scenes with many placements use JSON and its packed form.
 constexpr size_t kMostBytes = size_t{64} << 20;
 
 std::string PlaceText(const std::string& name, const YAML::Mark& mark) {

@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <map>
 #include <set>
@@ -19,21 +18,20 @@ namespace {
 
 struct UnitName {
   const char* name;
-  LengthScale scale;
+  // Metres, exact.
+  const char* length;
 };
-
-// Millimetres and centimetres are divided by a whole number, so that the result is rounded once.
 constexpr UnitName kUnits[] = {
-    {"mm", {1, 1000}}, {"cm", {1, 100}}, {"m", {1, 1}}, {"in", {0.0254, 1}}, {"ft", {0.3048, 1}}};
+    {"mm", "0.001"}, {"cm", "0.01"}, {"m", "1"}, {"in", "0.0254"}, {"ft", "0.3048"}};
 
-// The folder of a file, with the slash behind it; empty for none.
+// Returns the folder of a file, with a trailing slash; empty for none.
 std::string FolderOf(const std::string& path) {
   const size_t slash = path.find_last_of('/');
   return slash == std::string::npos ? "" : path.substr(0, slash + 1);
 }
 
-// Reads one document, part by part; names are known before they are used, whatever the order of
-// the parts in the file.
+// Reads one document, part by part. Names are resolved independently of the order of parts in the
+// file.
 class SceneParser {
  public:
   SceneParser(const YamlReader& yaml, std::string file) : yaml_(yaml), file_(std::move(file)) {}
@@ -44,7 +42,7 @@ class SceneParser {
                         {"prefix", "scale", "hulls", "bodies", "place", "ignore", "ask"});
     if (!entries.ok()) return entries.status();
     using Part = absl::Status (SceneParser::*)(const YAML::Node&);
-    // In the order in which they build on one another.
+    // In order of dependency.
     const std::pair<const char*, Part> parts[] = {
         {"prefix", &SceneParser::TakePrefix}, {"scale", &SceneParser::TakeScale},
         {"hulls", &SceneParser::TakeHulls},   {"bodies", &SceneParser::TakeBodies},
@@ -80,11 +78,9 @@ class SceneParser {
     const auto text = yaml_.Text(node, "scale");
     if (!text.ok()) return text.status();
     for (const UnitName& unit : kUnits) {
-      if (*text == unit.name) return unit.scale;
+      if (*text == unit.name) return *LengthScale::FromText(unit.length);
     }
-    LengthScale scale;
-    const bool is_number = ParseDouble(*text, &scale.factor) == NumberText::kNumber;
-    if (is_number && std::isfinite(scale.factor) && scale.factor != 0) return scale;
+    if (const auto scale = LengthScale::FromText(*text); scale.has_value()) return *scale;
     return yaml_.ErrorAt(node, absl::StrCat("scale: ", Quoted(*text),
                                             " is no unit and no number other than 0; units are "
                                             "mm, cm, m, in and ft, of a scene in metres"));
@@ -140,7 +136,7 @@ class SceneParser {
     return absl::OkStatus();
   }
 
-  // Edges; the box stands around the origin.
+  // Reads edge lengths; the box is centred on the origin.
   absl::Status TakeBox(const YAML::Node& node, HullDefinition* hull) const {
     const auto size = yaml_.Numbers(node, "box", {3});
     if (!size.ok()) return size.status();
@@ -168,7 +164,7 @@ class SceneParser {
     return absl::OkStatus();
   }
 
-  // A translation, a quaternion and a translation, or both by name.
+  // Reads a translation, a quaternion and a translation, or both by name.
   absl::StatusOr<RigidPose> PoseOf(const YAML::Node& node) const {
     if (!node.IsMap()) {
       const auto numbers = yaml_.Numbers(node, "at", {3, 7});
@@ -207,7 +203,7 @@ class SceneParser {
     return yaml_.ErrorAt(node, "at: a quaternion 0 0 0 0 is no rotation");
   }
 
-  // The ID of a hull that the file defines.
+  // Returns the ID of a hull defined in the file.
   absl::StatusOr<std::string> DefinedHull(const YAML::Node& node) const {
     const auto name = yaml_.Text(node, "hull");
     if (!name.ok()) return name.status();
@@ -464,8 +460,8 @@ class SceneParser {
   size_t pieces_ = 0;
 };
 
-// Which placements are asked about together, as the contract says it: a class for each placement
-// that stands alone and for each group, and the pairs of classes that are ignored.
+// Exclusion of pairs in the form of the contract: a class for each placement outside of groups and
+// for each group, and the ignored pairs of classes.
 class Classes {
  public:
   explicit Classes(const SceneDescription& scene) {
@@ -524,7 +520,7 @@ v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP) {
   return placement;
 }
 
-// Adds a placement, or, of a body in pieces, its pieces; returns their indices.
+// Adds a placement, or the pieces of a divided body; returns their indices.
 std::vector<uint32_t> AddPlacement(const SceneDescription& from,
                                    const PlacementDefinition& placement, BodyForm form,
                                    Scene* scene) {
@@ -594,7 +590,7 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
   for (size_t i = 0; i < count; ++i) {
     if (!first.contains(i)) order.push_back(i);
   }
-  // The indices that each placement came to.
+  // Request indices of each placement.
   std::vector<std::vector<uint32_t>> placed(count);
   uint32_t movers = 0;
   for (const size_t i : order) {

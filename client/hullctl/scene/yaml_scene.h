@@ -12,27 +12,27 @@
 
 namespace hulld {
 
-// Whether a scene whose first line with something on it is this one is written in YAML.
+// Returns true if a scene with this first line that is not blank is YAML.
 bool LooksLikeYaml(std::string_view line);
 
-// Reads a scene in YAML; client/README.md#scene-files tells its keys. `name` stands in errors, and
-// relative names of files start at its folder. No file that it names is opened. INVALID_ARGUMENT
-// "NAME:LINE:COLUMN: message": no YAML; an unknown key; a value of another kind; a name that is not
-// defined, or twice; more than kMostPieces pieces.
+// Parses a YAML scene; for the keys see client/README.md#scene-files. `name` appears in errors, and
+// relative file names start at its folder. Opens none of the named files. INVALID_ARGUMENT
+// "NAME:LINE:COLUMN: message": not YAML; an unknown key; a value of the wrong type; an undefined or
+// duplicate name; more than kMostPieces pieces.
 absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name);
 
-// The same of a file; - is standard input.
+// Reads a file; "-" is standard input.
 absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path);
 
-// The most pieces that the placements of a scene may come to.
+// Maximum total number of pieces of a scene's placements.
 inline constexpr size_t kMostPieces = size_t{1} << 22;
 
-// The body as it is put on the server.
+// Returns the request that creates the body on the server.
 v1::PutBodyRequest BodyRequest(const BodyDefinition& body);
 
-// The placements as the server takes them. Pieces of one placement, members of one group, and what
-// is ignored are never asked about together. Movers come first. INVALID_ARGUMENT: more pairs than
-// kMostPairs are named.
+// Returns the placements in the form of the server. Pieces of a placement, members of a group, and
+// ignored pairs are excluded. Movers come first. INVALID_ARGUMENT: more than kMostPairs named
+// pairs.
 absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,
                               BodyForm form);
 

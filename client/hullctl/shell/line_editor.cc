@@ -53,7 +53,7 @@ class LineEditor::Terminal {
     const char* const line = el_gets(edit_, &length);
     sigaction(SIGINT, &before, nullptr);
     if (interrupted_ != 0) {
-      // Ctrl-C gives the line up, not the shell.
+      // Ctrl-C discards the line and keeps the shell.
       el_reset(edit_);
       std::cout << "^C\n" << std::flush;
       return "";
@@ -71,7 +71,7 @@ class LineEditor::Terminal {
     std::error_code ignored;
     std::filesystem::create_directories(std::filesystem::path(history_file_).parent_path(),
                                         ignored);
-    // Only its owner may read it, from its first moment on.
+    // Created readable by its owner only.
     close(open(history_file_.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0600));
     history(history_, &event, H_SAVE, history_file_.c_str());
   }

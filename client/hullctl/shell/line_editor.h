@@ -9,31 +9,31 @@
 
 namespace hulld {
 
-// Reads lines from standard input. On a terminal they are edited, remembered and completed, by
-// libedit; otherwise they are taken as they come, without a prompt.
+// Reads lines from standard input. On a terminal, libedit provides editing, history, and
+// completion; otherwise lines are read plainly, without a prompt.
 class LineEditor {
  public:
-  // What can stand for the last word of a line.
+  // Returns the completions of the last word of a line.
   using Completer = std::function<std::vector<std::string>(const std::string& line)>;
 
-  // history_file: where lines are kept between sessions; empty: nowhere.
+  // history_file: keeps lines between sessions; empty: none.
   LineEditor(const std::string& program, const std::string& prompt, const std::string& history_file,
              Completer complete);
   ~LineEditor();
   LineEditor(const LineEditor&) = delete;
   LineEditor& operator=(const LineEditor&) = delete;
 
-  // The next line without its end; nullopt at the end of the input.
+  // Returns the next line without its end; nullopt at the end of the input.
   std::optional<std::string> Next();
-  // Keeps a line.
+  // Adds a line to the history.
   void Remember(const std::string& line);
 
-  // Somebody types.
+  // Returns true if the input is interactive.
   bool is_terminal() const;
 
  private:
   class Terminal;
-  // Null when nobody types.
+  // Null if the input is not interactive.
   std::unique_ptr<Terminal> terminal_;
 };
 

@@ -7,11 +7,11 @@ namespace {
 
 struct Split {
   std::vector<std::string> words;
-  // The last of them goes on at the line's end.
+  // True if the last word is still open at the end of the line.
   bool open_word = false;
-  // The quote that does not end; 0: none.
+  // The unterminated quote; 0: none.
   char open_quote = 0;
-  // A character outside of quotes that a shell would act upon; 0: none.
+  // A character outside of quotes that is special to a shell; 0: none.
   char special = 0;
 };
 

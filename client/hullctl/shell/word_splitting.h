@@ -8,14 +8,14 @@
 
 namespace hulld {
 
-// A line's words as a POSIX shell cuts them: at blanks; 'quotes', "quotes" and backslashes keep
-// characters together; a # at the start of a word begins a comment. Nothing is replaced: no
-// variables, no patterns. INVALID_ARGUMENT: a quote does not end, or the line holds what only a
-// shell can do, such as a pipe.
+// Splits a line into words like a POSIX shell: at blanks; 'quotes', "quotes", and backslashes keep
+// characters together; a # at the start of a word begins a comment. Expands nothing: no variables,
+// no patterns. INVALID_ARGUMENT: an unterminated quote, or syntax that needs a shell, such as a
+// pipe.
 absl::StatusOr<std::vector<std::string>> SplitWords(const std::string& line);
 
-// The same as far as it goes, for completion: the last word is the one at the line's end, empty
-// behind a blank.
+// Splits as far as possible, for completion: the last word is the one at the end of the line, empty
+// after a blank.
 std::vector<std::string> SplitUnfinished(const std::string& line);
 
 }  // namespace hulld

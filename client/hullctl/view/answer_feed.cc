@@ -12,9 +12,9 @@
 namespace hulld {
 namespace {
 
-// While something is dragged, a scene of more objects is asked about at rest only.
+// During a drag, larger scenes are queried only at rest.
 constexpr size_t kMostObjectsInMotion = 3000;
-// The page lists and lights at most this many of a scene's colliding pairs; totals count all.
+// Maximum number of colliding pairs that the page lists and highlights; totals count all.
 constexpr size_t kMostPairs = 5000;
 
 v1::Pose ToPose(const Pose7& numbers) {
@@ -44,7 +44,7 @@ int32_t IndexOf(bool has_piece, const v1::DecidingPiece& piece) {
   return has_piece ? static_cast<int32_t>(piece.index()) : -1;
 }
 
-// That of the pieces that decided; null where boxes settle them.
+// Returns the certificate of the deciding pieces; null if boxes settle them.
 const v1::Certificate* CertificateOf(
     std::pair<int32_t, int32_t> pieces,
     const google::protobuf::RepeatedPtrField<v1::PieceCertificate>& certificates) {
@@ -84,7 +84,7 @@ std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& 
   return message.Close();
 }
 
-// The pairs that FindCollisions tells, put together.
+// Collects the pairs of a FindCollisions call.
 class SceneAnswer {
  public:
   explicit SceneAnswer(std::vector<uint32_t> objects) : objects_(std::move(objects)) {}
@@ -131,7 +131,7 @@ class SceneAnswer {
     absl::StrAppend(&problems_, problems_.empty() ? "" : ",", QuoteJson(message));
   }
 
-  // The object of each placement.
+  // Object of each placement.
   const std::vector<uint32_t> objects_;
   std::string pairs_;
   std::string problems_;
@@ -141,7 +141,7 @@ class SceneAnswer {
   v1::SceneTotals totals_;
 };
 
-// Those that have a hull, packed; `objects`: which they are.
+// Packs the objects that have a hull; `objects` receives their indices.
 v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint32_t>* objects) {
   v1::PackedPlacements packed;
   std::unordered_map<std::string, uint32_t> index_of;
@@ -224,7 +224,7 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   question_ = Question();
   question_.objects = scene.objects;
   question_.rules = scene.rules;
-  // The page asks once it has the scene.
+  // The page asks after it receives the scene.
   asked_ = false;
 }
 
@@ -314,7 +314,7 @@ absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question)
   v1::CheckCollisionRequest request =
       PairRequest(question.objects[question.pair->first], question.objects[question.pair->second],
                   /*certificate=*/false);
-  // A tolerance excludes them.
+  // A tolerance excludes wanted fields.
   request.clear_wanted();
   request.set_tolerance(question.tolerance);
   const auto response = client_.CheckCollision(request);
@@ -350,7 +350,7 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
     update.add_placements(1);
     update.mutable_poses()->Add(a.pose.begin(), a.pose.end());
     update.mutable_poses()->Add(b.pose.begin(), b.pose.end());
-    // It costs one look-up of each of two hulls.
+    // Costs one lookup for each of the two hulls.
     update.set_refresh_hulls(true);
     response = stream_->Update(std::move(update));
   }

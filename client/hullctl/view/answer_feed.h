@@ -16,26 +16,25 @@
 
 namespace hulld {
 
-// Answers the questions of one page on a thread of its own. While one is being answered, those that
-// come become one, and the latest poses win: a hand moves faster than answers travel. Any thread
-// may call it.
+// Answers the questions of a page on its own thread. Questions that arrive while one is in flight
+// are merged, and the latest poses win: the pointer moves faster than answers arrive. Thread-safe.
 class AnswerFeed {
  public:
   AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Waits for the answer that is under way.
+  // Waits for the answer in flight.
   ~AnswerFeed();
 
-  // Another scene, by its number: forgets objects and questions.
+  // Switches to another scene, by number; drops objects and questions.
   void Show(const ViewScene& scene, uint64_t number);
-  // Passed over when they are of another scene.
+  // Ignored if they belong to another scene.
   void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
-  // Passed over when it is about another scene.
+  // Ignored if it belongs to another scene.
   void Ask(const ViewQuestion& question);
-  // Some hull changed: the last question is answered anew.
+  // Answers the last question again, as a hull changed.
   void HullsChanged();
 
  private:
-  // What is asked, as a whole.
+  // The complete question.
   struct Question {
     std::vector<ViewObject> objects;
     v1::FindCollisionsRequest rules;
@@ -48,19 +47,19 @@ class AnswerFeed {
   };
 
   void Run();
-  // What became of the pair. False when the page has gone.
+  // Sends the answer about the pair. Returns false if the page has closed.
   bool AnswerPair(const Question& question);
   absl::StatusOr<std::string> MovingAnswer(const Question& question);
   absl::StatusOr<std::string> RestingAnswer(const Question& question) const;
-  // What the tolerance makes of the pair, as JSON.
+  // Returns the pair's answer with the tolerance, as JSON.
   absl::StatusOr<std::string> TolerantAnswer(const Question& question) const;
   bool AnswerScene(const Question& question) const;
 
   const Client& client_;
   const std::shared_ptr<PageChannel> page_;
 
-  // Used by the thread alone: the stream of a pair, which hulls or bodies it is of, and whether it
-  // tells certificates.
+  // Used by the thread only: the stream of a pair, its hulls or bodies, and true if it returns
+  // certificates.
   std::unique_ptr<CollisionStream> stream_;
   std::pair<std::string, std::string> streamed_hulls_;
   bool streamed_certificate_ = false;
@@ -69,7 +68,7 @@ class AnswerFeed {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  // The rest is guarded by the mutex.
+  // Guarded by the mutex, as all members below.
   Question question_;
   uint64_t scene_ = 0;
   bool asked_ = false;
@@ -77,17 +76,17 @@ class AnswerFeed {
   std::thread thread_;
 };
 
-// All that a page shows of a pair, from the answer to one question; tolerant_json: its member
-// `tolerant` (protocol.h), or empty.
+// Returns all data shown about a pair, from one query; tolerant_json: its member `tolerant`
+// (protocol.h), or empty.
 std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                            const ViewObject& b, uint64_t update,
                            const v1::CheckCollisionResponse& response,
                            const std::string& tolerant_json = "");
 
-// What is wanted for that, with or without what proves it.
+// Returns the request for that answer, with or without a proof.
 v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate);
 
-// The message `collisions` for a scene.
+// Returns the message `collisions` for a scene.
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const v1::FindCollisionsRequest& rules,
                                             const std::vector<ViewObject>& objects,

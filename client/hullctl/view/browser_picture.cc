@@ -28,7 +28,7 @@ constexpr const char* kBrowsers[] = {"chromium", "chromium-browser", "google-chr
 constexpr uint32_t kLeastSide = 64;
 constexpr uint32_t kMostSide = 16384;
 
-// An absolute path, or empty.
+// Returns an absolute path, or empty.
 std::string FindProgram(const std::string& name) {
   const char* const path = getenv("PATH");
   for (const auto folder : absl::StrSplit(path == nullptr ? "" : path, ':', absl::SkipEmpty())) {
@@ -53,7 +53,7 @@ absl::StatusOr<std::string> FindBrowser() {
       " is on the PATH; install one (Debian: chromium) or name it in HULLCTL_BROWSER"));
 }
 
-// Goes with all that is in it.
+// Deleted with its content by the destructor.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -67,14 +67,14 @@ class TemporaryFolder {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-  // Empty when it could not be made.
+  // Empty if it could not be created.
   const fs::path& path() const { return path_; }
 
  private:
   fs::path path_;
 };
 
-// Runs a program to its end, with what it prints in two files; whether it started.
+// Runs a program to completion, with its output in two files; returns true if it started.
 bool RunToEnd(std::vector<std::string> arguments, const std::string& out, const std::string& err) {
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
@@ -98,7 +98,7 @@ std::string BytesOf(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// The last line that says something.
+// Returns the last nonblank line.
 std::string LastLine(const fs::path& log) {
   std::string last;
   const std::string text = BytesOf(log);
@@ -137,13 +137,13 @@ absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
   }
   std::vector<std::string> arguments = {
       *browser, "--headless=new", "--no-first-run", "--mute-audio",
-      // Where there is no graphics processor.
+      // For machines without a GPU.
       "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
-      // The page draws when all is there; its clock then runs ahead to the end.
+      // The page draws when loaded; its virtual clock then runs to the end.
       "--virtual-time-budget=10000", "--force-prefers-reduced-motion",
       "--force-device-scale-factor=1",
       absl::StrCat("--user-data-dir=", (folder.path() / "profile").string()), "--dump-dom"};
-  // Its sandbox refuses root; the page is ours and may reach nothing.
+  // The browser's sandbox refuses root. The page is ours and has no network access.
   if (geteuid() == 0) arguments.emplace_back("--no-sandbox");
   arguments.push_back("file://" + page.string());
   const bool started = RunToEnd(std::move(arguments), shown.string(), log.string());

@@ -9,14 +9,14 @@
 
 namespace hulld {
 
-// "1600x1000". INVALID_ARGUMENT: it is none, or a side is not from 64 to 16384.
+// Parses "1600x1000". INVALID_ARGUMENT: another format, or a side outside of 64 to 16384.
 absl::StatusOr<PictureSize> ParsePictureSize(const std::string& text);
 
-// The bytes of the PNG that a PicturePage makes of itself in a browser without a window: the first
-// of chromium, chromium-browser, google-chrome, google-chrome-stable and microsoft-edge on the
-// PATH, or the one that $HULLCTL_BROWSER names. It works in a temporary folder, which goes
-// afterwards. FAILED_PRECONDITION: there is no browser. INTERNAL: it made no picture, with what it
-// said last.
+// Returns the PNG that a PicturePage renders of itself in a headless browser: the one named by
+// $HULLCTL_BROWSER, or the first of chromium, chromium-browser, google-chrome,
+// google-chrome-stable, and microsoft-edge on the PATH. Uses a temporary folder, deleted
+// afterwards. FAILED_PRECONDITION: no browser. INTERNAL: no picture, with the browser's last
+// message.
 absl::StatusOr<std::string> PictureOf(const std::string& picture_page);
 
 }  // namespace hulld

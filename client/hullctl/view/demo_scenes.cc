@@ -12,7 +12,7 @@ namespace hulld {
 namespace {
 
 constexpr char kModels[] = "/usr/share/assimp/models/OBJ/";
-// The pace of the growing hull: this many points, this often.
+// Pace of the growing hull: points per step, and time between steps.
 constexpr uint64_t kGrowthPoints = 40;
 constexpr std::chrono::milliseconds kGrowthPause{120};
 constexpr int kGrowthSteps = 200;
@@ -28,7 +28,7 @@ v1::PointBlock Cloud(const CloudOptions& cloud) {
   return points;
 }
 
-// Balls of ever larger radius, so that the hull grows on all sides.
+// Returns points in balls of increasing radius, so that the hull grows on all sides.
 v1::PointBlock GrowthOf(int step) {
   CloudOptions cloud;
   cloud.count = kGrowthPoints;
@@ -39,10 +39,10 @@ v1::PointBlock GrowthOf(int step) {
 
 absl::Status SendGrowth(const Client::PointSink& sink) { return sink(GrowthOf(1)); }
 
-// The pose that turns a copy of a hull by half a turn about the vertical line through its vertex of
-// largest x, moved by `shift` of the way towards the mean of its vertices. With shift 0 the two
-// share exactly that vertex, and the plane of constant x through it separates the rest. Doubling a
-// coordinate and turning by half a turn round nothing, so the touching is exact.
+// Returns the pose that turns a copy of a hull by half a turn about the vertical line through its
+// vertex of largest x, moved by `shift` of the distance towards the mean of its vertices. With
+// shift 0 the two share exactly that vertex, and the plane of constant x through it separates the
+// rest. Doubling a coordinate and half a turn round nothing, so the contact is exact.
 Pose7 TurnedAbout(const HullMesh& hull, double shift) {
   double sum_x = 0;
   double sum_y = 0;
@@ -59,7 +59,7 @@ Pose7 TurnedAbout(const HullMesh& hull, double shift) {
           0};
 }
 
-// Makes the hulls and shapes that the scenes are composed of; remembers the first error.
+// Creates the hulls and shapes of the scenes; keeps the first error.
 class Workshop {
  public:
   Workshop(const Client& client, TemporaryHulls* hulls) : client_(client), hulls_(hulls) {}
@@ -105,7 +105,7 @@ class Workshop {
   absl::Status status_;
 };
 
-// Two copies of one model, with its mesh.
+// Returns a scene of two copies of a model, with its mesh.
 ViewScene TwoCopies(const std::string& title, const std::string& note, const std::string& name,
                     const std::string& hull_id, std::shared_ptr<const FileShape> shape,
                     const Pose7& pose_b) {
@@ -148,7 +148,7 @@ ViewScene GrowingScene(const std::string& live, const std::string& ball) {
 }  // namespace
 
 absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, TemporaryHulls* hulls) {
-  // Each hull once; scenes share them.
+  // The scenes share their hulls.
   Workshop make(client, hulls);
   const std::string spider = make.Model("spider.obj");
   const std::string wuson = make.Model("WusonOBJ.obj");
@@ -217,13 +217,13 @@ void GrowingHull::Run() {
   }
 }
 
-// A failure, as when the server goes, ends the growth; the viewer shows what there is.
+// An error, such as a lost server, ends the growth; the viewer shows the state reached.
 void GrowingHull::Grow(uint64_t start) {
   v1::ReplaceOpen open;
   open.set_hull_id(hull_id_);
   if (!client_.ReplaceHull(open, SendGrowth).ok()) return;
   AppendOptions options;
-  // Each step is committed before the next, so that a page sees it.
+  // Commits each step before the next, so that a page sees it.
   options.max_in_flight_chunks = 1;
   const auto appender = client_.OpenAppend(hull_id_, options);
   if (!appender.ok()) return;

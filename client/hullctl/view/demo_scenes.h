@@ -17,33 +17,34 @@
 
 namespace hulld {
 
-// A hull that grows while it is looked at: ever larger balls of points are streamed into it.
+// A hull that grows while it is displayed: points in balls of increasing radius are streamed into
+// it.
 class GrowingHull {
  public:
-  // `hull_id` is there already; it waits for Restart.
+  // Requires that `hull_id` exists. Growth starts with Restart.
   GrowingHull(const Client& client, std::string hull_id);
-  // Stops growing.
+  // Stops the growth.
   ~GrowingHull();
 
-  // Grows from the start, in place of what there was. Does not wait.
+  // Replaces the hull and grows it from the start. Does not wait.
   void Restart();
 
  private:
   void Run();
-  // Until it is grown, or another start is wanted.
+  // Grows the hull until it is complete, or another start is requested.
   void Grow(uint64_t start);
 
   const Client& client_;
   const std::string hull_id_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by the mutex: counts calls of Restart.
+  // Guarded by the mutex: number of calls of Restart.
   uint64_t starts_ = 0;
   bool ended_ = false;
   std::thread thread_;
 };
 
-// The textbook's scenes, which client/demo.sh asks about, keys 0 to 7:
+// Creates the textbook's scenes, also used by client/demo.sh, keys 0 to 7:
 //   0  two Spiders far apart            4  two Wusons that overlap by a part in 10^12
 //   1  two Spiders that overlap         5  cubes that share a face, an edge and a corner
 //   2  two Spiders that share a vertex  6  two balls, of 3000 and 100 random points
@@ -52,7 +53,7 @@ class GrowingHull {
 absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, TemporaryHulls* hulls);
 
 inline constexpr char kGrowingSceneKey[] = "7";
-// The scene of that key starts with the hull that grows.
+// The growing hull is the first object of this scene.
 inline constexpr size_t kGrowingObject = 0;
 
 }  // namespace hulld

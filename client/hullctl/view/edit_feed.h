@@ -16,46 +16,45 @@
 
 namespace hulld {
 
-// Edits that wait. Those of one hull keep their order; an edit that is like the last one that waits
-// for its hull joins it: points are appended together, and deleting twice is deleting once. Hulls
-// take turns in the order of their oldest edits. Not thread-safe.
+// Pending edits. Edits of a hull keep their order. An edit of the same kind as the last pending one
+// of its hull is merged into it: points are appended together, and repeated deletes become one.
+// Hulls take turns in the order of their oldest edits. Not thread-safe.
 class EditQueue {
  public:
-  // At most this many numbers of points wait, about 100 MB. A choice: a page sends 4 MiB at a time
-  // at most (BridgeOptions::max_message_bytes).
+  // Maximum number of pending coordinates, about 100 MB. A choice: one message of a page has at
+  // most 4 MiB (BridgeOptions::max_message_bytes).
   static constexpr size_t kMostNumbers = size_t{12} << 20;
 
-  // Whether it was taken: there is room for it.
+  // Returns true if the edit was accepted: the queue had room.
   [[nodiscard]] bool Add(ViewEdit edit);
   bool empty() const { return edits_.empty(); }
-  // Requires that it is not empty.
+  // Requires a nonempty queue.
   ViewEdit Take();
 
  private:
   using Edits = std::list<ViewEdit>;
 
-  // What an edit counts, so that those without points count as well.
+  // Size of an edit, with a minimum for edits without points.
   static size_t NumbersOf(const ViewEdit& edit) { return edit.points.size() + 64; }
 
   Edits edits_;
-  // The last edit of each hull that has one.
+  // The last pending edit of each hull.
   std::unordered_map<std::string, Edits::iterator> last_;
   size_t numbers_ = 0;
 };
 
-// Changes hulls as one page asks, each hull's changes in their order, on a thread of its own, and
-// tells the page how each change ended; what became of the hull comes with the watch that follows
-// it. Changes that wait may be made as one (EditQueue). Any thread may call it. For `hullctl view
-// --edit` alone.
+// Applies the edits of a page, each hull's edits in order, on its own thread, and reports the
+// result of each edit to the page. The new hull arrives through the watch. Pending edits may be
+// merged (EditQueue). Thread-safe. Only for `hullctl view --edit`.
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Makes the changes that wait: a user who asked for them and closed the page meant them.
+  // Applies the pending edits: a user who closes the page still wants them.
   ~EditFeed();
   EditFeed(const EditFeed&) = delete;
   EditFeed& operator=(const EditFeed&) = delete;
 
-  // Does not wait. The page is told where too much waits already to take this one.
+  // Does not wait. If the queue is full, reports it to the page.
   void Ask(ViewEdit edit);
 
  private:

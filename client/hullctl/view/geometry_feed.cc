@@ -5,7 +5,7 @@
 namespace hulld {
 namespace {
 
-// Pages ask for each hull once, and again when it changed and they have the former one.
+// Pages request each hull once, and again if it changed after they received it.
 constexpr size_t kMostWishes = 1 << 20;
 
 std::string MessageOf(const absl::Status& status) {

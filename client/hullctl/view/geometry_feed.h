@@ -16,20 +16,19 @@ namespace hulld {
 
 using ShapeFiles = std::vector<std::shared_ptr<const FileShape>>;
 
-// Sends the shapes that one page asks for, in its order, on a thread of its own. Any thread may
-// call it.
+// Sends the shapes requested by one page, in order, on its own thread. Thread-safe.
 class GeometryFeed {
  public:
   GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page);
 
-  // Another scene: forgets what was wished for and not sent.
+  // Switches to another scene; drops pending requests.
   void Show(const ShapeFiles& files);
   void Ask(const std::vector<GeometryWish>& wishes);
 
  private:
   struct Order {
     GeometryWish wish;
-    // The files of the scene that the wish is about.
+    // Files of the scene of the request.
     std::shared_ptr<const ShapeFiles> files;
   };
 
@@ -37,11 +36,12 @@ class GeometryFeed {
   // Guarded by the mutex.
   std::shared_ptr<const ShapeFiles> files_;
   const std::shared_ptr<PageChannel> page_;
-  // Waits for the shape that is under way.
+  // Its destructor waits for the shape in flight.
   OrderedWorker<Order> worker_;
 };
 
-// The frame that answers a wish. For a body, `pieces`, unless null, gets the IDs of its hulls.
+// Returns the frame for a request. For a body, `pieces`, unless null, receives the IDs of its
+// hulls.
 std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
                      std::vector<std::string>* pieces = nullptr);
 

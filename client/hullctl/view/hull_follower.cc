@@ -5,8 +5,6 @@
 #include <chrono>
 #include <utility>
 
-#include "client/calls/revisions.h"
-
 namespace hulld {
 namespace {
 
@@ -56,7 +54,7 @@ void HullFollower::Run() {
       const std::lock_guard lock(mutex_);
       if (ended_) return;
     }
-    // May wait, and so must not hold up Cancel.
+    // May block, so it is called without the mutex, which Cancel needs.
     if (complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
     if (is_unknown) return;
     std::unique_lock lock(mutex_);
@@ -104,7 +102,8 @@ void HullFollower::Take(const v1::WatchHullsResponse& response) {
     }
     told_anew_.clear();
   }
-  ResumeAfter(response.header(), &request_);
+  request_.set_after_revision(response.header().revision());
+  request_.set_store_id(response.header().store_id());
 }
 
 }  // namespace hulld

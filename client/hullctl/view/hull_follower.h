@@ -14,29 +14,29 @@
 
 namespace hulld {
 
-// Follows hulls as they change, on a thread of its own, for as long as it lives: when a watch ends
-// because its server is gone for long, another one resumes where it ended. Where a watch starts
-// anew, hulls that went meanwhile are told of as DELETED.
+// Follows changes of hulls on its own thread until destroyed. After a watch ends because its server
+// is lost for long, another one resumes from its position. If a watch restarts from scratch, hulls
+// deleted in between are reported as DELETED.
 class HullFollower {
  public:
-  // `synced`: what was there has been told.
+  // `synced`: the initial state is complete.
   using Receiver = std::function<void(const v1::HullEvent& event, bool synced)>;
-  // Told why hulls are not followed at present; nothing is said of it when they are again.
+  // Receives the reason why hulls are not followed at present. Recovery is not reported.
   using Complaint = std::function<void(const std::string& message)>;
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
                Complaint complain);
-  // Cancels and waits for the thread, which may be within a call of the receiver.
+  // Cancels and waits for the thread, which may be inside the receiver.
   ~HullFollower();
 
-  // Has the thread end soon; does not wait.
+  // Makes the thread end soon; does not wait.
   void Cancel();
-  // Whether the thread has ended, so that the destructor does not wait.
+  // Returns true if the thread has ended, so that the destructor does not wait.
   bool finished() const { return finished_; }
 
  private:
   void Run();
-  // One watch, until it ends; returns why.
+  // Follows one watch until it ends; returns its error.
   absl::Status Follow(HullWatch* watch);
   void Take(const v1::WatchHullsResponse& response);
 
@@ -44,7 +44,7 @@ class HullFollower {
   v1::WatchHullsRequest request_;
   const Receiver receive_;
   const Complaint complain_;
-  // Those told of and not deleted, and those of them that were told of since the start anew.
+  // IDs reported and not deleted, and the subset reported since a restart from scratch.
   std::unordered_set<std::string> present_;
   std::unordered_set<std::string> told_anew_;
   bool synced_ = false;

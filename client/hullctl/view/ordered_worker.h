@@ -11,16 +11,14 @@
 
 namespace hulld {
 
-// Does one piece of work after another, in the order in which they are asked for, on a thread of
-// its own. Any thread may call it.
+// Processes work items one by one, in order of submission, on its own thread. Thread-safe.
 template <typename Work>
 class OrderedWorker {
  public:
-  // `most`: more than that many do not wait. `work` is done until it returns false, and nothing
-  // after that.
+  // `most`: maximum number of pending items. Calls `work` for each until it returns false.
   OrderedWorker(size_t most, std::function<bool(const Work&)> work)
       : most_(most), work_(std::move(work)), thread_([this] { Run(); }) {}
-  // Waits for the work that is under way; what waits is dropped.
+  // Waits for the item in flight; drops pending ones.
   ~OrderedWorker() {
     {
       const std::lock_guard lock(mutex_);
@@ -32,7 +30,7 @@ class OrderedWorker {
   OrderedWorker(const OrderedWorker&) = delete;
   OrderedWorker& operator=(const OrderedWorker&) = delete;
 
-  // Whether it will be done: there was room for it.
+  // Returns true if the item was accepted: the queue had room.
   [[nodiscard]] bool Ask(Work work) {
     {
       const std::lock_guard lock(mutex_);
@@ -42,7 +40,7 @@ class OrderedWorker {
     changed_.notify_all();
     return true;
   }
-  // Drops what waits.
+  // Drops pending items.
   void Forget() {
     const std::lock_guard lock(mutex_);
     waiting_.clear();

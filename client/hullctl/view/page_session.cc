@@ -15,7 +15,7 @@ std::string CommonPrefix(const std::string& a, const std::string& b) {
   return {a.begin(), end};
 }
 
-// One watch that covers all of the scene. Events of what is not in it are passed over.
+// Returns one watch that covers the scene. Events outside the scene are ignored.
 v1::WatchHullsRequest WatchFor(const ViewScene& scene) {
   v1::WatchHullsRequest request;
   request.set_bodies(true);
@@ -177,7 +177,7 @@ void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool sync
         "objects", {{"scene", std::to_string(scene)}, {"objects", ObjectsJson(objects)}}));
   }
   page_->SendText(TextMessage("hull", {{"event", MessageJson(event)}}));
-  // What is there at the start, the page knows already.
+  // The page already knows the initial state.
   if (synced || is_new) answers_.HullsChanged();
 }
 

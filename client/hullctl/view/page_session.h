@@ -20,23 +20,23 @@
 
 namespace hulld {
 
-// What all pages see; must outlive them.
+// State shared by all pages; must outlive them.
 struct ViewProgram {
   Client client;
   std::string server;
-  // "x", "y" or "z".
+  // "x", "y", or "z".
   std::string up;
-  // Whether pages may change hulls.
+  // True if pages may change hulls.
   bool edit = false;
   // At least one; pages start with the first.
   std::vector<ViewScene> scenes;
-  // Told the key of each scene that a page starts to show; may be empty.
+  // Receives the key of each scene that a page starts to show; may be empty.
   std::function<void(const std::string&)> on_show;
 };
 
 std::string HelloMessage(const ViewProgram& program);
 
-// One page: takes what it asks to the feeds that answer it.
+// One page: passes its messages to the feeds that answer them.
 class PageSession final : public PageHandler {
  public:
   PageSession(const ViewProgram& program, std::shared_ptr<PageChannel> page);
@@ -47,9 +47,9 @@ class PageSession final : public PageHandler {
  private:
   void Show(const std::string& key);
   void Edit(ViewEdit edit);
-  // Tells of these from now on, as of the objects: pieces of bodies.
+  // Also follows these pieces of bodies from now on.
   void FollowToo(const std::vector<GeometryWish>& wishes);
-  // Instead of what was followed.
+  // Replaces the current watch.
   void Follow(v1::WatchHullsRequest request);
   // Called by the thread of the follower of scene number `scene`.
   void TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced);
@@ -62,15 +62,16 @@ class PageSession final : public PageHandler {
   const std::unique_ptr<EditFeed> edits_;
 
   std::mutex mutex_;
-  // Guarded by the mutex: which scene is on show, counted, and what of it is known by ID.
+  // Guarded by the mutex: the number of the current scene, and its known IDs.
   uint64_t scene_ = 0;
   std::vector<std::string> prefixes_;
   std::unordered_set<std::string> known_;
 
-  // What the last follower watches.
+  // Request of the last follower.
   v1::WatchHullsRequest watched_;
-  // Last: their threads use the others. The last one follows the scene on show; those before it
-  // were cancelled. The bridge's thread must not wait for them, as they may wait for it to send.
+  // Declared last, as their threads use the other members. The last one follows the current scene;
+  // earlier ones are cancelled. The bridge's thread must not wait for them, as they may wait for it
+  // to send.
   std::vector<std::unique_ptr<HullFollower>> followers_;
 };
 

@@ -20,7 +20,7 @@ using google::protobuf::Value;
 
 static_assert(std::endian::native == std::endian::little, "frames are little-endian");
 
-// Reads members of a message, and notes the first one that is not what it must be.
+// Reads members of a message, and keeps the first type error.
 class Reader {
  public:
   explicit Reader(const Struct& object) : object_(object) {}
@@ -58,7 +58,7 @@ class Reader {
     }
     return indices;
   }
-  // A whole number of the page, at most 2^53.
+  // Reads an integer from 0 to 2^53.
   uint64_t Count(const std::string& name) {
     const double number = Number(name);
     if (number >= 0 && number <= 0x1p53 && number == std::floor(number)) {
@@ -153,7 +153,7 @@ void AppendBytes(const std::vector<Number>& numbers, std::string* frame) {
   frame->append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
 }
 
-// The front of a frame.
+// Returns the start of a frame.
 std::string StartFrame(const std::string& head, size_t room) {
   const auto length = static_cast<uint32_t>(head.size());
   std::string frame;

@@ -13,7 +13,7 @@
 namespace hulld {
 namespace {
 
-// A frame for each file, hull and body of the scene, and for each hull of a body.
+// Returns a frame for each file, hull, and body of the scene, and for each hull of a body.
 std::string AllFrames(const Client& client, const ViewScene& scene) {
   std::string frames = "[";
   const auto add = [&](const GeometryWish& wish, std::vector<std::string>* pieces) {
@@ -46,7 +46,7 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scen
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
       auto response = client.CheckCollision(PairRequest(objects[a], objects[b], true));
       if (absl::IsResourceExhausted(response.status())) {
-        // Bodies of very many pieces, whose certificate no message holds.
+        // For bodies of so many pieces that no message can hold their certificate.
         response = client.CheckCollision(PairRequest(objects[a], objects[b], false));
       }
       if (!response.ok()) return response.status();

@@ -9,9 +9,9 @@
 
 namespace hulld {
 
-// All that the page shows of one scene as it is now, for a page without a bridge (protocol.h):
-// shapes, the pairs that collide, and, for scenes of at most kMostRecordedObjects objects, the full
-// answer for each two. Errors are those of the calls.
+// Returns the current content of a scene, for a page without a bridge (protocol.h): shapes,
+// colliding pairs, and, for scenes of at most kMostRecordedObjects objects, the full answer for
+// each pair. Returns errors of the calls.
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene);
 
 inline constexpr size_t kMostRecordedObjects = 12;

@@ -17,7 +17,7 @@ constexpr size_t kPrefixBytes = 6;
 }  // namespace
 
 TemporaryHulls::~TemporaryHulls() {
-  // Nobody is left to tell of a failure; the next run does not depend on it.
+  // Ignores errors: no caller can handle them, and later runs do not depend on these hulls.
   for (const std::string& id : ids_) static_cast<void>(client_.DeleteHull(id));
 }
 

@@ -12,8 +12,8 @@
 
 namespace hulld {
 
-// Hulls that are on the server while hullctl needs them, under "ROOT/RANDOM/". The destructor
-// deletes them; a process that is killed leaves them there, for `hullctl delete`.
+// Hulls that exist on the server while hullctl needs them, under "ROOT/RANDOM/". The destructor
+// deletes them; a killed process leaves them for `hullctl delete`.
 class TemporaryHulls {
  public:
   // root: a segment of an ID.
@@ -23,16 +23,16 @@ class TemporaryHulls {
   TemporaryHulls(const TemporaryHulls&) = delete;
   TemporaryHulls& operator=(const TemporaryHulls&) = delete;
 
-  // The hull of all points of a file; points that are not finite are left out. Returns its ID.
+  // Creates the hull of all finite points of a file. Returns its ID.
   absl::StatusOr<std::string> AddFile(const std::string& path);
-  // The hull of the points that `feed` passes on. A name that is there is replaced.
+  // Creates the hull of the points from `feed`. Replaces an existing hull of that name.
   absl::StatusOr<std::string> Add(
       const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed);
 
  private:
   const Client& client_;
   const std::string root_;
-  // "ROOT/RANDOM/"; empty before the first.
+  // "ROOT/RANDOM/"; empty before the first hull.
   std::string prefix_;
   std::vector<std::string> ids_;
 };

@@ -29,7 +29,7 @@ absl::Status ReadMeshShape(const std::string& path, FileShape* shape) {
   return absl::OkStatus();
 }
 
-// Keeps every 2^k-th point, with k as large as needed.
+// Keeps every 2^k-th point, with the smallest sufficient k.
 absl::Status ReadPointShape(const std::string& path, PointFormat format, FileShape* shape) {
   ReadRequest request{path, format, {}, {}};
   request.options.skip_nonfinite = true;
@@ -114,7 +114,7 @@ absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_pr
   std::unordered_set<std::string> pieces;
   for (const v1::BodyInfo& body : bodies->bodies()) {
     ids.push_back(body.body_id());
-    // Without the right to see its pieces, the page says so of the body itself.
+    // Without permission to read its pieces, the page reports that for the body itself.
     const auto whole = client.GetBody(body.body_id());
     if (!whole.ok()) continue;
     for (const v1::Placement& piece : whole->pieces()) pieces.insert(piece.hull_id());
@@ -153,7 +153,7 @@ absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
   scene->rules = std::move(file->request);
   scene->rules.clear_placements();
   scene->rules.clear_packed_placements();
-  // The page shows relations alone here.
+  // The page shows only relations here.
   scene->rules.clear_wanted();
   return absl::OkStatus();
 }

@@ -18,10 +18,10 @@ namespace hulld {
 using Pose7 = std::array<double, 7>;
 inline constexpr Pose7 kIdentityPose = {1, 0, 0, 0, 0, 0, 0};
 
-// The shape that a file holds: a mesh, or points alone.
+// The shape of a file: a mesh, or points alone.
 struct FileShape {
   std::string name;
-  // x y z each. At most kMaxDrawnPoints of the points of a file without triangles.
+  // n x 3. At most kMaxDrawnPoints of the points of a file without triangles.
   std::vector<double> xyz;
   // Three indices each.
   std::vector<uint32_t> triangles;
@@ -29,10 +29,10 @@ struct FileShape {
 };
 inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
-// One thing that is looked at: a hull or a body at a pose, a file, or a file with its hull.
+// A displayed object: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
   std::string name;
-  // That of a hull or a body. Empty: none.
+  // ID of a hull or a body. Empty: none.
   std::string hull_id;
   // Index into ViewScene::files, -1: none.
   int file = -1;
@@ -40,37 +40,38 @@ struct ViewObject {
 };
 
 struct ViewScene {
-  // What selects it among several.
+  // Key that selects the scene.
   std::string key;
   std::string title;
   std::string note;
   std::vector<ViewObject> objects;
   std::vector<std::shared_ptr<const FileShape>> files;
-  // Hulls and bodies that appear under these become objects, too.
+  // Hulls and bodies that appear under these prefixes become objects, too.
   std::vector<std::string> prefixes;
-  // Hulls under them that are shown as pieces of bodies alone.
+  // Hulls under the prefixes that are shown only as pieces of bodies.
   std::vector<std::string> pieces;
-  // Which pairs are asked about: groups and movers of a scene file. Without placements.
+  // Selection of the queried pairs: groups and movers of a scene file. Without placements.
   v1::FindCollisionsRequest rules;
 };
 
-// Reads a mesh (IsMeshFormat) or the points of any other format. Points that are not finite are
-// left out. INVALID_ARGUMENT names the file and the place.
+// Reads a mesh (IsMeshFormat) or the points of any other format. Skips points that are not finite.
+// INVALID_ARGUMENT names the file and the position.
 absl::StatusOr<FileShape> ReadShape(const std::string& path);
 
-// The name of a file without its folders; bytes that are not UTF-8 become question marks, as they
-// would end the connection to the page.
+// Returns the name of a file without its folders. Bytes that are not UTF-8 become question marks,
+// as they would end the connection to the page.
 std::string ShownName(const std::string& path);
 
-// Whether the argument names a file that is there, rather than a hull or a body.
+// Returns true if the argument names an existing file, rather than a hull or a body.
 bool IsFile(const std::string& argument);
 
-// Adds the hull or the body of this ID to the scene, or all whose IDs start so, but for hulls that
-// are pieces of these bodies. NOT_FOUND: there is none.
+// Adds the hull or the body of this ID to the scene, or all with this ID prefix, except for hulls
+// that are pieces of these bodies. NOT_FOUND: none exists.
 absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
                                ViewScene* scene);
 
-// Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the place.
+// Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the
+// position.
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene);
 
 }  // namespace hulld

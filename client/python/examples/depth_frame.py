@@ -1,10 +1,10 @@
-"""A depth frame becomes a hull, and a gripper asks how near it may go.
+"""Turns a depth frame into a hull, and lowers a gripper towards it.
 
     python depth_frame.py
 
-A synthetic camera looks down on a table with an egg on it. The pixels that stand out from the table
-become points, the points become a hull, and a box is lowered until it touches. The hull of points
-seen from one side is what is visible of the egg; what the camera does not see is not in it.
+A synthetic camera looks down on a table with an egg on it. The pixels above the table become
+points, the points become a hull, and a box is lowered until it is 2 mm away. The hull covers only
+the visible side of the egg.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def render() -> npt.NDArray[np.float32]:
 
 
 def to_points(depth: npt.NDArray[np.float32]) -> Array:
-    """The points of a frame in the world, n x 3, without those of the table."""
+    """The points of a frame in the world, n x 3, without the table."""
     v, u = np.nonzero(np.isfinite(depth))
     z = depth[v, u].astype(float)
     points_C = np.stack([(u - WIDTH / 2) / FOCAL * z, (v - HEIGHT / 2) / FOCAL * z, z], axis=1)

@@ -54,7 +54,7 @@ class Robot:
         return poses
 
     def pairs(self) -> list[tuple[str, str]]:
-        """Those that are not excluded, and not joined."""
+        """Pairs of links that are neither excluded nor joined."""
         links = list(self.points)
         joined = {frozenset((joint.parent, joint.child)) for joint in self.joints} | self.ignored
         return [

@@ -1,11 +1,11 @@
-"""What a tolerance buys: time against the answers that it leaves open.
+"""The gain of a tolerance: time against answers that are left open.
 
     python trade_plot.py [PICTURE]
 
 Pairs of balls stand within a millionth of each other. With tolerance 0 every relation is exact.
 With more, pairs that are nearer than the tolerance may be WITHIN_TOLERANCE, which is never wrong.
-Draws PICTURE where matplotlib is installed, and prints the same as a table in any case. The times
-are of this machine, as busy as it is.
+Draws PICTURE if matplotlib is installed, and always prints a table. The times depend on the load of
+the machine.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Client of hulld, a server that keeps 3D convex hulls by ID and tells exactly whether they
-collide.
+"""Client of hulld, a server of 3D convex hulls and exact collision queries.
 
     import hulld
 
@@ -8,102 +7,110 @@ collide.
         answer = client.check_collision("box", ("box", pose), separation=True)
         print(answer.relation.name, answer.separation)
 
-README.md beside the package shows each task.
+README.md of the package shows each task.
 """
 
-from hulld._version import __version__
-from hulld.aio.appender import AsyncAppender
-from hulld.aio.client import AsyncClient
-from hulld.aio.collision_stream import AsyncCollisionStream
-from hulld.aio.watches import AsyncCollisionWatch, AsyncHullWatch
-from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
-from hulld.answers.collisions import (
-    Analysis,
-    Answers,
-    Axis,
-    AxisKind,
-    Batch,
-    BatchPart,
-    Certificate,
-    Collision,
-    CollisionChanges,
-    CollisionEvent,
-    CollisionEventKind,
-    DecidingPiece,
-    Feature,
-    HullSize,
-    HullVersion,
-    Method,
-    PieceCertificate,
-    Problem,
-    Relation,
-    Rung,
-    Scene,
-    ScenePart,
-    SceneTotals,
-    Separation,
-    StreamAnswer,
-    VertexPair,
-    Witness,
-)
-from hulld.answers.hulls import (
-    Audit,
-    CreatedHull,
-    Durability,
-    Header,
-    Hull,
-    HullChanges,
-    HullEvent,
-    HullEventKind,
-    HullInfo,
-    HullMesh,
-    MeshFacets,
-    MeshHeader,
-    MeshPart,
-    MeshVertices,
-    PointCounts,
-    ReplacedHull,
-)
-from hulld.answers.status import Limits, ServerStatus
-from hulld.appender import Appender
-from hulld.backup import Backup
-from hulld.calls.append_state import Appended, Opened
-from hulld.calls.freshness import Freshness
-from hulld.client import Client
-from hulld.collision_stream import CollisionStream
-from hulld.connection import DEFAULT_SERVER, Tls, read_token_file
-from hulld.errors import (
-    AbortedError,
-    AlreadyExistsError,
-    CancelledError,
-    DataLossError,
-    DeadlineExceededError,
-    FailedPreconditionError,
-    HulldError,
-    InternalError,
-    InvalidArgumentError,
-    NotFoundError,
-    PermissionDeniedError,
-    ResourceExhaustedError,
-    UnauthenticatedError,
-    UnavailableError,
-    UnimplementedError,
-)
-from hulld.geometry.placements import (
-    Placement,
-    PlacementLike,
-    Placements,
-    PlacementsLike,
-    all_pairs,
-)
-from hulld.geometry.points import PointsLike, as_points
-from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
-from hulld.local_server import Local, LocalServer, local
-from hulld.programs import find_program
-from hulld.retry import RetryPolicy
-from hulld.verification import VerificationError, Verifier
-from hulld.watches import CollisionWatch, HullWatch
+import importlib
+from typing import TYPE_CHECKING, Any
 
+from hulld._version import __version__
+
+if TYPE_CHECKING:
+    from hulld.aio import (
+        AsyncAppender,
+        AsyncClient,
+        AsyncCollisionStream,
+        AsyncCollisionWatch,
+        AsyncHullWatch,
+    )
+    from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
+    from hulld.answers.collisions import (
+        Analysis,
+        AnswerRow,
+        Answers,
+        Axis,
+        AxisKind,
+        Batch,
+        BatchPart,
+        Certificate,
+        Collision,
+        CollisionChanges,
+        CollisionEvent,
+        CollisionEventKind,
+        DecidingPiece,
+        Feature,
+        HullSize,
+        HullVersion,
+        Method,
+        PieceCertificate,
+        Problem,
+        Relation,
+        Rung,
+        Scene,
+        ScenePart,
+        SceneTotals,
+        Separation,
+        StreamAnswer,
+        VertexPair,
+        Witness,
+    )
+    from hulld.answers.hulls import (
+        Audit,
+        CreatedHull,
+        Durability,
+        Header,
+        Hull,
+        HullChanges,
+        HullEvent,
+        HullEventKind,
+        HullInfo,
+        HullMesh,
+        MeshFacets,
+        MeshHeader,
+        MeshPart,
+        MeshVertices,
+        PointCounts,
+        ReplacedHull,
+    )
+    from hulld.answers.status import Limits, ServerStatus
+    from hulld.appender import Appender
+    from hulld.backup import Backup
+    from hulld.calls.append_state import Appended, Opened
+    from hulld.calls.freshness import Freshness
+    from hulld.client import Client
+    from hulld.collision_stream import CollisionStream
+    from hulld.connection import DEFAULT_SERVER, Tls, read_token_file
+    from hulld.errors import (
+        AbortedError,
+        AlreadyExistsError,
+        CancelledError,
+        DataLossError,
+        DeadlineExceededError,
+        FailedPreconditionError,
+        HulldError,
+        InternalError,
+        InvalidArgumentError,
+        NotFoundError,
+        PermissionDeniedError,
+        ResourceExhaustedError,
+        UnauthenticatedError,
+        UnavailableError,
+        UnimplementedError,
+    )
+    from hulld.geometry.placements import (
+        Placement,
+        PlacementLike,
+        Placements,
+        PlacementsLike,
+        all_pairs,
+    )
+    from hulld.geometry.points import PointsLike, as_points
+    from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
+    from hulld.local_server import Local, LocalServer, local
+    from hulld.programs import find_program
+    from hulld.retry import RetryPolicy
+    from hulld.verification import VerificationError, Verifier
+    from hulld.watches import CollisionWatch, HullWatch
 
 __all__ = [
     "DEFAULT_SERVER",
@@ -111,6 +118,7 @@ __all__ = [
     "AbortedError",
     "AlreadyExistsError",
     "Analysis",
+    "AnswerRow",
     "Answers",
     "Appended",
     "Appender",
@@ -207,3 +215,43 @@ __all__ = [
     "pack_poses",
     "read_token_file",
 ]
+
+#: The modules that define the names of __all__.
+_MODULES = (
+    "answers.bodies",
+    "answers.collisions",
+    "answers.hulls",
+    "answers.status",
+    "appender",
+    "backup",
+    "calls.append_state",
+    "calls.freshness",
+    "client",
+    "collision_stream",
+    "connection",
+    "errors",
+    "geometry.placements",
+    "geometry.points",
+    "geometry.poses",
+    "local_server",
+    "programs",
+    "retry",
+    "verification",
+    "watches",
+    "aio",
+)
+
+
+def __getattr__(name: str) -> Any:
+    # Names are imported at first use: `import hulld` alone loads neither numpy nor gRPC.
+    if name in __all__:
+        for module in _MODULES:
+            found = getattr(importlib.import_module(f"hulld.{module}"), name, None)
+            if found is not None:
+                globals()[name] = found
+                return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from types import TracebackType
-from typing import Any, cast
+from typing import Any
 
-from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState, Opened
-from hulld.calls.duplex import Duplex
+from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState, Opened, pieces
+from hulld.calls.attempts import Attempts
+from hulld.calls.transport import Duplex, sleep
 from hulld.errors import (
     DeadlineExceededError,
     FailedPreconditionError,
@@ -16,19 +16,18 @@ from hulld.errors import (
     UnavailableError,
     read_answer,
 )
-from hulld.geometry.points import Points, PointsLike, as_points, chunks_of
+from hulld.geometry.points import Points, PointsLike
 from hulld.retry import RetryPolicy
 
 
 class Appender:
-    """A stream of chunks into one hull, with a bounded number in flight. When the connection
-    breaks, or the server ends the stream and says when to come again, it reconnects as the same
-    writer, asks for the last committed sequence and sends what is missing, so that each chunk is
-    applied once. It stops when the hull or the store is another one than before: what was
-    acknowledged would be missing there.
+    """A stream of chunks into one hull, with a bounded number in flight. If the connection breaks,
+    or the server ends the stream and says when to retry, it reconnects as the same writer, asks for
+    the last committed sequence, and sends the missing chunks, so that each is applied once. It
+    stops if the hull or the store was replaced: acknowledged points would be missing there.
 
     For one thread. A context manager: it waits for all acknowledgements at the end, and cancels
-    what is not acknowledged when it is left by an exception. Made by Client.open_append.
+    unacknowledged chunks if it is left by an exception. Made by Client.open_append.
     """
 
     def __init__(
@@ -46,24 +45,46 @@ class Appender:
         self._timeout = timeout
         self._failed: HulldError | None = None
         self._connection: Duplex | None = None
-        self._open_first()
+        # Since the last acknowledgement; None: the connection has not failed since.
+        self._attempts: Attempts | None = None
+        self._ensure_open()  # sync only
 
     @property
     def opened(self) -> Opened:
-        """The server's answer to the opening: the hull as it was, and this writer's last committed
+        """The server's answer to the opening: the hull, and this writer's last committed
         sequence."""
-        assert self._state.opened is not None
+        if self._state.opened is None:
+            raise RuntimeError("the stream is not open yet; enter it, or await open()")
         return self._state.opened
 
     @property
     def writer_id(self) -> str:
-        """Under which name chunks are numbered."""
+        """The name of the writer that numbers the chunks."""
         return self._state.writer_id
 
     @property
     def totals(self) -> Appended:
-        """What became of the points so far."""
+        """The progress so far."""
         return self._state.totals()
+
+    def _ensure_open(self) -> Opened:
+        """Opens the stream, unless it is open."""
+        if self._failed is not None:
+            raise self._failed
+        if self._connection is None:
+            attempts = Attempts(self._retry, True, self._timeout)
+            while True:
+                try:
+                    read_answer(self._state.take_opened, self._connect())
+                    break
+                except HulldError as error:
+                    failed = error
+                try:
+                    wait = attempts.wait_after(failed)
+                except HulldError as error:
+                    raise self._fail(error) from None
+                sleep(wait)
+        return self.opened
 
     def append(
         self,
@@ -74,31 +95,22 @@ class Appender:
     ) -> None:
         """Queues points, in chunks of about chunk_bytes; waits while too much is in flight.
 
-        points: n x 3, as hulld.as_points takes them; doubles and floats travel as they are. A chunk
-        is applied wholly or not at all. if_revision: applied only if the hull is at this revision
-        (0: it was made by this stream, and is empty); then all points must fit one chunk, as the
-        first changes the revision.
+        points: n x 3, as in hulld.as_points; doubles and floats travel unchanged. A chunk is
+        applied wholly or not at all. if_revision: applied only if the hull is at this revision (0:
+        it was made by this stream, and is empty); then all points must fit one chunk, as the first
+        changes the revision.
 
-        Raises ValueError, before anything is sent: not points; several chunks with if_revision.
-        HulldError: how the stream ended, which may be about an earlier chunk; every further call
-        raises it again.
+        ValueError, before anything is sent: not points; several chunks with if_revision.
+        HulldError: the error that ended the stream, which may be about an earlier chunk; every
+        later call raises it again.
         """
-        self.append_chunks(pieces(points, if_revision, chunk_bytes), if_revision)
-
-    def append_chunks(self, chunks: Iterable[Points], if_revision: int | None = None) -> None:
-        """As append, for chunks that hulld.as_points has checked."""
-        for chunk in chunks:
-            if self._failed is not None:
-                raise self._failed
-            assert self._connection is not None
-            self._connection.send(self._state.add(chunk, if_revision))
-            self._pump(lambda: not self._state.full)
+        self._append_chunks(pieces(points, if_revision, chunk_bytes), if_revision)
 
     def finish(self) -> Appended:
         """Waits until every chunk is acknowledged, and ends the stream."""
-        if self._failed is not None:
-            raise self._failed
-        self._pump(lambda: self._state.idle)
+        self._ensure_open()
+        while not self._state.idle:
+            self._take_one()
         connection = self._connection
         assert connection is not None
         connection.close_sending()
@@ -107,17 +119,17 @@ class Appender:
             while connection.receive(self._timeout) is not None:
                 pass
         except (UnavailableError, TimeoutError):
-            # Everything is acknowledged, so it does not matter that a server which drains, or is
-            # gone, did not end the stream properly.
+            # Everything is acknowledged: a server that drains, or is gone, loses nothing.
             connection.cancel()
         return self._state.totals()
 
     def cancel(self) -> None:
-        """Ends the stream; what is not acknowledged may be applied or not."""
+        """Ends the stream. Unacknowledged chunks may be applied or not."""
         if self._failed is None:
             self._fail(FailedPreconditionError("the append stream was cancelled"))
 
     def __enter__(self) -> Appender:
+        self._ensure_open()
         return self
 
     def __exit__(
@@ -136,8 +148,6 @@ class Appender:
         if connection is not None:
             connection.cancel()
 
-    # --- How it works ---
-
     def _fail(self, error: HulldError, cancel: bool = True) -> HulldError:
         self._failed = error
         if cancel and self._connection is not None:
@@ -146,100 +156,77 @@ class Appender:
         return error
 
     def _connect(self) -> bytes:
-        """The server's answer to the opening of a new connection."""
-        # The old stream ends before the new one exists, so that the server sees one stream per
-        # writer.
+        """Opens a connection. Returns the server's answer to the opening."""
+        # The old stream ends first, so that the server sees one stream per writer.
         if self._connection is not None:
             self._connection.cancel()
         self._connection = Duplex(self._call, self._metadata)
-        self._connection.send(self._state.open_request())
         try:
+            self._connection.send(self._state.open_request(), self._timeout)
             return self._connection.expect(self._timeout)
         except TimeoutError:
             raise DeadlineExceededError(
                 f"the server did not open the stream within {self._timeout} s"
             ) from None
 
-    def _open_first(self) -> None:
-        deadline = None if self._timeout is None else time.monotonic() + self._timeout
-        while True:
-            try:
-                read_answer(self._state.take_opened, self._connect())
-                self._state.failures = 0
-                return
-            except HulldError as error:
-                self._state.failures += 1
-                remaining = None if deadline is None else deadline - time.monotonic()
-                wait = self._retry.wait_after(self._state.failures, error, remaining)
-                if wait is None:
-                    raise self._fail(error) from None
-                time.sleep(wait)
+    def _append_chunks(self, chunks: Iterable[Points], if_revision: int | None) -> None:
+        for chunk in chunks:
+            self._ensure_open()
+            self._send(self._state.add(chunk, if_revision))
+            while self._state.full or self._has_answer():
+                self._take_one()
 
-    def _reconnect(self, cause: HulldError) -> None:
-        while True:
-            self._state.failures += 1
-            wait = self._retry.wait_after(self._state.failures, cause, None)
-            if wait is None:
-                raise self._fail(self._state.cannot_reopen(cause)) from None
-            time.sleep(wait)
-            try:
-                opened = self._connect()
-            except HulldError as error:
-                cause = error
-                continue
-            try:
-                missing = read_answer(self._state.resume, opened)
-            except HulldError as error:
-                raise self._fail(error) from None
-            assert self._connection is not None
-            for request in missing:
-                self._connection.send(request)
-            return
+    def _has_answer(self) -> bool:
+        """True if an acknowledgement was received, or an error about unacknowledged chunks."""
+        return self._connection is not None and self._connection.ready and not self._state.idle
 
-    def _pump(self, done: Any) -> None:
-        """Takes acknowledgements until `done`, and those that are there."""
-        while True:
-            enough = done()
-            assert self._connection is not None
-            try:
-                message = self._connection.expect(0 if enough else self._timeout)
-            except TimeoutError:
-                if enough:
-                    return
-                raise self._fail(
-                    DeadlineExceededError(
-                        f"the server acknowledged no chunk for {self._timeout} s; "
-                        f"{self.totals.points_acknowledged} points are committed"
-                    )
-                ) from None
-            except HulldError as error:
-                if self._state.idle and enough:
-                    return
-                self._reconnect(error)
-                continue
+    def _send(self, request: bytes) -> None:
+        assert self._connection is not None
+        try:
+            self._connection.send(request, self._timeout)
+        except TimeoutError:
+            raise self._fail(self._late("took")) from None
+
+    def _take_one(self) -> None:
+        """Takes one acknowledgement, or reconnects."""
+        assert self._connection is not None
+        try:
+            message = self._connection.expect(self._timeout)
+        except TimeoutError:
+            raise self._fail(self._late("acknowledged")) from None
+        except HulldError as error:
+            failed = error
+        else:
             try:
                 read_answer(self._state.take_ack, message)
             except HulldError as error:
                 raise self._fail(error) from None
+            self._attempts = None
+            return
+        self._reconnect(failed)
 
+    def _reconnect(self, cause: HulldError) -> None:
+        while True:
+            self._attempts = self._attempts or Attempts(self._retry, True, self._timeout)
+            try:
+                wait = self._attempts.wait_after(cause)
+            except HulldError as error:
+                raise self._fail(self._state.cannot_reopen(error)) from None
+            sleep(wait)
+            try:
+                opened = self._connect()
+                break
+            except HulldError as error:
+                cause = error
+        try:
+            missing = read_answer(self._state.resume, opened)
+        except HulldError as error:
+            raise self._fail(error) from None
+        for request in missing:
+            self._send(request)
 
-def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Iterator[Points]:
-    """The chunks of points. ValueError: several, with if_revision."""
-    array = as_points(points)
-    chunks = list(chunks_of(array, chunk_bytes))
-    if if_revision is not None and len(chunks) > 1:
-        raise ValueError(
-            f"{len(array)} points make {len(chunks)} chunks, and if_revision can hold for the "
-            "first alone; give fewer points, or a larger chunk_bytes"
+    def _late(self, did: str) -> DeadlineExceededError:
+        return DeadlineExceededError(
+            f"the server {did} no chunk for {self._timeout} s; "
+            f"{self.totals.points_acknowledged} points are committed"
         )
-    return iter(chunks)
-
-
-def chunks_to_send(
-    points: PointsLike | Iterator[PointsLike], if_revision: int | None, chunk_bytes: int
-) -> Iterator[Points]:
-    """The chunks of one array, which is checked as a whole at once, or of each array of an iterator
-    or a generator, each as it comes. Lists and tuples are arrays."""
-    if isinstance(points, Iterator):
-        return (chunk for block in points for chunk in pieces(block, if_revision, chunk_bytes))
-    return pieces(cast(PointsLike, points), if_revision, chunk_bytes)

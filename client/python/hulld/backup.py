@@ -19,7 +19,7 @@ _FIRST_LINE = b"hulld backup 1\n"
 
 @dataclass(frozen=True)
 class Backup:
-    """What was saved. header: the store and its revision when the backup began; byte_count: of all
+    """A finished backup. header: the store and its revision at the start; byte_count: of all
     files."""
 
     header: Header
@@ -29,11 +29,12 @@ class Backup:
 
 
 class BackupWriter:
-    """Writes the parts of SaveBackup: a line that says what it is, then each part after its size
+    """Writes the parts of SaveBackup: a line that names the format, then each part after its size
     and CRC-32. The file gets its name only when it is complete and on disk; otherwise nothing is
     left. A context manager.
 
-    OSError: it cannot be written. ValueError: a part is damaged or out of place."""
+    OSError: the file cannot be written. ValueError: a part is damaged or out of place.
+    """
 
     def __init__(self, path: PathLike) -> None:
         self._path = pathlib.Path(path)

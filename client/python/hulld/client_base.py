@@ -1,32 +1,40 @@
-"""What a client is before it knows any call: its connection, and how calls over it are made,
-bounded in time and repeated."""
+"""The connection of a client, and its calls: bounded in time, and retried."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
-import grpc
-import grpc.experimental
-
-from hulld.answers.hulls import HullMesh, MeshAssembly, MeshPart
+from hulld import arguments
 from hulld.calls.attempts import Attempts
+from hulld.calls.channel import Channel
 from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, as_fresh
+from hulld.calls.transport import cancel_call, close_channel, invoke, open_channel, read, sleep
 from hulld.connection import DEFAULT_SERVER, Connection, Tls
-from hulld.errors import from_rpc_error, read_answer
+from hulld.errors import HulldError, read_answer
 from hulld.notebook import Viewer
 from hulld.retry import RetryPolicy
 
+R = TypeVar("R", covariant=True)
 T = TypeVar("T")
 
 DEFAULT_TIMEOUT = 30.0
 
 
+class Assembly(Protocol[R]):
+    """The parts of an answer, put together. ValueError: they contradict each other."""
+
+    def add(self, data: bytes) -> None:
+        ...
+
+    def finish(self) -> R:
+        ...
+
+
 class ClientBase:
-    """As Client, whose arguments these are. Its methods are for those that add calls."""
+    """As Client, with the same arguments. Its methods are for subclasses that add calls."""
 
     def __init__(
         self,
@@ -40,35 +48,24 @@ class ClientBase:
     ) -> None:
         self._connection = Connection(server, tls, token, insecure)
         self._viewer = Viewer(self._connection)
-        self._timeout = timeout
+        self._timeout = arguments.seconds(timeout)
         self._retry = retry
-        credentials = self._connection.credentials()
-        # Answers that stream then need no thread of their own: observed, 2 ms less for each call.
-        options = [
-            *self._connection.options(),
-            (grpc.experimental.ChannelOptions.SingleThreadedUnaryStream, 1),
-        ]
-        self._channel = (
-            grpc.insecure_channel(self._connection.target, options)
-            if credentials is None
-            else grpc.secure_channel(self._connection.target, credentials, options)
-        )
-        self._calls: dict[str, Any] = {}
+        self._channel = Channel(self._connection, open_channel)
 
     @property
     def server(self) -> str:
-        """The address that was given."""
+        """The address, with its port."""
         return self._connection.server
 
     @property
     def channel(self) -> Any:
-        """gRPC's channel, for the generated stubs in hulld.v1. Calls through it carry no token of
-        their own accord."""
-        return self._channel
+        """gRPC's channel, for the generated stubs in hulld.v1; opened if it is not yet. Calls
+        through it carry no token."""
+        return self._channel.get()
 
     def close(self) -> None:
         """Ends the connection and every call on it."""
-        self._channel.close()
+        close_channel(self._channel)
 
     def __enter__(self) -> Self:
         return self
@@ -85,71 +82,66 @@ class ClientBase:
         return f"hulld.{type(self).__name__}({self.server!r})"
 
     def _seconds(self, timeout: float | None) -> float | None:
-        return self._timeout if timeout is None else timeout
+        return self._timeout if timeout is None else arguments.seconds(timeout)
 
     def _start(self, call: Call[Any], timeout: float | None) -> Any:
-        """Starts a call whose answer streams."""
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self._channel.unary_stream(call.method)
-        )
-        return multi(call.request, timeout=timeout, metadata=self._connection.metadata())
+        """Starts a call with a stream of answers."""
+        method = self._channel.call("unary_stream", call.method)
+        return method(call.request, timeout=timeout, metadata=self._connection.metadata())
 
     def _unary(self, call: Call[T], timeout: float | None, freshness: Freshness | None = None) -> T:
         call = as_fresh(call, freshness)
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self._channel.unary_unary(call.method)
-        )
+        method = self._channel.call("unary_unary", call.method)
+        metadata = self._connection.metadata()
         attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
         while True:
             try:
-                answer = multi(
-                    call.request, timeout=attempts.remaining(), metadata=self._connection.metadata()
-                )
-            except grpc.RpcError as error:
-                time.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(call.decode, answer)
+                answer = invoke(method, call.request, attempts.remaining(), metadata)
+                return read_answer(call.decode, answer)
+            except HulldError as error:
+                sleep(attempts.wait_after(error))
 
-    def _received(
-        self, call: Call[Any], timeout: float | None, freshness: Freshness | None = None
-    ) -> Iterator[bytes]:
-        """The messages of an answer. Retried only while nothing was received."""
+    def _parts(
+        self, call: Call[T], timeout: float | None, freshness: Freshness | None = None
+    ) -> Iterator[T]:
+        """The decoded messages of an answer. Retried only until the first message."""
         call = as_fresh(call, freshness)
         attempts = Attempts(self._retry, call.safe_to_repeat, timeout)
         received = False
         while True:
             stream = self._start(call, attempts.remaining())
             try:
-                for data in stream:
+                while (data := read(stream)) is not None:
                     received = True
-                    yield data
+                    yield read_answer(call.decode, data)
                 return
-            except grpc.RpcError as error:
-                failed = from_rpc_error(error)
+            except HulldError as error:
+                if received:
+                    raise
+                failed = error
             finally:
-                stream.cancel()
-            if received:
-                raise failed
-            time.sleep(attempts.wait_after(failed))
+                cancel_call(stream)
+            sleep(attempts.wait_after(failed))
 
-    def _parts(
-        self, call: Call[T], timeout: float | None, freshness: Freshness | None = None
-    ) -> Iterator[T]:
-        for data in self._received(call, self._seconds(timeout), freshness):
-            yield read_answer(call.decode, data)
-
-    def _mesh(
-        self, call: Call[MeshPart], timeout: float | None, freshness: Freshness | None
-    ) -> HullMesh:
-        """Retried from the start, whatever was received."""
+    def _whole(
+        self,
+        call: Call[Any],
+        assembly: Callable[[], Assembly[R]],
+        timeout: float | None,
+        freshness: Freshness | None,
+    ) -> R:
+        """The messages of an answer, put together. Retried from the start."""
         call = as_fresh(call, freshness)
         attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
         while True:
-            mesh = MeshAssembly()
+            parts = assembly()
+            stream = self._start(call, attempts.remaining())
             try:
-                for data in self._start(call, attempts.remaining()):
-                    mesh.add(read_answer(call.decode, data))
-            except grpc.RpcError as error:
-                time.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(mesh.finish, self._viewer)
+                while (data := read(stream)) is not None:
+                    read_answer(parts.add, data)
+                return read_answer(lambda _: parts.finish(), None)
+            except HulldError as error:
+                failed = error
+            finally:
+                cancel_call(stream)
+            sleep(attempts.wait_after(failed))

@@ -1,4 +1,4 @@
-"""Asks again and again while poses change."""
+"""Asks repeatedly while poses change."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from hulld.answers.assembly import StepAssembly
 from hulld.answers.collisions import StreamAnswer
-from hulld.calls.duplex import Duplex
-from hulld.calls.freshness import Freshness
-from hulld.calls.requests import open_stream, update_stream
+from hulld.calls.requests import update_stream
+from hulld.calls.transport import Duplex
 from hulld.calls.wanted import Wanted
 from hulld.errors import (
     DeadlineExceededError,
@@ -22,88 +21,101 @@ from hulld.errors import (
     InternalError,
     read_answer,
 )
-from hulld.geometry.placements import Placements, as_indices
-from hulld.geometry.poses import PosesLike, pack_poses
+from hulld.geometry.placements import check_update
+from hulld.geometry.poses import PosesLike
 
-#: Which placements move, and where to.
+#: The indices of moved placements, and their new poses.
 Update = tuple[npt.ArrayLike, PosesLike]
 
 
 class CollisionStream:
-    """One StreamCollisions call, step by step: poses go up, the relations of the pairs that they
-    change come down. What decided a pair is kept by the server and tried first at its next poses,
-    so that small motions cost little.
+    """One StreamCollisions call, step by step: poses are sent, and the relations of the pairs that
+    they change are received. The server keeps the witness of each pair and tries it first at the
+    next poses, so that small motions cost little.
 
-    Never retried: what the server keeps of a stream ends with it. For one thread. A context
-    manager, which ends the call. Made by Client.stream_collisions.
+    Never retried: the server's state ends with the stream. For one thread. A context manager, which
+    ends the call. Made by Client.stream_collisions.
     """
 
     def __init__(
         self,
         call: Any,
         metadata: Any,
-        placements: Placements,
+        opening: bytes,
+        placements: int,
         pairs: npt.NDArray[np.uint32],
         wanted: Wanted,
-        tolerance: float,
-        only_changes: bool,
-        freshness: Freshness | None,
+        orthogonality_tolerance: float,
         timeout: float | None,
     ) -> None:
-        self._placements = len(placements)
+        self._call = call
+        self._metadata = metadata
+        self._opening = opening
+        self._placements = placements
         self._pairs = pairs
         self._wanted = wanted
+        self._orthogonality_tolerance = orthogonality_tolerance
         self._timeout = timeout
         self._count = 0
         self._failed: HulldError | None = None
-        self._connection = Duplex(call, metadata)
-        self._opened = self._ask(
-            open_stream(placements, pairs, wanted, tolerance, only_changes, freshness)
-        )
+        self._connection: Duplex | None = None
+        self._opened: StreamAnswer | None = None
+        self._ensure_open()  # sync only
 
     @property
     def opened(self) -> StreamAnswer:
         """The answer to the opening: every pair, at the first poses."""
+        if self._opened is None:
+            raise RuntimeError("the stream is not open yet; enter it, or await open()")
+        return self._opened
+
+    def _ensure_open(self) -> StreamAnswer:
+        """Opens the stream, unless it is open. Returns the answer to the opening."""
+        if self._opened is None:
+            self._opened = self._ask(self._opening)
         return self._opened
 
     def update(
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
-        """Moves placements, and answers every pair that this concerns, or with only_changes those
-        whose relation changed.
+        """Moves placements. Answers every pair of a moved placement; with only_changes, every pair
+        with another relation.
 
         placements: k indices into those of the stream, each at most once. poses: the new pose of
-        each: k x 7, k x 4 x 4 or k x 3. refresh_hulls: looks every hull up anew before answering;
-        hulls that changed count as moved.
+        each: k x 7, k x 4 x 4, or k x 3. refresh_hulls: looks every hull up again first; a hull
+        that changed counts as moved.
 
-        Raises ValueError, before anything is sent: an index out of range; poses that are none, or
-        not k. HulldError: the stream has ended, and every later call raises it again.
+        ValueError, before anything is sent, and the stream goes on: an index out of range; poses
+        that are none, or not k. HulldError: the stream has ended; every later call raises it again.
         """
-        return self._ask(encode_update(placements, poses, self._placements, refresh_hulls))
+        moved = check_update(placements, poses, self._placements, self._orthogonality_tolerance)
+        self._ensure_open()
+        return self._ask(update_stream(*moved, refresh_hulls))
 
     def refresh(self) -> StreamAnswer:
-        """Looks every hull up anew, and answers the pairs whose hulls changed."""
+        """Looks every hull up again, and answers the pairs of changed hulls."""
+        self._ensure_open()
         return self._ask(update_stream(np.empty(0, np.uint32), np.empty((0, 7)), True))
 
     def follow(self, updates: Iterable[Update]) -> Iterator[StreamAnswer]:
-        """The answer to each of the updates, (placements, poses), one after another."""
+        """The answer to each update, (placements, poses), in order."""
         for placements, poses in updates:
             yield self.update(placements, poses)
 
     def close(self) -> None:
-        """Says that nothing follows, and waits for the end. HulldError: how the call ended, if not
-        well."""
-        if self._failed is not None:
+        """Ends the stream, and waits for the server to confirm. HulldError: the call failed."""
+        if self._failed is not None or self._connection is None:
             return
         self._failed = FailedPreconditionError("the collision stream is closed")
         self._connection.close_sending()
         try:
             if self._connection.receive(self._timeout) is not None:
-                raise InternalError("the server answered more than it was asked")
+                raise InternalError("the server sent more answers than there were requests")
         except TimeoutError:
             self._connection.cancel()
 
     def __enter__(self) -> CollisionStream:
+        self._ensure_open()
         return self
 
     def __exit__(
@@ -116,7 +128,8 @@ class CollisionStream:
             self.close()
         else:
             self._failed = self._failed or FailedPreconditionError("the collision stream is closed")
-            self._connection.cancel()
+            if self._connection is not None:
+                self._connection.cancel()
 
     def __del__(self) -> None:
         connection = getattr(self, "_connection", None)
@@ -126,10 +139,12 @@ class CollisionStream:
     def _ask(self, request: bytes) -> StreamAnswer:
         if self._failed is not None:
             raise self._failed
+        if self._connection is None:
+            self._connection = Duplex(self._call, self._metadata)
         step = StepAssembly(self._count, self._pairs, self._wanted)
         self._count += 1
-        self._connection.send(request)
         try:
+            self._connection.send(request, self._timeout)
             while not read_answer(step.add, self._connection.expect(self._timeout)):
                 pass
             return read_answer(lambda _: step.finish(), None)
@@ -142,22 +157,3 @@ class CollisionStream:
         self._failed = failed
         self._connection.cancel()
         raise failed
-
-
-def check_update(
-    placements: npt.ArrayLike, poses: PosesLike, count: int
-) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float64]]:
-    """Indices of some of `count` placements, and their poses, packed; errors as in
-    CollisionStream.update."""
-    indices = as_indices(placements, count, "placements").reshape(-1)
-    packed = pack_poses(poses)
-    if len(packed) != len(indices):
-        raise ValueError(f"there are {len(packed)} poses for {len(indices)} placements")
-    return indices, packed
-
-
-def encode_update(
-    placements: npt.ArrayLike, poses: PosesLike, count: int, refresh_hulls: bool
-) -> bytes:
-    """A message that moves placements; errors as in CollisionStream.update."""
-    return update_stream(*check_update(placements, poses, count), refresh_hulls)

@@ -1,4 +1,4 @@
-"""Where the server is, how the connection is protected, and who we are."""
+"""The address of the server, TLS, and the token."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import ipaddress
 import json
 import os
 import pathlib
+import re
 import stat
 from dataclasses import dataclass, field
 from typing import Any, Union
 
-import grpc
-
-DEFAULT_SERVER = "127.0.0.1:50551"
-#: For several servers: in turn, and only to those that report that they serve.
+DEFAULT_PORT = 50551
+DEFAULT_SERVER = f"127.0.0.1:{DEFAULT_PORT}"
+#: For several servers: round robin among all that serve.
 _SPREAD_CALLS = json.dumps(
     {"loadBalancingConfig": [{"round_robin": {}}], "healthCheckConfig": {"serviceName": ""}}
 )
-#: The server cuts its replies at about 1 MiB. This bounds the memory that a faulty one can claim.
+#: Replies of hulld have about 1 MiB. This bounds the memory that a faulty server can claim.
 _MAX_RECEIVE_BYTES = 64 << 20
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -25,11 +25,11 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 @dataclass(frozen=True)
 class Tls:
-    """Encrypts. All are paths of PEM files, read when the client connects.
+    """Encrypts the connection. Files are PEM, read when the client is made.
 
-    ca_cert: the authorities that the server's certificate may come from; None: those of the system.
-    cert, key: ours, for a server that asks for one; both or neither. server_name: the name in the
-    server's certificate, where it is not that of the address.
+    ca_cert: the authorities that may have signed the server's certificate; None: the system's.
+    cert, key: the client's certificate and its key, for mutual TLS. server_name: the name in the
+    server's certificate, if it differs from that in the address.
     """
 
     ca_cert: PathLike | None = None
@@ -40,13 +40,14 @@ class Tls:
     def __post_init__(self) -> None:
         if (self.cert is None) != (self.key is None):
             raise ValueError(
-                "a client certificate and its key belong together; give both or neither"
+                "a client certificate and its key belong together; pass both or neither"
             )
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What a channel is made of. ValueError: the token would be readable on its way, or is none."""
+    """The settings of a channel. ValueError: a malformed address or token, or a token that would
+    travel unencrypted to another machine."""
 
     server: str = DEFAULT_SERVER
     tls: Tls | None = None
@@ -54,31 +55,32 @@ class Connection:
     insecure: bool = False
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "server", _with_port(self.server))
         _ = self.target
         if self.tls is not None and not self.tls.server_name and _is_list(self.server):
             raise ValueError(
-                "several addresses have certificates for one name: say which, with "
+                "several addresses need the name in their certificates: pass "
                 "tls=hulld.Tls(server_name=...)"
             )
         if self.token is None:
             return
         if not self.token or not all("!" <= character <= "~" for character in self.token):
-            raise ValueError("the token is empty, or holds blanks or characters beyond ASCII")
+            raise ValueError("the token is empty, or has blanks or characters beyond ASCII")
         if self.tls is None and not self.insecure and not is_loopback(self.server):
             raise ValueError(
-                f"the token would travel unencrypted to {self.server}, where everyone on the way "
-                "could read it; use tls=hulld.Tls(), or allow it with insecure=True"
+                f"the token would travel unencrypted to {self.server}; use tls=hulld.Tls(), or "
+                "allow it with insecure=True"
             )
 
     @property
     def target(self) -> str:
-        """What gRPC calls the server. ValueError: a list of what is not addresses of one kind."""
+        """gRPC's name of the server. ValueError: a list of addresses of different kinds."""
         if not _is_list(self.server):
             return self.server
         return f"ipv{_ip_version(self.server)}:{self.server}"
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
-        """What goes with each call."""
+        """The metadata of each call."""
         return (("authorization", f"Bearer {self.token}"),) if self.token else ()
 
     def options(self) -> list[tuple[str, Any]]:
@@ -86,35 +88,52 @@ class Connection:
         options: list[tuple[str, Any]] = [
             ("grpc.max_receive_message_length", _MAX_RECEIVE_BYTES),
             ("grpc.max_send_message_length", -1),
-            # A retry must find a server that has come back meanwhile, rather than gRPC's memory of
-            # the failure.
+            # A retry finds a restarted server within a second. gRPC resolves the name again before
+            # it reconnects, addresses included, by default at most every 30 s.
+            ("grpc.dns_min_time_between_resolutions_ms", 100),
             ("grpc.initial_reconnect_backoff_ms", 50),
-            ("grpc.max_reconnect_backoff_ms", 1000),
+            # The time for one connection attempt, TLS handshake included.
+            ("grpc.min_reconnect_backoff_ms", 5000),
+            ("grpc.max_reconnect_backoff_ms", 500),
         ]
         if _is_list(self.server) or self.server.startswith("dns:///"):
             options.append(("grpc.service_config", _SPREAD_CALLS))
         if is_loopback(self.server):
-            # Otherwise gRPC uses the proxy of the environment even for services on this machine.
+            # gRPC would use the proxy of the environment even for this machine.
             options.append(("grpc.enable_http_proxy", 0))
         if self.tls is not None and self.tls.server_name:
             options.append(("grpc.ssl_target_name_override", self.tls.server_name))
         return options
 
-    def credentials(self) -> Any:
-        """gRPC's credentials of the channel; None without TLS. OSError: a file cannot be read."""
+    def pem_files(self) -> tuple[bytes | None, bytes | None, bytes | None] | None:
+        """The contents of ca_cert, key, and cert, as gRPC's ssl_channel_credentials takes them;
+        None without TLS. OSError: a file cannot be read."""
         if self.tls is None:
             return None
 
         def content(path: PathLike | None) -> bytes | None:
             return None if path is None else pathlib.Path(path).read_bytes()
 
-        return grpc.ssl_channel_credentials(
-            content(self.tls.ca_cert), content(self.tls.key), content(self.tls.cert)
-        )
+        return content(self.tls.ca_cert), content(self.tls.key), content(self.tls.cert)
+
+
+def _with_port(server: Any) -> str:
+    """The address with DEFAULT_PORT if it names none. TypeError, ValueError: not an address."""
+    if not isinstance(server, str):
+        raise TypeError(f'server is {server!r}; it takes a string such as "{DEFAULT_SERVER}"')
+    if _is_list(server) or re.match(r"(unix|unix-abstract|ipv4|ipv6|vsock):|\w+:///", server):
+        return server
+    if _address(f"[{server}]") is not None:
+        return f"[{server}]:{DEFAULT_PORT}"
+    # A name or IPv4 address, or an IPv6 address in brackets; then a port.
+    parts = re.fullmatch(r"([\w.-]+|\[[0-9A-Fa-f:.%\w]+\])(?::(\d{1,5}))?", server)
+    if parts is None or (parts[2] is not None and not 1 <= int(parts[2]) <= 65535):
+        raise ValueError(f'server is {server!r}; it takes HOST:PORT, such as "{DEFAULT_SERVER}"')
+    return server if parts[2] else f"{server}:{DEFAULT_PORT}"
 
 
 def is_loopback(server: str) -> bool:
-    """Whether every server that it names is on this machine. False for what only DNS can tell."""
+    """True if every server named is on this machine; False for DNS names but localhost."""
     return server.startswith("unix:") or all(
         _is_loopback_host(one.rpartition(":")[0]) for one in server.split(",")
     )
@@ -154,24 +173,24 @@ def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
 
 
 def _is_loopback_host(host: str) -> bool:
-    # An address, not a name that begins like one.
+    # Not a name such as 127.0.0.1.example.
     address = _address(host)
     return host == "localhost" or (address is not None and address.is_loopback)
 
 
 def read_token_file(path: PathLike) -> str:
-    """The token in a file of one line, as `hullctl token new --token-out` writes it.
+    """The token in a file, as `hullctl token new --token-out` writes it.
 
-    Raises ValueError: others can read it too, or it holds no token; OSError: it cannot be read. No
+    ValueError: other users can read the file, or it holds no token. OSError: it cannot be read. No
     error repeats its text.
     """
     info = os.stat(path)
     if stat.S_ISREG(info.st_mode) and info.st_mode & 0o077:
-        raise ValueError(f"{os.fspath(path)}: others can read this token; chmod 600 it")
+        raise ValueError(f"{os.fspath(path)}: other users can read this token; chmod 600 it")
     words = pathlib.Path(path).read_text(encoding="ascii", errors="replace").split()
     if len(words) != 1:
         raise ValueError(
-            f"{os.fspath(path)}: it does not hold one token, as 'hullctl token new --token-out' "
+            f"{os.fspath(path)}: not a file of one token, as 'hullctl token new --token-out' "
             "writes it"
         )
     return words[0]

@@ -1,4 +1,4 @@
-"""How calls fail: one class per gRPC status, with what the server says for programs."""
+"""Errors of calls: one class per gRPC status, with the reason and metadata of the server."""
 
 from __future__ import annotations
 
@@ -10,6 +10,27 @@ from google.protobuf.message import DecodeError
 
 from hulld.rpc import error_details_pb2
 
+#: gRPC's status codes, by number.
+STATUS_NAMES = (
+    "OK",
+    "CANCELLED",
+    "UNKNOWN",
+    "INVALID_ARGUMENT",
+    "DEADLINE_EXCEEDED",
+    "NOT_FOUND",
+    "ALREADY_EXISTS",
+    "PERMISSION_DENIED",
+    "RESOURCE_EXHAUSTED",
+    "FAILED_PRECONDITION",
+    "ABORTED",
+    "OUT_OF_RANGE",
+    "UNIMPLEMENTED",
+    "INTERNAL",
+    "UNAVAILABLE",
+    "DATA_LOSS",
+    "UNAUTHENTICATED",
+)
+
 D = TypeVar("D")
 T = TypeVar("T")
 
@@ -20,14 +41,13 @@ _ERROR_INFO = "google.rpc.ErrorInfo"
 
 
 class HulldError(Exception):
-    """A call failed. Read the class or `code`, `reason` and `metadata`; the text is for people and
-    may change.
+    """A failed call. Programs read the class or `code`, `reason`, and `metadata`; the text is for
+    people and may change.
 
-    code: gRPC's status, as in "NOT_FOUND". message: what to fix. reason: why, by the name that
-    proto/hulld/v1/error.proto gives, as in "HULL_NOT_FOUND"; None where the server gave none, as
-    for errors of gRPC itself. metadata: what goes with the reason, as in {"hull_id": "arm"}.
-    request_id: under which the server's log knows the call, or None. retry_after: the seconds to
-    wait before the same call is made again; None where the server does not say that it may be.
+    code: gRPC's status, as in "NOT_FOUND". message: the problem, and the remedy. reason: the name
+    in proto/hulld/v1/error.proto, as in "HULL_NOT_FOUND"; None for errors of gRPC itself. metadata:
+    details of the reason, as in {"hull_id": "arm"}. request_id: of the call in the server's log,
+    or None. retry_after: the seconds to wait before a retry, if the server allows one; else None.
     """
 
     code = "UNKNOWN"
@@ -73,7 +93,7 @@ def _restore(kind: type[HulldError], message: str, state: dict[str, Any]) -> Hul
 
 
 class CancelledError(HulldError):
-    """The call was ended on this side."""
+    """The client ended the call."""
 
     code = "CANCELLED"
 
@@ -97,7 +117,7 @@ class NotFoundError(HulldError, LookupError):
 
 
 class AlreadyExistsError(HulldError):
-    """There is such a hull."""
+    """The hull exists already."""
 
     code = "ALREADY_EXISTS"
 
@@ -109,22 +129,21 @@ class PermissionDeniedError(HulldError):
 
 
 class ResourceExhaustedError(HulldError):
-    """More than a limit allows; metadata["flag"] names it. With retry_after: others use it up at
-    the moment."""
+    """A limit is exceeded; metadata["flag"] names it. With retry_after: only for now."""
 
     code = "RESOURCE_EXHAUSTED"
 
 
 class FailedPreconditionError(HulldError):
-    """The hull was deleted or replaced while a stream was open, a chunk is missing, or the store
-    keeps nothing to save."""
+    """The hull was deleted or replaced while a stream was open, a chunk is missing, the store
+    keeps nothing to save, the client is closed, or the process was forked with an open client."""
 
     code = "FAILED_PRECONDITION"
 
 
 class AbortedError(HulldError):
-    """The hull is not at the revision that the request expects; metadata["current_revision"] is the
-    one that it is at."""
+    """The hull is not at the revision that the request expects; metadata["current_revision"] is its
+    revision."""
 
     code = "ABORTED"
 
@@ -136,7 +155,7 @@ class UnimplementedError(HulldError):
 
 
 class InternalError(HulldError):
-    """The server, or what came from it, contradicts itself."""
+    """The server failed, or sent a malformed answer."""
 
     code = "INTERNAL"
 
@@ -148,13 +167,13 @@ class UnavailableError(HulldError):
 
 
 class DataLossError(HulldError):
-    """What the store keeps of the hull is damaged."""
+    """The stored hull is damaged."""
 
     code = "DATA_LOSS"
 
 
 class UnauthenticatedError(HulldError):
-    """The call has no token, or one that the server does not know."""
+    """The call has no token, or an unknown one."""
 
     code = "UNAUTHENTICATED"
 
@@ -180,13 +199,18 @@ _CLASSES: dict[str, type[HulldError]] = {
 }
 
 
+def status_name(code: int) -> str:
+    """The name of a status code."""
+    return STATUS_NAMES[code] if 0 <= code < len(STATUS_NAMES) else "UNKNOWN"
+
+
 def error_class(code: str) -> type[HulldError]:
     """The class for a status, as in "NOT_FOUND"."""
     return _CLASSES.get(code, HulldError)
 
 
 def read_answer(read: Callable[[D], T], data: D) -> T:
-    """What the server sent, read. InternalError: it is malformed, or contradicts itself."""
+    """Reads data of the server. InternalError: it is malformed, or contradicts itself."""
     try:
         return read(data)
     except HulldError:
@@ -196,7 +220,7 @@ def read_answer(read: Callable[[D], T], data: D) -> T:
 
 
 def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | None) -> HulldError:
-    """The error of a call that ended with this status and these trailing metadata."""
+    """The error of a call with this status and these trailing metadata."""
     metadata = {key: value for key, value in trailing or ()}
     reason, info = _error_info(metadata.get(_DETAILS))
     request_id = metadata.get(_REQUEST_ID)
@@ -211,7 +235,7 @@ def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | N
 
 
 def from_rpc_error(error: Any) -> HulldError:
-    """The same for gRPC's exception, of its synchronous or its asynchronous interface."""
+    """Converts gRPC's exception, of its synchronous or its asynchronous interface."""
     return from_status(error.code().name, error.details() or "", error.trailing_metadata())
 
 
@@ -226,7 +250,7 @@ def _error_info(details: Any) -> tuple[str | None, dict[str, str]]:
             if detail.type_url.endswith("/" + _ERROR_INFO):
                 info.ParseFromString(detail.value)
     except DecodeError:
-        # What is malformed tells nothing; the status stands without it.
+        # The status stands without malformed details.
         return None, {}
     if info.domain != "hulld":
         return None, {}
@@ -238,5 +262,5 @@ def _retry_after(hint: Any) -> float | None:
         milliseconds = int(hint)
     except (TypeError, ValueError):
         return None
-    # A negative number asks not to.
+    # A negative number forbids retries.
     return milliseconds / 1000 if milliseconds >= 0 else None

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import collections
 import os
-import pathlib
 import re
 import shutil
 import subprocess
@@ -14,12 +12,14 @@ import threading
 import weakref
 from collections.abc import Callable, Sequence
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hulld.aio.client import AsyncClient
 from hulld.client import Client
 from hulld.connection import PathLike
 from hulld.programs import find_program
+
+if TYPE_CHECKING:
+    from hulld.aio import AsyncClient
 
 _LISTENING = re.compile(r"listening on (\S+)")
 #: The last lines of the server's log that are kept.
@@ -81,7 +81,8 @@ class LocalServer:
         return list(self._log)
 
     def start(self) -> LocalServer:
-        """Returns once it listens. RuntimeError: it ended instead; tells what it said."""
+        """Returns when the server listens. RuntimeError: it ended instead; the message has its
+        output."""
         if self._process is not None:
             return self
         folder = tempfile.mkdtemp(prefix="hulld-")
@@ -167,7 +168,7 @@ class LocalServer:
 
 
 class Local:
-    """What local() returns: `with` gives a Client, `async with` an AsyncClient."""
+    """The result of local(): `with` gives a Client, `async with` an AsyncClient."""
 
     def __init__(self, server: LocalServer, client: dict[str, Any]) -> None:
         self._server = server
@@ -190,6 +191,10 @@ class Local:
         self._server.stop()
 
     async def __aenter__(self) -> AsyncClient:
+        import asyncio
+
+        from hulld.aio import AsyncClient
+
         await asyncio.to_thread(self._server.start)
         self._async_client = AsyncClient(self._server.address, **self._options)
         return self._async_client
@@ -200,6 +205,8 @@ class Local:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        import asyncio
+
         if self._async_client is not None:
             await self._async_client.close()
         await asyncio.to_thread(self._server.stop)
@@ -212,7 +219,7 @@ def local(
     binary: PathLike | None = None,
     **client: Any,
 ) -> Local:
-    """A server of one's own, for a script or a test, and a client of it:
+    """Runs a server for a script or a test, with a client:
 
         with hulld.local() as client:
             ...

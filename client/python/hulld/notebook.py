@@ -1,4 +1,4 @@
-"""What notebooks show: a table, and the viewer's page where hullctl is found."""
+"""Answers in notebooks: a table, and the viewer's page if hullctl is found."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ class Viewer:
         shown: Placements | Sequence[str],
         pairs: Sequence[tuple[int, int]] = (),
     ) -> str:
-        """A table of `rows`, without those that are None, and the page of `shown`, IDs or
-        placements, or why there is none. Never raises: a notebook would show the error in place of
-        the answer."""
+        """A table of `rows`, without None, and the page of `shown`, IDs or placements, or the
+        reason for its absence. Never raises: a notebook would show the error in place of the
+        answer."""
         body = "".join(
             f"<tr><th style='text-align:left'>{html.escape(str(name))}</th><td "
             f"style='text-align:left'>{html.escape(str(value))}</td></tr>"

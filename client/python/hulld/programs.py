@@ -9,12 +9,9 @@ from collections.abc import Iterator
 
 
 def find_program(name: str) -> pathlib.Path:
-    """Where the program is: HULLD_BINARY (for hulld) or HULLCTL_BINARY, the directory of
-    HULLD_BINARY, the PATH, or the newest build in the checkout of hulld that the working directory
-    or this package lies in.
-
-    Raises FileNotFoundError, which tells where was looked.
-    """
+    """Finds a program: by HULLD_BINARY (for hulld) or HULLCTL_BINARY, then in the directory of
+    HULLD_BINARY, on the PATH, or in the newest build of the hulld checkout around the working
+    directory or this package. FileNotFoundError lists these places."""
     variable = f"{name.upper()}_BINARY"
     named = os.environ.get(variable)
     if named:

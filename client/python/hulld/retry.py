@@ -1,39 +1,40 @@
-"""When a call that is safe to repeat is repeated."""
+"""Retries of calls that are safe to repeat."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hulld import arguments
 from hulld.errors import HulldError, ResourceExhaustedError, UnavailableError
 
 
 @dataclass(frozen=True)
 class RetryPolicy:
-    """Calls that are safe to repeat are repeated after UNAVAILABLE, which says that the server was
-    not reached or is draining, and when it is overloaded and says when to come again. Waits double
-    from initial_backoff to max_backoff, in seconds, and are at least as long as the server asks.
-    All attempts together stay within the call's timeout.
+    """Calls that are safe to repeat are retried after UNAVAILABLE (the server was not reached, or
+    is draining), and if it is overloaded and says when to retry. They are retried until their
+    timeout has passed, so that a call outlives a restart of the server. Waits double from
+    initial_backoff to max_backoff, in seconds, and are at least as long as the server asks.
     """
 
-    #: In all; 1 turns retries off.
-    max_attempts: int = 4
+    #: In all; 1 turns retries off, None leaves only the timeout.
+    max_attempts: int | None = None
     initial_backoff: float = 0.1
     max_backoff: float = 2.0
 
-    def wait_after(
-        self,
-        failures: int,
-        error: HulldError,
-        remaining: float | None,
-        max_attempts: float | None = None,
-    ) -> float | None:
+    def __post_init__(self) -> None:
+        if self.max_attempts is not None:
+            arguments.count(self.max_attempts, "max_attempts", least=1)
+        for name in ("initial_backoff", "max_backoff"):
+            arguments.seconds(arguments.number(getattr(self, name), name), name)
+
+    def wait_after(self, failures: int, error: HulldError, remaining: float | None) -> float | None:
         """The seconds to wait after `failures` >= 1 failed attempts, the last of which ended with
-        `error`; None: give up, as it may not be repeated, the attempts are used up, or the wait
+        `error`; None: give up, because it may not be retried, the attempts are used up, or the wait
         would pass the deadline, `remaining` seconds away.
         """
-        if not may_retry(error) or failures >= (
-            self.max_attempts if max_attempts is None else max_attempts
-        ):
+        if not may_retry(error):
+            return None
+        if self.max_attempts is not None and failures >= self.max_attempts:
             return None
         backoff = min(self.initial_backoff * 2.0 ** min(failures - 1, 60), self.max_backoff)
         wait = max(backoff, error.retry_after or 0.0)
@@ -41,7 +42,7 @@ class RetryPolicy:
 
 
 def may_retry(error: HulldError) -> bool:
-    """Whether a call that ended so may be repeated, if it is safe to repeat."""
+    """True if a call that is safe to repeat may be retried after `error`."""
     return isinstance(error, UnavailableError) or (
         isinstance(error, ResourceExhaustedError) and error.retry_after is not None
     )

@@ -2,8 +2,8 @@
 
 Everything is a rational number (fractions.Fraction), so nothing is rounded: a vertex, a translation
 and the components of a quaternion are doubles, and the rotation of a quaternion q is a matrix of
-integers in these, divided by |q|^2. Nothing of the server's is trusted but the hulls and bodies that
-it keeps, at the revisions that the answer names.
+integers in these, divided by |q|^2. The server is trusted only for the hulls and bodies that it
+stores, at the revisions that the answer names.
 """
 
 from __future__ import annotations
@@ -29,14 +29,8 @@ from hulld.answers.collisions import (
 )
 from hulld.answers.hulls import HullMesh
 from hulld.errors import NotFoundError
-from hulld.geometry.placements import (
-    Placement,
-    PlacementLike,
-    Placements,
-    PlacementsLike,
-    as_placement,
-)
-from hulld.geometry.poses import Pose, PoseLike, pack_pose
+from hulld.geometry.placements import Placement, PlacementLike, Placements, PlacementsLike
+from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, pack_pose
 
 _Point = tuple[Fraction, Fraction, Fraction]
 _ORIGIN: _Point = (Fraction(0), Fraction(0), Fraction(0))
@@ -44,8 +38,8 @@ Rows = Union[Batch, Scene, StreamAnswer]
 
 
 class VerificationError(Exception):
-    """A certificate does not prove the answer, or there is nothing to check it against. moved: the
-    hull or body has changed since, or is gone; a new answer may be checked."""
+    """A certificate does not prove the answer, or cannot be checked. moved: the hull or body has
+    changed since, or is gone; a new answer may be checked."""
 
     def __init__(self, reason: str, *, moved: bool = False) -> None:
         super().__init__(reason)
@@ -53,7 +47,7 @@ class VerificationError(Exception):
 
 
 class _Source(Protocol):
-    """What a Verifier needs of a client."""
+    """The methods of a client that a Verifier calls."""
 
     def get_hull_mesh(self, hull_id: str) -> HullMesh:
         ...
@@ -130,7 +124,7 @@ class _Piece:
 
 
 def _holds_origin(points: Sequence[_Point]) -> bool:
-    """Whether the convex hull of at most four points holds 0 (Caratheodory: some simplex does)."""
+    """True if the convex hull of at most four points holds 0 (Caratheodory: some simplex does)."""
     if any(p == _ORIGIN for p in points):
         return True
     for p, q in combinations(points, 2):
@@ -157,7 +151,7 @@ def _holds_origin(points: Sequence[_Point]) -> bool:
 
 
 def _surrounds_origin(points: Sequence[_Point]) -> bool:
-    """Whether 0 is strictly inside the convex hull: no half-space through 0 holds all points. Where
+    """True if 0 is strictly inside the convex hull: no half-space through 0 holds all points. If
     the points span space, such a half-space could be turned until two of them, independent, lie on
     its boundary."""
     spans = any(_dot(a, _cross(b, c)) != 0 for a, b, c in combinations(points, 3))
@@ -174,11 +168,11 @@ def _surrounds_origin(points: Sequence[_Point]) -> bool:
 
 
 def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -> None:
-    """Whether the certificate proves the relation of two hulls."""
+    """Checks that the certificate proves the relation of two hulls."""
     differences = []
     for pair in certificate.pairs:
         if pair.index_a >= len(a.points) or pair.index_b >= len(b.points):
-            raise VerificationError("a vertex pair names a vertex that there is not")
+            raise VerificationError("a vertex pair names a vertex that does not exist")
         differences.append(_minus(a.points[pair.index_a], b.points[pair.index_b]))
     if relation == Relation.OVERLAPPING:
         if not _surrounds_origin(differences):
@@ -226,7 +220,7 @@ def _check_pieces(
     for one in certificates:
         name = f"pieces {one.piece_a} of A and {one.piece_b} of B"
         if one.piece_a >= len(a) or one.piece_b >= len(b):
-            raise VerificationError(f"there are no {name}")
+            raise VerificationError(f"{name} do not exist")
         if one.relation not in _STRENGTH or _STRENGTH[one.relation] > _STRENGTH[relation]:
             raise VerificationError(f"{name} are {one.relation.name}, the bodies {relation.name}")
         try:
@@ -248,24 +242,29 @@ def _check_pieces(
 
 
 class Verifier:
-    """Checks answers with certificates against the hulls and bodies that a client fetches, each
-    once.
-
+    """Checks answers with certificates against hulls and bodies, which a client fetches and keeps.
     Cost: about 0.2 milliseconds for each vertex of each hull or piece that is placed, and some
-    microseconds for each pair of pieces.
-    """
+    microseconds for each pair of pieces."""
 
     def __init__(self, client: _Source) -> None:
         self._client = client
         self._meshes: dict[str, HullMesh] = {}
         self._bodies: dict[str, Body | None] = {}
 
-    def check(self, a: PlacementLike, b: PlacementLike, answer: Collision) -> None:
-        """Whether the certificate of check_collision(a, b, certificate=True) proves its relation.
-        VerificationError: it does not, or cannot be checked."""
+    def check(
+        self,
+        a: PlacementLike,
+        b: PlacementLike,
+        answer: Collision,
+        *,
+        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+    ) -> None:
+        """Checks that the certificate of check_collision(a, b, certificate=True) proves its
+        relation. VerificationError: it does not, or cannot be checked."""
+        pair = Placements.of([a, b], orthogonality_tolerance=orthogonality_tolerance)
         self._check(
-            as_placement(a),
-            as_placement(b),
+            pair[0],
+            pair[1],
             answer.relation,
             answer.certificate,
             (answer.hull_a, answer.hull_b),
@@ -273,10 +272,17 @@ class Verifier:
             answer.piece_hulls,
         )
 
-    def check_row(self, placements: PlacementsLike, found: Rows, row: int) -> None:
-        """The same of row `row` of a batch, a scene or a step of a stream, which was asked about
-        these placements with certificate=True."""
-        packed = Placements.of(placements)
+    def check_row(
+        self,
+        placements: PlacementsLike,
+        found: Rows,
+        row: int,
+        *,
+        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+    ) -> None:
+        """Checks row `row` of a batch, a scene, or a step of a stream about these placements with
+        certificate=True."""
+        packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         a, b = (packed[int(index)] for index in found.pairs[row])
         answers = found.answers
         if a.id not in found.hulls or b.id not in found.hulls:
@@ -308,7 +314,7 @@ class Verifier:
         if relation not in _STRENGTH:
             raise VerificationError(f"{relation.name} has no certificate")
         if (a.id, b.id) != (versions[0].hull_id, versions[1].hull_id):
-            raise VerificationError("the answer is about other hulls than the question")
+            raise VerificationError("the answer is about different hulls")
         if proof is None:
             if certificate is None:
                 raise VerificationError("the answer has no certificate")
@@ -368,10 +374,10 @@ class Verifier:
 
     def _expect(self, version: HullVersion, created: int, revision: int, store_id: str) -> None:
         if store_id != version.store_id:
-            raise VerificationError("the server holds another store than the answer's")
+            raise VerificationError("the server has a different store than the answer")
         if (created, revision) == (version.create_revision, version.revision):
             return
-        # A newer answer may be about what is there by now.
+        # A newer answer may be about the current body.
         self._meshes.pop(version.hull_id, None)
         self._bodies.pop(version.hull_id, None)
         raise VerificationError(

@@ -11,28 +11,28 @@
 namespace hulld {
 namespace {
 
-// The smaller a surface, the cheaper it is to test a point against all its triangles.
+// On a surface this small, testing a point against all triangles is cheap.
 constexpr size_t kMostTrianglesToTest = 64;
-// A block of at most this many points is not worth a sample: all are tested against all triangles.
+// A block of at most this many points is not sampled: all are tested against all triangles.
 constexpr size_t kSmallBlock = 4096;
-// Each sample, and then the block, is this many times the sample before.
+// Each sample, and finally the block, is this many times the previous sample.
 constexpr size_t kSampleRatio = 16;
-// Samples are made of runs of consecutive points, for the sake of memory.
+// Samples consist of runs of consecutive points, for memory locality.
 constexpr size_t kRun = 8;
-// The map of directions (see Surface::MeasureBefore) that a sample is looked up in, and the one
-// that follows where the first leaves many times as many points as the surface has triangles, as it
-// does where points lie along large facets.
-constexpr double kMapFineness = 2.4;
-constexpr double kWalksPerPoint = 0.2;
+// Parameters of the map of directions (see Surface::MeasureBefore) in which a sample is looked up,
+// and of the finer map that follows if the first leaves many times as many points as the surface
+// has triangles, as for points along large facets.
+constexpr double kBlockMapFineness = 2.4;
+constexpr double kBlockWalksPerPoint = 0.2;
 constexpr size_t kManyPerTriangle = 32;
 constexpr double kFineMapFineness = 5.6;
 constexpr double kWalksPerSurvivor = 0.6;
 
 // One call of InsertBlock.
 //
-// Idea: in most clouds, most points are inside. Samples of growing size shape the surface; then the
-// map of directions rejects most of what follows, read once and in order, and what remains goes
-// into conflict lists. A block most of which is outside is inserted in rounds instead.
+// In most clouds, most points are inside. Samples of growing size shape the surface; then the map
+// of directions, reading the rest once and in order, rejects most of it, and the remaining points
+// go into conflict lists. A block with most points outside is inserted in rounds instead.
 class BlockInsertion {
  public:
   BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
@@ -44,7 +44,7 @@ class BlockInsertion {
         poll_(poll) {}
 
   bool Run() {
-    // A triangle's list takes memory whether it is used or not.
+    // A triangle's list takes memory even if it is unused.
     if (!surface_.IsMeasurable() || 64 * points_.size() < surface_.triangle_count()) {
       return InsertRounds();
     }
@@ -63,7 +63,8 @@ class BlockInsertion {
     size_t first;
     size_t end;
   };
-  // A sample in order: each stride-th run of the block, without those of earlier samples.
+  // Returns a sample in order: each stride-th run of the block, without the runs of earlier
+  // samples.
   std::vector<Range> RangesOf(size_t stride) const {
     std::vector<Range> ranges;
     for (size_t first = 0; first < points_.size(); first += kRun * stride) {
@@ -78,7 +79,7 @@ class BlockInsertion {
     return ranges;
   }
 
-  // A power of kSampleRatio, or 1 for all points at once.
+  // Returns a power of kSampleRatio, or 1 for all points at once.
   size_t FirstStride() const {
     size_t stride = 1;
     while (points_.size() / stride > kSmallBlock) stride *= kSampleRatio;
@@ -123,13 +124,13 @@ class BlockInsertion {
     }
   }
 
-  // Looks up where each point of the sample lies and gives the lists those outside.
+  // Locates each point of the sample and adds the points outside to the lists.
   void TakeByDirection(size_t stride, ConflictLists& lists) {
     std::vector<Vector> outside;
     std::vector<TriangleId> seen;
     for (const Vector& p : SurvivorsOf(stride)) {
       if (poll_.Step()) return;
-      // Points that follow each other often lie near each other.
+      // Consecutive points are often close to each other.
       if (!seen.empty() && surface_.IsCertainlySeenFrom(vertices_, seen.back(), p)) {
         outside.push_back(p);
         seen.push_back(seen.back());
@@ -148,10 +149,11 @@ class BlockInsertion {
     lists.Take(outside, seen);
   }
 
-  // The points of a sample that the map of directions cannot reject, nor a finer one where these
-  // are many.
+  // Returns the points of a sample that the map of directions cannot reject, nor, if there are
+  // many, a finer map.
   std::vector<Vector> SurvivorsOf(size_t stride) {
-    surface_.MeasureBefore(vertices_, points_.size() / stride, kMapFineness, kWalksPerPoint, poll_);
+    surface_.MeasureBefore(vertices_, points_.size() / stride, kBlockMapFineness,
+                           kBlockWalksPerPoint, poll_);
     std::vector<Vector> survivors;
     size_t asked = 0;
     for (const Range& range : RangesOf(stride)) {
@@ -176,7 +178,8 @@ class BlockInsertion {
     return survivors;
   }
 
-  // Inserts in rounds what conflict lists gave up and what no sample had.
+  // Inserts in rounds the points that conflict lists gave up, and the points that no sample
+  // contained.
   bool InsertRounds() {
     surface_.BeginInsertions(vertices_);
     if (stride_before_ != 1) AppendSample(1, rest_);
@@ -186,16 +189,16 @@ class BlockInsertion {
   Surface& surface_;
   VertexTable& vertices_;
   std::span<const Vector> points_;
-  // Indices of points that are not to be inserted, few.
+  // Indices of points to skip; few.
   std::vector<uint32_t> done_;
   StopPoll& poll_;
-  // The stride of the sample before; 0 when there is none.
+  // The stride of the previous sample; 0 if there is none.
   size_t stride_before_ = 0;
-  // Points that are to be inserted one by one: the walk to them was too long.
+  // Points to insert one by one, because the walk to them was too long.
   std::vector<Vector> astray_;
-  // Points that are to be inserted in rounds.
+  // Points to insert in rounds.
   std::vector<Vector> rest_;
-  // Those points to keep, among the ones that are looked up in the map.
+  // Surviving indices among the points being looked up in the map.
   std::vector<uint32_t> indices_;
 };
 

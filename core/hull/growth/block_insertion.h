@@ -10,10 +10,10 @@
 
 namespace hulld {
 
-// Adds a block of points to a surface, all but those with the indices `done`, in an order that is
-// fast for any input: the points that the map of directions cannot reject go into conflict lists,
-// or, where most points are outside, are inserted in rounds of growing size. Returns false, with
-// some of the points added, when the poll, whose steps are insertions, said stop.
+// Adds a block of points to a surface, except those with the indices `done`, in an order that is
+// fast for any input. The points that the map of directions cannot reject go into conflict lists
+// or, if most points are outside, are inserted in rounds of growing size. Returns false, with some
+// of the points added, if the poll stopped; its steps are insertions.
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
                  std::span<const uint32_t> done, StopPoll& poll);
 

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// A vertex on its way to its place in the canonical order.
+// A vertex being sorted into canonical order.
 struct Ranked {
   Vector point;
   VertexId id;
@@ -27,13 +27,13 @@ void Sort(std::span<Ranked> vertices) {
   });
 }
 
-// Sorts into canonical order. After the poll said stop, the result means nothing.
+// Sorts into canonical order. If the poll stopped, the result is meaningless.
 //
-// Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
-// few in each, and only these are compared. The slice of an x is a composition of rounded
-// operations that never decrease, so slices are in order whatever is rounded.
+// The x of most hulls are spread out, so as many slices across x as there are vertices leave few
+// vertices in each, and comparisons are needed only within a slice. The slice of an x is a
+// composition of rounded monotonic operations, so slices are in order for any rounding.
 std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) {
-  // Ends of a range whose length overflows, or is zero, have no slices.
+  // A range with a length that overflows or is zero is not sliced.
   double least = INFINITY;
   double largest = -INFINITY;
   for (const Ranked& v : vertices) {
@@ -51,7 +51,7 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) 
   const auto slice_of = [&](const Ranked& v) {
     return static_cast<size_t>(std::min((v.point.x() - least) * scale, last));
   };
-  // ends[s]: first where slice s begins, then, as it fills, where it ends.
+  // ends[s]: the start of slice s, which advances to its end as the slice fills.
   std::vector<uint32_t> ends(vertices.size(), 0);
   for (const Ranked& v : vertices) {
     if (poll.Step()) return vertices;
@@ -79,7 +79,7 @@ struct Ranking {
   std::vector<uint32_t> index_of;
 };
 
-// Ranks all vertices that live. The result means nothing after the poll said stop.
+// Ranks all live vertices. If the poll stopped, the result is meaningless.
 Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   std::vector<Ranked> ranked;
   ranked.reserve(vertices.size());
@@ -109,11 +109,11 @@ struct Faces {
 
 // One call of SnapshotOf.
 //
-// Idea: an edge between facets is passed once in each direction, each time with another facet to
-// the left. Written down at its lower vertex, together with the facet to the left when it is the
-// first edge of that facet, and sorted by its higher vertex among the few that are written there,
-// edges and facets come out in canonical order: a facet is told from the others that start at the
-// same vertex by its second vertex alone.
+// An edge between facets is traversed once in each direction, each time with another facet to the
+// left. It is recorded at its lower vertex, together with the facet to the left if it is the first
+// edge of that facet. The few edges recorded at a vertex are sorted by their higher vertex. Edges
+// and facets then come out in canonical order, because the second vertex alone distinguishes a
+// facet from the other facets that start at the same vertex.
 class FaceCollector {
  public:
   FaceCollector(const VertexTable& vertices, const Surface& surface, const Ranking& ranking)
@@ -125,7 +125,7 @@ class FaceCollector {
     polygon_starts_.push_back(0);
   }
 
-  // False when stopped.
+  // Returns false if stopped.
   bool Run(StopPoll& poll) {
     FindFlatEdges(poll);
     if (poll.stopped()) return false;
@@ -137,10 +137,10 @@ class FaceCollector {
     return !poll.stopped();
   }
 
-  // Requires that Run was not stopped. Once. Nothing when stopped.
+  // Returns the faces, or nothing if stopped. Requires: Run completed. Call at most once.
   std::optional<Faces> Assemble(StopPoll& poll) {
     Faces faces;
-    // Reserved, as a snapshot stays as it is for long.
+    // Reserves exactly, because a snapshot is long-lived and never grows.
     faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
     faces.facet_vertices.reserve(3 * triangle_facets_ + polygon_vertices_.size());
     faces.edges.reserve(departures_.size());
@@ -149,7 +149,7 @@ class FaceCollector {
     uint32_t first = 0;
     for (uint32_t tail = 0; tail < vertex_count; ++tail) {
       if (poll.Step()) return std::nullopt;
-      // Its departures were written, so this is where they end.
+      // After the departures were written, this is their end.
       const uint32_t end = departures_at_[tail];
       SortByHead(std::span(departures_).subspan(first, end - first));
       for (; first < end; ++first) {
@@ -170,17 +170,17 @@ class FaceCollector {
   }
 
  private:
-  // Flags of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is
-  // known.
+  // Flags of a triangle: bit i is set if edge i lies within a facet, the fourth bit if the facet
+  // has been found.
   static constexpr uint8_t kAnyFlat = 7;
   static constexpr uint8_t kVisited = 8;
 
   // An edge from its lower vertex to its higher one.
   struct Departure {
     uint32_t head;
-    // The third vertex of the facet to the left if that is a triangle; the number of vertices and
-    // then the polygon's if it is a polygon that starts with this edge; 0 otherwise. A facet starts
-    // with this edge when this is above the edge's lower vertex.
+    // If the facet to the left is a triangle: its third vertex. If it is a polygon that starts with
+    // this edge: the number of vertices plus the polygon's index. Otherwise 0. A facet starts with
+    // this edge if this value is above the edge's lower vertex.
     uint32_t next;
   };
 
@@ -193,8 +193,8 @@ class FaceCollector {
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Edges at which triangles were joined know whether they are flat. Triangles that were made
-  // together have a common apex; for each, the edge to the next one round the apex is tested here.
+  // Edges at which triangles were joined record if they are flat. Triangles created together share
+  // an apex; for each, tests the edge to the next one around the apex.
   void FindFlatEdges(StopPoll& poll) {
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;
@@ -213,7 +213,7 @@ class FaceCollector {
   void TracePolygons(StopPoll& poll) {
     for (TriangleId id = 0; id < flags_.size() && !poll.stopped(); ++id) {
       if ((flags_[id] & kAnyFlat) == 0 || (flags_[id] & kVisited) != 0) continue;
-      // A triangle all of whose edges are within its facet is met from its neighbours.
+      // A triangle with all edges within its facet is reached from its neighbours.
       uint32_t edge = 0;
       while (edge < 3 && IsFlat(id, edge)) ++edge;
       if (edge < 3) TracePolygon(id, edge, poll);
@@ -221,14 +221,14 @@ class FaceCollector {
   }
   bool IsFlat(TriangleId id, uint32_t edge) const { return (flags_[id] >> edge & 1) != 0; }
 
-  // Walks round one facet, from one edge of its boundary to the next through the triangles round
-  // the vertex between them. All triangles of the facet are met, as each has its corners on the
-  // boundary.
+  // Walks around one facet, from one edge of its boundary to the next through the triangles around
+  // the vertex between them. This reaches all triangles of the facet, because each has its corners
+  // on the boundary.
   void TracePolygon(TriangleId first, uint32_t first_edge, StopPoll& poll) {
     const size_t start = polygon_vertices_.size();
     TriangleId id = first;
     uint32_t edge = first_edge;
-    // Steps of a walk that is right: through each corner of each triangle at most once.
+    // Bound on the steps of a correct walk: through each corner of each triangle at most once.
     size_t steps_left = 3 * surface_.triangle_count();
     do {
       if (poll.Step()) return;
@@ -251,8 +251,8 @@ class FaceCollector {
     polygon_starts_.push_back(static_cast<uint32_t>(polygon_vertices_.size()));
   }
 
-  // Calls visit(tail, head, next) for every edge of a triangle that is a facet, and of a polygon,
-  // that leads from a lower vertex to a higher one.
+  // Calls visit(tail, head, next) for every edge of a triangular facet, and of a polygon, that
+  // leads from a lower vertex to a higher one.
   template <typename Visitor>
   void ForEachTriangleDeparture(const SurfaceTriangle& t, Visitor&& visit) const {
     const auto [a, b, c] = RanksOf(t);
@@ -269,7 +269,7 @@ class FaceCollector {
     }
   }
 
-  // Leaves in departures_at_[v] where those at vertex v begin.
+  // Sets departures_at_[v] to the start of the departures at vertex v.
   void CountDepartures(StopPoll& poll) {
     const auto count = [this](uint32_t tail, uint32_t, uint32_t) { ++departures_at_[tail]; };
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
@@ -283,7 +283,7 @@ class FaceCollector {
     departures_.resize(begin);
   }
 
-  // Leaves in departures_at_[v] where those at vertex v end.
+  // Advances departures_at_[v] to the end of the departures at vertex v.
   void WriteDepartures(StopPoll& poll) {
     const auto write = [this](uint32_t tail, uint32_t head, uint32_t next) {
       departures_[departures_at_[tail]++] = {head, next};
@@ -317,10 +317,10 @@ class FaceCollector {
   // By triangle.
   std::vector<uint8_t> flags_;
   size_t triangle_facets_ = 0;
-  // The facets that are not triangles of the surface, by ranks, each from its lowest.
+  // The facets that are not triangles of the surface, by ranks, each from its lowest vertex.
   std::vector<uint32_t> polygon_starts_;
   std::vector<uint32_t> polygon_vertices_;
-  // In order of their lower vertices, and where those of each begin or end.
+  // Departures in order of their lower vertices, and the start or end of each vertex's range.
   std::vector<Departure> departures_;
   std::vector<uint32_t> departures_at_;
 };
@@ -350,7 +350,7 @@ std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<con
   }
   std::rotate(facet.begin(), std::min_element(facet.begin(), facet.end()), facet.end());
   if (facet[1] > facet[n - 1]) std::reverse(facet.begin() + 1, facet.end());
-  // The two edges of each vertex lead to its neighbours; each edge is written at its lower vertex.
+  // The two edges of each vertex lead to its neighbours; each edge is recorded at its lower vertex.
   std::vector<std::pair<uint32_t, uint32_t>> neighbours(n);
   for (uint32_t i = 0; i < n; ++i) {
     if (poll.Step()) return std::nullopt;

@@ -11,15 +11,15 @@
 
 namespace hulld {
 
-// Turn the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles merged
-// exactly, facets and edges sorted. Cost: O(V log V), linear where the x of the vertices are spread
-// out, and an exact sign for each pair of neighbours with a common apex. Where there is a poll, it
-// stops them, and they return nullopt then.
+// Convert the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles
+// merged exactly, facets and edges sorted. Functions with a poll return nullopt if it stopped.
+// Cost: O(V log V), linear if the x of the vertices are spread out, and an exact sign for each pair
+// of neighbours with a common apex.
 
-// Requires at most two vertices, in lexicographic order (unchecked: AuditHull sees it).
+// Requires: at most two vertices, in lexicographic order (unchecked; AuditHull detects violations).
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);
-// Requires at least three vertices of a strictly convex polygon, in order, either way round
-// (unchecked: AuditHull sees it).
+// Requires: at least three vertices of a strictly convex polygon, in order, in either orientation
+// (unchecked; AuditHull detects violations).
 std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop,
                                       StopPoll& poll);
 std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface, StopPoll& poll);

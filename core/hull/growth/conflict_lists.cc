@@ -8,12 +8,12 @@
 namespace hulld {
 namespace {
 
-// Steps of the poll for one insertion: it moves the points of the lists that it changes, too.
+// Poll steps for one insertion, which also moves the points of the lists that it changes.
 constexpr uint64_t kStepsPerInsertion = 4;
-// Insertions after which it is clear whether most points are inside.
+// Number of insertions after which it is clear if most points are inside.
 constexpr size_t kTrialInsertions = 24;
-// Moves of a point, on average, from which on another order of insertion is better. Observed: at
-// most 8 for clouds and meshes most of which is inside.
+// Average moves of a point above which another order of insertion is better. Observed: at most 8
+// for clouds and meshes with most points inside.
 constexpr size_t kMostMoves = 32;
 
 }  // namespace
@@ -40,7 +40,7 @@ void ConflictLists::Take(std::span<const Vector> points, std::span<const Triangl
   CountTaken(points);
   is_trial_ = false;
   std::vector<TriangleId> targets;
-  // By triangle: its place among the targets, from 1.
+  // Place among the targets, from 1, by triangle.
   std::vector<uint32_t> place(surface_.id_bound(), 0);
   counts_.assign(1, 0);
   for (const TriangleId id : seen) {
@@ -81,7 +81,7 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
   return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
 }
 
-// After some insertions, all of them far out, most of a cloud is inside or will never be.
+// After some insertions, all of them far out, most of a cloud is inside or never will be.
 bool ConflictLists::IsMostlyOutside(size_t insertions) {
   if (insertions != kTrialInsertions || !is_trial_) return false;
   return 8 * (waiting_ + insertions) > 7 * taken_;
@@ -109,7 +109,7 @@ void ConflictLists::InsertFrom(TriangleId id) {
   if (!sources_.empty()) Distribute(targets);
 }
 
-// Requires a list that is not empty.
+// Requires: a non-empty list.
 Vector ConflictLists::RemoveFarthest(TriangleId id) {
   List& list = lists_[id];
   HULLD_CHECK(list.count > 0);
@@ -123,12 +123,12 @@ Vector ConflictLists::RemoveFarthest(TriangleId id) {
   return farthest;
 }
 
-// Moves the points of sources_ to the targets that they see; those that see none are inside.
+// Moves the points of sources_ to targets that they see; points that see none are inside.
 void ConflictLists::Distribute(std::span<const TriangleId> targets) {
   size_t points = 0;
   for (const List& source : sources_) points += source.count;
   moved_ += points;
-  // One block beyond the lists takes the points that are inside.
+  // One block beyond the lists receives the points that are inside.
   Reserve(BlocksFor(points) + targets.size() + 1);
   source_blocks_.clear();
   for (const List& source : sources_) {
@@ -169,8 +169,8 @@ void ConflictLists::Match(std::span<const TriangleId> targets) {
   }
 }
 
-// Copies the points of sources_ to the lists of their matches, without branching on the match: what
-// is inside goes to a place that never advances.
+// Copies the points of sources_ to the lists of their matches, without branching on the match:
+// points inside are written to a place that never advances.
 void ConflictLists::Scatter() {
   const int64_t* matches = matches_.data();
   size_t* const cursors = cursors_.data();
@@ -186,8 +186,8 @@ void ConflictLists::Scatter() {
   }
 }
 
-// The index of a target that the point sees, or kBelowAll if there is none. Counts the point when
-// it equals a vertex.
+// Returns the index of a target that the point sees, or kBelowAll if there is none. Counts the
+// point if it equals a vertex.
 int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const TriangleId> targets) {
   for (size_t k = 0; k < targets.size(); ++k) {
     if (IsCertainlyBelow(planes_[k], point)) continue;
@@ -201,7 +201,7 @@ int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const Triangl
 }
 
 // Gives each target a list with room for counts_[k + 1] points, and points cursors_[k + 1] to it;
-// cursors_[0] to a block beyond all lists. Requires that Reserve has made room.
+// cursors_[0] points to a block beyond all lists. Requires: Reserve has made room.
 void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_.resize(targets.size() + 1);
   queue_.MakeRoom(queue_.size() + targets.size(), queue_.size());
@@ -211,13 +211,13 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
     const uint32_t count = counts_[k + 1];
     const size_t blocks = BlocksFor(count);
     cursors_[k + 1] = end_ * PointBlock::kSize;
-    // Whether a target gets points cannot be foreseen, so nothing branches on it: an empty list
-    // fills a block that is free.
+    // Branch-free, because it is unpredictable if a target gets points: an empty list fills a free
+    // block.
     HULLD_DCHECK(end_ + blocks < capacity_);
     lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
     *queued = targets[k];
     queued += count > 0;
-    // The last may be partly filled.
+    // The last block may be partly filled.
     blocks_[end_ + std::max(blocks, size_t{1}) - 1].Fill(inside);
     end_ += blocks;
   }
@@ -226,15 +226,15 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_[0] = end_ * PointBlock::kSize;
 }
 
-// Makes room for this many blocks at the end, by leaving out the gaps.
+// Makes room for this many blocks at the end, by removing the gaps.
 void ConflictLists::Reserve(size_t blocks) {
   if (end_ + blocks <= capacity_) return;
   size_t kept = 0;
   for (const List& list : lists_) kept += BlocksFor(list.count);
   for (const List& list : sources_) kept += BlocksFor(list.count);
-  // The more room, the rarer all blocks are moved; most of it is never touched.
+  // More room makes moves of all blocks rarer; most of it is never touched.
   capacity_ = 4 * (kept + blocks);
-  // Lists hold the numbers of blocks in 32 bits.
+  // Lists store block numbers in 32 bits.
   HULLD_CHECK(capacity_ <= UINT32_MAX);
   auto packed = std::make_unique_for_overwrite<PointBlock[]>(capacity_);
   end_ = 0;

@@ -15,44 +15,42 @@
 
 namespace hulld {
 
-// Points to be added to a surface, each in the list of one triangle that it sees strictly.
+// Points to be added to a surface, each in the list of a triangle that it sees strictly.
 //
-// Idea: add the point of a list that is farthest from the list's triangle; the points of the
-// triangles that go are tested against the new triangles alone, and one that sees none of them is
-// inside. That holds exactly: what a point sees strictly is connected, so a point that saw a
-// triangle that went and still sees one that stayed, sees both sides of an edge of the horizon,
+// An insertion adds the point of a list that is farthest from the list's triangle. The points of
+// removed triangles are tested against the new triangles alone, and a point that sees none of them
+// is inside. This is exact: the region that a point sees strictly is connected, so a point that saw
+// a removed triangle and still sees a remaining one sees both sides of an edge of the horizon,
 // hence the new triangle there. Source: Barber, Dobkin and Huhdanpaa 1996, The Quickhull Algorithm
 // for Convex Hulls.
 class ConflictLists {
  public:
   enum class Outcome {
     kDone,
-    // The poll said stop.
+    // The poll stopped.
     kStopped,
-    // The points are moved so often that another order of insertion does better: see TakeRest.
+    // The points are moved so often that another order of insertion is faster; see TakeRest.
     kGaveUp
   };
 
-  // The poll's steps are single insertions or exact tests. After it said stop, InsertAll says so,
-  // and some points that are waiting may be lost.
-  // Requires that an interior point is known.
+  // The poll's steps are single insertions or exact tests. If it stopped, InsertAll returns
+  // kStopped, and some pending points may be lost. Requires: a known interior point.
   ConflictLists(Surface& surface, VertexTable& vertices, StopPoll& poll)
       : surface_(surface), vertices_(vertices), poll_(poll) {}
 
-  // Takes points that may lie anywhere; those inside are counted and forgotten. Requires that no
-  // point is waiting. Cost: as many tests a point as the surface has triangles.
+  // Takes points anywhere; points inside are counted and dropped. Requires: no pending points.
+  // Cost: as many tests a point as the surface has triangles.
   void Take(std::span<const Vector> points);
-  // Takes points that see seen[i] strictly. Requires that no point is waiting.
+  // Takes points that see seen[i] strictly. Requires: no pending points.
   void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
 
-  // Adds all points that were taken.
+  // Adds all pending points.
   Outcome InsertAll();
-  // The points not yet added.
+  // Returns the points not yet added.
   std::vector<Vector> TakeRest();
 
  private:
-  // A range of blocks_. What the last one has room for beyond the list's points is filled with a
-  // point inside, which sees nothing.
+  // A range of blocks_. The last block is padded with an inside point, which sees nothing.
   struct List {
     uint32_t first_block = 0;
     uint32_t count = 0;
@@ -83,26 +81,26 @@ class ConflictLists {
   Surface& surface_;
   VertexTable& vertices_;
   StopPoll& poll_;
-  // All lists, with gaps where lists were.
+  // All lists, with gaps left by former lists.
   std::unique_ptr<PointBlock[]> blocks_;
   size_t end_ = 0;
   size_t capacity_ = 0;
   // By triangle.
   std::vector<List> lists_;
-  // Triangles that have had a list, in the order in which they are looked at.
+  // Triangles that have had a list, in the order of processing.
   ScratchList<TriangleId> queue_;
   size_t next_in_queue_ = 0;
-  // How many points are in lists, how many were taken in all, and how often one was moved.
+  // Number of points in lists, of points taken, and of moves of a point.
   size_t waiting_ = 0;
   size_t taken_ = 0;
   size_t moved_ = 0;
-  // Points were taken that may lie anywhere.
+  // True if points from anywhere were taken.
   bool is_trial_ = false;
   // Largest absolute coordinate of a point.
   double size_ = 0;
 
-  // Scratch of one distribution: the lists to empty, their blocks, the targets' planes, what
-  // MatchPlanes says, and, by match + 1, how many points there are and where the next one goes.
+  // Scratch for a distribution: the lists to empty, their blocks, the targets' planes, the results
+  // of MatchPlanes, and, by match + 1, the number of points and the place of the next one.
   std::vector<List> sources_;
   ScratchList<const PointBlock*> source_blocks_;
   std::vector<PlaneWithBound> planes_;

@@ -26,12 +26,12 @@ namespace {
 
 // Insertions between two polls of should_stop.
 constexpr size_t kInsertionsPerPoll = 256;
-// Points looked at for some that are extreme along the axes, at most twice.
+// Number of points sampled, up to a factor of two, to find some that are extreme along the axes.
 constexpr size_t kExtremesSample = 4096;
-// From this many points on, the order of insertion is worth choosing.
+// Number of points from which on the order of insertion matters.
 constexpr size_t kWorthOrdering = 128;
 
-// No branch but the loop's, so that the compiler tests several at a time.
+// Branch-free except for the loop, so that the compiler vectorizes it.
 bool AreFinite(std::span<const Vector> points) {
   int64_t bad = 0;
   for (const Vector& p : points) {
@@ -40,7 +40,7 @@ bool AreFinite(std::span<const Vector> points) {
   return bad == 0;
 }
 
-// Requires a coordinate that is not finite.
+// Requires: at least one non-finite coordinate.
 absl::Status DescribeNotFinite(std::span<const Vector> points) {
   constexpr const char* kNames[] = {"x", "y", "z"};
   for (size_t i = 0; i < points.size(); ++i) {
@@ -53,8 +53,8 @@ absl::Status DescribeNotFinite(std::span<const Vector> points) {
   HULLD_UNREACHABLE();
 }
 
-// Where the lowest and the highest coordinates are, along each axis, among some points spread over
-// all; each index once. Points to start a hull from.
+// Returns the indices, without duplicates, of the lowest and highest coordinates along each axis in
+// a sample spread over all points. A hull starts from these points.
 std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
   const size_t stride = points.size() / kExtremesSample + 1;
   std::array<uint32_t, 6> extremes{};
@@ -88,14 +88,14 @@ bool LexicographicallyLess(const Vector& a, const Vector& b) {
 // surface.
 class HullBuilder::State {
  public:
-  // Starts a journal: what comes can be undone until it ends.
+  // Starts a journal: later changes can be undone until it ends.
   void StartJournal() {
     vertices_.StartJournal();
     before_.Start({ends_, polygon_.has_value(), surface_.has_value(), std::nullopt});
     if (polygon_) polygon_->StartJournal();
     if (surface_) surface_->StartJournal();
   }
-  // Makes everything as it was when the journal was started.
+  // Restores the state at the start of the journal.
   void Undo() {
     HULLD_CHECK(before_);
     ends_ = before_->ends;
@@ -113,7 +113,7 @@ class HullBuilder::State {
     vertices_.Undo();
     before_.End();
   }
-  // Keeps what changed.
+  // Ends the journal and keeps the changes.
   void EndJournal() {
     vertices_.EndJournal();
     if (polygon_) polygon_->EndJournal();
@@ -145,7 +145,7 @@ class HullBuilder::State {
     HULLD_UNREACHABLE();
   }
 
-  // Inserts all points. Returns false, with some of them inserted, when the poll said stop.
+  // Inserts all points. Returns false, with some of them inserted, if the poll stopped.
   bool InsertAll(std::span<const Vector> points, StopPoll& poll) {
     if (points.size() < kWorthOrdering) {
       for (const Vector& point : points) {
@@ -184,7 +184,7 @@ class HullBuilder::State {
   }
   uint64_t housekeeping_steps() const { return surface_ ? surface_->work() : 0; }
 
-  // nullopt when stopped.
+  // Returns nullopt if stopped.
   std::optional<Hull> Snapshot(StopPoll& poll) const {
     if (surface_) return SnapshotOf(vertices_, *surface_, poll);
     if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop(), poll);
@@ -201,7 +201,7 @@ class HullBuilder::State {
     if (LexicographicallyLess(point, vertices_[ends_[0]])) std::swap(ends_[0], ends_[1]);
   }
 
-  // On one line, order along it and lexicographic order agree.
+  // On one line, the order along the line and the lexicographic order agree.
   void InsertIntoSegment(const Vector& point) {
     const CoordinatePlane plane = ProjectionOf(vertices_[ends_[0]], vertices_[ends_[1]], point);
     if (plane.first >= 0) {
@@ -240,8 +240,8 @@ class HullBuilder::State {
   std::array<Vector, 3> plane_;
   std::optional<Surface> surface_;
 
-  // What the journal keeps beside those of the parts: the stage, and the polygon once it has given
-  // way to a surface.
+  // Journal of this class, in addition to the journals of the parts: the stage, and the polygon
+  // after a surface has replaced it.
   struct Before {
     std::vector<VertexId> ends;
     bool has_polygon;
@@ -272,7 +272,7 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
   state_->BeginBlock();
   const std::function<bool()> never;
   StopPoll poll(may_stop ? limits.should_stop : never, kInsertionsPerPoll);
-  // Whatever noticed the stop may have left points out.
+  // Any code that noticed the stop may have skipped points.
   const bool is_done = state_->InsertAll(points, poll) && !poll.stopped();
   const size_t reached = vertex_count();
   undo_bytes_ = may_fail ? state_->JournalBytes() : 0;

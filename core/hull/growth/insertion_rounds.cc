@@ -10,18 +10,18 @@
 namespace hulld {
 namespace {
 
-// Points of the first round, about.
+// Approximate number of points of the first round.
 constexpr size_t kFirstRound = 64;
 
 // Parameters of the map of directions for a round (see Surface::MeasureBefore).
-constexpr double kMapFineness = 2.8;
-constexpr double kWalksPerPoint = 0.2;
+constexpr double kRoundMapFineness = 2.8;
+constexpr double kRoundWalksPerPoint = 0.2;
 
-// Odd, and far from any power of two: consecutive numbers get ranks far apart.
+// Odd, and far from any power of two: consecutive numbers get distant ranks.
 constexpr uint32_t kMultiplier = 0x9E3779B1u;
 
-// The inverse of an odd number modulo 2^32, by Newton's iteration: each step doubles the number of
-// right bits.
+// Returns the inverse of an odd number modulo 2^32, by Newton's iteration: each step doubles the
+// number of correct bits.
 constexpr uint32_t InverseOf(uint32_t odd) {
   uint32_t x = odd;
   for (int i = 0; i < 5; ++i) x *= 2 - odd * x;
@@ -37,17 +37,17 @@ uint32_t Scramble(uint32_t x) {
   return x ^ (x >> 16);
 }
 
-// Where to insert a point, for sorting: the place of its direction in the upper half, the point's
-// index in the lower.
+// Sort key of a point: the place of its direction in the upper half, the point's index in the
+// lower.
 using SortKey = uint64_t;
-// Cells a side, as a power of two, of the grid that tells the place; and the bits of a place: three
-// for the face of the cube. As fine as the upper half can hold: points along a curve, such as the
-// rim of a prism, are in few of them.
+// Cells per side, as a power of two, of the grid of places; and the bits of a place: three for the
+// face of the cube. As fine as the upper half can hold: points along a curve, such as the rim of a
+// prism, are in few cells.
 constexpr int kGridBits = 14;
 constexpr int kPlaceBits = 3 + 2 * kGridBits;
 static_assert(kPlaceBits <= 32);
 
-// Unfinished when the poll says stop.
+// The result is unsorted if the poll stops.
 void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch, StopPoll& poll) {
   constexpr size_t kWorthRadix = 2048;
   if (keys.size() < kWorthRadix) {
@@ -73,7 +73,7 @@ void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch, 
   }
 }
 
-// The bits of a number below 2^16, each followed by a zero.
+// Returns the bits of a number below 2^16, each followed by a zero.
 uint32_t Spread(uint32_t x) {
   x = (x | (x << 8)) & 0x00FF00FF;
   x = (x | (x << 4)) & 0x0F0F0F0F;
@@ -81,7 +81,7 @@ uint32_t Spread(uint32_t x) {
   return (x | (x << 1)) & 0x55555555;
 }
 
-// Directions in Morton order on a fine grid, face by face.
+// Orders directions in Morton order on a fine grid, face by face.
 SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t index) {
   const auto cell =
       static_cast<uint32_t>(DirectionMap::PlaceIn(directions.frame(), 1 << kGridBits, point).cell);
@@ -111,15 +111,15 @@ class RoundsInsertion {
   }
 
  private:
-  // Fills chosen_ with the round's points that cannot be rejected at once, in the order to insert.
+  // Fills chosen_ with the round's points that cannot be rejected at once, in order of insertion.
   void Choose(int round) {
     const bool is_last = round + 1 == rounds_.count();
     members_.clear();
     if (!is_last) rounds_.AppendRound(round, members_);
-    // Where most points of a round are outside, most of the next are, however new the surface is.
+    // If most points of a round are outside, so are most of the next, even if the surface is new.
     if (surface_.IsMapWorthwhile()) {
-      surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
-                             kWalksPerPoint, poll_);
+      surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(),
+                             kRoundMapFineness, kRoundWalksPerPoint, poll_);
     }
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);
@@ -137,7 +137,7 @@ class RoundsInsertion {
     }
     if (!is_last) surface_.CountRejected(members_.size(), members_.size() - keys_.size());
     SortByUpperHalf(keys_, scratch_, poll_);
-    // Gathered first: the misses of a loop that does nothing else overlap.
+    // Gathered first: the cache misses of a loop that does nothing else overlap.
     chosen_.reserve(keys_.size());
     for (const SortKey key : keys_) {
       if (poll_.Step()) return;
@@ -145,8 +145,8 @@ class RoundsInsertion {
     }
   }
 
-  // The last round is most of the points: all are read in order, and only those that remain are
-  // asked whether they belong to it.
+  // The last round contains most of the points. Reads all points in order, and tests only the
+  // survivors for membership.
   void ChooseLast(int round, const DirectionMap* directions) {
     if (directions == nullptr) {
       members_.resize(points_.size());

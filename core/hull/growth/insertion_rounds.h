@@ -12,18 +12,18 @@
 
 namespace hulld {
 
-// The numbers 0 ... n-1 in rounds, each four times the one before, every round spread evenly and
-// irregularly over all of them: a biased randomized insertion order without a permutation in
+// The numbers 0 ... n-1 in rounds, each four times the previous one, with every round spread evenly
+// and irregularly over all of them: a biased randomized insertion order without a permutation in
 // memory. Source: Amenta, Choi and Rote 2003, Incremental Constructions con BRIO.
 class InsertionRounds {
  public:
-  // Requires n < 2^32.
+  // Requires: n < 2^32.
   explicit InsertionRounds(size_t n);
 
   int count() const { return count_; }
   int RoundOf(uint32_t i) const;
-  // Appends the members of a round. Requires a round other than the last, whose members are most of
-  // the numbers: these are better recognized by RoundOf.
+  // Appends the members of a round. Requires: a round other than the last, which contains most of
+  // the numbers; use RoundOf for its members.
   void AppendRound(int round, std::vector<uint32_t>& members) const;
 
  private:
@@ -35,10 +35,10 @@ class InsertionRounds {
   uint32_t group_mask_;
 };
 
-// Adds points to a surface in rounds of growing size, each reduced to those that the map of
-// directions cannot reject and sorted along the surface: the order for blocks most of which is
-// outside. Returns false, with some of the points added, when the poll, whose steps are insertions,
-// said stop.
+// Adds points to a surface in rounds of growing size, each reduced to the points that the map of
+// directions cannot reject and sorted along the surface: the order for blocks with most points
+// outside. Returns false, with some of the points added, if the poll stopped; its steps are
+// insertions.
 bool InsertInRounds(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
                     StopPoll& poll);
 

@@ -6,7 +6,7 @@
 namespace hulld {
 namespace {
 
-// Four doubles, and four truth values; the compiler cuts them into what the target has.
+// Four doubles, and four truth values; the compiler splits them into the target's registers.
 using Lanes = double __attribute__((vector_size(32)));
 using Mask = int64_t __attribute__((vector_size(32)));
 
@@ -59,7 +59,7 @@ __attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock*
 }
 #endif
 
-// Lane by lane, and then the best of the lanes, the first one of equals.
+// Finds the best of each lane, then the best lane, the first of equal ones.
 __attribute__((always_inline)) inline size_t FarthestAlongBody(std::span<const PointBlock> blocks,
                                                                size_t count,
                                                                const Vector& direction) {

@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// Points in fours, each coordinate together, for testing four at a time against planes.
+// Points in fours, structure of arrays, for testing four at once against planes.
 struct PointBlock {
   static constexpr size_t kSize = 4;
 
@@ -23,8 +23,8 @@ struct PointBlock {
     y[i] = p.y();
     z[i] = p.z();
   }
-  // Component by component: as one object, compilers copy it by a string instruction, which takes
-  // longer to start than all of this.
+  // Component by component: compilers copy a whole object by a string instruction, which takes
+  // longer to start than this entire function.
   void Fill(const Vector& p) {
     for (size_t i = 0; i < kSize; ++i) Set(i, p);
   }
@@ -34,8 +34,8 @@ inline size_t BlocksFor(size_t points) {
   return (points + PointBlock::kSize - 1) / PointBlock::kSize;
 }
 
-// A plane in floating point: points with normal . p - offset > bound are certainly above it, those
-// with less than -bound certainly below. An infinite bound leaves all uncertain.
+// A plane in floating point: points with normal . p - offset > bound are certainly above it, points
+// with less than -bound certainly below. An infinite bound leaves all points uncertain.
 struct PlaneWithBound {
   double normal[3];
   double offset;
@@ -48,18 +48,19 @@ inline bool IsCertainlyBelow(const PlaneWithBound& plane, const Vector& p) {
   return value < -plane.bound;
 }
 
-// What MatchPlanes says of a point that is certainly above no plane: certainly below all, or not.
+// Results of MatchPlanes for a point that is certainly above no plane: certainly below all, or
+// uncertain.
 inline constexpr int64_t kBelowAll = -1;
 inline constexpr int64_t kUncertain = -2;
 
-// For each point of the blocks, the index of a plane that it is certainly above, the one with the
-// largest normal . p - offset; kBelowAll or kUncertain when there is none. matches: 4 per block.
-// True when some are uncertain. The same bits with AVX2 and without.
+// Finds, for each point of the blocks, the index of a plane that it is certainly above, the one
+// with the largest normal . p - offset; kBelowAll or kUncertain if there is none. matches: 4 per
+// block. Returns true if some are uncertain. Bit-identical with and without AVX2.
 bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches);
 
-// The index of the point, of the first `count`, with the largest component along the direction.
-// Requires that there is one.
+// Returns the index of the point, among the first `count`, with the largest component along the
+// direction. Requires: count > 0.
 size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction);
 
 }  // namespace hulld

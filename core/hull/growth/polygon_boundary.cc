@@ -53,7 +53,7 @@ void PolygonBoundary::InsertVertex(VertexTable& vertices, VertexId id) {
   if (is_below) Extend(vertices, lower_, +1, id);
   const bool is_above = IsBeyond(vertices, upper_, -1, vertices[id]);
   if (is_above) Extend(vertices, upper_, -1, id);
-  // Otherwise the vertex would live on no chain.
+  // Otherwise the vertex would be on no chain.
   HULLD_CHECK(is_below || is_above);
 }
 
@@ -65,8 +65,8 @@ bool PolygonBoundary::IsBeyond(const VertexTable& vertices, const Chain& chain, 
   return Orient2d(vertices[before->second], point, vertices[after->second], plane_) == turn;
 }
 
-// The chain's ends may move inwards on one chain alone, never on both: a vertex leaves the polygon
-// with its second chain.
+// An end of the chains may become inner on one chain alone, never on both: a vertex leaves the
+// polygon with its second chain.
 void PolygonBoundary::Extend(VertexTable& vertices, Chain& chain, int turn, VertexId id) {
   const auto it = chain.emplace(KeyOf(vertices[id]), id).first;
   Note(chain, true, it->first, id);

@@ -9,32 +9,31 @@
 
 namespace hulld {
 
-// The boundary of a growing convex polygon whose points all lie in one plane, exactly.
+// The exact boundary of a growing convex polygon, with all points in one plane.
 //
-// Idea: a coordinate plane onto which the polygon projects with non-zero area keeps every
-// orientation in it, up to one common sign. There the boundary is a lower and an upper chain, each
-// sorted lexicographically; a point joins a chain when it lies strictly beyond the chain's edge
-// above or below it, and then drives out neighbours that are no longer strictly convex. Source:
-// Preparata 1979, An Optimal Real-Time Algorithm for Planar Convex Hulls.
+// A coordinate plane onto which the polygon projects with non-zero area preserves every orientation
+// in it, up to one common sign. There the boundary is a lower and an upper chain, each sorted
+// lexicographically. A point joins a chain if it lies strictly beyond the chain's edge above or
+// below it, and then removes neighbours that are no longer strictly convex. Source: Preparata 1979,
+// An Optimal Real-Time Algorithm for Planar Convex Hulls.
 class PolygonBoundary {
  public:
-  // Starts from three points, which become the vertices. Requires that they are not collinear in
-  // `plane`, which ProjectionOf gives.
+  // Starts from three points, which become the vertices. Requires: the points are not collinear in
+  // `plane`, as returned by ProjectionOf.
   PolygonBoundary(VertexTable& vertices, CoordinatePlane plane, VertexId a, VertexId b, VertexId c);
 
-  // Adds a point of the plane. Unchecked: the caller has just decided that it lies in the plane.
-  // Cost: O(log n) amortized.
+  // Adds a point. Requires: the point lies in the polygon's plane (unchecked: the caller has just
+  // decided this). Cost: O(log n) amortized.
   void Insert(VertexTable& vertices, const Vector& point);
 
-  // What it holds in memory: each node has three links, a color, a key and an ID. Cost: O(1).
+  // Memory: each node has three links, a color, a key and an ID. Cost: O(1).
   size_t MemoryBytes() const {
     return (lower_.size() + upper_.size()) * (4 * sizeof(void*) + sizeof(Chain::value_type)) +
            journal_.capacity() * sizeof(Change);
   }
 
-  // Starts a journal of what changes; makes everything as it was then; ends the journal and keeps
-  // what changed; tells what the journal holds. The vertices are the table's to undo. Cost: the
-  // changes.
+  // Journal of changes: starts it; restores the state at its start; ends it and keeps the changes;
+  // returns its size. The table undoes its vertices itself. Cost: the changes.
   void StartJournal() { has_journal_ = true; }
   void Undo();
   void EndJournal() {
@@ -43,7 +42,7 @@ class PolygonBoundary {
   }
   size_t JournalBytes() const { return journal_.size() * sizeof(Change); }
 
-  // The vertices in order, counter-clockwise in the coordinate plane.
+  // Returns the vertices in order, counter-clockwise in the coordinate plane.
   std::vector<VertexId> Loop() const;
 
  private:
@@ -54,7 +53,7 @@ class PolygonBoundary {
     friend auto operator<=>(const Key&, const Key&) = default;
   };
   using Chain = std::map<Key, VertexId>;
-  // A vertex that came to a chain, or went from it.
+  // A vertex added to or removed from a chain.
   struct Change {
     bool is_lower;
     bool came;
@@ -73,8 +72,8 @@ class PolygonBoundary {
   }
 
   CoordinatePlane plane_;
-  // Left to right; the lower one turns left (+1), the upper one right (-1). Both hold the first and
-  // the last point.
+  // Left to right; the lower chain turns left (+1), the upper one right (-1). Both contain the
+  // first and the last point.
   Chain lower_;
   Chain upper_;
   bool has_journal_ = false;

@@ -16,19 +16,20 @@
 namespace hulld {
 namespace {
 
-// The first attempt is as computed. Then corners go outwards by this much of their distance from
-// the centre, eight times as much each time that does not enclose. What pushing adds is twice as
-// much each time from the third on.
+// The first attempt uses the computed corners. Then corners move outwards by this fraction of their
+// distance from the centre, eight times as much in each failed attempt. From the third attempt on,
+// the amount added by pushing doubles each time.
 constexpr double kFirstInflation = 0x1p-50;
 constexpr double kFirstGrowth = 0x1p-6;
 constexpr int kMostAttempts = 18;
-// A vertex is pushed along the mean of the normals round it; where that is farther than this from a
-// normal, as at the tip of a needle, no farther than this lets.
+// A vertex is pushed along the mean of its facets' normals. This is the least cosine used for the
+// angle between the mean and a normal. It limits the distance if they differ widely, as at the tip
+// of a needle.
 constexpr double kLeastCosine = 0.05;
-// Corners farther from the centre, in units of the hull's size, enclose nothing tightly. A choice.
+// Corners farther from the centre, in units of the hull's size, do not enclose tightly. A choice.
 constexpr double kFarthestCorner = 0x1p20;
-// Vertices of the full hull that are checked at once. As many, spread over all of them, are checked
-// first: most hulls that fail, fail early.
+// Vertices of the full hull per check. As many, spread over all vertices, are checked first: most
+// failing hulls fail early.
 constexpr size_t kVerticesPerCheck = 1024;
 
 Vector MeanOf(std::span<const Vector> points) {
@@ -52,7 +53,7 @@ Enclosure::Enclosure(const Hull& full, const UnitScale& scale,
       vertices_(scale.ToUnit(full.vertices())),
       support_(full, vertices_, poll) {}
 
-// Where the inside hull's vertices are among those of the full hull; both are sorted.
+// Returns the places of the inside hull's vertices among those of the full hull; both are sorted.
 std::vector<uint32_t> Enclosure::PlacesOf(const Hull& inside) const {
   std::vector<uint32_t> places;
   uint32_t place = 0;
@@ -75,7 +76,7 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
   const bool is_flat = inside.dimension() == 2;
   const std::vector<Vector> points = scale_.ToUnit(inside.vertices());
   const std::vector<uint32_t> places = PlacesOf(inside);
-  // By facet, or by edge of a polygon, its vertices.
+  // Vertices of each facet, or of each edge of a polygon.
   std::vector<std::span<const uint32_t>> sides;
   for (size_t f = 0; f < inside.facet_count() && !is_flat; ++f) sides.push_back(inside.facet(f));
   std::vector<std::array<uint32_t, 2>> edges;
@@ -94,7 +95,7 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
     const Vector& corner = points[side[0]];
     Vector normal = is_flat ? (points[side[1]] - corner).cross(flat_normal).stableNormalized()
                             : AreaNormal(points, side).stableNormalized();
-    // An edge is written from its lower vertex, whichever way round that is.
+    // An edge starts at its lower vertex, in either orientation.
     if (is_flat && normal.dot(corner - center) < 0) normal = -normal;
     planes.push_back(MakePlane(normal, corner, places[side[0]]));
     for (const uint32_t v : side) along[v] += normal;
@@ -147,16 +148,16 @@ std::optional<SimplifiedHull> Enclosure::ByPlanes(const Hull& inside) {
   return std::nullopt;
 }
 
-// The corners, from the centre and at unit scale, of the intersection of the half-spaces, by
-// duality: a facet of the hull of the points normal / reach is a corner. Rounded; none where that
-// fails.
+// Returns the corners, relative to the centre and at unit scale, of the intersection of the
+// half-spaces, by duality: each facet of the hull of the points normal / reach is a corner.
+// Rounded; empty on failure.
 std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> planes,
                                                     const Vector& center) const {
-  // In the order of a hull's vertices, so that these lead back to the planes.
+  // Sorted like a hull's vertices, to map these back to the planes.
   std::vector<Corner> dual;
   for (const Plane& plane : planes) {
     const double reach = plane.offset + plane.gap - plane.normal.dot(center);
-    // Where the centre is so near to a plane, dual points are too far away to reckon with.
+    // If the centre is too near to a plane, dual points are too far away to compute with.
     if (!(reach > kDualMinReach)) return {};
     dual.push_back({plane.normal / reach, plane.farthest});
   }
@@ -178,7 +179,7 @@ std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> plane
     const Vector& on_facet = hull->vertices()[facet[0]];
     const Vector normal = AreaNormal(hull->vertices(), facet).stableNormalized();
     const Vector corner = normal / normal.dot(on_facet);
-    // The corner of a facet of the dual that passes through the origin is at infinity.
+    // The corner of a dual facet that passes through the origin is at infinity.
     if (!(LargestComponent(corner) < kFarthestCorner)) return {};
     const size_t place =
         std::lower_bound(points.begin(), points.end(), on_facet, less) - points.begin();
@@ -203,7 +204,7 @@ std::optional<SimplifiedHull> Enclosure::ByBox() {
   return HullAround(corners);
 }
 
-// The hull of the corners, if it holds the full hull.
+// Returns the hull of the corners if it contains the full hull.
 std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corners) {
   std::vector<Vector> points;
   for (const Corner& corner : corners) {
@@ -215,7 +216,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
   if (!HoldsAll(builder)) return std::nullopt;
   absl::StatusOr<Hull> hull = builder.Snapshot(should_stop_);
   if (!hull.ok()) return std::nullopt;
-  // The distance from a convex set is largest at a vertex, and each is one of these.
+  // The distance from a convex set is largest at a vertex, and every vertex is one of these.
   double error = 0;
   for (const Corner& corner : corners) {
     if (poll_.Step()) return std::nullopt;
@@ -225,7 +226,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
   return SimplifiedHull{*std::move(hull), scale_.LengthFromUnit(error)};
 }
 
-// Exact: a point that is not in the hull would become a vertex.
+// Exact: a point outside the hull would become a vertex.
 bool Enclosure::HoldsAll(HullBuilder hull) {
   const std::span<const Vector> all = full_.vertices();
   const auto holds = [&](std::span<const Vector> points) {

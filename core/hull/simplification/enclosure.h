@@ -17,39 +17,40 @@
 
 namespace hulld {
 
-// Makes hulls that enclose a given one, exactly for the doubles that they hold, from hulls of some
-// of its vertices. What encloses is guessed in floating point, checked exactly, and pushed outwards
-// until the check passes. Each answer is nothing where it never passes, or where the caller said
-// stop.
+// Builds hulls that enclose a given one, exactly for the doubles that they store, from hulls of
+// some of its vertices. A candidate is computed in floating point, checked exactly, and pushed
+// outwards until the check passes. A function returns nothing if the check never passes or the poll
+// stopped.
 class Enclosure {
  public:
-  // Requires a hull of dimension 2 or 3 and a poll, which outlive this. should_stop: what the poll
-  // asks.
+  // Requires: a hull of dimension 2 or 3, and a poll; both must outlive this object. should_stop:
+  // the function that the poll calls.
   Enclosure(const Hull& full, const UnitScale& scale, const std::function<bool()>& should_stop,
             StopPoll& poll);
 
-  // The inside hull's vertices, each pushed outwards until it reaches beyond the planes that
-  // support the full hull along its own facets; a polygon becomes a thin prism. As many vertices as
-  // the inside hull, twice as many for a polygon. Suits what is round. Requires the same dimension.
+  // Pushes each vertex of the inside hull outwards beyond the planes that support the full hull
+  // along the vertex's facets; a polygon becomes a thin prism. The result has as many vertices as
+  // the inside hull, twice as many for a polygon. Suits round shapes. Requires: the same dimension.
   std::optional<SimplifiedHull> ByPushing(const Hull& inside);
-  // The intersection of the half-spaces that support the full hull along the inside hull's facets.
-  // At most twice as many vertices as the inside hull has facets. Suits what is made of few planes.
-  // Requires dimension 3.
+  // Intersects the half-spaces that support the full hull along the inside hull's facets. The
+  // result has at most twice as many vertices as the inside hull has facets. Suits shapes with few
+  // planes. Requires: dimension 3.
   std::optional<SimplifiedHull> ByPlanes(const Hull& inside);
-  // The box along the axes: 8 vertices, less for what is flat along an axis. Never nothing.
+  // Returns the box along the axes: 8 vertices, fewer for a shape that is flat along an axis.
+  // Always has a value.
   std::optional<SimplifiedHull> ByBox();
 
  private:
   // A plane n . x = offset, n of unit length and outwards, of a facet of an inside hull, or of an
-  // edge of a polygon; how far the full hull reaches beyond it, and at which vertex.
+  // edge of a polygon; the largest extent of the full hull beyond it, and the vertex there.
   struct Plane {
     Vector normal;
     double offset;
     double gap;
     uint32_t farthest;
   };
-  // A point to enclose with, mostly in the caller's unit, and a vertex of the full hull that is
-  // about nearest.
+  // A corner of a candidate, in the caller's unit except in CornersOf, and an approximately nearest
+  // vertex of the full hull.
   struct Corner {
     Vector point;
     uint32_t near;

@@ -15,25 +15,26 @@
 
 namespace hulld {
 
-// The vertices of a hull of dimension 2 or 3, farthest first, as far as anyone has asked.
+// The vertices of a hull of dimension 2 or 3, farthest first, computed on demand.
 class InsideOrder {
  public:
-  // The hull and the poll must outlive this. After the poll said stop, its answers mean nothing.
+  // The hull and the poll must outlive this object. If the poll stopped, results are meaningless.
   InsideOrder(const Hull& hull, const UnitScale& scale, StopPoll& poll);
   InsideOrder(const InsideOrder&) = delete;
   InsideOrder& operator=(const InsideOrder&) = delete;
 
-  // The fewest vertices that this order begins with.
+  // The fewest vertices that this order starts with.
   size_t least() const { return least_; }
-  // How many of the first vertices bring the error within `error`; `most` if that is not reached
-  // before. Not less than least(). Requires most >= least().
+  // Returns the number of leading vertices that reduces the error to `error`, or `most` if that is
+  // not reached earlier. At least least(). Requires: most >= least().
   size_t CountFor(double error, size_t most);
-  // Proven: no point of the hull is farther than this from the hull of the first `count` vertices.
-  // The caller's length unit. Requires least() <= count <= the hull's vertices.
+  // Returns a **proven** bound, in the caller's length unit, of the distance of any point of the
+  // hull from the hull of the first `count` vertices. Requires: least() <= count <= the hull's
+  // vertices.
   double ErrorAt(size_t count);
-  // The first `count`, by index.
+  // Returns the first `count` vertices, by index.
   std::vector<uint32_t> First(size_t count);
-  // True where the signs of determinants mostly are certain in floating point, of a solid; not at
+  // True for a solid if the signs of determinants usually are certain in floating point; false at
   // extreme scales.
   bool IsMeasurable() const { return solid_ && solid_->IsMeasurable(); }
   // The hull's vertices at unit scale.

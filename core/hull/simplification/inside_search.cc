@@ -9,15 +9,15 @@
 namespace hulld {
 namespace {
 
-// Attempts, and moves of all vertices in each. More gain little (observed on a sphere of 1e5
-// vertices: farthest first takes 1.7 times the fewest, 1.50 with the first attempt, 1.43 with the
-// sixth).
+// Number of attempts, and moves of all vertices in each. More gain little. Observed on a sphere of
+// 1e5 vertices: farthest first takes 1.7 times the fewest, 1.50 with the first attempt, 1.43 with
+// the sixth.
 constexpr int kAttempts = 6;
 constexpr int kMovesPerAttempt = 4;
-// Attempts after which the search ends if nothing was gained.
+// Attempts without gain after which the search ends.
 constexpr int kAttemptsInVain = 2;
-// Moves of single vertices, for each vertex of the hull, after which no attempt begins. That many
-// come up where a large part of the vertices is chosen, and then there is little to choose from.
+// Moves of single vertices, per vertex of the hull, after which no further attempt starts. The
+// limit is reached if a large part of the vertices is chosen, and then there is little choice.
 constexpr size_t kMovesPerVertex = 3;
 
 }  // namespace
@@ -35,9 +35,9 @@ void InsideSearch::Run() {
   const size_t count = order_.CountFor(max_error_, most_);
   best_ = {order_.First(count), order_.ErrorAt(count)};
   if (poll_.stopped() || hull_.dimension() < 3) return;
-  // With the fewest vertices, or none left out, there is nothing to gain.
+  // With the fewest vertices, or all of them, no gain is possible.
   if (Reaches(best_) && (count == order_.least() || count == hull_.vertices().size())) return;
-  // An attempt looks for the triangles of all vertices, which is slow by integers.
+  // An attempt finds the triangles of all vertices, which is slow in integers.
   if (!order_.IsMeasurable()) return;
   Improve();
 }
@@ -61,8 +61,8 @@ void InsideSearch::Improve() {
     }
     auto subset = VertexSubset::StartingWith(chosen, hull_.vertices(), order_.unit_points(), poll_);
     if (!subset) return;
-    // Some more than the best has, for the next attempt to start from something that is near enough
-    // everywhere.
+    // Slightly more than the best has, so that the next attempt starts from a choice that is near
+    // enough everywhere.
     const size_t best = best_.vertices.size();
     const size_t end = Reaches(best_) ? std::min(most_, best + best / 20) : most_;
     const auto error = [&] {
@@ -77,7 +77,7 @@ void InsideSearch::Improve() {
   }
 }
 
-// Keeps it if it is better than the best: near enough with fewer vertices, or nearer.
+// Keeps the choice if it is better than the best: near enough with fewer vertices, or nearer.
 bool InsideSearch::Consider(const VertexSubset& subset, double error) {
   const size_t count = subset.chosen().size();
   const bool reaches = error <= max_error_;

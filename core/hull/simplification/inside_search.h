@@ -17,18 +17,17 @@ namespace hulld {
 // Chooses vertices of a hull of dimension 2 or 3: few for a given error, or a given number for a
 // small error.
 //
-// Idea: farthest first, and then, for a solid, attempts to do better: some fewer vertices, spread
-// more evenly (Relaxation), and again farthest first from there, until the error is reached or the
-// vertices are used up. The best of all that came up counts, so nothing is worse than farthest
-// first alone. Each attempt goes on from where the last one ended.
+// Starts with farthest first. For a solid, attempts to improve: spreads somewhat fewer vertices
+// more evenly (Relaxation), and continues farthest first from there until the error is reached or
+// the vertices are used up. Each attempt continues from the end of the previous one. The best
+// choice found counts, so the result is never worse than farthest first alone.
 class InsideSearch {
  public:
-  // max_error: the caller's length unit; 0: none to reach. most: vertices, at least dimension + 1
-  // and at most the hull's. All given must outlive this.
+  // max_error: the caller's length unit; 0: no limit. most: vertices, at least dimension + 1 and at
+  // most the hull's. All arguments must outlive this object.
   InsideSearch(const Hull& hull, double max_error, size_t most, StopPoll& poll);
 
-  // After the poll said stop, the answer means nothing. Cost: that of farthest first, some times
-  // over.
+  // If the poll stopped, the result is meaningless. Cost: a small multiple of farthest first.
   void Run();
   const VertexChoice& best() const { return best_; }
 

@@ -12,8 +12,8 @@ PolygonSubset::PolygonSubset(std::span<const Vector> points, std::span<const uin
                              StopPoll& poll)
     : points_(points), loop_(loop) {
   HULLD_CHECK(loop.size() >= 3);
-  // The vertex farthest from the first, and the one farthest from both sides of that edge: any
-  // three vertices are a triangle.
+  // The vertex farthest from the first, and the vertex farthest from both ends of that edge: any
+  // three vertices form a triangle.
   const auto farthest_from = [&](size_t a, size_t b) {
     size_t farthest = 0;
     double most = -1;

@@ -11,34 +11,34 @@
 
 namespace hulld {
 
-// A growing subset of the vertices of a convex polygon, the next one always the vertex farthest
-// from the polygon of those chosen, as far as rounding can tell.
+// A growing subset of the vertices of a convex polygon. The next one is always the vertex farthest
+// from the polygon of the chosen ones, as far as rounding permits.
 //
-// Idea: an edge of the chosen ones stands for the arc of vertices beyond it. Its farthest vertex
-// splits it. Source: Ramer 1972, An Iterative Procedure for the
-// Polygonal Approximation of Plane Curves.
+// An edge between chosen vertices represents the arc of vertices beyond it, and its farthest vertex
+// splits it. Source: Ramer 1972, An Iterative Procedure for the Polygonal Approximation of Plane
+// Curves.
 class PolygonSubset {
  public:
-  // points: at unit scale. loop: their indices in order round the polygon; both must outlive this.
-  // Starts with three. Requires at least three. After the poll said stop, here or in ChooseNext,
-  // this may only be destroyed.
+  // points: at unit scale. loop: their indices in order around the polygon. Both must outlive this
+  // object. Starts with three vertices. If the poll stopped, here or in ChooseNext, this object may
+  // only be destroyed. Requires: at least three vertices.
   PolygonSubset(std::span<const Vector> points, std::span<const uint32_t> loop, StopPoll& poll);
 
   // Indices, in the order chosen.
   const std::vector<uint32_t>& chosen() const { return chosen_; }
   bool is_complete() const { return chosen_.size() == loop_.size(); }
-  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: O(vertices of the arc
+  // Chooses the apparently farthest vertex. Requires: !is_complete(). Cost: O(vertices of the arc
   // that it splits).
   void ChooseNext(StopPoll& poll);
-  // Proven: no vertex is farther than this from the polygon of those chosen. In units. Cost: O(1).
+  // Returns a **proven** bound, in units, of the distance of any vertex from the polygon of the
+  // chosen ones. Cost: O(1).
   double DistanceBound() const { return arcs_.top().distance; }
 
  private:
-  // The vertices strictly between two places of the loop, the latter perhaps counted beyond its
-  // end.
+  // The vertices strictly between two places of the loop; the second place may be counted beyond
+  // the loop's end.
   struct Arc {
-    // Proven bound of the distance of the vertex that is farthest from the edge; 0 when there is
-    // none.
+    // Proven bound of the distance of the vertex farthest from the edge; 0 if the arc is empty.
     double distance;
     size_t farthest;
     size_t first;

@@ -9,8 +9,8 @@
 namespace hulld {
 namespace {
 
-// One vertex in this many is among those that stick out least; about half of these have a neighbour
-// that sticks out even less, and stay.
+// One vertex in this many is a candidate for removal, as one of the least protruding. About half of
+// the candidates have a neighbour that protrudes even less, and stay.
 constexpr size_t kVerticesPerFlat = 10;
 
 }  // namespace
@@ -28,7 +28,7 @@ std::optional<std::vector<uint32_t>> Relaxation::MoveFewer(std::span<const uint3
 
 std::optional<std::vector<uint32_t>> Relaxation::Move(std::span<const uint32_t> chosen,
                                                       bool leave_out) {
-  // In this order they are those of the inside hull.
+  // In this order they are the vertices of the inside hull.
   const std::vector<uint32_t> places = Ascending(chosen);
   const std::optional<Hull> inside = HullOfSubset(hull_, places, poll_);
   if (!inside || inside->dimension() < 3) return std::nullopt;
@@ -51,7 +51,7 @@ std::optional<std::vector<uint32_t>> Relaxation::Move(std::span<const uint32_t> 
   return Ascending(moved);
 }
 
-// Each once. Not sorted, so that no poll waits for it.
+// Returns the vertices without duplicates. Avoids a sort, which could not poll.
 std::vector<uint32_t> Relaxation::Ascending(std::span<const uint32_t> chosen) const {
   std::vector<bool> is_chosen(unit_points_.size(), false);
   for (const uint32_t i : chosen) is_chosen[i] = true;
@@ -63,7 +63,7 @@ std::vector<uint32_t> Relaxation::Ascending(std::span<const uint32_t> chosen) co
   return ascending;
 }
 
-// The vertices that are about the least high above their neighbours' mean, no two of them
+// Finds vertices with about the least height above their neighbours' mean, no two of them
 // neighbours.
 std::vector<bool> Relaxation::FindFlattest(const Hull& inside, std::span<const Vector> points,
                                            std::span<const Vector> normals) {

@@ -13,28 +13,28 @@
 
 namespace hulld {
 
-// Spreads chosen vertices of a hull of dimension 3 more evenly. It proves nothing: what a choice is
-// worth is to be measured afterwards.
+// Spreads chosen vertices of a hull of dimension 3 more evenly. Proves nothing: measure the quality
+// of a choice afterwards.
 //
-// Idea: while the neighbours of a chosen vertex stay, the hull of all chosen has the most volume
-// with that vertex farthest along the sum of the area normals of the facets round it. Moving all
-// there at once, some times, makes of the irregular triangles that farthest first leaves ones that
-// are about equilateral, as far as curvature lets be, and these have the least error for their
-// area. Where vertices are crowded they stick out least, and leaving one out makes room for the
-// others. Source: Chen and Xu 2004, Optimal Delaunay Triangulations, for the place of most volume;
-// Lloyd 1982, Least Squares Quantization in PCM, for moving all at once.
+// If the neighbours of a chosen vertex are fixed, the hull of all chosen vertices has the most
+// volume with that vertex farthest along the sum of the area normals of the surrounding facets.
+// Repeatedly moving all vertices there at once turns the irregular triangles of farthest first into
+// nearly equilateral ones, as far as curvature permits, and these have the least error for their
+// area. Crowded vertices protrude least, and removing one makes room for its neighbours. Source:
+// Chen and Xu 2004, Optimal Delaunay Triangulations, for the place of most volume; Lloyd 1982,
+// Least Squares Quantization in PCM, for moving all at once.
 class Relaxation {
  public:
-  // unit_points: the hull's vertices at unit scale. All given must outlive this. After the poll
-  // said stop, here or later, the answers mean nothing. Cost: O(V log V).
+  // unit_points: the hull's vertices at unit scale. All arguments must outlive this object. If the
+  // poll stopped, here or later, results are meaningless. Cost: O(V log V).
   Relaxation(const Hull& hull, std::span<const Vector> unit_points, StopPoll& poll);
 
-  // Moves each of the chosen vertices once; they may meet, so that fewer come back, ascending.
-  // Nothing where the chosen lie in a plane, or the poll said stop. Cost: a hull of the chosen and
-  // a support point of each.
+  // Moves each of the chosen vertices once. Vertices may coincide, so fewer may be returned,
+  // ascending. Returns nothing if the chosen vertices lie in a plane or the poll stopped. Cost: a
+  // hull of the chosen vertices and a support point for each.
   std::optional<std::vector<uint32_t>> Move(std::span<const uint32_t> chosen);
-  // The same, without some of those that stick out least, no two of them neighbours: about one in
-  // 20.
+  // Move, with some of the least protruding vertices removed, no two of them neighbours: about one
+  // in 20.
   std::optional<std::vector<uint32_t>> MoveFewer(std::span<const uint32_t> chosen);
 
  private:

@@ -69,7 +69,8 @@ class OutsideSearch {
       if (!best_ || !Reaches(*best_)) UseAll();
     }
     if (poll_.stopped()) return Stopped();
-    // The box is a hull for all finite doubles, of no more vertices than may be asked for.
+    // The box is a hull for all finite doubles, with no more vertices than the least permitted
+    // limit.
     HULLD_CHECK(best_.has_value());
     return *std::move(best_);
   }
@@ -79,8 +80,8 @@ class OutsideSearch {
     return target_.max_error > 0 && hull.error <= target_.max_error;
   }
 
-  // Hulls that keep max_error go before all others, and the one with fewer vertices first;
-  // otherwise the one with less error is better.
+  // Orders hulls within max_error before all other hulls, and among them by fewer vertices; other
+  // hulls by less error.
   bool IsBetter(const SimplifiedHull& a, const SimplifiedHull& b) const {
     if (Reaches(a) != Reaches(b)) return Reaches(a);
     const size_t count_a = a.hull.vertices().size();
@@ -89,7 +90,7 @@ class OutsideSearch {
     return a.error != b.error ? a.error < b.error : count_a < count_b;
   }
 
-  // Keeps the hull if it is the best so far. Returns whether it keeps to both limits.
+  // Keeps the hull if it is the best so far. Returns true if it is within both limits.
   bool Consider(std::optional<SimplifiedHull> hull) {
     if (!hull || poll_.stopped() || hull->hull.vertices().size() > most_) return false;
     const bool reaches = Reaches(*hull);
@@ -97,7 +98,7 @@ class OutsideSearch {
     return reaches;
   }
 
-  // The vertices that a better hull may have: as many as the best with its error or less.
+  // Returns the most vertices of a better hull: as many as the best has, with its error or less.
   size_t Worthwhile() const {
     return best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
   }
@@ -118,8 +119,8 @@ class OutsideSearch {
 
   size_t CornersPerVertex() const { return hull_.dimension() == 2 ? 2 : 1; }
 
-  // Pushing a vertex errs by no less than what it is pushed, about as much as the inside hull errs:
-  // the search starts there, goes on in steps, and comes back by halves.
+  // Pushing a vertex errs by at least the distance it is pushed, about the error of the inside
+  // hull. The search starts there, continues in steps, and returns by halves.
   void SearchByPushing() {
     const size_t most = Worthwhile() / CornersPerVertex();
     if (most < order_.least()) return;
@@ -137,8 +138,8 @@ class OutsideSearch {
     }
   }
 
-  // Planes through the facets of an inside hull of n vertices meet in some 4 n corners; in fewer
-  // where facets are large, so it is tried as long as half of these would do.
+  // Planes through the facets of an inside hull of n vertices meet in some 4 n corners, and in
+  // fewer if facets are large. They are tried if half of these corners would be permitted.
   void SearchByPlanes() {
     if (hull_.dimension() < 3) return;
     const size_t all = hull_.vertices().size();
@@ -148,7 +149,7 @@ class OutsideSearch {
     }
   }
 
-  // Without an error to reach, or none in reach: what as many vertices as there may be can do.
+  // Without a reachable error limit: uses as many vertices as permitted.
   void UseAll() {
     const size_t pushed = most_ / CornersPerVertex();
     if (pushed >= order_.least()) TryPushing(std::min(pushed, hull_.vertices().size()));
@@ -188,7 +189,7 @@ absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyT
   if (absl::Status s = CheckTarget(target, kBoxVertices); !s.ok()) return s;
   const size_t all = hull.vertices().size();
   if (all <= kBoxVertices || (target.max_error == 0 && all <= target.max_vertices)) {
-    // With up to 8 vertices, no enclosure has an error of 0 and fewer.
+    // With up to 8 vertices, no enclosure has an error of 0 and fewer vertices.
     return SimplifiedHull{hull, 0};
   }
   StopPoll poll(target.should_stop);

@@ -12,21 +12,21 @@
 
 namespace hulld {
 
-// Some of a hull's vertices, by index and each once, and what their hull is worth for the whole.
+// Distinct vertices of a hull, by index, and the quality of their hull as an approximation.
 struct VertexChoice {
   std::vector<uint32_t> vertices;
-  // Proven: no point of the hull is farther than this from the hull of these. The caller's length
-  // unit.
+  // A **proven** bound, in the caller's length unit, of the distance of any point of the hull from
+  // the hull of these vertices.
   double error = 0;
 };
 
-// The hull of some of a hull's vertices; nothing when the poll said stop. All of them are vertices
-// of it, as each is extreme among all.
+// Returns the hull of some of a hull's vertices, or nothing if the poll stopped. All of them are
+// vertices of the result, because each is extreme among all.
 std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> chosen,
                                  StopPoll& poll);
 
-// Twice the area of a facet times its unit normal; rounded. Newell's sum, which many corners do not
-// spoil.
+// Returns twice the area of a facet times its unit normal, rounded. Newell's sum, which is robust
+// for many corners.
 Vector AreaNormal(std::span<const Vector> points, std::span<const uint32_t> loop);
 
 }  // namespace hulld

@@ -13,15 +13,16 @@ namespace hulld {
 namespace {
 
 constexpr uint32_t kLeafVertices = 8;
-// Vertices that are put on two sides in about as long as a step of a poll may take.
+// Number of vertices partitioned in about the time of a poll step.
 constexpr uint32_t kVerticesPerStep = 256;
-// Edges of a vertex that are climbed along.
+// The most edges of a vertex to climb along.
 constexpr size_t kMostNeighbours = 64;
-// Vertices climbed to, so that no way round a long edge of small facets is walked to its end.
+// The most vertices to climb to, so that a path around a long edge of small facets is not walked to
+// its end.
 constexpr int kMostClimbs = 256;
-// Support points for one distance. Each makes the bound less, so it holds after any number.
+// The most support points for one distance. Each lowers the bound, which is valid after any number.
 constexpr int kMostSupportPoints = 32;
-// A bound that is this near to the distance, relatively, is not worth another one.
+// Relative gap between bound and distance that does not justify another support point.
 constexpr double kRelativeEnough = 1e-9;
 
 double ReachOf(const Vector& low, const Vector& high, const Vector& direction) {
@@ -109,7 +110,7 @@ void SupportFunction::Search(uint32_t at, const Vector& direction, uint32_t& bes
     }
     return;
   }
-  // The half that reaches farther first.
+  // Visits the half that reaches farther first.
   std::array<uint32_t, 2> halves = {at + 1, node.second_half};
   std::array<double, 2> reaches{};
   for (size_t k = 0; k < 2; ++k) {

@@ -11,31 +11,32 @@
 
 namespace hulld {
 
-// The support function of a hull at unit scale, and with it distances from the hull, up to
+// The support function of a hull at unit scale, and distances from the hull computed with it, up to
 // rounding.
 //
-// Idea: from any vertex, edges that lead farther along the direction lead to the farthest vertex of
-// all. A vertex of many edges, such as the tip of a cone, is not climbed from; a tree of boxes over
-// the vertices answers then: a box is looked into while it reaches farther than the best vertex so
+// From any vertex, edges that lead farther along the direction lead to the farthest vertex of all.
+// Vertices with many edges, such as the tip of a cone, are not climbed from; a tree of boxes over
+// the vertices is searched instead, visiting each box that reaches farther than the best vertex so
 // far.
 class SupportFunction {
  public:
-  // points: the hull's vertices at unit scale, which must outlive this. Requires a vertex. After
-  // the poll said stop, this may only be destroyed. Cost: O(V log V).
+  // points: the hull's vertices at unit scale, which must outlive this object. If the poll stopped,
+  // this object may only be destroyed. Requires: at least one vertex. Cost: O(V log V).
   SupportFunction(const Hull& hull, std::span<const Vector> points, StopPoll& poll);
 
-  // The index of the vertex farthest along the direction. Any start is right; a near one is fast.
+  // Returns the index of the vertex farthest along the direction. Any start is correct; a near one
+  // is fast.
   uint32_t FarthestAlong(const Vector& direction, uint32_t start) const;
 
-  // Proven: p is not farther than this from the hull; mostly within one in 10^9, unless less than
-  // `enough`, which then did. Idea: a triangle of vertices, one of which gives way to the support
-  // point towards p while that brings the triangle nearer. Source: Gilbert, Johnson and Keerthi
-  // 1988. Cost: some 5 support points.
+  // Returns a **proven** bound of the distance of p from the hull; usually within one in 10^9,
+  // except that a bound below `enough` is returned at once. Maintains a triangle of vertices, and
+  // replaces one of them by the support point towards p while that brings the triangle nearer.
+  // Source: Gilbert, Johnson and Keerthi 1988. Cost: some 5 support points.
   double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 
  private:
-  // A box of order_[first, end), and where its second half is; the first is the next node. 0: a
-  // leaf.
+  // A box of order_[first, end), and the index of its second half; the first half is the next node.
+  // 0: a leaf.
   struct Node {
     Vector low;
     Vector high;
@@ -52,10 +53,10 @@ class SupportFunction {
   void Search(uint32_t at, const Vector& direction, uint32_t& best, double& most) const;
 
   std::span<const Vector> points_;
-  // By vertex, those at the other ends of its edges.
+  // Adjacent vertices, by vertex.
   std::vector<uint32_t> starts_;
   std::vector<uint32_t> neighbours_;
-  // The vertices as the tree has them.
+  // The vertices in the order of the tree.
   std::vector<uint32_t> order_;
   std::vector<Node> nodes_;
 };

@@ -11,8 +11,8 @@
 namespace hulld {
 namespace {
 
-// Coordinates of the point of the triangle a, a + e, a + f nearest to a + p, as a + s e + t f with
-// s, t >= 0 and s + t <= 1, up to rounding.
+// Returns the coordinates of the point of the triangle a, a + e, a + f nearest to a + p, as a + s e
+// + t f with s, t >= 0 and s + t <= 1, up to rounding.
 std::pair<double, double> NearestOnTriangle(const Vector& e, const Vector& f, const Vector& p) {
   const TriangleNearest nearest = FindNearestOnTriangle([&](int corner) -> EdgeProjections {
     if (corner == 0) return {e.dot(p), f.dot(p)};
@@ -45,8 +45,9 @@ std::pair<double, double> NearestOnTriangle(const Vector& e, const Vector& f, co
 
 }  // namespace
 
-// The distance to the point a + s e + t f, which belongs to the triangle for the doubles s and t;
-// where it is does not matter for the bound, and kSubsetDistanceErrorFactor covers its evaluation.
+// Returns the distance to the point a + s e + t f, which belongs to the triangle for the doubles s
+// and t. The bound is valid for any such point, and kSubsetDistanceErrorFactor covers its
+// evaluation.
 TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vector& c,
                                     const Vector& p) {
   const Vector e = b - a;

@@ -5,15 +5,16 @@
 
 namespace hulld {
 
-// How far a point is from a triangle: a number that the distance certainly does not exceed, and
-// mostly is within some units in the last place of; and about where the nearest point is.
+// The distance of a point from a triangle: an upper bound, usually within some units in the last
+// place; and the approximate nearest point.
 struct TriangleDistance {
   double bound;
   Vector nearest;
 };
 
-// From p to the triangle a, b, c, which may be degenerate. Proven for coordinates of at most 2^1000
-// in magnitude, even where each errs by 2^-1075 from being scaled. Cost: some 30 ns.
+// Returns the distance from p to the triangle a, b, c, which may be degenerate. **Proven** for
+// coordinates of at most 2^1000 in magnitude, even if each errs by 2^-1075 from scaling. Cost: some
+// 30 ns.
 TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vector& c,
                                     const Vector& p);
 

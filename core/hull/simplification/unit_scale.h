@@ -10,18 +10,18 @@
 
 namespace hulld {
 
-// Lengths and points in units of a power of two above the largest coordinate, so that no difference
-// and no product of two of them overflows, and none that matters underflows.
+// Converts lengths and points to units of a power of two above the largest coordinate, so that no
+// difference and no product of two of them overflows, and no significant one underflows.
 class UnitScale {
  public:
-  // Requires a finite length >= 0. Points whose coordinates are at most that come to at most 1.
+  // Requires: a finite length >= 0. Coordinates of at most that map to at most 1.
   explicit UnitScale(double largest) {
     HULLD_CHECK(std::isfinite(largest) && largest >= 0);
     std::frexp(largest, &exponent_);
   }
 
-  // Exact but for components that become subnormal, which err by at most 2^-1075 each: see
-  // kLeastPositive.
+  // Exact except for components that become subnormal, which err by at most 2^-1075 each (see
+  // kLeastPositive).
   Vector ToUnit(const Vector& p) const { return Times(p, -exponent_); }
   std::vector<Vector> ToUnit(std::span<const Vector> points) const {
     std::vector<Vector> scaled;

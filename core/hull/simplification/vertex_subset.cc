@@ -16,12 +16,13 @@
 namespace hulld {
 namespace {
 
-// Steps from triangle to triangle in search of a nearer one; the next search goes on from there.
+// The most steps from triangle to triangle towards a nearer one; the next search continues from
+// there.
 constexpr int kMostSteps = 64;
-// Steps of walks for each point, on average, beyond which a shape does not suit them.
+// Average walk steps per point above which a shape is unsuitable for walks.
 constexpr uint64_t kMostWalkPerPoint = 64;
 
-// The candidate, other than those excluded, for which `measure` is largest.
+// Returns the candidate with the largest `measure`, excluding some.
 template <size_t n, typename Measure>
 uint32_t Farthest(std::span<const uint32_t> candidates, const std::array<uint32_t, n>& excluded,
                   StopPoll& poll, Measure&& measure) {
@@ -75,9 +76,9 @@ std::optional<VertexSubset> VertexSubset::StartingWith(std::span<const uint32_t>
   return subset;
 }
 
-// Four of the candidates that span them about as well as any. Three vertices are never on one line;
-// that the fourth is not in their plane is decided exactly. False where all are in a plane, or the
-// poll said stop.
+// Starts with four of the candidates that span them nearly optimally. Three vertices are never on
+// one line; the test that the fourth is not in their plane is exact. Returns false if all are in a
+// plane, or the poll stopped.
 bool VertexSubset::StartWithCornersOf(std::span<const uint32_t> candidates, StopPoll& poll) {
   const std::span<const Vector> u = unit_points_;
   const uint32_t a = candidates[0];
@@ -105,30 +106,31 @@ bool VertexSubset::StartWithCornersOf(std::span<const uint32_t> candidates, Stop
   return true;
 }
 
-// Adds them to the surface, while no list is kept. In an order like a random one, as sorted points
-// may see all that came before. False where walks are long, or the poll said stop.
+// Adds the given vertices to the surface, before any list exists. Uses a pseudorandom order,
+// because sorted points may see all earlier ones. Returns false if walks are long, or the poll
+// stopped.
 bool VertexSubset::ChooseRestOf(std::span<const uint32_t> start, StopPoll& poll) {
   if (surface_->directions() == nullptr) return false;
   std::vector<uint32_t> order;
   std::copy_if(start.begin(), start.end(), std::back_inserter(order), [this](uint32_t i) {
     return std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end();
   });
-  // Not std::shuffle, which differs from library to library.
+  // Avoids std::shuffle, which differs between libraries.
   std::mt19937 random;
   for (size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random() % k]);
   for (const uint32_t i : order) {
     if (poll.Step(1 + surface_->TakeSteps())) return false;
     surface_->Insert(vertices_, points_[i]);
     chosen_.push_back(i);
-    // A vertex of the whole is one of the hull of any, and stays one.
+    // A vertex of the whole hull is and remains a vertex of the hull of any subset.
     HULLD_CHECK(vertices_.size() == chosen_.size());
     if (IsSlow()) return false;
   }
   return true;
 }
 
-// Gives each vertex that is not chosen to a triangle. False where walks are long, or the poll said
-// stop.
+// Assigns each vertex that is not chosen to a triangle. Returns false if walks are long, or the
+// poll stopped.
 bool VertexSubset::AssignRest(StopPoll& poll) {
   MakeCells();
   std::vector<bool> is_chosen(points_.size(), false);
@@ -145,7 +147,7 @@ bool VertexSubset::AssignRest(StopPoll& poll) {
   return true;
 }
 
-// True where walks on the surface are so long that together they may be quadratic.
+// True if walks on the surface are so long that their total may be quadratic.
 bool VertexSubset::IsSlow() const {
   return surface_->work() > kMostWalkPerPoint * (points_.size() + 1024);
 }
@@ -203,8 +205,8 @@ double VertexSubset::DistanceTo(TriangleId id, uint32_t point) const {
                                  unit_points_[chosen_[c]], unit_points_[point]);
 }
 
-// Gives the vertex to a triangle that it sees strictly, the one that it is highest above unless
-// rounding deceives. Requires that it sees a target: see ConflictLists for why it does.
+// Assigns the vertex to a triangle that it sees strictly, the one that it is highest above, up to
+// rounding. Requires: it sees a target; ConflictLists explains the reason.
 void VertexSubset::Assign(uint32_t point, std::span<const TriangleId> targets) {
   TriangleId best = targets[0];
   double most = HeightOver(best, point);
@@ -231,7 +233,7 @@ void VertexSubset::Link(TriangleId id, uint32_t point, double distance) {
   if (cell.farthest == kNone || distance > distance_[cell.farthest]) cell.farthest = point;
 }
 
-// Moves the vertices of a list to triangles that came nearer.
+// Moves the vertices of a list to nearer triangles.
 void VertexSubset::Redistribute(TriangleId id) {
   uint32_t i = std::exchange(cells_[id].first, kNone);
   cells_[id].farthest = kNone;
@@ -253,7 +255,7 @@ void VertexSubset::Redistribute(TriangleId id) {
   }
 }
 
-// Puts the lists that changed into the queue as they are now.
+// Enqueues the changed lists in their current state.
 void VertexSubset::EnqueueChanged() {
   for (const TriangleId id : changed_) {
     Cell& cell = cells_[id];
@@ -264,7 +266,7 @@ void VertexSubset::EnqueueChanged() {
   changed_.clear();
 }
 
-// The triangle to which steps lead that each raise the point's height.
+// Returns the triangle reached by steps that each raise the point's height.
 TriangleId VertexSubset::ClimbFrom(TriangleId id, uint32_t point) const {
   double height = HeightOver(id, point);
   for (int step = 0; step < kMostSteps; ++step) {
@@ -281,9 +283,9 @@ TriangleId VertexSubset::ClimbFrom(TriangleId id, uint32_t point) const {
   return id;
 }
 
-// The triangle of the farthest vertex, which no step brings nearer to the surface; kNone when no
-// vertex waits. Moves vertices to nearer triangles on the way, all of a list at once: what one
-// gains from a new triangle others mostly do, too.
+// Returns the triangle of the farthest vertex, which no step brings nearer to the surface; kNone if
+// no vertex is pending. Moves vertices to nearer triangles on the way, a whole list together: if
+// one vertex gains from a new triangle, most of its list does.
 TriangleId VertexSubset::Worst() {
   while (!queue_.empty()) {
     const Entry top = queue_.top();

@@ -15,26 +15,26 @@
 
 namespace hulld {
 
-// A growing subset of the vertices of a hull of dimension 3, the next one always the vertex
-// farthest from the hull of those chosen, as far as rounding can tell.
+// A growing subset of the vertices of a hull of dimension 3. The next one is always the vertex
+// farthest from the hull of the chosen ones, as far as rounding permits.
 //
-// Idea: the hull of those chosen grows as any hull does, exactly, and each other vertex waits in
-// the list of a triangle that it sees strictly: a vertex of the whole is outside the hull of any
-// others. The distance to that triangle bounds the distance to the hull. A vertex is given to the
-// triangle whose plane it is highest above, which is the nearest where the vertex lies over it.
-// Triangles that come later may be nearer still; that is looked at when a vertex seems the farthest
-// of all, and not before. Source: Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists;
-// Kamenev 1992, A Class of Adaptive Algorithms for Approximating Convex Bodies by Polyhedra, for
-// the order and what it is worth.
+// The hull of the chosen vertices grows exactly, like any hull, and each other vertex waits in the
+// list of a triangle that it sees strictly: a vertex of the whole is outside the hull of any other
+// vertices. The distance to that triangle bounds the distance to the hull. A vertex is assigned to
+// the triangle with the plane that it is highest above, which is the nearest if the vertex lies
+// over it. Later triangles may be nearer; this is tested only when a vertex appears to be the
+// farthest of all. Source: Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists; Kamenev
+// 1992, A Class of Adaptive Algorithms for Approximating Convex Bodies by Polyhedra, for the order
+// and its quality.
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
-  // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, this may only
-  // be destroyed. Cost: O(points).
+  // outlive this object. Starts with four vertices. If the poll stopped, here or in ChooseNext,
+  // this object may only be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
-  // The same, but it starts with the vertices given, each once. Nothing where these lie in a plane,
-  // where no double is found inside their hull, where walks on it are longer than round shapes
-  // need, and after the poll said stop. Cost: O(points) walks.
+  // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane, if
+  // no double is found inside their hull, if walks on it are longer than round shapes need, or if
+  // the poll stopped. Cost: O(points) walks.
   static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
                                                   std::span<const Vector> points,
                                                   std::span<const Vector> unit_points,
@@ -45,27 +45,27 @@ class VertexSubset {
   bool is_complete() const { return chosen_.size() == points_.size(); }
   // See Surface.
   bool IsMeasurable() const { return surface_->IsMeasurable(); }
-  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: O((V + n) log n) for n
+  // Chooses the apparently farthest vertex. Requires: !is_complete(). Cost: O((V + n) log n) for n
   // choices of V vertices of round shapes.
   void ChooseNext(StopPoll& poll);
-  // Proven: no vertex is farther than this from the hull of those chosen. In units. Cost: O(log V)
-  // amortized.
+  // Returns a **proven** bound, in units, of the distance of any vertex from the hull of the chosen
+  // ones. Cost: O(log V) amortized.
   double DistanceBound();
 
  private:
   static constexpr uint32_t kNone = UINT32_MAX;
 
-  // What the subset keeps for a triangle of the surface: a corner and the unit normal, rounded, at
-  // unit scale, and the list of vertices.
+  // Data for a triangle of the surface: a corner and the unit normal, rounded, at unit scale, and
+  // the list of vertices.
   struct Cell {
     Vector corner = Vector::Zero();
     Vector normal = Vector::Zero();
     uint32_t first = kNone;
-    // The farthest of the list.
+    // The farthest vertex of the list.
     uint32_t farthest = kNone;
-    // The number of the last entry of the queue that is about this cell.
+    // The number of this cell's last entry in the queue.
     uint64_t entry = 0;
-    // The list has changed since.
+    // True if the list has changed since that entry.
     bool is_changed = false;
   };
   struct Entry {
@@ -103,7 +103,7 @@ class VertexSubset {
 
   std::span<const Vector> points_;
   std::span<const Vector> unit_points_;
-  // The chosen vertices, whose IDs are their places in chosen_, and the boundary of their hull.
+  // The chosen vertices, with their places in chosen_ as IDs, and the boundary of their hull.
   VertexTable vertices_;
   std::optional<Surface> surface_;
   std::vector<uint32_t> chosen_;
@@ -112,12 +112,12 @@ class VertexSubset {
   // By point that is not chosen: the next one of its list, and a proven bound of its distance.
   std::vector<uint32_t> next_;
   std::vector<double> distance_;
-  // Each cell with a list has one entry that counts, and may have some that no longer do.
+  // Each cell with a list has one valid entry, and may have stale ones.
   std::priority_queue<Entry> queue_;
   uint64_t entries_ = 0;
-  // Triangles whose lists changed since they were put into the queue.
+  // Triangles with lists that changed since they were enqueued.
   std::vector<TriangleId> changed_;
-  // Vertices whose triangles went.
+  // Vertices of removed triangles.
   std::vector<uint32_t> orphans_;
 };
 

@@ -13,17 +13,17 @@
 
 namespace hulld {
 
-// A vector that grows in chunks of 256 elements: no single push_back costs more than a chunk,
-// however long the vector, and nothing is held in reserve for a doubling. Only a first chunk that
-// is not full yet grows by doubling, so that small vectors stay small; then its elements move.
+// A vector that grows in chunks of 256 elements: no push_back costs more than one chunk, regardless
+// of the size, and there is no spare capacity from doubling. Only a first chunk that is not full
+// grows by doubling, so that small vectors stay small; its elements then move.
 //
-// It can keep a journal of what changes, to undo it: the old value of each element, when it is
-// changed for the first time. That costs as much as what changes, not as what is there.
+// It can keep a journal for undo: the old value of each element at its first change. The journal
+// costs as much as the changes, regardless of the size.
 template <typename T>
 class ChunkedVector {
  public:
   ChunkedVector() = default;
-  // Requires that no journal is kept.
+  // Requires: no journal.
   ChunkedVector(const ChunkedVector& other) { *this = other; }
   ChunkedVector& operator=(const ChunkedVector& other) {
     if (this == &other) return *this;
@@ -45,7 +45,7 @@ class ChunkedVector {
 
   size_t size() const { return size_; }
   const T& operator[](size_t i) const { return chunks_[i >> kBits][i & kMask]; }
-  // The element, to be changed; where a journal is kept, that notes what it was.
+  // Returns the element for modification, and records its old value in the journal, if any.
   T& Mutable(size_t i) {
     if (i < journal_end_) Note(i);
     return chunks_[i >> kBits][i & kMask];
@@ -55,7 +55,7 @@ class ChunkedVector {
   const T& back() const { return (*this)[size_ - 1]; }
   // Keeps the memory.
   void pop_back() { --size_; }
-  // The journal included.
+  // Includes the journal.
   size_t MemoryBytes() const {
     const size_t elements = chunks_.empty() ? 0 : first_capacity_ + (chunks_.size() - 1) * kChunk;
     return elements * sizeof(T) + chunks_.capacity() * sizeof(chunks_[0]) +
@@ -66,7 +66,7 @@ class ChunkedVector {
     const T copy = value;  // may be an element that moves
     Mutable(Extend()) = copy;
   }
-  // Appends an element that is still to be assigned, by Mutable; returns its index.
+  // Appends an unassigned element, to be set by Mutable; returns its index.
   size_t Extend() {
     if (size_ < kChunk) {
       if (size_ == first_capacity_) GrowFirst();
@@ -76,12 +76,12 @@ class ChunkedVector {
     return size_++;
   }
 
-  // Starts a journal. Requires that none is kept.
+  // Starts a journal. Requires: no journal.
   void StartJournal() {
     HULLD_CHECK(journal_.empty() && journal_end_ == 0);
     journal_end_ = size_;
   }
-  // Makes everything as it was when the journal was started, and ends it. Cost: the changes.
+  // Restores the state at the start of the journal, and ends it. Cost: the changes.
   void Undo() {
     for (const Change& change : journal_) {
       chunks_[change.index >> kBits][change.index & kMask] = change.before;
@@ -92,7 +92,7 @@ class ChunkedVector {
     if (noted_.size() > chunks_.size()) noted_.resize(chunks_.size());
     if (chunks_.empty()) first_capacity_ = 0;
   }
-  // Ends the journal and keeps what changed. Cost: the changes.
+  // Ends the journal and keeps the changes. Cost: the changes.
   void EndJournal() {
     for (const Change& change : journal_) {
       noted_[change.index >> kBits][(change.index & kMask) / 64] = 0;
@@ -100,7 +100,7 @@ class ChunkedVector {
     journal_ = {};
     journal_end_ = 0;
   }
-  // What the journal holds.
+  // Memory of the journal, in bytes.
   size_t JournalBytes() const { return journal_.size() * sizeof(Change); }
 
  private:
@@ -108,7 +108,7 @@ class ChunkedVector {
   static constexpr size_t kChunk = size_t{1} << kBits;
   static constexpr size_t kMask = kChunk - 1;
   static constexpr size_t kLeastCapacity = 8;
-  // By element of a chunk, a bit: the journal has it.
+  // One bit for each element of a chunk: set if the journal contains it.
   using Noted = std::array<uint64_t, kChunk / 64>;
   struct Change {
     size_t index;
@@ -134,13 +134,12 @@ class ChunkedVector {
   }
 
   std::vector<std::unique_ptr<T[]>> chunks_;
-  // By chunk; the last chunks may have none yet, so that a vector without a journal has none.
+  // By chunk; may be shorter than the list of chunks, so that a vector without a journal has none.
   std::vector<Noted> noted_;
-  // Elements that the first chunk has room for.
+  // Capacity of the first chunk.
   size_t first_capacity_ = 0;
   size_t size_ = 0;
-  // How many elements there were when the journal was started, the ones that it is about; 0 when
-  // there is none.
+  // Number of elements at the start of the journal, which covers these; 0 without a journal.
   size_t journal_end_ = 0;
   std::vector<Change> journal_;
 };

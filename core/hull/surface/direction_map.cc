@@ -21,7 +21,7 @@ namespace {
 
 // The least pivot of the moments, relative to their sum along the axes: flatter sets have no frame.
 constexpr double kLeastRelativeMoment = 0x1p-40;
-// The condition number of L from which on it is worth its multiplications.
+// The condition number of L above which it is worth its multiplications.
 constexpr double kWorthAFrame = 4;
 
 double RowSumNorm(const Eigen::Matrix3d& m) { return m.cwiseAbs().rowwise().sum().maxCoeff(); }
@@ -91,24 +91,24 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
       CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_));
 }
 
-// The gauge g of the set round c, in the frame, is convex and subadditive. |L| is the largest sum
+// The gauge g of the set around c, in the frame, is convex and subadditive. |L| is the largest sum
 // of a row's absolute entries, E the extent, u0 the unit roundoff.
 //
 // A corner: solving L w = d for its direction d is exact for a right side within 4 u0 |L| |w| of d
 // (Higham 2002, 8.5), and its point, m w beyond c, is rounded by at most 2 u0 (|c| + m |w|), where
-// m |w| is at most E. So that point is within u0 |L| (6 E + 2 |c|) of m d in the frame, and g(d) at
-// most 1 / m times 1 + u0 |L| (6 E + 2 |c|) max g, max g over all directions.
+// m |w| is at most E. The point is therefore within u0 |L| (6 E + 2 |c|) of m d in the frame, and
+// g(d) is at most 1 / m times 1 + u0 |L| (6 E + 2 |c|) max g, with max g over all directions.
 //
-// A point p: L (p - c) errs by at most 4 u0 |L| |p - c|, and g there is at least |p - c| / E, as
-// the set is within E of c: by at most 4 u0 |L| E max g of itself. The direction that it is
-// interpolated at is within 8 u0 of its own, which adds at most 8 u0 max g. The interpolation is of
-// positive terms and errs, with the distance and the stored gauges, by 16 u0 of itself, which is at
-// least the least gauge.
+// A point p: L (p - c) errs by at most 4 u0 |L| |p - c|, and g there is at least |p - c| / E,
+// because the set is within E of c. The error is at most 4 u0 |L| E max g of itself. The direction
+// at which it is interpolated is within 8 u0 of its own, which adds at most 8 u0 max g. The
+// interpolation has positive terms and errs, with the distance and the stored gauges, by 16 u0 of
+// itself, which is at least the least gauge.
 //
-// max g is at most 1 / least reach, the least gauge 1 / largest reach. Relative to what is computed
-// all this is at most ratio (24 + 16 stretch) u0, with ratio = largest / least reach and stretch =
-// |L| (E + |c|) / least reach; half of kDirectionMapMargin bounds it. Products that underflow add
-// less than the slack, as distances are at least kMapMinDistance. Proven.
+// max g is at most 1 / least reach, the least gauge 1 / largest reach. Relative to the computed
+// value the total is at most ratio (24 + 16 stretch) u0, with ratio = largest / least reach and
+// stretch = |L| (E + |c|) / least reach; half of kDirectionMapMargin bounds it. Products that
+// underflow add less than the slack, because distances are at least kMapMinDistance. Proven.
 void DirectionMap::Finish(double least_reach, double largest_reach, double extent) {
   HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
   if (!(least_reach > 0)) return;
@@ -139,9 +139,9 @@ bool DirectionMap::Coarsen() {
 
 void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
                                    StopPoll& poll) const {
-  // By the chunk, so that the buffer stays in the nearest cache.
+  // Processes one chunk after the other, so that the buffer stays in the nearest cache.
   constexpr size_t kChunk = 1024;
-  // Room beyond the chunk's, as four are written at a time.
+  // Extra capacity, because four indices are written together.
   std::array<uint32_t, kChunk + 4> buffer;
   const bool has_avx2 = CurrentSimdPath() == SimdPath::kAvx2 && rejects_;
   for (size_t first = 0; first < points.size() && !poll.Step(); first += kChunk) {
@@ -162,8 +162,8 @@ void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<u
 #ifdef HULLD_HAS_AVX2_PATH
 namespace {
 
-// Steps of WriteSurvivorsAvx2, for four points at a time. Each computes, operation by operation,
-// what the function that it names computes for one, so that the results are the same.
+// Steps of WriteSurvivorsAvx2, for four points together. Each performs the same operations as the
+// scalar function that it names, so that the results are the same.
 
 struct FourVectors {
   __m256d x;
@@ -171,7 +171,7 @@ struct FourVectors {
   __m256d z;
 };
 
-// Four points that lie one after the other.
+// Loads four consecutive points.
 [[gnu::target("avx2"), gnu::always_inline]] inline FourVectors LoadFour(const Vector* points) {
   const double* p = points->data();
   const __m256d a = _mm256_loadu_pd(p);      // x0 y0 z0 x1
@@ -222,7 +222,7 @@ struct FourOnCube {
     const __m256d abs_x = _mm256_andnot_pd(sign, v.x);
     const __m256d abs_y = _mm256_andnot_pd(sign, v.y);
     const __m256d abs_z = _mm256_andnot_pd(sign, v.z);
-    // Not a number where y or z is not: then the point is out of range. x is always a number.
+    // NaN if y or z is NaN: the point is then out of range. x is never NaN.
     largest = _mm256_max_pd(abs_x, _mm256_max_pd(abs_y, abs_z));
     const __m256d is_x = _mm256_cmp_pd(abs_x, largest, _CMP_EQ_OQ);
     const __m256d is_y = _mm256_andnot_pd(is_x, _mm256_cmp_pd(abs_y, largest, _CMP_EQ_OQ));
@@ -248,7 +248,7 @@ struct FourOnCube {
   return _mm256_max_pd(_mm256_min_pd(along, n), _mm256_setzero_pd());
 }
 
-// What DirectionMap::PlaceIn makes of a resolution.
+// Constants of DirectionMap::PlaceIn for a resolution.
 struct GridOfFour {
   [[gnu::target("avx2"), gnu::always_inline]] explicit GridOfFour(int resolution)
       : half(_mm256_set1_pd(0.5 * resolution)),
@@ -261,7 +261,7 @@ struct GridOfFour {
   __m256d corners;
 };
 
-// DirectionMap::PlaceIn, but for the cell.
+// DirectionMap::PlaceIn, without the cell.
 struct FourPlaces {
   [[gnu::target("avx2"), gnu::always_inline]] FourPlaces(const FourVectors& v,
                                                          const GridOfFour& grid) {
@@ -289,14 +289,14 @@ struct FourPlaces {
   __m256d in_range;
 };
 
-// a where t is 0, b where it is 1.
+// Returns a if t is 0, b if it is 1.
 [[gnu::target("avx2"), gnu::always_inline]] inline __m256d Interpolate(__m256d a, __m256d b,
                                                                        __m256d t, __m256d rest) {
   return _mm256_add_pd(_mm256_mul_pd(a, rest), _mm256_mul_pd(b, t));
 }
 
-// The gauges at four corners, and at the next corner after each. Pairs are loaded together, as four
-// gathers take longer.
+// The gauges at four corners, and at the next corner after each. Loads pairs, because four gathers
+// take longer.
 struct GaugesOfRow {
   [[gnu::target("avx2"), gnu::always_inline]] GaugesOfRow(const double* gauges, const int32_t* at) {
     const __m256d even = _mm256_loadu2_m128d(gauges + at[2], gauges + at[0]);
@@ -323,7 +323,7 @@ struct GaugesOfRow {
                      Interpolate(high.first, high.second, t, rest_t), s, rest_s);
 }
 
-// By which of four are kept: the numbers of these, in order, and then anything.
+// For each subset of four kept: the indices of its members, in order, followed by arbitrary values.
 alignas(16) constexpr int32_t kKeptFirst[16][4] = {
     {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0},
     {1, 2, 0, 0}, {0, 1, 2, 0}, {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0},
@@ -331,12 +331,12 @@ alignas(16) constexpr int32_t kKeptFirst[16][4] = {
 
 }  // namespace
 
-// IsCertainlyInside for four points at a time. Writes the survivors' indices to `end` and moves it
-// beyond them, without a branch on which these are; up to four places beyond are overwritten.
-// Returns how many points it has done.
+// IsCertainlyInside for four points together. Writes the survivors' indices to `end` and advances
+// it beyond them, without branching on the result; up to four places beyond are overwritten.
+// Returns the number of points processed.
 __attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
     std::span<const Vector> points, uint32_t*& end) const {
-  // The indices that are written might change what is a member, so all is taken out of the loop.
+  // Local copies: for the compiler, the stores of the loop might alias members.
   const FrameOfFour frame(frame_);
   const GridOfFour grid(n_);
   const int resolution = n_;

@@ -17,30 +17,30 @@
 namespace hulld {
 
 // The coordinates in which a map measures a set: q = L (p - center), L a lower triangular matrix.
-// Where a set is flat or slender, in any direction, L makes it about as wide in all directions, so
-// that the cells of a map divide its surface evenly. L is exactly what its doubles say; it does not
-// matter that they were rounded.
+// For a set that is flat or slender in any direction, L makes it about equally wide in all
+// directions, so that the cells of a map divide its surface evenly. L is exactly the matrix of its
+// doubles, so its rounding is irrelevant.
 class MapFrame {
  public:
   // L = 1.
   explicit MapFrame(const Vector& center) : center_(center) {}
-  // The frame that turns points with these second moments about `center`, the sums of the products
-  // of their differences, into points equally spread in all directions, times a factor; |L| is at
-  // most 1, component by component. L = 1 where the points are nearly spread so already, where they
-  // are so flat that rounding would matter, or where the moments are not finite.
+  // Builds the frame that maps points with these second moments about `center`, the sums of the
+  // products of their differences, to points equally spread in all directions, times a factor; |L|
+  // is at most 1, component by component. L = 1 if the points are already nearly so spread, if they
+  // are so flat that rounding would matter, or if the moments are not finite.
   MapFrame(const Vector& center, const Eigen::Matrix3d& moments);
 
   const Vector& center() const { return center_; }
   bool is_plain() const { return is_plain_; }
   Eigen::Matrix3d matrix() const;
-  // L (p - center), rounded. An overflow gives an infinite or NaN component.
+  // Returns L (p - center), rounded. An overflow yields an infinite or NaN component.
   Vector ToMap(const Vector& point) const {
     const Vector v = point - center_;
     if (is_plain_) return v;
     const auto& [xx, yx, yy, zx, zy, zz] = entries_;
     return {xx * v.x(), yx * v.x() + yy * v.y(), (zx * v.x() + zy * v.y()) + zz * v.z()};
   }
-  // The difference of points that L turns into `direction`, rounded.
+  // Returns the difference of points that L maps to `direction`, rounded.
   Vector FromMap(const Vector& direction) const;
 
  private:
@@ -50,23 +50,23 @@ class MapFrame {
   bool is_plain_ = true;
 };
 
-// A cube map of directions round a point c strictly inside a growing convex set: 6 faces of n x n
-// cells. Each corner of a cell holds a bound of the set's gauge in its direction, and each cell a
-// hint where on the surface its directions lead. The set only grows, so what the map holds stays
-// true.
+// A cube map of directions around a point c strictly inside a growing convex set: 6 faces of n x n
+// cells. Each corner of a cell stores a bound of the set's gauge in its direction, and each cell a
+// hint of the place on the surface that its directions lead to. The set only grows, so the map
+// stays valid.
 //
-// Idea: the gauge of a convex set, the factor by which the set about c must be scaled to reach a
-// point, is convex along any line. A point's direction, scaled to the largest absolute component 1,
-// lies in a cell on a face of the cube; there the gauge is at most what the values at the cell's
-// four corners give by interpolation along one side and then the other. So a few points of the set,
-// found along the corners' directions, reject all points below a surface that follows planes
-// exactly and curves closely, even where points lie along the surface. A linear map of the set
-// changes none of this, so all is done in the coordinates of a frame.
+// The gauge of a convex set, the factor by which the set about c must be scaled to reach a point,
+// is convex along any line. A point's direction, scaled to the largest absolute component 1, lies
+// in a cell on a face of the cube; the gauge there is at most the bilinear interpolation of the
+// values at the cell's four corners. A few points of the set, found along the corners' directions,
+// therefore reject all points below a surface that follows planes exactly and curves closely, even
+// if points lie along the surface. Linear maps of the set preserve this, so all computations are in
+// the coordinates of a frame.
 class DirectionMap {
  public:
-  // Where a point lies: its cell, that cell's first corner among all corners, how far from there
-  // to the opposite corner along either side, from 0 to 1, and its distance m from c, the largest
-  // absolute component in the frame.
+  // The location of a point: its cell, that cell's first corner among all corners, the position
+  // from there to the opposite corner along either side, from 0 to 1, and its distance m from c,
+  // the largest absolute component in the frame.
   struct Place {
     size_t cell;
     size_t corner;
@@ -75,19 +75,19 @@ class DirectionMap {
     double distance;
   };
 
-  // One cell a face, and nothing is certainly inside.
+  // One cell per face; no point is certainly inside.
   explicit DirectionMap(const MapFrame& frame);
-  // No corners and no cells yet: they are appended, so that a map can be made little by little.
+  // Starts without corners and cells. They are appended, so that a map can be built incrementally.
   DirectionMap(const MapFrame& frame, int resolution);
   // Appends the next corner, face by face, i major. reach: a distance m such that the double
   // nearest to center + m * direction, component by component, is in the set.
   void AppendCorner(double reach);
   // Appends the next cell, in the same order.
   void AppendCell(uint32_t hint);
-  // Says what the least and the largest reach of all corners are, and a bound of how far the set
-  // reaches from the center, by components. Requires that all corners and cells are there. Where
-  // the shape is too slender for the rounding of this map to be negligible, nothing is certainly
-  // inside.
+  // Completes the map with the least and the largest reach of all corners, and a bound, by
+  // components, of the set's extent from the center. If the shape is too slender for the rounding
+  // of this map to be negligible, no point is certainly inside. Requires: all corners and cells
+  // have been appended.
   void Finish(double least_reach, double largest_reach, double extent);
 
   const MapFrame& frame() const { return frame_; }
@@ -95,10 +95,10 @@ class DirectionMap {
   int resolution() const { return n_; }
   size_t cell_count() const { return 6 * static_cast<size_t>(n_) * static_cast<size_t>(n_); }
 
-  // NaN-free for every finite point. The cell may be a neighbour of the true one by rounding; the
+  // NaN-free for every finite point. By rounding, the cell may be a neighbour of the true one; the
   // gauges allow for that.
   Place PlaceOf(const Vector& point) const { return PlaceIn(frame_, n_, point); }
-  // The same for a map of any resolution.
+  // PlaceOf for a map of any resolution.
   static Place PlaceIn(const MapFrame& frame, int resolution, const Vector& point) {
     const Vector v = frame.ToMap(point);
     const OnCube on_cube(v.x(), v.y(), v.z());
@@ -125,17 +125,18 @@ class DirectionMap {
   uint32_t hint(size_t cell) const { return hints_[cell]; }
   void SetHint(size_t cell, uint32_t hint) { hints_[cell] = hint; }
 
-  // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component in
-  // the frame is +-1.
+  // Returns the direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest
+  // component in the frame is +-1.
   Vector CornerDirection(int face, int i, int j) const;
-  // Halves the resolution, keeping one of four corners; false, and no change, where it is odd.
+  // Halves the resolution, keeping one of four corners. Returns false, and changes nothing, if it
+  // is odd.
   bool Coarsen();
   size_t MemoryBytes() const {
     return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
   }
 
-  // Appends the indices of the points that are not certainly inside, ascending. Once the poll says
-  // stop, only some of the points are looked at.
+  // Appends the indices of the points that are not certainly inside, ascending. If the poll stops,
+  // some points are skipped.
   void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
                        StopPoll& poll) const;
 

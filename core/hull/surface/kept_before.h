@@ -8,13 +8,13 @@
 
 namespace hulld {
 
-// What a journal keeps beside the old values of elements: nothing, and of a pointer's size, while
-// there is no journal, as most hulls have none.
+// Journal data other than the old values of elements. Takes only a pointer while there is no
+// journal, the usual state of a hull.
 template <typename T>
 class KeptBefore {
  public:
   KeptBefore() = default;
-  // Requires that no journal is kept.
+  // Requires: no journal.
   KeptBefore(const KeptBefore& other) { *this = other; }
   KeptBefore& operator=(const KeptBefore& other) {
     HULLD_CHECK(!*this && !other);
@@ -27,7 +27,7 @@ class KeptBefore {
   void End() { value_.reset(); }
 
   explicit operator bool() const { return value_ != nullptr; }
-  // Requires a journal.
+  // Requires: a journal.
   T* operator->() {
     HULLD_DCHECK(value_ != nullptr);
     return value_.get();

@@ -14,20 +14,20 @@
 namespace hulld {
 namespace {
 
-// Triangles removed and created that take about as long as a step of a poll.
+// Triangles removed and created in about the time of a poll step.
 constexpr size_t kTrianglesPerStep = 64;
 
-// The edge after this one, counter-clockwise.
+// Returns the next edge, counter-clockwise.
 uint16_t NextEdge(uint32_t edge) { return static_cast<uint16_t>(edge == 2 ? 0 : edge + 1); }
 
-// Times the power of two that brings the largest component into [1/2, 1).
+// Returns v times the power of two that brings its largest component into [1/2, 1).
 Vector WithUnitSize(const Vector& v) {
   int exponent = 0;
   std::frexp(LargestComponent(v), &exponent);
   return v.unaryExpr([exponent](double component) { return std::ldexp(component, -exponent); });
 }
 
-// The normal, the offset and the slope.
+// Sets the normal, the offset and the slope.
 inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const Vector& c) {
   Vector e = b - a;
   Vector f = c - a;
@@ -80,7 +80,7 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
   steps_ += (work_ - work_before) / kTrianglesPerStep;
   last_ = location->triangle;
   if (location->side == Side::kInside) {
-    // A point equal to a vertex lies in the cones of that vertex's triangles alone.
+    // A point equal to a vertex lies only in the cones of that vertex's triangles.
     const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
     if (corner) vertices.CountDuplicate(*corner);
   } else {
@@ -102,12 +102,12 @@ std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const 
 }
 
 std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
-  // Empty unless RemoveVisible has come before.
+  // Empty if RemoveVisible was not called before.
   HULLD_CHECK(horizon_.size() >= 3);
   const VertexId apex = vertices.Add(point);
   JoinHorizon(vertices, apex);
   ++joined_;
-  // Here rather than when they are needed, so that no insertion does it for many.
+  // Grown here rather than on demand, so that no insertion pays for many.
   while (place_of_vertex_.size() < vertices.id_bound()) place_of_vertex_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
@@ -147,8 +147,8 @@ void Surface::StartJournal() {
                  .directions = std::nullopt});
 }
 
-// Marks and hints stay: a mark matters only while it is the present one, and a hint may be any
-// number.
+// Marks and hints are not restored: a mark matters only during its traversal, and a hint may have
+// any value.
 void Surface::Undo() {
   HULLD_CHECK(before_);
   triangles_.Undo();
@@ -162,7 +162,7 @@ void Surface::Undo() {
   joined_ = before_->joined;
   last_ = before_->last;
   if (before_->has_new_directions) directions_ = std::move(before_->directions);
-  // What was measured of a larger surface is not true of this one: measured anew soon.
+  // A measurement of a larger surface is not valid for this one; it restarts soon.
   measuring_.reset();
   if (before_->was_measuring) next_update_ = alive_;
   if (mark_ < before_->mark) ResetMarks();
@@ -181,7 +181,7 @@ size_t Surface::JournalBytes() const {
   return bytes;
 }
 
-// To be called before another map takes the place of the map of directions.
+// Saves the map of directions. Call before replacing it.
 void Surface::KeepDirections() {
   if (!before_ || std::exchange(before_->has_new_directions, true)) return;
   before_->directions = std::move(directions_);
@@ -222,9 +222,10 @@ void Surface::Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b,
   link(b, edge_b, a);
 }
 
-// Makes the triangles of the part of a cone's base from the loop's place `first` to `last`, linked
-// to each other and to the sides, which have the places' IDs; returns the one at the chord between
-// the two, which is its edge 2. Halves of halves, so that a line crosses few.
+// Creates the triangles of the part of a cone's base from the loop's place `first` to `last`,
+// linked to each other and to the sides, which have the places' IDs. Returns the triangle at the
+// chord between the two, which is its edge 2. Splits into halves recursively, so that a line
+// crosses few triangles.
 TriangleId Surface::MakeBase(const VertexTable& vertices, std::span<const VertexId> loop,
                              size_t first, size_t last) {
   const size_t middle = first + (last - first) / 2;
@@ -258,8 +259,8 @@ uint32_t Surface::NextMark() {
 }
 
 // Fills the region with the connected triangles for which classify(id) > 0, and the horizon with
-// their boundary, in order round it: depth first, the edges of each triangle counter-clockwise from
-// the one it was entered by. Where classify says 0, the horizon's edge is flat.
+// their boundary, in order around it: depth first, the edges of each triangle counter-clockwise
+// from the edge by which it was entered. If classify returns 0, the horizon's edge is flat.
 template <typename Classify>
 void Surface::Traverse(TriangleId first, Classify&& classify) {
   const uint32_t mark = NextMark();
@@ -297,12 +298,12 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
   }
 }
 
-// The same as CollectRegion where doubles are certain of all signs, but with the horizon in no
-// order. False where they are not certain. Which triangles a point sees cannot be foreseen, so
-// nothing branches on it: each neighbour is written to both lists, and one of them then counts it.
+// CollectRegion for points for which doubles are certain of all signs, with the horizon in no
+// order. Returns false if they are not certain. Branch-free, because visibility is unpredictable:
+// each neighbour is written to both lists, and then one list counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
-  // Local, because for all that the compiler knows, the stores below may change them.
+  // Local copies: for the compiler, the stores below might alias the originals.
   const double x = point.x();
   const double y = point.y();
   const double z = point.z();
@@ -312,7 +313,7 @@ bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double
   region_[0] = first;
   triangles_.Mutable(first).mark = mark;
   for (size_t k = 0; k < seen; ++k) {
-    // For what one triangle adds.
+    // Capacity for the additions of a single triangle.
     region_.MakeRoom(seen + 3, seen);
     horizon_.MakeRoom(edges + 3, edges);
     TriangleId* const region = region_.data();
@@ -322,7 +323,7 @@ bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double
     uint32_t is_certain = 1;
     for (uint32_t i = 0; i < 3; ++i) {
       const TriangleId next = t.neighbours[i];
-      // All of them change in the end.
+      // All of them are modified eventually.
       SurfaceTriangle& other = triangles_.Mutable(next);
       const double* const normal = other.normal.data();
       const double value = ((normal[0] * x + normal[1] * y) + normal[2] * z) - other.offset;
@@ -345,15 +346,15 @@ bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double
   return true;
 }
 
-// Fills the region with the triangles that the point sees, and those round vertices that it makes
-// redundant; and the horizon with their boundary.
+// Fills the region with the triangles that the point sees, and the triangles around vertices that
+// it makes redundant; fills the horizon with their boundary.
 void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
                             double size) {
   Traverse(first, [&](TriangleId id) { return SideOf(vertices, id, point, size); });
   if (!CollectFlatStars(vertices, point, size)) return;
   const uint32_t seen = mark_;
   for (const TriangleId id : flat_stars_) triangles_.Mutable(id).mark = seen;
-  // Marks start anew rarely; before, so that this one is told from the next.
+  // Marks rarely wrap around. Resets them in advance, so that this mark differs from the next.
   if (mark_ == kLastMark) {
     ResetMarks();
     return CollectRegion(vertices, first, point, size);
@@ -363,8 +364,8 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
   });
 }
 
-// Collects the triangles round the vertices of the horizon that lie in planes with the point on all
-// their sides that it does not see. True when there are some.
+// Collects the triangles outside the region around each vertex of the horizon, if all of them lie
+// in planes with the point. Returns true if there are some.
 bool Surface::CollectFlatStars(const VertexTable& vertices, const Vector& point, double size) {
   flat_stars_.clear();
   const HorizonEdge* before = &horizon_.back();
@@ -378,8 +379,8 @@ bool Surface::CollectFlatStars(const VertexTable& vertices, const Vector& point,
   return !flat_stars_.empty();
 }
 
-// Whether all triangles round the head of a horizon's edge that are not in the region lie in planes
-// with the point. Appends them, until one does not, to the flat stars.
+// Returns true if all triangles around the head of a horizon edge that are not in the region lie in
+// planes with the point. Appends them to the flat stars until one does not.
 bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& before,
                            const Vector& point, double size) {
   TriangleId id = before.beyond;
@@ -396,8 +397,9 @@ bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& befor
   }
 }
 
-// Removes the vertices that only triangles of the region have: those not on the horizon. By Euler's
-// formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
+// Removes the vertices that only triangles of the region have: the vertices not on the horizon. By
+// Euler's formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, usually
+// none.
 void Surface::RemoveVertices(VertexTable& vertices) {
   size_t left = (region_.size() + 2 - horizon_.size()) / 2;
   for (const TriangleId id : region_) {
@@ -412,7 +414,7 @@ void Surface::RemoveVertices(VertexTable& vertices) {
   }
 }
 
-// Joins the apex to the horizon; the new triangles take the places of the region's first.
+// Joins the apex to the horizon. The new triangles reuse the first IDs of the region.
 void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
   const size_t old_count = region_.size();
   const size_t new_count = horizon_.size();

@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// Three vertices that live and span a plane.
+// Checks that the corners are three live vertices that span a plane.
 const char* FindCornerDefect(const VertexTable& vertices, const SurfaceTriangle& t) {
   for (const VertexId v : t.corners) {
     if (!vertices.IsAlive(v)) return "a corner is no vertex";
@@ -21,7 +21,7 @@ const char* FindCornerDefect(const VertexTable& vertices, const SurfaceTriangle&
   return nullptr;
 }
 
-// The rounded plane holds the corners within its error, and the center lies below.
+// Checks that the rounded plane contains the corners within its error, and the center lies below.
 const char* FindPlaneDefect(const Surface& surface, const VertexTable& vertices,
                             const SurfaceTriangle& t) {
   for (const VertexId v : t.corners) {
@@ -37,7 +37,7 @@ const char* FindPlaneDefect(const Surface& surface, const VertexTable& vertices,
   return nullptr;
 }
 
-// The edge of `other` that is edge i of t the other way round; 3 when there is none.
+// Returns the edge of `other` that is edge i of t reversed; 3 if there is none.
 size_t TwinOf(const SurfaceTriangle& t, size_t i, const SurfaceTriangle& other) {
   size_t j = 0;
   while (j < 3 && (other.corners[j] != t.corners[(i + 1) % 3] ||
@@ -47,8 +47,8 @@ size_t TwinOf(const SurfaceTriangle& t, size_t i, const SurfaceTriangle& other) 
   return j;
 }
 
-// The sign of the dihedral angle at edge j of `other`, whose neighbour there is t: -1 where the
-// surface bends inwards, as it should, 0 where both lie in one plane.
+// Returns the sign of the dihedral angle at edge j of `other`, with t as its neighbour there: -1 if
+// the surface bends inwards, as required, 0 if both lie in one plane.
 int BendAt(const VertexTable& vertices, const SurfaceTriangle& t, const SurfaceTriangle& other,
            size_t j) {
   const auto& [a, b, c] = t.corners;
@@ -99,7 +99,7 @@ const char* FindDefect(const Surface& surface, const VertexTable& vertices,
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex) {
   if (const char* defect = FindDefect(surface, vertices, star)) return defect;
-  // Whatever their order, they turn about the new vertex once.
+  // In any order, they turn about the new vertex exactly once.
   TriangleId next = star[0];
   for (size_t k = 0; k < star.size(); ++k) {
     if (k > 0 && next == star[0]) return "the new triangles form more than one ring";

@@ -1,5 +1,5 @@
-// How Surface finds where a point lies: the walk, the interior point that walks aim from, and the
-// map of directions round it, measured as the surface grows.
+// Point location of Surface: the walk, the interior point from which walks aim, and the map of
+// directions around it, measured as the surface grows.
 
 #include <algorithm>
 #include <cmath>
@@ -15,20 +15,20 @@
 namespace hulld {
 namespace {
 
-// Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
+// The most rounds of aiming at the surface, each at a plane nearer than the last; more do not pay.
 constexpr int kMostRounds = 64;
 
-// A smaller surface is walked across faster than it is measured.
+// A smaller surface is faster to walk across than to measure.
 constexpr size_t kWorthMeasuring = 64;
 
-// Steps of a walk from which on it is no longer always straight.
+// Number of walk steps after which the walk is partly random instead of straight.
 constexpr size_t kStepsBeforeChance = 16;
 
-// Corners of a map that one insertion measures: a map is done long before the surface has doubled.
+// Corners of a map measured per insertion: a map is complete long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
-// Cells a side of a map for this many triangles: some triangles to a cell, fewer where the map
-// rejects many points than where it only tells where to start walking.
+// Returns the cells per side of a map for this many triangles: some triangles to a cell, fewer if
+// the map rejects many points than if it only supplies starts of walks.
 int ResolutionFor(size_t triangles, bool rejects) {
   const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
   return std::clamp(static_cast<int>(cells_a_side), 2, 256);
@@ -44,11 +44,11 @@ Surface::Ray Surface::RayTo(const Vector& point) const {
   return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
 }
 
-// The edge of a triangle to cross on the way to the point: one whose plane through the interior
-// point has the point on its far side, strictly and exactly. 3 when there is none: the triangle's
-// cone holds the point. When there are several: the one of which this is most so, or, from `first`
-// on round the triangle, the next one. Computing all three without a branch is faster than guessing
-// which to start with.
+// Returns the edge of a triangle to cross on the way to the point: one with the point strictly and
+// exactly on the far side of its plane through the interior point. Returns 3 if there is none: the
+// triangle's cone contains the point. If there are several: the one for which this holds most
+// clearly or, from `first` on around the triangle, the next one. Computing all three without a
+// branch is faster than guessing the first.
 size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t,
                             const Vector& point, const Ray& ray,
                             std::optional<uint32_t> first) const {
@@ -64,7 +64,7 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t i = (first.value_or(0) + k) % 3;
     if (turns[i] > ray.bound) continue;
-    // The center comes last: seen from a corner, the other and the point may be near.
+    // The center comes last: seen from a corner, the other corner and the point may be near.
     if (turns[i] < -ray.bound ||
         Orient3d(vertices[t.corners[i]], vertices[t.corners[(i + 1) % 3]], point, center) > 0) {
       return i;
@@ -73,8 +73,8 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   return 3;
 }
 
-// How far the direction is within the triangle's cone, less than zero outside, in no unit: the
-// least of what EdgeTowards compares.
+// Returns the depth of the direction within the triangle's cone, negative outside, in no particular
+// unit: the least of the values that EdgeTowards compares.
 double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
                           const Vector& direction) const {
   const Vector& center = directions_->center();
@@ -86,10 +86,10 @@ double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
                   std::min(direction.dot(b.cross(c)), direction.dot(c.cross(a))));
 }
 
-// Crosses edges that have the point on their far side. Each such step leads to a triangle whose
-// plane the ray from the interior point through the point meets no later, and sooner unless both
-// are coplanar. So only among coplanar triangles can a walk go in circles, and not for ever once it
-// chooses at random. Empty when the walk is longer than the surface warrants.
+// Crosses edges that have the point on their far side. The ray from the interior point through the
+// point meets the plane of the next triangle no later, and sooner unless both are coplanar. A walk
+// can therefore cycle only among coplanar triangles, and not for ever after it starts to choose at
+// random. Returns nothing if the walk is longer than the surface warrants.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
                                                double size, TriangleId start,
                                                uint64_t& steps) const {
@@ -137,21 +137,21 @@ void Surface::Measure(const VertexTable& vertices) {
   if (alive_ >= next_update_) Update(vertices);
 }
 
-// Looks for an interior point while none is known, and starts to measure the surface for its
-// present size. Called when the surface has doubled, so the cost of O(F) for an interior point is
+// Searches for an interior point if none is known, and starts to measure the surface for its
+// present size. Called when the surface has doubled, so the O(F) cost of an interior point is
 // amortized.
 void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
   if (!directions_) SetCenter(vertices);
   if (IsWorthMeasuring() && !measuring_) {
-    // The first surface, from which the center comes, may have been a corner of what it is now.
+    // The center comes from the first surface, which may have been a corner of the present one.
     if (directions_->resolution() == 1) SetCenter(vertices);
     StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
   }
 }
 
-// Puts the center strictly inside, fits the frame of the map to the shape, and forgets what was
-// measured; does nothing where no double is inside.
+// Moves the center strictly inside, fits the frame of the map to the shape, and discards
+// measurements; does nothing if no double is inside.
 void Surface::SetCenter(const VertexTable& vertices) {
   work_ += 2 * triangles_.size();
   const std::optional<Vector> interior = FindInterior(vertices);
@@ -171,7 +171,7 @@ void Surface::SetCenter(const VertexTable& vertices) {
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
-  // The mean of the vertices, in the order of memory; each divided first, so that no sum overflows.
+  // The mean of the vertices, in memory order. Divides each first, so that no sum overflows.
   Vector mean = Vector::Zero();
   const double weight = 1.0 / static_cast<double>(vertices.size());
   for (VertexId v = 0; v < vertices.id_bound(); ++v) {
@@ -186,7 +186,7 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
   return inside ? std::optional<Vector>(mean) : std::nullopt;
 }
 
-// At extreme scales every sign is decided by integers, and a map costs more than it saves.
+// At extreme scales integers decide every sign, and a map costs more than it saves.
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
@@ -197,8 +197,8 @@ bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double f
   const double useful = fineness * ResolutionFor(alive_, true);
   const int wanted = static_cast<int>(std::min({affordable, useful, 256.0})) & ~1;
   if (wanted < 4) return false;
-  // What the last map rejected tells little of a surface much of which is new; and the center of
-  // one that grew to a side is far from its middle.
+  // The rejections of the last map say little about a surface that is largely new, and the center
+  // of a surface that grew to one side is far from its middle.
   const bool is_new = 8 * joined_ > measured_at_ &&
                       wanted >= std::min(directions_->resolution(), ResolutionFor(alive_, true));
   if (!is_new) {
@@ -235,14 +235,14 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
   measuring_.reset();
 }
 
-// Measures one corner, and makes the cell whose last corner it is.
+// Measures one corner, and creates the cell that it completes.
 void Surface::MeasureCorner(const VertexTable& vertices) {
   Measurement& m = *measuring_;
   const auto j = static_cast<size_t>(m.j);
   const TriangleId hint_above = m.hint[j];
   const Vector direction = m.map.CornerDirection(m.face, m.i, m.j);
-  // From the corner to the left or the one above: where triangles are long and thin, such as on the
-  // side of a prism, it is far across them, and near along them.
+  // Starts from the corner to the left or the one above. If triangles are long and thin, as on the
+  // side of a prism, walks across them are long, and walks along them short.
   TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
   if (m.i > 0 && j > 0) {
     const TriangleId above = Alive(hint_above);
@@ -263,14 +263,15 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
   ++m.face;
 }
 
-// A distance m, near the largest, such that the double nearest to center + m * direction is inside;
-// 0 when none was found. `near` is where to start walking, and becomes where the direction leaves
-// the surface.
+// Returns a distance m, nearly maximal, such that the double nearest to center + m * direction is
+// inside; 0 if none was found. `near`: the start of the walk; receives the triangle at which the
+// direction leaves the surface.
 double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
   const Vector center = directions_->center();
   double m = extent_ / LargestComponent(direction);
-  // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
-  // nearly coplanar, their rounded planes tell little, hence the growing steps.
+  // A walk to a point outside may end at any triangle that the point sees, so several rounds are
+  // needed. If many triangles are nearly coplanar, their rounded planes are inaccurate, so the
+  // steps grow.
   double step_back = 0x1p-30;
   for (int round = 0; round < kMostRounds; ++round) {
     const SurfaceTriangle& t = triangles_[near];
@@ -294,11 +295,11 @@ void Surface::BeginInsertions(const VertexTable& vertices) {
 }
 
 void Surface::FinishInsertions(const VertexTable& vertices) {
-  // A map that was made fine for a large block takes more memory than it saves time from here on.
+  // From here on, a map that was refined for a large block takes more memory than it saves time.
   while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
   }
-  // A centre is wanted now; to measure waits for the next insertions, as a hull at rest would hold
-  // an unfinished map for nothing.
+  // Sets a center now. Measuring waits for further insertions, because a hull at rest would keep an
+  // unfinished map without using it.
   if (!directions_ && alive_ >= next_update_) Update(vertices);
 }
 

@@ -14,28 +14,28 @@ namespace hulld {
 
 using VertexId = uint32_t;
 
-// The vertices of a growing hull, by IDs that are reused, and what became of the points of the
-// current block: a point counts as a vertex, or as a duplicate of one, only while that vertex
-// lives.
+// The vertices of a growing hull, by reusable IDs, and the classification of the points of the
+// current block: a point counts as a vertex, or as a duplicate of one, only while that vertex is
+// alive.
 class VertexTable {
  public:
-  // Starts counting anew.
+  // Resets the counts.
   void BeginBlock() {
     ++count_.block;
     count_.outside = 0;
     count_.duplicate = 0;
     added_.clear();
   }
-  // Starts a journal: until it ends, everything can be undone. Requires that none is kept.
+  // Starts a journal: until it ends, all changes can be undone. Requires: no journal.
   void StartJournal() {
     points_.StartJournal();
     counts_.StartJournal();
     free_.StartJournal();
-    // The block that begins next would clear them.
+    // The next BeginBlock would clear them.
     added_before_ = std::move(added_);
     count_before_ = count_;
   }
-  // Makes everything as it was when the journal was started, and ends it. Cost: the changes.
+  // Restores the state at the start of the journal, and ends it. Cost: the changes.
   void Undo() {
     points_.Undo();
     counts_.Undo();
@@ -44,19 +44,19 @@ class VertexTable {
     added_before_ = {};
     count_ = count_before_;
   }
-  // Ends the journal and keeps what changed. Cost: the changes.
+  // Ends the journal and keeps the changes. Cost: the changes.
   void EndJournal() {
     points_.EndJournal();
     counts_.EndJournal();
     free_.EndJournal();
     added_before_ = {};
   }
-  // What the journal holds beyond what was there before.
+  // Memory of the journal beyond the previous state, in bytes.
   size_t JournalBytes() const {
     return points_.JournalBytes() + counts_.JournalBytes() + free_.JournalBytes();
   }
-  // Gives back the memory of what came and went within the block. Cost: amortized by the vertices
-  // that came.
+  // Frees the memory of vertices added and removed within the block. Cost: amortized by the
+  // vertices added.
   void FinishBlock() {
     if (added_.size() > count_.outside) {
       if (id_bound() <= 8 * added_.size()) {
@@ -92,7 +92,7 @@ class VertexTable {
     return id;
   }
 
-  // Requires a vertex that lives.
+  // Requires: a live vertex.
   void CountDuplicate(VertexId id) {
     HULLD_DCHECK(IsAlive(id));
     Counts& counts = counts_.Mutable(id);
@@ -101,7 +101,7 @@ class VertexTable {
     ++count_.duplicate;
   }
 
-  // Requires a vertex that lives.
+  // Requires: a live vertex.
   void Remove(VertexId id) {
     HULLD_DCHECK(IsAlive(id));
     Counts& counts = counts_.Mutable(id);
@@ -115,10 +115,10 @@ class VertexTable {
   }
 
   const Vector& operator[](VertexId id) const { return points_[id]; }
-  // False for an ID that waits to be used again, and for one that was never given out.
+  // False for a free ID, and for one that was never assigned.
   bool IsAlive(VertexId id) const { return id < points_.size() && counts_[id].is_alive; }
-  // The vertices that the current block added and that live.
-  // Cost: O(points of the block that were vertices at any time).
+  // Returns the live vertices that the current block added. Cost: O(points of the block that were
+  // vertices at any time).
   std::vector<Vector> NewVertices() const {
     std::vector<VertexId> ids = added_;
     KeepNew(ids);
@@ -127,7 +127,7 @@ class VertexTable {
     for (const VertexId id : ids) vertices.push_back(points_[id]);
     return vertices;
   }
-  // All that live. Cost: O(id_bound()).
+  // Returns all live vertices. Cost: O(id_bound()).
   std::vector<Vector> Vertices() const {
     std::vector<Vector> vertices;
     vertices.reserve(size());
@@ -136,7 +136,7 @@ class VertexTable {
     }
     return vertices;
   }
-  // Vertices that live.
+  // Number of live vertices.
   size_t size() const { return points_.size() - free_.size(); }
   // IDs lie below this.
   size_t id_bound() const { return points_.size(); }
@@ -144,12 +144,12 @@ class VertexTable {
     return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes() +
            (added_.capacity() + added_before_.capacity()) * sizeof(VertexId);
   }
-  // At least the largest absolute coordinate of all vertices that ever lived.
+  // At least the largest absolute coordinate of all vertices that were ever alive.
   double max_abs_coordinate() const { return count_.max_abs_coordinate; }
 
  private:
   struct Counts {
-    // The block that the next two belong to.
+    // The block of the next two members.
     uint64_t block;
     uint32_t duplicates;
     bool is_new;
@@ -163,12 +163,12 @@ class VertexTable {
     uint64_t duplicate = 0;
   };
 
-  // Leaves those that the current block added and that live, ascending and each once.
+  // Keeps the live vertices that the current block added, ascending and without duplicates.
   void KeepNew(std::vector<VertexId>& ids) const {
     std::erase_if(ids, [this](VertexId id) {
       return counts_[id].block != count_.block || !counts_[id].is_new;
     });
-    // An ID comes twice where one vertex of the block took the place of another.
+    // An ID occurs twice if one vertex of the block replaced another.
     if (!std::is_sorted(ids.begin(), ids.end())) std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   }
@@ -176,10 +176,10 @@ class VertexTable {
   ChunkedVector<Vector> points_;
   ChunkedVector<Counts> counts_;
   ChunkedVector<VertexId> free_;
-  // By the current block; some of them are gone again.
+  // Added by the current block; some may have been removed.
   std::vector<VertexId> added_;
   Count count_;
-  // When the journal was started.
+  // State at the start of the journal.
   std::vector<VertexId> added_before_;
   Count count_before_;
 };

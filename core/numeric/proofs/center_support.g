@@ -1,7 +1,7 @@
-# n . (a - b) over all vertices against the support functions about the centres, n the computed
-# difference of the centres, which errs by e kMinkowskiErrorFactor S per component. Units: |n| =
-# 1, S = 1; |n| itself is N = sqrt(3) S at most (by hand), so n . n = N (y . y) in this unit. The
-# supports are at most 4 in all.
+# n . (a - b) over all vertices against the support functions about the centres, with n the computed
+# difference of the centres, which errs by e kMinkowskiErrorFactor S per component. Units: |n| = 1,
+# S = 1; |n| itself is N = sqrt(3) S at most (by hand), so n . n = N (y . y) in this unit. The
+# supports are at most 4 in total.
 
 tilt = kMinkowskiErrorFactor * (y1 * e1 + y2 * e2 + y3 * e3);
 square = fl(y1 * y1 + y2 * y2 + y3 * y3);

@@ -1,12 +1,13 @@
 # Points of A - B as sums of weighted Minkowski vertices, in units of S: components of at most 4,
 # each within kMinkowskiErrorFactor, weights of at least 0.
 #
-# combination: weights that sum to 1 but for 8 u, which moves the point by at most that times 4.
-# near: p + s (q - p) + t (r - p) with weights s and t; an exact sum beyond 1 by 2 u moves the
-# point by 2 u times 8.
-# By hand: errors of vertices are averaged with the weights, so that they stay what they are;
-# sqrt(3) turns components into lengths; the length of the point, at most 7, errs by 8 u of
-# itself.
+# combination: weights that sum to 1 within 8 u, which moves the point by at most that times 4.
+#
+# near: p + s (q - p) + t (r - p) with weights s and t; an exact sum above 1 by 2 u moves the point
+# by 2 u times 8.
+#
+# By hand: errors of vertices are averaged with the weights, so they do not grow; sqrt(3) turns
+# components into lengths; the length of the point, at most 7, errs by 8 u of itself.
 
 l1 = P * Q; l2 = P * (1 - Q); l3 = 1 - P;
 p1 = 4 * x1; p2 = 4 * x2; p3 = 4 * x3;

@@ -1,9 +1,9 @@
 # det[p, q, r] of computed Minkowski vertices, in units of the largest component W. Each component
-# errs by at most d = kMinkowskiErrorFactor S: the exact one is p - D x, D = d / W. As W <= 4 S, D
-# is at least 32 u.
+# errs by at most d = kMinkowskiErrorFactor S: the exact one is p - D x, D = d / W. Since W <= 4 S,
+# D is at least 32 u.
 #
 # By hand: the determinant of a matrix with entries of at most 1 is at most 4, so the computed one
-# exceeds F D only where D is below 4 / 24 and a little.
+# exceeds F D only if D is below 4 / 24 and slightly more.
 
 value = fl(p1 * (q2 * r3 - q3 * r2) + p2 * (q3 * r1 - q1 * r3) + p3 * (q1 * r2 - q2 * r1));
 at_computed = p1 * (q2 * r3 - q3 * r2) + p2 * (q3 * r1 - q1 * r3) + p3 * (q1 * r2 - q2 * r1);

@@ -1,10 +1,10 @@
-# det[p, q, r] where each is a computed Minkowski vertex, the difference of two, or the ray, in
+# det[p, q, r] with each column a computed Minkowski vertex, the difference of two, or the ray, in
 # units of the largest component W. A vertex errs by at most d = kMinkowskiErrorFactor S, a
-# difference by 2 d and its rounding, at most u W <= d / 16, as W <= 8 S: the exact component is p
-# - D x, D = d / W, |x| <= 2.1.
+# difference by 2 d and its rounding, at most u W <= d / 16, because W <= 8 S: the exact component
+# is p - D x, D = d / W, |x| <= 2.1.
 #
-# By hand: as in determinant.g, the computed one exceeds F D only where D is below 4 / 64 and a
-# little.
+# By hand: as in determinant.g, the computed one exceeds F D only if D is below 4 / 64 and slightly
+# more.
 
 value = fl(p1 * (q2 * r3 - q3 * r2) + p2 * (q3 * r1 - q1 * r3) + p3 * (q1 * r2 - q2 * r1));
 at_computed = p1 * (q2 * r3 - q3 * r2) + p2 * (q3 * r1 - q1 * r3) + p3 * (q1 * r2 - q2 * r1);

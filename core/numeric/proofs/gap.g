@@ -1,10 +1,10 @@
 # The gap between two hulls along a computed normal n that errs by at most h per component: the
-# difference of n . b and n . a. Units: |n| = 1, S = 1. `tilt` is what the normal errs by, in
-# units of h, over exact components of at most 4 S; `shift` what positions err by, d in all, in
-# units of d = kMinkowskiErrorFactor S; `rounding` that of the products.
+# difference of n . b and n . a. Units: |n| = 1, S = 1. `tilt` is the effect of the normal's error,
+# in units of h, over exact components of at most 4 S; `shift` the effect of position errors, d in
+# total, in units of d = kMinkowskiErrorFactor S; `rounding` that of the products.
 #
-# By hand: positions are at most sqrt(3) (M_A + M_B) + |t| <= sqrt(3) S, of which A has the part
-# P; 1.74 covers that and their errors.
+# By hand: positions are at most sqrt(3) (M_A + M_B) + |t| <= sqrt(3) S, of which A has the part P;
+# 1.74 covers that and their errors.
 
 tilt = h1 * w1 + h2 * w2 + h3 * w3;
 shift = n1 * s1 + n2 * s2 + n3 * s3;

@@ -1,6 +1,6 @@
-# The sign of det[p, q, r] = p . ((q - p) x (r - p)) for computed Minkowski vertices in a unit
-# with S < 2. By hand: positions are at most sqrt(3) S, edges, in which translations cancel, at
-# most 2 sqrt(3) S; 3.465 and 6.93 cover these and their errors. A vertex errs by at most
+# The sign of det[p, q, r] = p . ((q - p) x (r - p)) for computed Minkowski vertices in a unit with
+# S < 2. By hand: positions are at most sqrt(3) S, edges, in which translations cancel, at most 2
+# sqrt(3) S; 3.465 and 6.93 cover these and their errors. A vertex errs by at most
 # kMinkowskiErrorFactor S = 256 u, so an edge by twice that and its rounding.
 
 E1 = e1 + 520b-53 * x1; E2 = e2 + 520b-53 * x2; E3 = e3 + 520b-53 * x3;
@@ -10,8 +10,8 @@ n1 = fl(e2 * f3 - e3 * f2); n2 = fl(e3 * f1 - e1 * f3); n3 = fl(e1 * f2 - e2 * f
 M1 = e2 * f3 - e3 * f2; M2 = e3 * f1 - e1 * f3; M3 = e1 * f2 - e2 * f1;
 N1 = E2 * F3 - E3 * F2; N2 = E3 * F1 - E1 * F3; N3 = E1 * F2 - E2 * F1;
 exact = P1 * N1 + P2 * N2 + P3 * N3;
-# What is compared is length times the least n . p / length over the corners: the rounding of the
-# length cancels but for 10 u, by hand.
+# The compared value is length times the least n . p / length over the corners: the rounding of the
+# length cancels up to 10 u, by hand.
 value = fl(p1 * n1 + p2 * n2 + p3 * n3);
 compared = value * (1 + c);
 

@@ -1,9 +1,9 @@
-# A component of the cross product of two computed edges, e2 f3 - e3 f2, whose ends err by at most
-# d: an edge errs by 2.1 d as in differences.g. In units of e + f + 3 d, with e and f the edges'
-# largest components and d = (1 - e - f) / 3. u f is at most d / 32, as f <= 4 S.
+# A component of the cross product of two computed edges, e2 f3 - e3 f2, with ends that err by at
+# most d: an edge errs by 2.1 d as in differences.g. In units of e + f + 3 d, with e and f the
+# edges' largest components and d = (1 - e - f) / 3. u f is at most d / 32, because f <= 4 S.
 #
 # By hand: the cross product's own rounding is bilinear, `rounding` e f; by the range of f that is
-# at most `rounding` / u times e d / 32. Its sign may be any, so its size is added.
+# at most `rounding` / u times e d / 32. Its sign is arbitrary, so its size is added.
 
 cross = fl(a2 * b3 - a3 * b2);
 rounding = cross - (a2 * b3 - a3 * b2);

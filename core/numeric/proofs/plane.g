@@ -19,14 +19,14 @@ offset = fl(n1 * r1 + n2 * r2 + n3 * r3);
 value = fl(at_q - offset);
 exact = (N1 * q1 + N2 * q2 + N3 * q3) - (N1 * r1 + N2 * r2 + N3 * r3);
 
-# The bound as computed: the factor, |e| and |f| with their roundings, rounded up and to a
-# float, times fl(|q| + |a|), which is rounded twice with the product.
+# The computed bound: the factor, |e| and |f| with their roundings, rounded up and to a float, times
+# fl(|q| + |a|), which is rounded twice with the product.
 bound = kPlaneErrorFactor * s * kPlaneSlopeRoundUp * (1 + to_float) * (1 + d1) * (1 + d2);
 
-# The audit's side of a facet's plane. By hand: its error is at most the sum of those of three terms
-# N O, O a component of p - a, here in units of it; N, in units of 2^63, errs by n, and the term
-# rounds with the difference, the product and two sums. Its part of the bound rounds as O does, in
-# two sums of absolute components, and with the factor.
+# The audit's side of a facet's plane. By hand: its error is at most the sum of the errors of three
+# terms N O, with O a component of p - a, the unit here; N, in units of 2^63, errs by n, and the
+# term rounds with the difference, the product and two sums. Its part of the bound rounds as O does,
+# in two sums of absolute components, and with the factor.
 term = (N + n) * (1 + t1) * (1 + t2) * (1 + t3) * (1 + t4);
 audit = kAuditErrorFactor * (1 + t1) * (1 + t5) * (1 + t6) * (1 + t7);
 

@@ -1,8 +1,8 @@
 # The ray's direction times a computed Minkowski vertex, in units of the largest component W; both
-# err by D = d / W per component, D >= 32 u as W <= 4 S.
+# err by D = d / W per component, D >= 32 u because W <= 4 S.
 #
-# By hand: the computed product is at most 3 and a little, so it exceeds F D only where D is below
-# 3 / 8 and a little.
+# By hand: the computed product is at most slightly above 3, so it exceeds F D only if D is below 3
+# / 8 and slightly more.
 
 value = fl(p1 * q1 + p2 * q2 + p3 * q3);
 at_computed = p1 * q1 + p2 * q2 + p3 * q3;

@@ -1,13 +1,13 @@
-# Lengths along a computed unit direction, whose exact length is within 8 u of 1. Units: S = 1.
+# Lengths along a computed unit direction with an exact length within 8 u of 1. Units: S = 1.
 #
 # reach: the largest value V along it is at most 7, found within kSupportErrorFactor; V / (1 + l)
-# plus what is added must not be below the exact reach, after rounding.
+# plus the added bound must not be below the exact reach, after rounding.
 value = V + kSupportErrorFactor * e;
 high = (value + kReachErrorFactor * (1 + d1)) * (1 + d2);
 reach = V / (1 + l);
 
-# triangle: the least n . p over the corners of a computed triangle. By hand: n . z over what a
-# vertex errs is at most sqrt(3) kMinkowskiErrorFactor, and every partial sum of n . p at most 7.
+# triangle: the least n . p over the corners of a computed triangle. By hand: n . z for the error z
+# of a vertex is at most sqrt(3) kMinkowskiErrorFactor, and every partial sum of n . p at most 7.
 computed = N + 0x1.bb67bp0 * kMinkowskiErrorFactor * (1 + l) * e + r;
 low = (computed - kTriangleDistanceErrorFactor * (1 + d1)) * (1 + d2);
 distance = N / (1 + l);

@@ -1,10 +1,10 @@
-# Entries of R(q) / |q|^2, |q| = 1 the unit. An entry is the sum of products of q's components
-# whose absolute values sum to at most 1: P x + (1 - P) y. On the diagonal it is (ww + xx) - (yy +
-# zz), with two roundings before the difference; off it 2 (x y - w z), with one.
+# Entries of R(q) / |q|^2, with |q| = 1 as the unit. An entry is the sum of products of q's
+# components with absolute values that sum to at most 1: P x + (1 - P) y. On the diagonal it is (ww
+# + xx) - (yy + zz), with two roundings before the difference; off it 2 (x y - w z), with one.
 #
-# By hand: each square has one rounding and the sum of four positive ones two more, so the
-# computed |q|^2 is within (1 + d1) (1 + d2) (1 + d3) of the exact one; `inverse` is what its
-# reciprocal errs by.
+# By hand: each square has one rounding and the sum of four positive ones two more, so the computed
+# |q|^2 is within (1 + d1) (1 + d2) (1 + d3) of the exact one; `inverse` is the error of its
+# reciprocal.
 
 a = P * x; b = (1 - P) * y;
 exact = a - b;

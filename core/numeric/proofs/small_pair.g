@@ -1,16 +1,15 @@
-# The largest value over a small pair (small_pair.h), whose vertices are turned beforehand. In
-# units of |n| = 1 and S = 1, P is the part of A, 1 - P that of B and of the translation. A turned
-# vertex, `position`, errs by at most 65 u of its part per component: its value s by 195 u and
-# what the product rounds. X is s numbered in its four low bits: fifteen
-# units in the last place, below 2^-48 of itself. `fresh` is the value computed anew from the
-# vertices found.
+# The largest value over a small pair (small_pair.h), with its vertices rotated in advance. In units
+# of |n| = 1 and S = 1, P is the part of A, 1 - P that of B and of the translation. A rotated
+# vertex, `position`, errs by at most 65 u of its part per component: its value s by 195 u and the
+# rounding of the product. X is s with its vertex number in the four low bits: fifteen units in the
+# last place, below 2^-48 of itself. `fresh` is the value recomputed from the vertices found.
 #
 # By hand: positions are at most sqrt(3), values n . y at most 3 (Cauchy and Schwarz). The vertex
-# found has X of at least that of the farthest: so the exact maximum exceeds `fresh` by at most
-# what the exact value of the farthest exceeds its X, `below`, and X of the one found exceeds
-# `fresh`, `again`. In the other direction fresh errs by less.
+# found has an X of at least that of the farthest. The exact maximum therefore exceeds `fresh` by at
+# most the excess of the farthest vertex's exact value over its X, `below`, plus the excess of the X
+# of the one found over `fresh`, `again`. In the other direction fresh errs by less.
 
-# Q of its part is M and 1 - Q the translation, 0 for A.
+# The part of M is Q, that of the translation 1 - Q, 0 for A.
 x1 = Q * y1; x2 = Q * y2; x3 = Q * y3;
 t = (1 - Q) * y4;
 s1 = R1 + g1; s2 = R2 + g2; s3 = R3 + g3;

@@ -1,6 +1,6 @@
-# The distance |p - (s e + t f)| for rounded differences p, e, f, in units of |p| + |e| + |f|, of
-# which P, (1 - P) Q and (1 - P) (1 - Q) are the parts. s and t are weights of a sum of at most 1;
-# an exact sum above that by u moves the point by at most 2 u.
+# The distance |p - (s e + t f)| for rounded differences p, e, f, in units of |p| + |e| + |f|, with
+# parts P, (1 - P) Q and (1 - P) (1 - Q). s and t are weights with a sum of at most 1; an exact sum
+# above that by u moves the point by at most 2 u.
 #
 # By hand: sqrt(3) turns components into lengths; the norm, of at most sqrt(3), errs by 8 u of
 # itself.
@@ -10,7 +10,7 @@ p = A * (1 + d1); e = B * (1 + d2); f = C * (1 + d3);
 component = fl(p - (s * e + t * f));
 at_computed = p - (s * e + t * f);
 exact = A - (s * B + t * C);
-# The distance D is at least 0, so what the bound adds for it covers 8 u D.
+# The distance D is at least 0, so the bound's term for it covers 8 u D.
 total = 0x1.bb67bp0 * (component - exact) + 2b-53 * m;
 bound = kSubsetDistanceErrorFactor * (1 - 1b-49);
 norm = 8b-53 / bound;

@@ -1,10 +1,9 @@
-# The largest value n . w over A - B, as FloatPair finds it: n is turned into each hull's frame,
-# which gives own; the values there are compared, and found right but for the blur of the support
-# map. Units: |n| = 1 and S = 1, of which P, (1 - P) Q and (1 - P) (1 - Q) are M_A, M_B and |t|. n
+# The largest value n . w over A - B, as FloatPair finds it: n is rotated into each hull's frame,
+# which gives own; the values there are compared, and found correctly up to the blur of the support
+# map. Units: |n| = 1 and S = 1, with parts P, (1 - P) Q and (1 - P) (1 - Q) for M_A, M_B and |t|. n
 # itself may err by 16 u per component, e.
 #
-# By hand: a component of w is at most sqrt(3) S, and what holds for each vertex holds for the
-# largest.
+# By hand: a component of w is at most sqrt(3) S, and a bound for each vertex holds for the largest.
 
 a1 = P * x1; a2 = P * x2; a3 = P * x3;
 B = (1 - P) * Q;

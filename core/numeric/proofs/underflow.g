@@ -1,12 +1,12 @@
-# What underflow adds to the determinants of orient2d.g and orient3d.g. A product that underflows
-# errs by h, |h| <= 2^-1075; sums never do. With differences of at most D, and r = 1 / (D + 1):
-# six inner products err by h each, times a difference and at most four roundings, g; three outer
-# products by h, times at most two sums. The permanent may lose as much, which the factor, below
-# 2^-50, makes small; its product with the factor, and that of size + 1 with kUnderflowError, may
-# each lose h. All in units of D + 1, and of 2^-1075.
+# The contribution of underflow to the determinants of orient2d.g and orient3d.g. A product that
+# underflows errs by h, |h| <= 2^-1075; sums never do. With differences of at most D, and r = 1 / (D
+# + 1): six inner products err by h each, times a difference and at most four roundings, g; three
+# outer products by h, times at most two sums. The permanent may lose as much, which the factor,
+# below 2^-50, makes small; its product with the factor, and that of size + 1 with kUnderflowError,
+# may each lose h. All in units of D + 1, and of 2^-1075.
 #
-# Where the differences were brought to D < 1 by powers of two, each of nine components may have
-# lost h, too, times a minor, at most 2 D^2 <= 2 D, and at most four roundings.
+# If the differences were scaled to D < 1 by powers of two, each of nine components may also have
+# lost h, times a minor, at most 2 D^2 <= 2 D, and at most four roundings.
 
 spatial = (6 * (1 - r) * h1 * g + 3 * r * h2 * g) * (1 + 1b-50) + r * (h3 + h4);
 scaled = spatial + 18 * (1 - r) * h5 * g;

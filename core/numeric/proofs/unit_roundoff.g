@@ -1,6 +1,6 @@
-# Rounding itself. A result in [1, 2) errs by at most u; by hand, a power of two moves the
-# exponent alone, so any normal result errs by at most u of itself. A smaller one errs by at most
-# 2^-1075. All other scripts assume the first of these alone, for any sizes (README.md).
+# Rounding itself. A result in [1, 2) errs by at most u; by hand, a power of two changes only the
+# exponent, so any normal result errs by at most u of itself. A smaller one errs by at most 2^-1075.
+# All other scripts assume only the first of these, for any sizes (README.md).
 
 y = float<ieee_64, ne>(x);
 tiny_y = float<ieee_64, ne>(tiny);

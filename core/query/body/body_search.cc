@@ -14,12 +14,11 @@
 namespace hulld {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-// Steps between two looks at whether to stop: a step takes a microsecond or less but for exact
-// pairs, which look themselves.
+// Steps between two polls of should_stop. A step takes at most a microsecond, except for exact
+// pairs, which poll themselves.
 constexpr int kStepsPerLook = 16;
 
-// The place of a relation among those of pairs.
+// Rank of a relation among the relations of pairs.
 int Strength(Relation relation) {
   switch (relation) {
     case Relation::kSeparated:
@@ -60,7 +59,7 @@ std::weak_ordering Compare(const BodyPiece& a, const BodyPiece& b) {
   return std::weak_ordering::equivalent;
 }
 
-// A total order of placed bodies by their content. The poses tell mostly.
+// A total order of placed bodies by content. The poses usually decide.
 bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
   if (const auto order = Compare(a.X_WB(), b.X_WB()); order != 0) return order < 0;
   const auto pieces_a = a.body().pieces();
@@ -72,14 +71,14 @@ bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
   return true;
 }
 
-// What is asked of the pair that decided: certificates are found apart.
+// Options for the deciding pair, without certificates: these are found separately.
 QueryOptions OfDecidingPair(const QueryOptions& options) {
   QueryOptions deciding = options;
   deciding.want_certificate = false;
   return deciding;
 }
 
-QueryOptions ForEachPair(const QueryOptions& options) {
+QueryOptions OptionsOfEachPair(const QueryOptions& options) {
   QueryOptions each = OfDecidingPair(options);
   each.want_separation = each.WantsDetails();
   each.want_axis = false;
@@ -119,7 +118,7 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
       x_(IsInOrder(a, b) ? &a : &b),
       y_(x_ == &a ? &b : &a),
       options_(&options),
-      each_(ForEachPair(options)),
+      each_(OptionsOfEachPair(options)),
       wants_least_(each_.want_separation),
       limit_(std::max(0.0, options.clearance.value_or(0))),
       gap_(*x_, *y_),
@@ -137,7 +136,7 @@ absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
   return ended_;
 }
 
-// One step towards the relation.
+// Makes one step towards the relation.
 absl::Status BodySearch::Search() {
   if (!candidates_.empty()) {
     const Candidate candidate = candidates_.back();
@@ -153,7 +152,7 @@ absl::Status BodySearch::Search() {
   return absl::OkStatus();
 }
 
-// One step towards what proves it.
+// Makes one step towards its certificates.
 absl::Status BodySearch::Prove() {
   if (certification_) return certification_->Step();
   certification_.emplace(*a_, *b_, *options_, relation_, decided_);
@@ -167,11 +166,11 @@ double BodySearch::Gap(const Box& of_x, const Box& of_y) {
 
 void BodySearch::Push(uint32_t x, uint32_t y) {
   const double gap = Gap(x_->body().tree().box(x), y_->body().tree().box(y));
-  // Infinite where a box is empty.
+  // Infinite if a box is empty.
   if (gap <= Limit() && gap < kInfinity) waiting_.push_back({x, y, gap});
 }
 
-// Replaces the larger of the two nodes by its children, the nearer one to be looked at first.
+// Replaces the larger of the two nodes by its children; the nearer child is visited first.
 void BodySearch::Descend(const Nodes& nodes) {
   const BoxTree& tree_x = x_->body().tree();
   const BoxTree& tree_y = y_->body().tree();
@@ -233,7 +232,7 @@ absl::Status BodySearch::Ask(const Candidate& candidate) {
 void BodySearch::TakeUp(const Answer& answer, PiecePair pieces) {
   const bool within = answer.within_clearance.value_or(false);
   const bool is_stronger = Strength(answer.relation) > Strength(relation_);
-  // What is separated but within the clearance decides where nothing collides.
+  // A separated pair within the clearance decides if no pair collides.
   if (is_stronger || (within && !decided_)) decided_ = pieces;
   if (is_stronger) relation_ = answer.relation;
   within_clearance_ |= within;
@@ -267,26 +266,26 @@ BodyAnswer BodySearch::TakeRelation() const {
   result.pieces = decided_;
   if (options_->clearance) result.answer.within_clearance = within_clearance_;
   if (!wants_least_) return result;
-  // Nothing but empty hulls.
+  // All hulls are empty.
   if (options_->want_separation) result.answer.separation = Separation{kInfinity, 0};
   if (options_->want_analysis) result.answer.analysis = Analysis();
   return result;
 }
 
-// The answer of the named pair, with what holds of the bodies.
+// Returns the answer of the deciding pair, with the relation and bounds of the bodies.
 absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   const PlacedPiece a(*a_, decided_->a);
   const PlacedPiece b(*b_, decided_->b);
   absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), OfDecidingPair(*options_));
   if (!answer.ok()) return answer.status();
   BodyAnswer result = {{decided_, {}}, *std::move(answer)};
-  // The signs of separations are exact, so that of the least one is the strongest relation.
+  // Signs of separations are exact, so the least separation has the sign of the strongest relation.
   HULLD_CHECK(result.answer.relation == relation_);
   result.answer.rung = rung_;
   if (options_->clearance) result.answer.within_clearance = within_clearance_;
   if (!result.answer.separation || relation_ == Relation::kTouching) return result;
   Separation& separation = *result.answer.separation;
-  // Another pair whose bounds reach lower may be the least one.
+  // Another pair with lower bounds may be the least one.
   const double bound = std::max(separation.value - least_low_, least_high_ - separation.value);
   if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
   return result;

@@ -20,75 +20,74 @@
 
 namespace hulld {
 
-// What an answer about bodies has beside one about hulls.
+// Details of an answer about bodies that an answer about hulls lacks.
 struct PiecesAnswer {
-  // The pair that decided. None where the relation alone shows that no pair collides, nor is within
-  // the clearance; where either body holds no points, too.
+  // The deciding pair. None if only the relation was requested and no pair collides or is within
+  // the clearance, or if either body is empty.
   std::optional<PiecePair> pieces;
-  // When wanted, what proves the relation (PieceCertification), and Answer::certificate is none.
+  // If requested, the proof of the relation (PieceCertification). Answer::certificate is then none.
   std::vector<PieceCertificate> certificates;
 };
 
 struct BodyAnswer : PiecesAnswer {
-  // The answer for the two bodies. Axis, witness points and analysis are those of the pair that
-  // decided.
+  // The answer for the two bodies. Axis, witness points and analysis come from the deciding pair.
   Answer answer;
 };
 
-// What a search looked at.
+// Work counters of a search.
 struct BodyCounts {
-  // Pairs of boxes, and pairs of pieces that were asked about as hulls are.
+  // Pairs of boxes visited, and pairs of pieces queried as hulls.
   uint64_t boxes = 0;
   uint64_t pairs = 0;
 };
 
-// The relation of two bodies: the strongest over all pairs of a piece of A and a piece of B,
-// OVERLAPPING, WITHIN_TOLERANCE, TOUCHING, SEPARATED in this order; the separation: the least over
-// all pairs, so the distance of the nearest pair, or minus the depth of the deepest. Each pair is
-// decided as two hulls are, at the exact products of the poses.
+// Finds the relation and separation of two bodies. The relation is the strongest over all pairs of
+// a piece of A and a piece of B, in the order OVERLAPPING, WITHIN_TOLERANCE, TOUCHING, SEPARATED.
+// The separation is the least over all pairs: the distance of the nearest pair, or minus the depth
+// of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
 //
-// Two trees of boxes are descended together, first where boxes are nearest. Without wishes beyond
-// the relation and the clearance, the first pair that no other can outdo ends the search and is the
-// named pair. With other wishes, the pair of the least separation is named. So swapping A and B
-// mirrors an answer, and the named pair does not depend on threads.
+// The search descends two box trees simultaneously, nearest boxes first. If only the relation and
+// the clearance are requested, it stops at the first pair that no other pair can outdo, and names
+// that pair. If further details are requested, it names the pair with the least separation.
+// Swapping A and B mirrors the answer, and the named pair does not depend on threads.
 //
-// A certificate does not count among these wishes: where it is wanted, those of pieces that prove
-// the relation are found once it is known.
+// Certificates do not count among these details. If requested, the certificates of pieces that
+// prove the relation are found after the relation is known.
 //
-// The search is made in steps, so that long ones can be cut into slices. Cost: O(log n) boxes and
-// the pairs that are near, where boxes of pieces overlap little; that of PieceCertification comes
-// on top.
+// The search proceeds in steps, so that long searches can be time-sliced. Cost: O(log n) boxes plus
+// the nearby pairs, if boxes of pieces overlap little; plus the cost of PieceCertification.
 class BodySearch {
  public:
-  // All must outlive the search. `options` must be valid (ValidateBodyOptions).
+  // All arguments must outlive the search. Requires: valid `options` (ValidateBodyOptions).
   BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOptions& options);
   BodySearch(const BodySearch&) = delete;
   BodySearch& operator=(const BodySearch&) = delete;
 
-  // Makes at most this many steps, of one node or one pair of pieces each. Returns whether the
-  // search has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would
-  // be needed than options.max_piece_certificates.
+  // Makes at most `steps` steps, of one node or one pair of pieces each. Returns true if the search
+  // has ended. CANCELLED: should_stop returned true. RESOURCE_EXHAUSTED: more certificates needed
+  // than options.max_piece_certificates.
   absl::StatusOr<bool> Advance(uint64_t steps);
-  // Requires that the search has ended; once.
+  // Requires: the search has ended. Call at most once.
   absl::StatusOr<BodyAnswer> Take();
   const BodyCounts& counts() const { return counts_; }
 
  private:
-  // X and Y are A and B, or B and A: the order that does not depend on which comes first.
+  // X and Y are A and B, or B and A, in an order that does not depend on the order of the
+  // arguments.
   struct Nodes {
     uint32_t x;
     uint32_t y;
     double gap;
   };
   struct Candidate {
-    // Positions in the leaves, and indices of the pieces.
+    // Positions in the leaves, and piece indices.
     uint32_t slot_x;
     uint32_t slot_y;
     uint32_t piece_x;
     uint32_t piece_y;
     double gap;
   };
-  // The pieces of a leaf that were placed.
+  // The placed pieces of a leaf.
   struct PlacedLeaf {
     uint32_t node = std::numeric_limits<uint32_t>::max();
     std::array<std::optional<PlacedPiece>, BoxTree::kLeafBoxes> pieces;
@@ -98,7 +97,7 @@ class BodySearch {
   };
 
   double Gap(const Box& of_x, const Box& of_y);
-  // No pair farther apart than this can change the answer.
+  // Pairs farther apart than this cannot change the answer.
   double Limit() const { return wants_least_ ? least_high_ : limit_; }
   void Descend(const Nodes& nodes);
   void Push(uint32_t x, uint32_t y);
@@ -116,7 +115,7 @@ class BodySearch {
   const PlacedBody* x_;
   const PlacedBody* y_;
   const QueryOptions* options_;
-  // What is asked of each pair.
+  // Options for each pair.
   QueryOptions each_;
   bool wants_least_;
   double limit_ = 0;
@@ -124,12 +123,11 @@ class BodySearch {
   StopPoll poll_;
 
   std::vector<Nodes> waiting_;
-  // Pairs of pieces from two leaves. The search takes them from the end, where the nearest ones
-  // are.
+  // Pairs of pieces from two leaves. The search pops from the end, where the nearest pairs are.
   std::vector<Candidate> candidates_;
   PlacedLeaf leaf_x_;
   PlacedLeaf leaf_y_;
-  // Whether the relation and what decided are known.
+  // True if the relation and the deciding pair are known.
   bool found_ = false;
   bool ended_ = false;
   std::optional<PieceCertification> certification_;
@@ -139,17 +137,18 @@ class BodySearch {
   Rung rung_ = Rung::kBounds;
   bool within_clearance_ = false;
   std::optional<PiecePair> decided_;
-  // The least separation found, and bounds of the least of all that were found.
+  // The least separation found, and bounds of the least over all pairs found.
   double least_value_ = std::numeric_limits<double>::infinity();
   double least_low_ = std::numeric_limits<double>::infinity();
   double least_high_ = std::numeric_limits<double>::infinity();
 };
 
-// OK, or INVALID_ARGUMENT: ValidateOptions; the textbook method, which is for pairs of hulls.
+// Returns OK, or INVALID_ARGUMENT for options that fail ValidateOptions or that select the textbook
+// method, which supports only pairs of hulls.
 absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames& names = {});
 
-// A whole search. INVALID_ARGUMENT: ValidateBodyOptions. CANCELLED, RESOURCE_EXHAUSTED:
-// BodySearch::Advance.
+// Runs a whole search. INVALID_ARGUMENT: see ValidateBodyOptions. CANCELLED, RESOURCE_EXHAUSTED:
+// see BodySearch::Advance.
 absl::StatusOr<BodyAnswer> CheckBodies(const PlacedBody& a, const PlacedBody& b,
                                        const QueryOptions& options, BodyCounts* counts = nullptr);
 

@@ -7,18 +7,19 @@
 
 namespace hulld {
 
-// How far apart boxes of two bodies are at least, each box in the frame of its body.
+// Lower bounds of the separation of boxes of two bodies, each box in its body's frame.
 class BoxGap {
  public:
   BoxGap(const PlacedBody& x, const PlacedBody& y);
 
-  // A lower bound of the separation of any two hulls in the boxes, proven: the largest gap along
-  // the axes of both, negative where all show an overlap, as no penetration is deeper than the
-  // overlap along any axis. Infinite where a box is empty, minus infinity where nothing is known.
+  // Returns a **proven** lower bound of the separation of any two hulls in the boxes: the largest
+  // gap along the axes of both boxes. Negative if all axes show an overlap, because no penetration
+  // is deeper than the overlap along any axis. Infinite if a box is empty, minus infinity if no
+  // bound is known.
   double AtLeast(const Box& of_x, const Box& of_y) const;
 
  private:
-  // R_XY: the frame of Y in that of X, and p_XY where its origin is.
+  // R_XY is the orientation of frame Y in frame X, p_XY the position of Y's origin.
   Eigen::Matrix3d R_XY_;
   Eigen::Matrix3d abs_R_XY_;
   Vector p_XY_;

@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-QueryOptions ForEachPair(const QueryOptions& options) {
+QueryOptions CertificateOptions(const QueryOptions& options) {
   QueryOptions each;
   each.want_certificate = true;
   each.should_stop = options.should_stop;
@@ -25,7 +25,7 @@ PieceCertification::PieceCertification(const PlacedBody& a, const PlacedBody& b,
                                        std::optional<PiecePair> decided)
     : a_(&a),
       b_(&b),
-      each_(ForEachPair(options)),
+      each_(CertificateOptions(options)),
       most_(options.max_piece_certificates),
       relation_(relation) {
   HULLD_CHECK(relation != Relation::kWithinTolerance);
@@ -83,7 +83,7 @@ absl::Status PieceCertification::FindPairs(uint32_t piece_a) {
   tree_.AppendMeeting(BoundingBox(piece.placed()), 0, meeting_);
   std::sort(meeting_.begin(), meeting_.end());
   for (const uint32_t piece_b : meeting_) {
-    // An empty box meets one that is all of space.
+    // An empty box intersects a box that covers all of space.
     if (b_->body().pieces()[piece_b].hull->empty()) continue;
     pairs_.push_back({piece_a, piece_b});
   }

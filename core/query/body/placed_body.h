@@ -13,10 +13,10 @@
 
 namespace hulld {
 
-// A body, or a hull beside bodies, at a pose. Pieces are placed when they are asked about.
+// A body, or a hull queried together with bodies, at a pose. Pieces are placed on demand.
 class PlacedBody {
  public:
-  // `body` must outlive the result. Requires a valid pose (ValidatePose).
+  // `body` must outlive the result. Requires: a valid pose (ValidatePose).
   PlacedBody(const QueryBody& body, const Pose& X_WB) : body_(&body), X_WB_(X_WB) {
     HULLD_DCHECK(IsValidPose(X_WB));
   }
@@ -29,10 +29,10 @@ class PlacedBody {
   Pose X_WB_;
 };
 
-// One piece in the world. It stays where it is made, as what it places refers to its pose.
+// One piece in the world. Not movable: the placed hull refers to the pose stored here.
 class PlacedPiece {
  public:
-  // Requires an index of a piece. The hull of the piece must outlive the result.
+  // Requires: `index` is the index of a piece. The hull of the piece must outlive the result.
   PlacedPiece(const PlacedBody& body, uint32_t index) {
     HULLD_DCHECK(index < body.body().pieces().size());
     const BodyPiece& piece = body.body().pieces()[index];
@@ -53,15 +53,15 @@ class PlacedPiece {
   std::optional<PlacedHull> placed_;
 };
 
-// A piece of A and a piece of B, by index; that of a hull is 0.
+// A piece of A and a piece of B, by index; 0 for a hull.
 struct PiecePair {
   uint32_t a;
   uint32_t b;
   friend bool operator==(const PiecePair&, const PiecePair&) = default;
 };
 
-// A box, world frame, that is certain to hold all pieces: larger than the least one where the body
-// is turned. All of space where doubles do not reach; empty where all pieces are.
+// Returns a box (world frame) that certainly contains all pieces; larger than the least such box if
+// the body is rotated. Covers all of space beyond the range of doubles; empty if all pieces are.
 Box BoundingBox(const PlacedBody& placed);
 
 }  // namespace hulld

@@ -21,19 +21,19 @@ struct BodyPiece {
   Pose X_BP;
 };
 
-// A box about each piece, in the body's frame, and a tree of these. It refers to no hull, so that
-// it may be kept as long as the points of the hulls stay the same. Immutable.
+// A box for each piece, in the body's frame, and a tree of these boxes. Holds no reference to the
+// hulls, so it remains valid as long as their points do not change. Immutable.
 class PieceBoxes {
  public:
-  // Requires valid poses (ValidatePose; PlacedHull checks them). Cost: O(n log n) and six support
+  // Requires: valid poses (ValidatePose; PlacedHull checks them). Cost: O(n log n) and six support
   // points for each piece.
   explicit PieceBoxes(std::span<const BodyPiece> pieces);
 
-  // By the index of the piece; the boxes of empty hulls are empty.
+  // Indexed by piece; boxes of empty hulls are empty.
   const BoxTree& tree() const { return tree_; }
-  // Holds all pieces; all of space where doubles do not reach, empty where all pieces are.
+  // Contains all pieces; covers all of space beyond the range of doubles, empty if all pieces are.
   Box all() const { return tree_.empty() ? Box::Empty() : tree_.box(0); }
-  // The largest absolute coordinate; infinite where a box is all of space.
+  // Largest absolute coordinate; infinite if a box covers all of space.
   double size() const { return size_; }
   size_t MemoryBytes() const { return sizeof(*this) + tree_.MemoryBytes(); }
 
@@ -42,24 +42,24 @@ class PieceBoxes {
   double size_ = 0;
 };
 
-// A body as questions need it: its pieces and their boxes. Or a hull, which is asked about together
-// with bodies: it is its own one piece, at no pose but that of where it is placed. The hulls must
-// outlive it. Immutable; readable by any thread.
+// A body in the form that queries need: its pieces and their boxes. It may also wrap a single hull
+// that is queried together with bodies; the hull is then its only piece, without a pose of its own.
+// The hulls must outlive it. Immutable and thread-safe.
 class QueryBody {
  public:
-  // A body of these pieces, perhaps none. Requires valid poses, and boxes that were made of the
-  // same pieces, or of others with the same hulls as point sets (unchecked but for the size: only
-  // making the boxes again would tell).
+  // Builds a body from zero or more pieces. Requires: valid poses, and boxes built from the same
+  // pieces or from pieces with the same hulls as point sets (unchecked except for the count: a
+  // check would rebuild the boxes).
   QueryBody(std::vector<BodyPiece> pieces, std::shared_ptr<const PieceBoxes> boxes)
       : is_hull_(false), pieces_(std::move(pieces)), boxes_(std::move(boxes)) {
     HULLD_DCHECK(boxes_ != nullptr && boxes_->tree().empty() == pieces_.empty());
   }
-  // The same; makes the boxes.
+  // Builds the boxes as well.
   explicit QueryBody(std::vector<BodyPiece> pieces);
-  // A hull. Cost: six support points.
+  // Wraps a hull. Cost: six support points.
   explicit QueryBody(const QueryHull& hull);
 
-  // Whether it is a hull, whose one piece has no pose of its own.
+  // True if this wraps a hull, the only piece, without a pose of its own.
   bool is_hull() const { return is_hull_; }
   std::span<const BodyPiece> pieces() const { return pieces_; }
   const PieceBoxes& boxes() const { return *boxes_; }

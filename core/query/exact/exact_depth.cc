@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -19,7 +20,10 @@
 namespace hulld {
 namespace {
 
-// The plane n.w = offset of a facet, n outward; `key` is its signed distance from the origin in
+// The most seed vertices inserted, each in O(facets): the last ones, which are nearest. A choice.
+constexpr size_t kMostSeeds = 1024;
+
+// The plane n.w = offset of a facet, n outward. `key` is its signed distance from the origin in
 // floating point, in units of a common power of two.
 struct Plane {
   IntegerVector n;
@@ -27,7 +31,7 @@ struct Plane {
   double key;
 };
 
-// Sign of the difference of the signed distances of two planes.
+// Returns the sign of the difference of the signed distances of two planes.
 int CompareDistance(const Plane& f, const Plane& g) {
   const int side = Sign(f.offset);
   if (side != Sign(g.offset)) return side < Sign(g.offset) ? -1 : 1;
@@ -39,15 +43,19 @@ int CompareDistance(const Plane& f, const Plane& g) {
 class ExactExpansion {
  public:
   ExactExpansion(ExactPair& pair, const std::function<bool()>& should_stop)
-      : pair_(pair), poll_(should_stop, 1) {}
+      : pair_(pair), poll_(should_stop) {}
 
   absl::StatusOr<ExactNearest> Run(std::span<const VertexPair> seed) {
-    Start(seed);
-    for (const VertexPair& p : seed) Insert(pair_.Corner(p));
+    if (!Start(seed)) return Stopped();
+    for (const VertexPair& p : seed.last(std::min(seed.size(), kMostSeeds))) {
+      if (poll_.Poll()) return Stopped();
+      Insert(pair_.Corner(p));
+    }
     for (;;) {
-      if (poll_.Step()) return absl::CancelledError("stopped in an exact query");
+      if (poll_.Poll()) return Stopped();
       const uint32_t nearest = Nearest();
       ExactCorner farthest = pair_.Farthest(planes_[nearest].n);
+      if (pair_.stopped()) return Stopped();
       if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) {
         HULLD_CHECK(Sign(planes_[nearest].offset) > 0);
         return PointOn(nearest);
@@ -57,42 +65,75 @@ class ExactExpansion {
   }
 
  private:
-  // Adds a corner for which differs(w) holds: one of the seed, or one that is farthest along one of
-  // the directions or against it.
+  static absl::Status Stopped() { return absl::CancelledError("stopped in an exact query"); }
+
+  static bool IsNearer(const Plane& f, const Plane& g) {
+    const double slack =
+        kDepthKeyErrorFactor * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
+    if (f.key < g.key - slack) return true;
+    if (f.key > g.key + slack) return false;
+    return CompareDistance(f, g) < 0;
+  }
+
+  // The order of the heap. Its front is the nearest facet, the first of several.
+  struct IsLater {
+    const std::vector<Plane>& planes;
+    bool operator()(uint32_t f, uint32_t g) const {
+      if (IsNearer(planes[g], planes[f])) return true;
+      return g < f && !IsNearer(planes[f], planes[g]);
+    }
+  };
+
+  // Adds a corner for which differs(w) holds: one of the seed, or one that is farthest along or
+  // against one of the directions. Returns false if should_stop returned true.
   template <typename Differs>
-  void AddCorner(std::span<const VertexPair> seed, std::vector<IntegerVector> directions,
+  bool AddCorner(std::span<const VertexPair> seed, std::vector<IntegerVector> directions,
                  Differs differs) {
     for (const VertexPair& p : seed) {
+      if (poll_.Step()) return false;
       ExactCorner corner = pair_.Corner(p);
-      if (differs(corner.w)) return corners_.push_back(std::move(corner));
+      if (!differs(corner.w)) continue;
+      corners_.push_back(std::move(corner));
+      return true;
     }
     for (const IntegerVector& n : directions) {
       for (const IntegerVector& towards : {n, -n}) {
         ExactCorner corner = pair_.Farthest(towards);
-        if (differs(corner.w)) return corners_.push_back(std::move(corner));
+        if (pair_.stopped()) return false;
+        if (!differs(corner.w)) continue;
+        corners_.push_back(std::move(corner));
+        return true;
       }
     }
     // A - B is solid.
     HULLD_UNREACHABLE();
   }
 
-  // A tetrahedron, its corner 3 inside of its facet 0, 1, 2. There is one: A - B is solid.
-  void Start(std::span<const VertexPair> seed) {
-    AddCorner(seed, {{1, 0, 0}}, [](const IntegerVector&) { return true; });
+  // Builds a tetrahedron with corner 3 on the inner side of facet 0, 1, 2. One exists, because A -
+  // B is solid. Returns false if should_stop returned true.
+  bool Start(std::span<const VertexPair> seed) {
+    if (!AddCorner(seed, {{1, 0, 0}}, [](const IntegerVector&) { return true; })) return false;
     const IntegerVector p = corners_[0].w;
-    AddCorner(seed, {{1, 0, 0}}, [&](const IntegerVector& w) { return !(w == p); });
+    if (!AddCorner(seed, {{1, 0, 0}}, [&](const IntegerVector& w) { return !(w == p); })) {
+      return false;
+    }
     const IntegerVector e = corners_[1].w - p;
-    const IntegerVector across = AnyPerpendicular(e);
-    AddCorner(seed, {across}, [&](const IntegerVector& w) { return !IsZero(Cross(e, w - p)); });
-    IntegerVector n = Cross(e, corners_[2].w - p);
-    AddCorner(seed, {n}, [&](const IntegerVector& w) { return Sign(Dot(n, w - p)) != 0; });
+    if (!AddCorner(seed, {AnyPerpendicular(e)},
+                   [&](const IntegerVector& w) { return !IsZero(Cross(e, w - p)); })) {
+      return false;
+    }
+    const IntegerVector n = Cross(e, corners_[2].w - p);
+    if (!AddCorner(seed, {n}, [&](const IntegerVector& w) { return Sign(Dot(n, w - p)) != 0; })) {
+      return false;
+    }
     if (Sign(Dot(n, corners_[3].w - p)) > 0) std::swap(corners_[1], corners_[2]);
     SetUnit();
     surface_.Start();
     AddPlanes(0);
+    return true;
   }
 
-  // The size of the corners, for the keys.
+  // Computes the size of the corners, for the keys.
   void SetUnit() {
     for (const ExactCorner& corner : corners_) {
       for (int i = 0; i < 3; ++i) {
@@ -119,7 +160,7 @@ class ExactExpansion {
                       height.exponent - exponent - unit_exponent_);
   }
 
-  // For all facets from `first` on.
+  // Computes planes for all facets from `first` on.
   void AddPlanes(uint32_t first) {
     for (uint32_t i = first; i < surface_.facets().size(); ++i) {
       const auto& c = surface_.facets()[i].corners;
@@ -128,23 +169,28 @@ class ExactExpansion {
       Integer offset = Dot(n, p);
       const double key = KeyOf(n, offset);
       planes_.push_back({std::move(n), std::move(offset), key});
+      heap_.push_back(i);
+      std::push_heap(heap_.begin(), heap_.end(), IsLater{planes_});
     }
   }
 
   bool Sees(const ExactCorner& corner, uint32_t facet) const {
-    return Dot(planes_[facet].n, corner.w) > planes_[facet].offset;
+    return !poll_.Step() && Dot(planes_[facet].n, corner.w) > planes_[facet].offset;
   }
 
-  // Requires the corner strictly above the facet. A convex polytope's facets strictly below a point
-  // are connected, and so is their edge, so that the surface always closes.
+  // Requires: the corner strictly above the facet, unless should_stop returned true. The facets of
+  // a convex polytope strictly below a point are connected, and so is their boundary, so the
+  // surface always closes.
   void Expand(uint32_t facet, ExactCorner corner) {
-    HULLD_DCHECK(Sees(corner, facet));
+    HULLD_DCHECK(Sees(corner, facet) || poll_.stopped());
     const auto apex = static_cast<uint32_t>(corners_.size());
     corners_.push_back(std::move(corner));
     const std::optional<uint32_t> first =
         surface_.Expand(facet, apex, [&](uint32_t i) { return Sees(corners_[apex], i); });
-    HULLD_CHECK(first.has_value());
+    HULLD_CHECK(first.has_value() || poll_.stopped());
+    if (poll_.stopped()) return;
     AddPlanes(*first);
+    if (surface_.HasManyDead()) Compact();
   }
 
   void Insert(ExactCorner corner) {
@@ -153,27 +199,32 @@ class ExactExpansion {
     }
   }
 
-  // The first of the facets at the least signed distance.
-  uint32_t Nearest() const {
-    std::optional<uint32_t> nearest;
-    for (uint32_t i = 0; i < planes_.size(); ++i) {
-      if (!surface_.facets()[i].alive) continue;
-      if (!nearest || IsNearer(planes_[i], planes_[*nearest])) nearest = i;
+  // Drops dead facets.
+  void Compact() {
+    const std::vector<uint32_t> places = surface_.Compact();
+    for (uint32_t i = 0; i < places.size(); ++i) {
+      if (places[i] != ExpandingSurface::kGone && places[i] != i) {
+        planes_[places[i]] = std::move(planes_[i]);
+      }
     }
-    HULLD_CHECK(nearest.has_value());
-    return *nearest;
+    planes_.resize(surface_.facets().size());
+    heap_.resize(planes_.size());
+    std::iota(heap_.begin(), heap_.end(), 0u);
+    std::make_heap(heap_.begin(), heap_.end(), IsLater{planes_});
   }
 
-  static bool IsNearer(const Plane& f, const Plane& g) {
-    const double slack =
-        kDepthKeyErrorFactor * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
-    if (f.key < g.key - slack) return true;
-    if (f.key > g.key + slack) return false;
-    return CompareDistance(f, g) < 0;
+  // Returns the first of the facets at the least signed distance.
+  uint32_t Nearest() {
+    while (!surface_.facets()[heap_.front()].alive) {
+      std::pop_heap(heap_.begin(), heap_.end(), IsLater{planes_});
+      heap_.pop_back();
+      HULLD_CHECK(!heap_.empty());
+    }
+    return heap_.front();
   }
 
-  // The foot of the perpendicular from the origin onto the facet's plane, which supports A - B: it
-  // lies in a triangle of that plane.
+  // Returns the foot of the perpendicular from the origin onto the facet's plane. The plane
+  // supports A - B, and the foot lies in a triangle of that plane.
   ExactNearest PointOn(uint32_t facet) const {
     const Plane& plane = planes_[facet];
     const auto on_plane = [&](uint32_t corner) {
@@ -205,10 +256,12 @@ class ExactExpansion {
   }
 
   ExactPair& pair_;
-  StopPoll poll_;
+  mutable StopPoll poll_;
   std::vector<ExactCorner> corners_;
   ExpandingSurface surface_;
   std::vector<Plane> planes_;
+  // Facets by distance, including some dead ones.
+  std::vector<uint32_t> heap_;
   int unit_exponent_ = INT32_MIN / 2;
 };
 

@@ -12,13 +12,14 @@
 
 namespace hulld {
 
-// The point of the boundary of A - B that is nearest to the origin, exactly: the expanding polytope
-// in integers. The facet of a growing polytope of vertices of A - B whose plane is nearest to the
-// origin, planes that have the origin outside first, is expanded by the vertex farthest along its
-// normal, until there is none farther: then the plane supports A - B, and no part of the boundary
-// is nearer. Every step adds a vertex, so it ends. Requires the relation OVERLAPPING: otherwise no
-// tetrahedron is found, or the plane found has the origin outside, and the process ends. `seed`:
-// pairs to start from, which save steps. CANCELLED when should_stop said so (it may be empty).
+// Finds the exact point of the boundary of A - B that is nearest to the origin, by an expanding
+// polytope in integers. Repeatedly takes the facet of a growing polytope of vertices of A - B with
+// the plane nearest to the origin, planes with the origin outside first, and expands it by the
+// vertex farthest along its normal. If no vertex is farther, the plane supports A - B, and no part
+// of the boundary is nearer. Every step adds a vertex, so the search terminates. Requires: the
+// relation OVERLAPPING; otherwise no tetrahedron is found, or the final plane has the origin
+// outside, and the process aborts. `seed`: initial pairs, which save steps. CANCELLED: should_stop,
+// which may be empty, returned true.
 absl::StatusOr<ExactNearest> FindDepthExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                               const std::function<bool()>& should_stop);
 

@@ -13,9 +13,9 @@
 namespace hulld {
 namespace {
 
-// Four squares of them, and sums of products as large, stay below 2^123.
+// Most bits of a component: four squares, and sums of products of that size, stay below 2^123.
 constexpr int kMostQuaternionBits = 60;
-// So do products of two norms that have this many bits together, and sums of three such.
+// Most bits of two norms together: their product, and sums of three such, stay below 2^123.
 constexpr int kMostNormBits = 120;
 
 int BitWidth(Int128 magnitude) {
@@ -24,15 +24,16 @@ int BitWidth(Int128 magnitude) {
                    : static_cast<int>(std::bit_width(static_cast<uint64_t>(magnitude)));
 }
 
-// |x| < 2^exponent. Requires x finite.
+// Returns an exponent with |x| < 2^exponent. Requires: x finite.
 int ExponentAbove(double x) {
   HULLD_DCHECK(std::isfinite(x));
   const BinaryDouble d = Decompose(x);
   return d.exponent + static_cast<int>(std::bit_width(d.magnitude));
 }
 
-// Divides by the least component that is not zero, where it divides all. A greatest common divisor
-// would find more, at the price of many divisions; common powers of two are left to the caller.
+// Divides by the least non-zero component if it divides all of them. A greatest common divisor
+// would find more factors, at the price of many divisions; common powers of two are left to the
+// caller.
 void DivideByLeast(std::array<int64_t, 4>& q) {
   int64_t least = INT64_MAX;
   for (const int64_t c : q) {
@@ -40,13 +41,13 @@ void DivideByLeast(std::array<int64_t, 4>& q) {
   }
   if (least == 1) return;
   for (const int64_t c : q) {
-    // Equal magnitudes are the rule where this divides at all.
+    // If a division succeeds, the magnitudes are usually equal.
     if (c != 0 && std::abs(c) != least && c % least != 0) return;
   }
   for (int64_t& c : q) c /= least;
 }
 
-// The bits of a hull's own coordinates once they are turned and in the pair's unit.
+// Returns the bits of a hull's own coordinates after rotation, in the pair's unit.
 int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
   // |R p| = N |p| <= N sqrt(3) times the largest component.
   return norm_bits + (side.exponent - exponent) + side.own_bits + 1;
@@ -81,7 +82,7 @@ bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) 
   rotation.rows = {{{ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)},
                     {2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)},
                     {2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz}}};
-  // With |q|^2 of 2 or 4 modulo 8 all entries may be even.
+  // If |q|^2 is 2 or 4 modulo 8, all entries may be even.
   Int128 any = rotation.norm;
   for (const auto& row : rotation.rows) any |= row[0] | row[1] | row[2];
   const int even = std::countr_zero(static_cast<uint64_t>(any) | uint64_t{4});
@@ -99,7 +100,8 @@ bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation) {
   SmallRotation outer, inner;
   if (!FindSmallRotation(placed.product()->X_WB().q, outer)) return false;
   if (!FindSmallRotation(placed.product()->X_BP().q, inner)) return false;
-  // Rows are as long as the norm: each of the three products below is at most that of the norms.
+  // Rows have the length of the norm, so each of the three products below is at most the product of
+  // the norms.
   if (BitWidth(outer.norm) + BitWidth(inner.norm) > kMostNormBits) return false;
   rotation.norm = outer.norm * inner.norm;
   for (int i = 0; i < 3; ++i) {
@@ -152,7 +154,7 @@ bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
   const auto add_side = [&](const PlacedHull& placed, SmallFrame::Side& side) {
     const double largest = placed.query_hull().max_abs_coordinate();
     if (largest == 0) {
-      // Its one vertex is its origin, a multiple of every power of two.
+      // The hull's only vertex is its origin, a multiple of every power of two.
       side.exponent = frame.exponent;
       side.own_bits = 0;
     } else {
@@ -162,7 +164,7 @@ bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
   };
   const int bits_a = add_side(pair.a(), frame.a);
   const int bits_b = add_side(pair.b(), frame.b);
-  // The difference of two translations, then the sum of it and what is rotated.
+  // The difference of two translations, then its sum with the rotated coordinates.
   frame.bits = std::max({bits_a, bits_b, norm_bits + translation_bits + 1}) + 1;
   return true;
 }

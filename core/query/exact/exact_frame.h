@@ -8,24 +8,24 @@
 
 namespace hulld {
 
-// A rotation over the integers: it takes p to rows p / norm. Common factors that are found without
-// much work are left out, so that turns by no angle, by 90, 120 and 180 degrees have entries of 0,
-// 1 and -1 and the norm 1, however their quaternions are scaled.
+// A rotation over the integers: it maps p to rows p / norm. Common factors that are cheap to find
+// are removed, so that the identity and rotations by 90, 120 and 180 degrees have entries of 0, 1
+// and -1 and the norm 1, for any scale of their quaternions.
 struct SmallRotation {
   std::array<std::array<Int128, 3>, 3> rows;
   Int128 norm;
 };
 
-// A pair of hulls in integers of few bits: what world coordinates are made of, and how large they
-// get. In units of 2^exponent / norm, shifted by -t_A, world coordinates are
+// The composition and size of the world coordinates of a pair of hulls in integers of few bits. In
+// units of 2^exponent / norm, shifted by -t_A, world coordinates are
 //   A: factor * rows_A * 2^(exponent_A - exponent) * own, and
 //   B: factor * rows_B * 2^(exponent_B - exponent) * own + norm * (t_B - t_A) / 2^exponent,
 // where own are a hull's coordinates over 2^exponent_A or 2^exponent_B, and the factor is the other
-// hull's norm, or 1 when the norms are the same.
+// hull's norm, or 1 if the norms are equal.
 struct SmallFrame {
   struct Side {
     SmallRotation rotation;
-    // Whether the other's norm is a factor.
+    // True if the other hull's norm is a factor.
     bool times_other_norm;
     int exponent;
     // Every own coordinate is below 2^own_bits in magnitude.
@@ -34,30 +34,31 @@ struct SmallFrame {
   Side a;
   Side b;
   int exponent;
-  // Every world coordinate, and every term of the sums that make it, is below 2^bits in magnitude.
+  // Every world coordinate, and every term of its sums, is below 2^bits in magnitude.
   int bits;
 };
 
-// The least width, in words of 64 bits, of the world coordinates with which a search in
+// Returns the least width, in words of 64 bits, of world coordinates for which a search in
 // fixed-width integers is exact; see WidePair.
 inline constexpr int WordsFor(int bits) { return (bits + 9 + 63) / 64; }
 
-// The rotation of a quaternion whose components are integers of at most 60 bits over a power of
-// two. False for others, whose components differ widely in magnitude. Requires q finite and not
-// zero.
+// Finds the rotation of a quaternion with components that are integers of at most 60 bits over a
+// power of two. Returns false for other quaternions, with components of widely different magnitude.
+// Requires: q finite and not zero.
 bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation);
 
-// The rotation of a placed hull. That of a piece of a body is the product of two, which is small
-// where its norm is below 2^120, as it is when one of them turns by no angle or by quarter turns.
+// Finds the rotation of a placed hull. The rotation of a piece of a body is a product of two, which
+// is small if its norm is below 2^120, for example if one factor is the identity or a rotation by
+// quarter turns.
 bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation);
 
-// The poses that place a hull: its own, or both of a piece of a body.
+// Returns the poses that place a hull: its own, or both of a piece of a body.
 std::array<const Pose*, 2> PosesOf(const PlacedHull& placed);
-// The least exponent of the lowest bits of the translations that place it, or `otherwise` when that
+// Returns the least exponent of the lowest bits of the hull's translations, or `otherwise` if that
 // is less.
 int TranslationExponent(const PlacedHull& placed, int otherwise);
 
-// False where a quaternion has no small rotation. Cost: about 50 ns.
+// Returns false if a quaternion has no small rotation. Cost: about 50 ns.
 bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame);
 
 }  // namespace hulld

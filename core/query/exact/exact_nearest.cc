@@ -14,13 +14,14 @@
 namespace hulld {
 namespace {
 
-// A part of a simplex: the point of its affine hull that is nearest to the origin has these
-// weights, all positive.
+// A part of a simplex. The weights, all positive, are those of the point of its affine hull that is
+// nearest to the origin.
 struct Part {
   std::vector<ExactCorner> corners;
   std::vector<Integer> weights;
   Integer weight_sum;
-  // A positive multiple of the vector from that point to the origin; zero when it is the origin.
+  // A positive multiple of the vector from that point to the origin; zero if the point is the
+  // origin.
   IntegerVector towards_origin;
   Integer numerator;
   Integer denominator;
@@ -30,8 +31,8 @@ bool AllPositive(const std::vector<Integer>& weights) {
   return std::all_of(weights.begin(), weights.end(), [](const Integer& w) { return Sign(w) > 0; });
 }
 
-// The functions below give nothing where the corners are affinely dependent or the nearest point of
-// their affine hull is not strictly between them.
+// The functions below return nothing if the corners are affinely dependent, or if the nearest point
+// of their affine hull is not strictly between them.
 
 std::optional<Part> PartOf(const ExactCorner& p) {
   return Part{{p}, {1}, 1, -p.w, Dot(p.w, p.w), 1};
@@ -89,7 +90,8 @@ std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
   }
 }
 
-// Whether no corner is nearer to the origin, along the direction there, than the part.
+// Returns true if no corner is nearer to the origin than the part, along the direction to the
+// origin.
 bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
   const Integer reach = Dot(part.towards_origin, part.corners[0].w);
   return std::all_of(corners.begin(), corners.end(), [&](const ExactCorner& corner) {
@@ -97,8 +99,9 @@ bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
   });
 }
 
-// The part of the simplex whose inside holds its point nearest to the origin. There is one, with
-// affinely independent corners, also where those of the simplex are not (Caratheodory).
+// Returns the part of the simplex that contains the point nearest to the origin in its interior.
+// One exists, with affinely independent corners, even if the corners of the simplex are dependent
+// (Caratheodory).
 Part NearestPart(const std::vector<ExactCorner>& corners) {
   for (uint32_t size = 1; size <= corners.size(); ++size) {
     for (uint32_t subset = 1; subset < (1u << corners.size()); ++subset) {
@@ -129,6 +132,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
     const IntegerVector& n = part.towards_origin;
     if (!IsZero(n)) {
       ExactCorner farthest = pair.Farthest(n);
+      if (pair.stopped()) return absl::CancelledError("stopped in an exact query");
       if (Dot(n, farthest.w) > Dot(n, part.corners[0].w)) {
         corners = std::move(part.corners);
         corners.push_back(std::move(farthest));

@@ -29,12 +29,12 @@ struct ExactNearest {
   Integer denominator;
 };
 
-// Finds it exactly, for hulls of every dimension: Gilbert, Johnson and Keerthi's walk (1988) in
-// integers. A part (vertex, edge, triangle) of A - B is kept of which the nearest point is strictly
-// inside; the farthest vertex towards the origin is added until no vertex is farther. The distance
-// decreases strictly, so that no part comes twice and the walk ends. Directions have degree at most
-// 3 in the coordinates. `seed`: pairs to start from; may be empty. Requires at most four of them.
-// CANCELLED when should_stop, which may be empty, said so.
+// Finds the exact nearest point, for hulls of every dimension, by the walk of Gilbert, Johnson and
+// Keerthi (1988) in integers. Keeps a part (vertex, edge, triangle) of A - B with its nearest point
+// strictly inside, and adds the farthest vertex towards the origin until no vertex is farther. The
+// distance decreases strictly, so no part recurs and the walk terminates. Directions have degree at
+// most 3 in the coordinates. `seed`: initial pairs; may be empty. Requires: at most four initial
+// pairs. CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                                 const std::function<bool()>& should_stop);
 

@@ -13,7 +13,7 @@
 namespace hulld {
 namespace {
 
-// The homogeneous matrix and squared norm of a quaternion as integers, but for common factors.
+// The homogeneous matrix and squared norm of a quaternion as integers, up to common factors.
 struct IntegerRotation {
   IntegerVector rows[3];
   Integer norm_squared;
@@ -65,8 +65,9 @@ IntegerRotation RotationOf(const PlacedHull& placed) {
   return product;
 }
 
-// The norm of the rotation times the translation over 2^exponent: integers, as the translation of a
-// piece of a body, R(q_B) t_P / |q_B|^2 + t_B, has a divisor of that norm as its denominator.
+// Returns the norm of the rotation times the translation over 2^exponent. The results are integers:
+// the translation of a piece of a body, R(q_B) t_P / |q_B|^2 + t_B, has a divisor of that norm as
+// its denominator.
 IntegerVector ScaledTranslation(const PlacedHull& placed, const Integer& norm, int exponent) {
   const PoseProduct* const product = placed.product();
   if (product == nullptr) return norm * ToInteger(placed.X_WH().t, exponent);
@@ -79,33 +80,35 @@ IntegerVector ScaledTranslation(const PlacedHull& placed, const Integer& norm, i
 
 }  // namespace
 
-// Each answers what the farthest candidates are, ascending; none where the direction is too wide.
+// Each function returns the farthest candidates, ascending; none if the direction is too wide.
 class ExactPair::Narrow {
  public:
   virtual ~Narrow() = default;
   virtual std::vector<uint32_t> FeatureA(const IntegerVector& n,
-                                         std::span<const uint32_t> candidates) const = 0;
+                                         std::span<const uint32_t> candidates,
+                                         ScanPoll& poll) const = 0;
   virtual std::vector<uint32_t> FeatureB(const IntegerVector& n,
-                                         std::span<const uint32_t> candidates) const = 0;
+                                         std::span<const uint32_t> candidates,
+                                         ScanPoll& poll) const = 0;
   virtual size_t MemoryBytes() const = 0;
 };
 
 template <int kWords>
 class ExactPair::NarrowOf : public Narrow {
  public:
-  NarrowOf(const FloatPair& filter, const SmallFrame& frame) : pair_(filter, frame) {}
+  NarrowOf(const FloatPair& filter, const SmallFrame& frame) : pair_(filter, frame, kNever) {}
 
-  std::vector<uint32_t> FeatureA(const IntegerVector& n,
-                                 std::span<const uint32_t> candidates) const override {
+  std::vector<uint32_t> FeatureA(const IntegerVector& n, std::span<const uint32_t> candidates,
+                                 ScanPoll& poll) const override {
     typename WidePair<kWords>::Direction wide;
     if (!ToWide(n, wide)) return {};
-    return pair_.FeatureA(wide, candidates);
+    return pair_.FeatureA(wide, candidates, poll);
   }
-  std::vector<uint32_t> FeatureB(const IntegerVector& n,
-                                 std::span<const uint32_t> candidates) const override {
+  std::vector<uint32_t> FeatureB(const IntegerVector& n, std::span<const uint32_t> candidates,
+                                 ScanPoll& poll) const override {
     typename WidePair<kWords>::Direction wide;
     if (!ToWide(n, wide)) return {};
-    return pair_.FeatureB(wide, candidates);
+    return pair_.FeatureB(wide, candidates, poll);
   }
   size_t MemoryBytes() const override { return sizeof(*this); }
 
@@ -115,12 +118,17 @@ class ExactPair::NarrowOf : public Narrow {
   }
 
  private:
+  // The scans of this class poll through the argument that they receive.
+  static inline const std::function<bool()> kNever;
+
   WidePair<kWords> pair_;
 };
 
 ExactPair::~ExactPair() = default;
 
-ExactPair::ExactPair(const FloatPair& filter, bool with_narrow) : filter_(&filter) {
+ExactPair::ExactPair(const FloatPair& filter, const std::function<bool()>& should_stop,
+                     bool with_narrow)
+    : filter_(&filter), poll_(should_stop) {
   const IntegerRotation R_A = RotationOf(filter.a());
   const IntegerRotation R_B = RotationOf(filter.b());
   a_ = {&filter.a().query_hull(), {}, {}, {}};
@@ -166,14 +174,14 @@ const IntegerVector& ExactPair::Vertex(Side& side, uint32_t i) {
 }
 
 void ExactPair::CacheAllVertices() {
-  for (uint32_t i = 0; i < a().point_count(); ++i) VertexA(i);
-  for (uint32_t i = 0; i < b().point_count(); ++i) VertexB(i);
+  for (uint32_t i = 0; i < a().point_count() && !poll_.StopsAfter(i + 1); ++i) VertexA(i);
+  for (uint32_t i = 0; i < b().point_count() && !poll_.StopsAfter(i + 1); ++i) VertexB(i);
 }
 
 size_t ExactPair::MemoryBytes() const {
   size_t bytes = narrow_ == nullptr ? 0 : narrow_->MemoryBytes();
   for (const Side* const side : {&a_, &b_}) {
-    // A node of a map has a pointer beside the value, and a bucket is one.
+    // A map node has a pointer in addition to the value, and a bucket is a pointer.
     bytes += side->vertices.size() * (sizeof(*side->vertices.begin()) + sizeof(void*)) +
              side->vertices.bucket_count() * sizeof(void*);
   }
@@ -186,13 +194,17 @@ std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
   return all;
 }
 
-std::vector<uint32_t> ExactPair::Farthest(Side& side, std::span<const uint32_t> candidates,
+// Compares along n in the hull's own frame, which needs less computation and no storage.
+std::vector<uint32_t> ExactPair::Farthest(const Side& side, std::span<const uint32_t> candidates,
                                           const IntegerVector& n) {
   if (candidates.size() == 1) return {candidates[0]};
+  const IntegerVector n_own = n.x * side.rows[0] + n.y * side.rows[1] + n.z * side.rows[2];
   std::vector<uint32_t> farthest;
+  size_t seen = 0;
   Integer best;
   for (const uint32_t i : candidates) {
-    const Integer value = Dot(n, Vertex(side, i));
+    if (poll_.StopsAfter(++seen)) break;
+    const Integer value = Dot(n_own, ToInteger(side.hull->point(i), side.hull->exponent()));
     if (!farthest.empty() && value < best) continue;
     if (farthest.empty() || value > best) {
       farthest.clear();
@@ -206,7 +218,7 @@ std::vector<uint32_t> ExactPair::Farthest(Side& side, std::span<const uint32_t> 
 std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n,
                                           std::span<const uint32_t> candidates) {
   if (narrow_ != nullptr && candidates.size() > 1) {
-    std::vector<uint32_t> feature = narrow_->FeatureA(n, candidates);
+    std::vector<uint32_t> feature = narrow_->FeatureA(n, candidates, poll_);
     if (!feature.empty()) return feature;
   }
   return Farthest(a_, candidates, n);
@@ -215,7 +227,7 @@ std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n,
 std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n,
                                           std::span<const uint32_t> candidates) {
   if (narrow_ != nullptr && candidates.size() > 1) {
-    std::vector<uint32_t> feature = narrow_->FeatureB(n, candidates);
+    std::vector<uint32_t> feature = narrow_->FeatureB(n, candidates, poll_);
     if (!feature.empty()) return feature;
   }
   return Farthest(b_, candidates, -n);

@@ -21,14 +21,14 @@ struct ExactSpan {
   int dimension = 0;
   // Dimension 1: along the line. Otherwise zero.
   typename Pair::Coordinates direction = {0, 0, 0};
-  // Dimension 2: across the plane. Otherwise zero, or not asked for.
+  // Dimension 2: normal of the plane. Otherwise zero, or not requested.
   typename Pair::Direction normal = {0, 0, 0};
 };
 
 // Directions that span a hull: differences of its points, one per dimension up to two.
 template <typename Coordinates>
 struct SpanningDirections {
-  // Those of two flat hulls.
+  // Capacity for two flat hulls.
   std::array<Coordinates, 4> directions;
   size_t count = 0;
 
@@ -66,7 +66,7 @@ ExactSpan<Pair> FindSpan(Pair& pair) {
   return span;
 }
 
-// One search of one pair.
+// A search of a pair.
 template <typename Pair>
 class Search {
  public:
@@ -102,6 +102,8 @@ class Search {
   using Number = typename Pair::Number;
   using PortalResult = typename PortalSearch<Pair>::Result;
 
+  static absl::Status Stopped() { return absl::CancelledError("stopped in an exact query"); }
+
   template <typename Axis>
   ExactSearchResult Found(Relation relation, const Axis& axis, uint64_t directions_tried) const {
     ExactSearchResult result;
@@ -113,7 +115,7 @@ class Search {
 
   absl::StatusOr<ExactSearchResult> Report(const PortalResult& found,
                                            uint64_t directions_tried) const {
-    // All returns name this one variable, so that the compiler constructs it in the caller's place.
+    // All returns name this variable, so that the compiler constructs it in the caller's storage.
     absl::StatusOr<ExactSearchResult> result(absl::in_place);
     result->directions_tried = directions_tried;
     if (with_axis_ && found.axis) result->axis = ToInteger(*found.axis);
@@ -131,7 +133,7 @@ class Search {
       case PortalSearch<Pair>::Verdict::kOverlapping:
         break;
       case PortalSearch<Pair>::Verdict::kStopped:
-        result = absl::CancelledError("stopped in an exact query");
+        result = Stopped();
         break;
     }
     return result;
@@ -142,15 +144,16 @@ class Search {
     return Report(found, search.directions_tried());
   }
 
-  // A and B in parallel planes, and the origin in the plane of C: thickened, the origin's position
-  // is that in the plane.
+  // A and B lie in parallel planes, and the origin in the plane of C. The origin has the same
+  // position relative to the thickened C as relative to C in the plane.
   absl::StatusOr<ExactSearchResult> SearchInPlane(const Direction& normal) {
     HULLD_CHECK(!IsZero(normal));
     int axis = 0;
     while (normal[axis].is_zero()) ++axis;
     PortalSearch<Pair> search(pair_, should_stop_);
-    // Any thickness will do; one of the size of the hulls keeps the search well shaped.
+    // Any thickness is valid; one of the size of the hulls keeps the search well shaped.
     const Coordinates width = pair_.Difference({pair_.FarthestA(Direction{1, 1, 1}), 0});
+    if (pair_.stopped()) return Stopped();
     Number half = 1;
     for (int i = 0; i < 3; ++i) {
       half += Sign(width[i]) < 0 ? Number(-width[i]) : width[i];
@@ -164,13 +167,14 @@ class Search {
     return result;
   }
 
-  // A and B on parallel lines along u, or points; w is a point of C.
-  ExactSearchResult SearchOnLine(const Coordinates& u, const Coordinates& w) {
+  // A and B lie on parallel lines along u, or are points; w is a point of C.
+  absl::StatusOr<ExactSearchResult> SearchOnLine(const Coordinates& u, const Coordinates& w) {
     const Direction across = Cross(u, w);
     if (!IsZero(across)) return Found(Relation::kSeparated, Cross(u, across), 1);
     for (const Coordinates& n : {u, Coordinates(-u)}) {
       const Direction along = Pair::ToDirection(n);
       const VertexPair farthest = {pair_.FarthestA(along), pair_.FarthestB(along)};
+      if (pair_.stopped()) return Stopped();
       if (Sign(Dot(n, pair_.Difference(farthest))) < 0) return Found(Relation::kSeparated, n, 2);
     }
     return Found(Relation::kTouching, AnyPerpendicular(u), 3);
@@ -181,7 +185,7 @@ class Search {
   const std::function<bool()>& should_stop_;
 };
 
-// Kept apart, so that only the width that is taken needs room on the stack.
+// Not inlined, so that only the selected width takes stack space.
 template <int kWords>
 [[gnu::noinline]] absl::StatusOr<ExactSearchResult> SearchWide(
     const FloatPair& pair, const SmallFrame& frame, const FloatSearchResult* end, bool with_axis,
@@ -189,15 +193,15 @@ template <int kWords>
   if (!WidePair<kWords>::Fits(frame)) {
     return absl::FailedPreconditionError("numbers of this pair may exceed the width");
   }
-  WidePair<kWords> wide(pair, frame);
+  WidePair<kWords> wide(pair, frame, should_stop);
   return Search<WidePair<kWords>>(wide, with_axis, should_stop).Run(end);
 }
 
 [[gnu::noinline]] absl::StatusOr<ExactSearchResult> SearchAny(
     const FloatPair& pair, const FloatSearchResult* end, bool with_axis,
     const std::function<bool()>& should_stop) {
-  // Where a fixed width holds its numbers, the search is one in that width.
-  ExactPair exact(pair, /*with_narrow=*/false);
+  // If a fixed width holds the pair's numbers, the search runs in that width.
+  ExactPair exact(pair, should_stop, /*with_narrow=*/false);
   return Search<ExactPair>(exact, with_axis, should_stop).Run(end);
 }
 

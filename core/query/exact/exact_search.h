@@ -19,17 +19,16 @@ namespace hulld {
 
 struct ExactSearchResult {
   Relation relation = Relation::kOverlapping;
-  // Separated and touching, where asked for: n, world frame, n.(a - b) <= 0 for all a and b, < 0
-  // when separated.
+  // Separated and touching, if requested: n, world frame, with n.(a - b) <= 0 for all a and b, < 0
+  // if separated.
   std::optional<IntegerVector> axis;
   uint64_t directions_tried = 0;
-  // Where touching and known: pairs whose differences hold 0 in their hull, with repetitions.
+  // Touching, if known: pairs with differences that contain 0 in their hull, with repetitions.
   uint32_t pair_count = 0;
   std::array<VertexPair, 3> pairs = {};
 };
 
-// In which integers an exact search computes. The answer is the same in all, axis and pairs
-// included.
+// The integers of an exact search. The answer is the same for all widths, axis and pairs included.
 enum class ExactWidth {
   kNarrowest,  // the least that are certain to hold every number that may come up
   k1Word,      // coordinates of 55 bits
@@ -39,16 +38,15 @@ enum class ExactWidth {
   kAny,        // integers of any size
 };
 
-// Decides the relation of two hulls that are not empty, exactly. `end`: where the search in
-// floating point ended without a verdict, which mostly shows the relation at once; may be null.
-// `with_axis`: whether the axis is wanted, which costs something where it is not otherwise needed
-// in integers of any size. CANCELLED when should_stop said so (it may be empty). `width`, for
-// tests: FAILED_PRECONDITION where the pair's numbers may exceed it.
+// Decides the relation of two non-empty hulls exactly. `end`: the final state of a floating-point
+// search without a verdict, which usually shows the relation at once; may be null. `with_axis`:
+// requests the axis, at an extra cost if it is not needed anyway in integers of any size. `width`,
+// for tests: FAILED_PRECONDITION if the pair's numbers may exceed it. CANCELLED: should_stop, which
+// may be empty, returned true.
 //
-// A flat Minkowski difference C, of dimension below 3, has no interior. Its plane or line either
-// misses the origin, or C is thickened along coordinate axes outside its span: that leaves the
-// position of the origin in the span as it was, and the portal search, which needs an interior,
-// applies.
+// A flat Minkowski difference C, of dimension below 3, has no interior. Either its plane or line
+// misses the origin, or C is thickened along coordinate axes outside its span. Thickening preserves
+// the position of the origin in the span, and the portal search, which needs an interior, applies.
 absl::StatusOr<ExactSearchResult> SearchExactly(const FloatPair& pair, const FloatSearchResult* end,
                                                 bool with_axis,
                                                 const std::function<bool()>& should_stop,

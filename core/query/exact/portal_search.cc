@@ -18,7 +18,7 @@ double LargestOf(const Vector& u, const Vector& v, const Vector& w) {
   return u.cwiseAbs().cwiseMax(v.cwiseAbs()).cwiseMax(w.cwiseAbs()).maxCoeff();
 }
 
-// Sign of `value` where it exceeds `bound`, otherwise nothing.
+// Returns the sign of `value` if it exceeds `bound`, otherwise nothing.
 std::optional<int> CertainSign(double value, double bound) {
   if (value > bound) return 1;
   if (value < -bound) return -1;
@@ -27,7 +27,7 @@ std::optional<int> CertainSign(double value, double bound) {
 
 }  // namespace
 
-// A direction in floating point, where filtered, and exactly once it is asked for.
+// A direction in floating point, if filtered, and exactly on demand.
 template <typename Pair>
 class PortalSearch<Pair>::Direction {
  public:
@@ -58,7 +58,7 @@ class PortalSearch<Pair>::Direction {
         break;
     }
   }
-  // Requires n not zero.
+  // Requires: n not zero.
   Direction(const PortalSearch& search, ExactDirection n)
       : search_(search), kind_(Kind::kOther), exact_(std::move(n)) {
     if (!search.filtered_) return;
@@ -66,7 +66,7 @@ class PortalSearch<Pair>::Direction {
     error_ = kScaledDoublesError * LargestOf(n_);
   }
 
-  // Requires filtered, and n not zero, of integers below 2^62.
+  // Requires: filtered, and n not zero, of integers below 2^62.
   Direction(const PortalSearch& search, const Vector& n)
       : search_(search), kind_(Kind::kOther), n_(n) {
     exact_ = ExactDirection{static_cast<int64_t>(n.x()), static_cast<int64_t>(n.y()),
@@ -84,7 +84,7 @@ class PortalSearch<Pair>::Direction {
   const Point& p() const { return *p_; }
   const Point& q() const { return *q_; }
   const Point& r() const { return *r_; }
-  // Where filtered: each component within error() of the exact one.
+  // If filtered: each component within error() of the exact one.
   const Vector& n() const { return n_; }
   double error() const { return error_; }
 
@@ -113,7 +113,7 @@ class PortalSearch<Pair>::Direction {
       case Kind::kOther:
         break;
     }
-    // A direction that was given is exact from the start.
+    // A given direction is exact from the start.
     HULLD_UNREACHABLE();
   }
 
@@ -160,7 +160,7 @@ const typename Pair::Coordinates& PortalSearch<Pair>::ExactRay() const {
   return *exact_ray_;
 }
 
-// Sign of det[p, q, r].
+// Returns the sign of det[p, q, r].
 template <typename Pair>
 int PortalSearch<Pair>::Sign3(const Point& p, const Point& q, const Point& r) const {
   if (filtered_) {
@@ -171,8 +171,9 @@ int PortalSearch<Pair>::Sign3(const Point& p, const Point& q, const Point& r) co
   return Sign(Dot(Cross(Exact(q), Exact(r)), Exact(p)));
 }
 
-// Sign of det[d, p - c, q - c]: +1 when q is to the left of p seen along the ray. Ties as in the
-// class comment: the derivative by c is (p - q) x d. Zero only when p - q is parallel to the ray.
+// Returns the sign of det[d, p - c, q - c]: +1 if q is to the left of p seen along the ray. Ties
+// are broken as in the class comment: the derivative by c is (p - q) x d. Zero only if p - q is
+// parallel to the ray.
 template <typename Pair>
 int PortalSearch<Pair>::TurnOf(const Point& p, const Point& q) const {
   if (filtered_) {
@@ -190,7 +191,7 @@ int PortalSearch<Pair>::TurnOf(const Point& p, const Point& q) const {
   return 0;
 }
 
-// Whether ray x p = 0.
+// Returns true if ray x p = 0.
 template <typename Pair>
 bool PortalSearch<Pair>::IsOnRay(const Point& p) const {
   if (filtered_) {
@@ -201,7 +202,7 @@ bool PortalSearch<Pair>::IsOnRay(const Point& p) const {
   return IsZero(Cross(ExactRay(), Exact(p)));
 }
 
-// Sign of n.w.
+// Returns the sign of n.w.
 template <typename Pair>
 int PortalSearch<Pair>::SignAlong(Direction& n, const Point& w) const {
   if (filtered_ && n.kind() == Kind::kRay && !n.negated()) {
@@ -236,7 +237,7 @@ int PortalSearch<Pair>::SignAlong(Direction& n, const Point& w) const {
   return Sign(Dot(n.exact(), Exact(w)));
 }
 
-// Sign of n.(w - p) for the normal n of the portal p, q, r.
+// Returns the sign of n.(w - p) for the normal n of the portal p, q, r.
 template <typename Pair>
 int PortalSearch<Pair>::SignOfAdvance(Direction& n, const Point& p, const Point& q, const Point& r,
                                       const Point& w) const {
@@ -251,7 +252,7 @@ int PortalSearch<Pair>::SignOfAdvance(Direction& n, const Point& p, const Point&
   return Sign(Dot(n.exact(), Coordinates(Exact(w) - Exact(p))));
 }
 
-// Floating point leaves few candidates, mostly one; among several exact values decide.
+// Floating point leaves few candidates, usually one; among several, exact values decide.
 template <typename Pair>
 typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   ++directions_tried_;
@@ -271,12 +272,13 @@ typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   return point;
 }
 
-// Explores along n; a result when that settles it.
+// Explores along n. Returns a result if that decides the relation.
 template <typename Pair>
 std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::Explore(Direction& n,
                                                                                Point* farthest) {
   if (poll_.Step()) return Result{};
   *farthest = Farthest(n);
+  if (pair_.stopped()) return Result{};
   if (SignAlong(n, *farthest) < 0) return Result{Verdict::kSeparated, n.exact(), {}};
   return std::nullopt;
 }
@@ -313,12 +315,13 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryEnd(
   }
 }
 
-// The result where no vertex is beyond the origin along n; `holding` are corners whose hull holds
-// the origin, where they are known.
+// Returns the result if no vertex is beyond the origin along n. `holding`: corners with a hull that
+// contains the origin, if known.
 template <typename Pair>
 std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::Judge(
     Direction& n, const std::array<const Point*, 3>& holding) {
   const Point w = Farthest(n);
+  if (pair_.stopped()) return Result{};
   const int side = SignAlong(n, w);
   if (side < 0) return Result{Verdict::kSeparated, n.exact(), {}};
   if (side > 0 || holding[0] == nullptr) return std::nullopt;
@@ -331,8 +334,8 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryDirect
     const Vector& direction, const Point& corner) {
   const double largest = LargestOf(direction);
   if (!(largest > 0)) return std::nullopt;
-  // Rounded to few bits, so that a direction close to an axis becomes that axis. It need not be
-  // exact: where the corner is the only contact, a cone of directions supports C there.
+  // Rounds to few bits, so that a direction close to an axis becomes that axis. The direction need
+  // not be exact: if the corner is the only contact, a cone of directions supports C there.
   const Vector n = (direction * std::ldexp(1.0, 30 - std::ilogb(largest))).array().round();
   Direction rounded(*this, n);
   const Point* const holding = IsZero(Exact(corner)) ? &corner : nullptr;
@@ -348,8 +351,8 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTriang
   if (IsZero(normal)) return std::nullopt;
   bool holds = Sign3(p, q, r) == 0;
   if (holds) {
-    // The origin's coordinates in the triangle: products that are parallel to the normal, so that a
-    // component in which it is not zero tells their signs.
+    // The origin's coordinates in the triangle are products parallel to the normal, so a component
+    // in which the normal is not zero gives their signs.
     int axis = 0;
     while (normal[axis].is_zero()) ++axis;
     int least = 1;
@@ -376,7 +379,7 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTetrah
   if (*least == *most || (*least < 0 && *most > 0)) return std::nullopt;
   for (int i = 0; i < 4; ++i) {
     if (weights[i] != 0) continue;
-    // The origin is on the face across from corner i.
+    // The origin is on the face opposite to corner i.
     const std::array<const Point*, 3> face = {&corners[(i + 1) % 4], &corners[(i + 2) % 4],
                                               &corners[(i + 3) % 4]};
     Direction n(*this, Kind::kNormal, face[0], face[1], face[2]);
@@ -395,7 +398,7 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::FindPorta
   Direction along(*this, Kind::kRay);
   if (auto result = Explore(along, &p)) return result;
   if (IsOnRay(p)) {
-    // p is on the ray's line; a vertex farthest along a direction across the ray is not.
+    // p is on the ray's line; a vertex farthest along a direction perpendicular to the ray is not.
     Direction across(*this, Pair::ToDirection(AnyPerpendicular(ExactRay())));
     if (auto result = Explore(across, &p)) return result;
   }
@@ -416,13 +419,14 @@ template <typename Pair>
 typename PortalSearch<Pair>::Result PortalSearch<Pair>::RefinePortal() {
   auto& [p, q, r] = portal_;
   for (;;) {
-    // n.p, as the triple product is the same for edges and for points.
+    // n.p: the triple product is the same for edges and for points.
     const int side = Sign3(p, q, r);
     if (side > 0) return {Verdict::kOverlapping, {}, {}};
     Point w;
     Direction n(*this, Kind::kNormal, &p, &q, &r);
     if (poll_.Step()) return {};
     w = Farthest(n);
+    if (pair_.stopped()) return {};
     const bool is_corner = std::any_of(portal_.begin(), portal_.end(), [&](const Point& corner) {
       return corner.pair == w.pair && corner.side == w.side;
     });
@@ -434,7 +438,7 @@ typename PortalSearch<Pair>::Result PortalSearch<Pair>::RefinePortal() {
   }
 }
 
-// Puts w in place of the corner that leaves the ray crossing the portal. Corners turn left in
+// Replaces a corner by w so that the ray still crosses the portal. Corners are in counter-clockwise
 // order; exactly one consecutive pair has w to the right of the first and to the left of the
 // second, unless w is in line with a corner.
 template <typename Pair>

@@ -13,25 +13,25 @@
 
 namespace hulld {
 
-// Where the origin lies relative to a convex set C of dimension 3, by shooting a ray from a point
-// inside C through the origin and looking for the facet of C through which it leaves. C is A - B,
-// or A - B thickened along a coordinate axis.
+// Finds the position of the origin relative to a convex set C of dimension 3. Shoots a ray from a
+// point inside C through the origin and searches for the facet of C through which it leaves. C is A
+// - B, or A - B thickened along a coordinate axis.
 //
-// A portal is a triangle of vertices of C that the ray crosses. Its plane's far side is explored by
-// the support vertex w along its normal n, pointing away from the centre: if n.w < 0, all of C is
-// below the origin and n separates; if the portal itself lies beyond the origin, the origin is
-// interior; if w is no farther than the portal, the plane supports C there and the origin, which is
-// not below the plane, lies on it. Otherwise w replaces the corner of the portal that leaves the
-// ray crossing it, and the crossing moves outwards.
+// A portal is a triangle of vertices of C that the ray crosses. The search explores the far side of
+// its plane by the support vertex w along its normal n, pointing away from the centre. If n.w < 0,
+// all of C is below the origin and n separates. If the portal itself lies beyond the origin, the
+// origin is interior. If w is no farther than the portal, the plane supports C there and the
+// origin, which is not below the plane, lies on it. Otherwise w replaces a corner of the portal so
+// that the ray still crosses it, and the crossing moves outwards.
 //
-// Ties: the centre c is taken to be c + (e, e^2, e^3) for an infinitesimal e, the ray's direction d
-// = -c being kept. Then the ray crosses no edge, unless the edge is parallel to it; every
-// refinement moves the crossing strictly outwards, so that with exact signs the search ends for
-// every input. All signs are exact: floating point with a proven bound decides most, integers the
-// rest. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals; Edelsbrunner
-// and Mücke 1990 (simulation of simplicity) for the ties.
+// Ties: the centre c is taken to be c + (e, e^2, e^3) for an infinitesimal e, with the ray's
+// direction d = -c unchanged. The ray then crosses no edge, unless the edge is parallel to it, and
+// every refinement moves the crossing strictly outwards, so with exact signs the search terminates
+// for every input. All signs are exact: floating point with a proven bound decides most, integers
+// the rest. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals;
+// Edelsbrunner and Mücke 1990 (simulation of simplicity) for the ties.
 //
-// Pair is ExactPair or a WidePair: the same search in integers of any width or of a fixed one.
+// Pair is ExactPair or a WidePair: integers of any width or of a fixed one.
 template <typename Pair>
 class PortalSearch {
  public:
@@ -39,8 +39,8 @@ class PortalSearch {
   using Coordinates = typename Pair::Coordinates;
   using ExactDirection = typename Pair::Direction;
 
-  // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
-  // dimension 3 (unchecked: SearchExactly finds the dimension first).
+  // `pair` and `should_stop`, which may be empty, must outlive the search. Requires: C of dimension
+  // 3 (unchecked: SearchExactly finds the dimension first).
   PortalSearch(Pair& pair, const std::function<bool()>& should_stop);
 
   // Thickens C: by +-half along a coordinate axis.
@@ -51,36 +51,36 @@ class PortalSearch {
     Verdict verdict = Verdict::kStopped;
     // Separated and touching: from A towards B, n.w <= 0 for all w in C.
     std::optional<ExactDirection> axis;
-    // Touching: pairs whose vertices of C are a triangle, possibly degenerate, that holds the
-    // origin.
+    // Touching: pairs for which the vertices of C are a triangle, possibly degenerate, that
+    // contains the origin.
     std::optional<std::array<VertexPair, 3>> portal;
   };
   Result Run();
 
-  // What the end of the search in floating point shows once its signs are made exact; nothing where
-  // that is not enough. It costs a fraction of Run, and works for a C of any dimension that is not
-  // thickened.
+  // Decides from the final state of a floating-point search by making its signs exact; returns
+  // nothing if that is not sufficient. Costs a fraction of Run, and works for a C of any dimension
+  // that is not thickened.
   //
-  // A direction along which nothing reaches the origin separates, whatever it was found by. A
-  // tetrahedron of vertices of C that holds the origin strictly inside shows an overlap. And a
-  // corner that is the origin, or a face that holds it, shows that the origin is in C, so that a
-  // supporting plane through it shows that it is on the boundary.
+  // A direction along which nothing reaches the origin separates, regardless of its source. A
+  // tetrahedron of vertices of C with the origin strictly inside proves an overlap. A corner equal
+  // to the origin, or a face that contains it, proves that the origin is in C, and then a
+  // supporting plane through the origin proves that it is on the boundary.
   std::optional<Result> TryEnd(const FloatSearchResult& end);
 
   uint64_t directions_tried() const { return directions_tried_; }
 
  private:
-  // A vertex of C, or the centre; in floating point within kMinkowskiErrorFactor of the pair's size
-  // where there is a filter.
+  // A vertex of C, or the centre. In floating point within kMinkowskiErrorFactor of the pair's size
+  // if there is a filter.
   struct Point {
     VertexPair pair = {};
-    // The end of C's thickness, -1 or 1; 0 when C is not thickened.
+    // The end of C's thickness, -1 or 1; 0 if C is not thickened.
     int side = 0;
     Vector w = Vector::Zero();
-    // Once it is asked for.
+    // Computed on demand.
     mutable std::optional<Coordinates> exact;
   };
-  // What a direction is made of.
+  // The construction of a direction.
   enum class Kind {
     kRay,            // the ray's
     kAcrossPoint,    // ray x p
@@ -111,13 +111,13 @@ class PortalSearch {
 
   Pair& pair_;
   StopPoll poll_;
-  // Whether floating point may decide.
+  // True if floating point may decide.
   bool filtered_;
-  // Bound of the error of a point's components, where filtered.
+  // Error bound of a point's components, if filtered.
   double position_error_;
   int axis_ = -1;
   Number half_;
-  // From the centre through the origin; exactly once it is asked for.
+  // From the centre through the origin; the exact value is computed on demand.
   mutable std::optional<Coordinates> exact_ray_;
   Vector ray_ = Vector::Zero();
   std::array<Point, 3> portal_;

@@ -4,10 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/scan_poll.h"
 #include "core/hull/hull.h"
 #include "core/numeric/integer.h"
 #include "core/numeric/wide_integer.h"
@@ -17,17 +19,18 @@
 
 namespace hulld {
 
-// What ExactPair is, in integers of a fixed width: for the search of the relation alone, without
-// allocation. The coordinates are the same integers.
+// An ExactPair in integers of a fixed width, without allocation, for searches of the relation
+// alone. The coordinates are the same integers.
 //
-// Widths: let world coordinates be below 2^c, c = SmallFrame::bits <= 64 kWords - 9. Vertices of A
-// - B are below 2^(c + 1), thickened ones (portal_search.h) below 2^(c + 4), their differences
-// below 2^(c + 5). The ray, with sums of at most ten vertices times at most ten, is below 200 * 2^c
-// < 2^(c
-// + 8): kWords hold it. A cross product of the ray and a difference is below 2 * 2^(2 c + 13), one
-// of two differences below 2 * 2^(2 c + 10): 2 kWords hold them, 2 c + 14 <= 128 kWords - 4. A
-// product of such a direction with a difference of vertices is below 3 * 2^(3 c + 19) < 2^(3 c +
-// 21) <= 2^(192 kWords - 6): 3 kWords hold it. Proven.
+// Widths (**proven**): let world coordinates be below 2^c, c = SmallFrame::bits <= 64 kWords - 9.
+// - Vertices of A - B are below 2^(c + 1), thickened ones (portal_search.h) below 2^(c + 4), and
+//   their differences below 2^(c + 5).
+// - The ray, with sums of at most ten vertices times at most ten, is below 200 * 2^c < 2^(c + 8):
+//   kWords hold it.
+// - A cross product of the ray and a difference is below 2 * 2^(2 c + 13), one of two differences
+//   below 2 * 2^(2 c + 10): 2 kWords hold them, 2 c + 14 <= 128 kWords - 4.
+// - Its product with a difference of vertices is below 3 * 2^(3 c + 19) < 2^(3 c + 21) <=
+//   2^(192 kWords - 6): 3 kWords hold it.
 template <int kWords>
 class WidePair {
  public:
@@ -40,9 +43,12 @@ class WidePair {
            frame.b.own_bits <= kMostOwnBits;
   }
 
-  // `filter` must outlive the pair. Requires Fits(frame), and the frame to be that of the filter.
-  WidePair(const FloatPair& filter, const SmallFrame& frame)
-      : filter_(&filter), a_(filter.a(), frame.a), b_(filter.b(), frame.b) {
+  // Requires: Fits(frame), and the frame of `filter`. `filter` and should_stop, which may be empty,
+  // must outlive the pair. Scans of many vertices poll should_stop; after stopped(), their results
+  // are meaningless.
+  WidePair(const FloatPair& filter, const SmallFrame& frame,
+           const std::function<bool()>& should_stop)
+      : filter_(&filter), poll_(should_stop), a_(filter.a(), frame.a), b_(filter.b(), frame.b) {
     HULLD_DCHECK(Fits(frame));
     const WideInteger<2> norm_a = WideOf(frame.a.rotation.norm);
     const WideInteger<2> norm_b = WideOf(frame.b.rotation.norm);
@@ -65,6 +71,7 @@ class WidePair {
   }
 
   const FloatPair& filter() const { return *filter_; }
+  bool stopped() const { return poll_.stopped(); }
   const QueryHull& a() const { return a_.placed->query_hull(); }
   const QueryHull& b() const { return b_.placed->query_hull(); }
 
@@ -72,37 +79,45 @@ class WidePair {
   Coordinates VertexB(uint32_t i) { return b_.Vertex(i); }
   Coordinates Difference(VertexPair pair) { return VertexA(pair.a) - VertexB(pair.b); }
 
-  // The lowest of the vertices of A farthest along n, and of B farthest against it; among all, or
-  // among `candidates`, ascending, when it is known to be one of these.
+  // Return the lowest of the vertices of A farthest along n, and of B farthest against it: among
+  // all, or among `candidates`, ascending, if the result is known to be one of these.
   uint32_t FarthestA(const Direction& n) {
     CandidateBuffer buffer;
-    return a_.Farthest(n, CandidatesOf(a_, n, [&](const Vector& n_W, double error) {
-                         return filter_->CandidatesA(n_W, error, buffer);
-                       }));
+    return a_.Farthest(n,
+                       CandidatesOf(a_, n,
+                                    [&](const Vector& n_W, double error) {
+                                      return filter_->CandidatesA(n_W, error, buffer);
+                                    }),
+                       poll_);
   }
   uint32_t FarthestB(const Direction& n) {
     CandidateBuffer buffer;
-    return b_.Farthest(-n, CandidatesOf(b_, n, [&](const Vector& n_W, double error) {
-      return filter_->CandidatesB(n_W, error, buffer);
-    }));
+    return b_.Farthest(-n,
+                       CandidatesOf(b_, n,
+                                    [&](const Vector& n_W, double error) {
+                                      return filter_->CandidatesB(n_W, error, buffer);
+                                    }),
+                       poll_);
   }
   uint32_t FarthestA(const Direction& n, std::span<const uint32_t> candidates) {
-    return a_.Farthest(n, candidates);
+    return a_.Farthest(n, candidates, poll_);
   }
   uint32_t FarthestB(const Direction& n, std::span<const uint32_t> candidates) {
-    return b_.Farthest(-n, candidates);
+    return b_.Farthest(-n, candidates, poll_);
   }
 
-  // All of the candidates farthest along n, or against it. Keeps no vertices, so that several
-  // threads may ask at once.
-  std::vector<uint32_t> FeatureA(const Direction& n, std::span<const uint32_t> candidates) const {
-    return a_.Feature(n, candidates);
+  // Return all candidates farthest along n, or against it; poll `poll`. Thread-safe, because they
+  // cache no vertices.
+  std::vector<uint32_t> FeatureA(const Direction& n, std::span<const uint32_t> candidates,
+                                 ScanPoll& poll) const {
+    return a_.Feature(n, candidates, poll);
   }
-  std::vector<uint32_t> FeatureB(const Direction& n, std::span<const uint32_t> candidates) const {
-    return b_.Feature(-n, candidates);
+  std::vector<uint32_t> FeatureB(const Direction& n, std::span<const uint32_t> candidates,
+                                 ScanPoll& poll) const {
+    return b_.Feature(-n, candidates, poll);
   }
 
-  // A positive multiple of a point in the relative interior of A - B (see ExactPair).
+  // Returns a positive multiple of a point in the relative interior of A - B (see ExactPair).
   Coordinates CenterDifference() const {
     Coordinates difference;
     const Coordinates sum_a = a_.SumOfInnerVertices();
@@ -120,10 +135,10 @@ class WidePair {
   }
 
  private:
-  // Own coordinates of at most this many bits take one word, and sums of ten of them do.
+  // Own coordinates of at most this many bits fit in one word, and so do sums of ten of them.
   static constexpr int kOneWordBits = 59;
   static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
-  // This many vertices, from the first on, are kept once they are multiplied out.
+  // Number of vertices, from the first on, that are cached after they are multiplied out.
   static constexpr uint32_t kKept = 32;
 
   struct Side {
@@ -160,15 +175,19 @@ class WidePair {
       return kept[i];
     }
 
-    // None: all are candidates.
-    uint32_t Farthest(const Direction& n, std::span<const uint32_t> candidates) {
+    // An empty `candidates` stands for all vertices.
+    uint32_t Farthest(const Direction& n, std::span<const uint32_t> candidates, ScanPoll& poll) {
       if (candidates.size() == 1) return candidates[0];
       uint32_t best = candidates.empty() ? 0 : candidates[0];
       auto largest = Dot(n, Vertex(best));
       if (candidates.empty()) {
-        for (uint32_t i = 1; i < vertex_count(); ++i) Consider(n, i, best, largest);
+        for (uint32_t i = 1; i < vertex_count() && !poll.StopsAfter(i); ++i) {
+          Consider(n, i, best, largest);
+        }
       } else {
-        for (const uint32_t i : candidates.subspan(1)) Consider(n, i, best, largest);
+        for (size_t k = 1; k < candidates.size() && !poll.StopsAfter(k); ++k) {
+          Consider(n, candidates[k], best, largest);
+        }
       }
       return best;
     }
@@ -181,10 +200,13 @@ class WidePair {
       largest = value;
     }
 
-    std::vector<uint32_t> Feature(const Direction& n, std::span<const uint32_t> candidates) const {
+    std::vector<uint32_t> Feature(const Direction& n, std::span<const uint32_t> candidates,
+                                  ScanPoll& poll) const {
       std::vector<uint32_t> farthest;
       WideInteger<3 * kWords> largest(0);
+      size_t seen = 0;
       for (const uint32_t i : candidates) {
+        if (poll.StopsAfter(++seen)) break;
         const auto value = Dot(n, MakeVertex(i));
         const int order = farthest.empty() ? 1 : Sign(value - largest);
         if (order < 0) continue;
@@ -218,13 +240,13 @@ class WidePair {
     // world = rows * own + shift.
     std::array<Coordinates, 3> rows;
     Coordinates shift;
-    // Which of `kept` are set.
+    // Bit set of valid elements of `kept`.
     uint32_t known = 0;
     std::array<Coordinates, kKept> kept;
   };
 
-  // The candidates that floating point leaves of a large hull. None of a small one, which stands
-  // for all.
+  // Returns the candidates that floating point leaves of a large hull. Empty for a small hull, to
+  // stand for all vertices.
   template <typename Candidates>
   std::span<const uint32_t> CandidatesOf(const Side& side, const Direction& n,
                                          Candidates candidates) const {
@@ -250,8 +272,8 @@ class WidePair {
             WideIntegerOf<kWords>(t.z(), exponent)};
   }
 
-  // The norm of a hull's rotation times its translation over 2^exponent. With the rows and norm n_B
-  // of a body, and n_P of its piece: n_P (rows_B t_P + n_B t_B).
+  // Returns the norm of a hull's rotation times its translation over 2^exponent. With the rows and
+  // norm n_B of a body, and n_P of its piece: n_P (rows_B t_P + n_B t_B).
   static Coordinates ScaledTranslation(const PlacedHull& placed, const SmallFrame::Side& side,
                                        int exponent) {
     Coordinates scaled;
@@ -278,7 +300,7 @@ class WidePair {
     return scaled;
   }
 
-  // b_.shift, where a pose is a product of two.
+  // Computes b_.shift if a pose is a product of two.
   void ShiftByProducts(const SmallFrame& frame) {
     Coordinates of_a = ScaledTranslation(filter_->a(), frame.a, frame.exponent);
     Coordinates of_b = ScaledTranslation(filter_->b(), frame.b, frame.exponent);
@@ -292,6 +314,7 @@ class WidePair {
   }
 
   const FloatPair* filter_;
+  ScanPoll poll_;
   Side a_;
   Side b_;
 };

@@ -10,29 +10,53 @@
 namespace hulld {
 
 // A closed surface of triangles that grows by cones over parts of itself: the combinatorial half of
-// an expanding polytope, for whatever arithmetic. Facets are counter-clockwise seen from outside.
+// an expanding polytope, for any arithmetic. Facets are counter-clockwise seen from outside.
 class ExpandingSurface {
  public:
   struct Facet {
     std::array<uint32_t, 3> corners;
-    // Across the edge from corner i to corner i + 1: the facet, and which of its edges it is there.
+    // Across the edge from corner i to corner i + 1: the neighbouring facet, and the index of the
+    // edge there.
     std::array<uint32_t, 3> neighbors;
     std::array<uint8_t, 3> their_edges;
     bool alive = true;
   };
 
-  // All facets that ever were; those that are not alive keep their places.
+  // All facets. Dead facets keep their places until Compact().
   const std::vector<Facet>& facets() const { return facets_; }
 
-  // Sets memory aside for as many facets, dead ones included.
+  // True if there are many facets and most of them are dead.
+  bool HasManyDead() const {
+    return facets_.size() >= kLeastCompacted && dead_ > facets_.size() / 2;
+  }
+  // Drops dead facets and keeps the order of live ones. Returns the new index of each facet, kGone
+  // if dropped. Cost: O(facets), so amortized O(1) for each facet created.
+  static constexpr uint32_t kGone = UINT32_MAX;
+  std::vector<uint32_t> Compact() {
+    std::vector<uint32_t> places(facets_.size(), kGone);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < facets_.size(); ++i) {
+      if (!facets_[i].alive) continue;
+      places[i] = count;
+      facets_[count++] = facets_[i];
+    }
+    facets_.resize(count);
+    for (Facet& facet : facets_) {
+      for (uint32_t& neighbor : facet.neighbors) neighbor = places[neighbor];
+    }
+    dead_ = 0;
+    return places;
+  }
+
+  // Reserves memory for `count` facets, including dead ones.
   void Reserve(size_t count) {
     facets_.reserve(count);
     horizon_.reserve(count);
     stack_.reserve(count);
   }
 
-  // The four facets of a tetrahedron of the vertices 0 to 3, of which 3 is inside of the facet 0,
-  // 1, 2.
+  // Creates the four facets of a tetrahedron of the vertices 0 to 3. Vertex 3 is on the inner side
+  // of facet 0, 1, 2.
   void Start() {
     facets_ = {{{0, 1, 2}, {1, 2, 3}, {2, 2, 2}},
                {{0, 3, 1}, {3, 2, 0}, {1, 0, 0}},
@@ -42,14 +66,14 @@ class ExpandingSurface {
 
   // Removes the facets that are connected to `start` through facets for which visible(facet) holds,
   // and closes the gap by triangles from its edge to the vertex `apex`. Returns the index of the
-  // first of these triangles, which are the last facets. Returns nothing, and leaves a surface of
-  // no further use, when the edge of the gap is not one closed loop. `start` is taken to be
-  // visible.
+  // first of these triangles, which are the last facets. If the edge of the gap is not a single
+  // closed loop, returns nothing and leaves an unusable surface. `start` is assumed visible.
   template <typename Visible>
   std::optional<uint32_t> Expand(uint32_t start, uint32_t apex, Visible visible) {
     horizon_.clear();
     stack_.clear();
     facets_[start].alive = false;
+    ++dead_;
     for (int i = 2; i >= 0; --i) Push(facets_[start], i);
     while (!stack_.empty()) {
       const Side side = stack_.back();
@@ -61,6 +85,7 @@ class ExpandingSurface {
         continue;
       }
       facet.alive = false;
+      ++dead_;
       Push(facet, (side.edge + 2) % 3);
       Push(facet, (side.edge + 1) % 3);
     }
@@ -68,6 +93,8 @@ class ExpandingSurface {
   }
 
  private:
+  static constexpr size_t kLeastCompacted = 4096;
+
   struct Side {
     uint32_t facet;
     uint8_t edge;
@@ -77,7 +104,7 @@ class ExpandingSurface {
     stack_.push_back({facet.neighbors[edge], facet.their_edges[edge]});
   }
 
-  // The sides of the horizon follow each other round the gap.
+  // Consecutive sides of the horizon are adjacent around the gap.
   std::optional<uint32_t> AddCone(uint32_t apex) {
     const auto first = static_cast<uint32_t>(facets_.size());
     const auto count = static_cast<uint32_t>(horizon_.size());
@@ -99,6 +126,7 @@ class ExpandingSurface {
   }
 
   std::vector<Facet> facets_;
+  size_t dead_ = 0;
   std::vector<Side> horizon_;
   std::vector<Side> stack_;
 };

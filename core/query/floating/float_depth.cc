@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <unordered_set>
 #include <utility>
 
 #include "core/base/check.h"
@@ -18,29 +19,31 @@
 namespace hulld {
 namespace {
 
-// A vertex this little above a facet leaves it in place; relative to the pair's size. Far below the
-// default error, far above rounding: flat parts of A - B are not cut into slivers.
+// Least height of a vertex above a facet, relative to the pair's size, that removes the facet. Far
+// below the default error, far above rounding: flat parts of A - B are not cut into slivers.
 constexpr double kRelativeVisibility = 0x1p-46;
-// Where memory is set aside. Observed: links of a robot's arm need 15 vertices.
+// Reserved capacity. Observed: links of a robot's arm need 15 vertices.
 constexpr size_t kUsualVertices = 32;
 constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
+// Number of corners up to which a lookup scans.
+constexpr size_t kMostScanned = 64;
 
 using Corner = MinkowskiVertex<PlainVector>;
 
 // The plane of a facet.
 struct Plane {
   PlainVector n;  // unit length, outward
-  // The least n . p over its corners p.
+  // The least n . p over the facet's corners p.
   double distance = 0;
-  // Whether the corners are certain to turn left as seen from outside, about the origin.
+  // True if the corners are certainly counter-clockwise seen from outside, about the origin.
   bool outward = false;
 };
 
 class Expansion {
  public:
-  Expansion(const FloatPair& pair, const SeparationGoal& goal)
-      : pair_(pair), goal_(goal), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {
+  Expansion(const FloatPair& pair, const SeparationGoal& goal, StopPoll& poll)
+      : pair_(pair), goal_(goal), poll_(poll), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {
     corners_.reserve(kUsualVertices);
     planes_.reserve(kUsualFacets);
     heap_.reserve(kUsualFacets);
@@ -76,7 +79,7 @@ class Expansion {
     return farthest;
   }
 
-  // A tetrahedron, its corner 3 inside of its facet 0, 1, 2.
+  // Builds a tetrahedron with corner 3 on the inner side of facet 0, 1, 2.
   bool Start(std::span<const VertexPair> start) {
     if (start.size() == 4) {
       for (const VertexPair& pair : start) corners_.push_back(At(pair));
@@ -89,7 +92,7 @@ class Expansion {
     return AddPlanes(0);
   }
 
-  // The farther of the two vertices farthest along and against n, as seen from the corner 0.
+  // Adds the vertex farthest along or against n, choosing the one farther from corner 0.
   bool AddFarther(PlainVector n) {
     const double length = Norm(n);
     if (!(length > 0)) return false;
@@ -114,7 +117,7 @@ class Expansion {
     return AddFarther(Cross(e, corners_[2].w - corners_[0].w));
   }
 
-  // For all facets from `first` on.
+  // Computes planes for all facets from `first` on.
   bool AddPlanes(uint32_t first) {
     planes_.resize(surface_.facets().size());
     for (uint32_t i = first; i < planes_.size(); ++i) {
@@ -128,7 +131,7 @@ class Expansion {
       const PlainVector n = (1 / length) * normal;
       const double distance = std::min(Dot(n, p), std::min(Dot(n, q), Dot(n, r)));
       planes_[i] = {n, distance, length * distance > kLeastOutward};
-      // One beyond the upper bound never becomes the nearest.
+      // A facet beyond the upper bound never becomes the nearest.
       if (distance * unit_ > bounds_.high) continue;
       heap_.emplace_back(distance, i);
       std::push_heap(heap_.begin(), heap_.end(), std::greater<>());
@@ -136,7 +139,7 @@ class Expansion {
     return true;
   }
 
-  // The nearest facet; none when all are beyond the upper bound.
+  // Returns the nearest facet; none if all are beyond the upper bound.
   std::optional<uint32_t> Nearest() {
     while (!heap_.empty() && !surface_.facets()[heap_.front().second].alive) {
       std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
@@ -152,25 +155,34 @@ class Expansion {
     return std::min(bounds_.high, distance - kTriangleDistanceErrorFactor * pair_.size());
   }
 
-  bool Contains(VertexPair pair) const {
-    return std::any_of(corners_.begin(), corners_.end(),
-                       [&](const Corner& corner) { return corner.pair == pair; });
+  // Scans a few corners, because a set needs allocations.
+  bool Contains(VertexPair pair) {
+    const size_t scanned = std::min(corners_.size(), kMostScanned);
+    const bool is_early =
+        std::any_of(corners_.begin(), corners_.begin() + static_cast<ptrdiff_t>(scanned),
+                    [&](const Corner& corner) { return corner.pair == pair; });
+    while (late_.size() + scanned < corners_.size()) {
+      late_.insert(KeyOf(corners_[late_.size() + scanned].pair));
+    }
+    return is_early || late_.contains(KeyOf(pair));
   }
+  static uint64_t KeyOf(VertexPair pair) { return uint64_t{pair.a} << 32 | pair.b; }
 
   bool IsAbove(uint32_t facet, const Corner& corner) const {
     return Dot(planes_[facet].n, corner.w) > planes_[facet].distance + kRelativeVisibility;
   }
 
-  // Expands the nearest facet; false when the goal is met or nothing is gained.
+  // Expands the nearest facet. Returns false if the goal is met or no progress is possible.
   bool Step() {
     const std::optional<uint32_t> nearest = Nearest();
     if (!nearest || corners_.size() >= kMaxVertices) return false;
+    if (corners_.size() > kUsualVertices && poll_.Step()) return false;
     const PlainVector n = planes_[*nearest].n;
     const double low = std::max(0.0, Low(nearest));
     const FloatPair::Support farthest = Reach(n);
     if (goal_.Met(low, bounds_.high)) return false;
     const Corner corner = At(farthest.pair);
-    // One of its own vertices: the surface is not convex up to rounding.
+    // The vertex is a known corner: the surface is not convex up to rounding.
     if (!IsAbove(*nearest, corner) || Contains(farthest.pair)) return false;
     corners_.push_back(corner);
     const PlainVector w = corner.w;
@@ -179,10 +191,27 @@ class Expansion {
       return Dot(planes_[i].n, w) > planes_[i].distance + kRelativeVisibility;
     });
     intact_ = first && AddPlanes(*first);
+    if (intact_ && planes_.size() - *first > kUsualFacets) {
+      poll_.Step((planes_.size() - *first) / kUsualFacets);
+    }
+    if (intact_ && surface_.HasManyDead()) Compact();
     return intact_;
   }
 
-  // The proven lower bound; 0 when there is none.
+  // Drops dead facets.
+  void Compact() {
+    const std::vector<uint32_t> places = surface_.Compact();
+    for (uint32_t i = 0; i < places.size(); ++i) {
+      if (places[i] != ExpandingSurface::kGone) planes_[places[i]] = planes_[i];
+    }
+    planes_.resize(surface_.facets().size());
+    std::erase_if(
+        heap_, [&](const Entry& entry) { return places[entry.second] == ExpandingSurface::kGone; });
+    for (Entry& entry : heap_) entry.second = places[entry.second];
+    std::make_heap(heap_.begin(), heap_.end(), std::greater<>());
+  }
+
+  // Returns the proven lower bound; 0 if there is none.
   double ProvenLow() {
     if (!intact_ || planes_.empty()) return 0;
     const double low = Low(Nearest());
@@ -203,8 +232,8 @@ class Expansion {
     return some ? low : 0;
   }
 
-  // The point of the surface that is nearest to the origin: on one of the triangles of the nearest
-  // facet, if that is flat.
+  // Finds the point of the surface nearest to the origin: on one of the triangles of the nearest
+  // facet, if that facet is flat.
   void FindPoint() {
     double least = INFINITY;
     uint32_t nearest = 0;
@@ -234,9 +263,12 @@ class Expansion {
 
   const FloatPair& pair_;
   const SeparationGoal& goal_;
+  StopPoll& poll_;
   const double unit_;
   const double per_unit_;
   std::vector<Corner> corners_;
+  // Corners from kMostScanned on.
+  std::unordered_set<uint64_t> late_;
   ExpandingSurface surface_;
   std::vector<Plane> planes_;
   std::vector<Entry> heap_;
@@ -247,11 +279,11 @@ class Expansion {
 }  // namespace
 
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
-                            const SeparationGoal& goal, bool want_point,
+                            const SeparationGoal& goal, bool want_point, StopPoll& poll,
                             std::vector<VertexPair>& vertices) {
   HULLD_CHECK(pair.usable());
   HULLD_CHECK(start.empty() || start.size() == 4);
-  Expansion expansion(pair, goal);
+  Expansion expansion(pair, goal, poll);
   const SeparationBounds bounds = expansion.Run(start, want_point);
   if (!goal.Met(bounds.low, bounds.high)) expansion.AppendVertices(vertices);
   return bounds;

@@ -12,8 +12,8 @@
 namespace hulld {
 namespace {
 
-// More steps than this are spent only where rounding hinders the walk. Observed: random pairs of up
-// to 10000 vertices need fewer than 40.
+// Step limit. More steps occur only if rounding hinders the walk. Observed: random pairs of up to
+// 10000 vertices need fewer than 40.
 constexpr int kMaxSteps = 128;
 
 using Corner = MinkowskiVertex<Vector>;
@@ -35,7 +35,7 @@ class Walk {
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();
-      // In exact arithmetic every step is nearer.
+      // In exact arithmetic every step comes nearer.
       if (count_ == 0 || !Accept(part)) break;
       n = part.towards;
       if (goal_.Met(bounds_.low, bounds_.high)) break;
@@ -65,8 +65,8 @@ class Walk {
     if (count_ == 1) return NearestOfVertex(corners_[0].w);
     if (count_ == 2) return NearestOnEdge(corners_[0].w, corners_[1].w, 0, 1);
     if (count_ == 3) return OnFace(0, 1, 2);
-    // The newest corner is part of the nearest; a face away from the origin is not nearer than one
-    // that faces it.
+    // The nearest part includes the newest corner. A face away from the origin is never nearer than
+    // a face towards it.
     NearestPart best = OnFace(3, 0, 1);
     double least = best.point.squaredNorm();
     for (const NearestPart& part : {OnFace(3, 1, 2), OnFace(3, 2, 0)}) {
@@ -79,7 +79,7 @@ class Walk {
     return best;
   }
 
-  // Keeps the part; false when it is not nearer than the last.
+  // Keeps the part. Returns false if it is not nearer than the last.
   bool Accept(const NearestPart& part) {
     const double length = part.point.norm();
     if (!(length < nearest_)) return false;

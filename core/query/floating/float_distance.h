@@ -6,11 +6,11 @@
 
 namespace hulld {
 
-// The distance of two separated hulls, in floating point: Gilbert, Johnson and Keerthi's walk
-// (1988) until the goal is met or rounding ends it. Proven whatever the walk does: the distance is
-// at most that of any point of A - B, and at least minus the reach of A - B along any unit vector.
-// `n`: a direction to start along; zero gives no bounds. The bounds may miss the goal. Requires
-// pair.usable().
+// Bounds the distance of two separated hulls, in floating point, by the walk of Gilbert, Johnson
+// and Keerthi (1988) until the goal is met or rounding ends it. The bounds are **proven**
+// independently of the walk: the distance is at most that of any point of A - B, and at least minus
+// the reach of A - B along any unit vector. `n`: the initial direction; zero gives no bounds. The
+// bounds may miss the goal. Requires: pair.usable().
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal);
 
 }  // namespace hulld

@@ -37,7 +37,7 @@ std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
     buffer.many = placed.query_hull().Candidates(n_own, error, slack);
     return buffer.many;
   }
-  // A small hull is scanned here, as a list needs an allocation.
+  // Small hulls are scanned here, because a list needs an allocation.
   std::array<double, CandidateBuffer::kMostFew> values;
   double largest = -INFINITY;
   for (size_t i = 0; i < vertices.size(); ++i) {
@@ -58,8 +58,8 @@ Vector FloatPair::InnerPoint(const PlacedHull& placed) {
   const auto inner = placed.query_hull().inner_points();
   Vector sum = Vector::Zero();
   for (const uint32_t i : inner) sum += placed.query_hull().point(i);
-  // Not Eigen's product: that fuses products and sums where the processor can, and rounds
-  // otherwise.
+  // Avoids Eigen's product, which fuses products and sums where the processor can, with different
+  // rounding.
   return OutOfOwnFrame(placed, Vector(sum / static_cast<double>(inner.size())));
 }
 

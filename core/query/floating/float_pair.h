@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// Where lists of candidates live: those of small hulls without allocation.
+// Storage for lists of candidates; without allocation for small hulls.
 struct CandidateBuffer {
   static constexpr size_t kMostFew = 64;
   std::array<uint32_t, kMostFew> few;
@@ -23,11 +23,11 @@ struct CandidateBuffer {
 };
 
 // A pair of placed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
-// Everything is relative to the world shifted by -t_A: A is rotated only, B is rotated and moved by
-// t_B - t_A, so a common offset costs no accuracy.
+// All positions are relative to the world shifted by -t_A: A is only rotated, B is rotated and
+// moved by t_B - t_A, so a common offset costs no accuracy.
 class FloatPair {
  public:
-  // The hulls must outlive the pair. Requires both not empty.
+  // The hulls must outlive the pair. Requires: both not empty.
   FloatPair(const PlacedHull& a, const PlacedHull& b)
       : a_(&a),
         b_(&b),
@@ -43,11 +43,11 @@ class FloatPair {
 
   const PlacedHull& a() const { return *a_; }
   const PlacedHull& b() const { return *b_; }
-  // Whether the bounds below hold: false when the pair's size is beyond [kFilterMinSize,
-  // kFilterMaxSize], or when pieces of bodies are so far from the origins of these, or of the
-  // world, that rounding their poses is not small beside the pair.
+  // True if the bounds below hold. False if the pair's size is outside [kFilterMinSize,
+  // kFilterMaxSize], or if pieces of bodies are so far from the origins of their bodies, or of the
+  // world, that the rounding of their poses is not small relative to the pair.
   bool usable() const { return usable_; }
-  // The size S of the pair that the bounds are relative to.
+  // The size S of the pair, the unit of the bounds.
   double size() const { return size_; }
   // t_B - t_A, rounded.
   const PlainVector& offset() const { return offset_; }
@@ -55,26 +55,26 @@ class FloatPair {
   // A vertex of A - B far along a direction.
   struct Support {
     VertexPair pair;
-    // n . (a - b): within SupportError of the largest over A - B.
+    // n . (a - b): within SupportError of the maximum over A - B.
     double value;
   };
-  // The vertex of A farthest along n_W, and that of B farthest against it.
+  // Returns the vertex of A farthest along n_W, and that of B farthest against it.
   Support Farthest(const PlainVector& n_W) const;
-  // How far that value may be from the true maximum. Requires the largest component of n_W
-  // between kDirectionMin and kDirectionMax.
+  // Returns the error bound of that value relative to the true maximum. Requires: the largest
+  // component of n_W between kDirectionMin and kDirectionMax.
   double SupportError(const PlainVector& n_W) const {
     const double largest = LargestComponent(n_W);
     HULLD_DCHECK(IsFilterDirection(largest));
     return kSupportErrorFactor * largest * size_;
   }
 
-  // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
-  // up to `error`. They live in the buffer.
+  // Returns all vertices of A that may be farthest along n_W, ascending, if each component of n_W
+  // errs by up to `error`. The span refers to `buffer`.
   std::span<const uint32_t> CandidatesA(const Vector& n_W, double error,
                                         CandidateBuffer& buffer) const {
     return CandidatesOf(*a_, InA(n_W), TurnedError(n_W, error), Slack(n_W, error), buffer);
   }
-  // All vertices of B that may be farthest against n_W.
+  // Returns all vertices of B that may be farthest against n_W.
   std::span<const uint32_t> CandidatesB(const Vector& n_W, double error,
                                         CandidateBuffer& buffer) const {
     return CandidatesOf(*b_, -InB(n_W), TurnedError(n_W, error), Slack(n_W, error), buffer);
@@ -89,25 +89,25 @@ class FloatPair {
   PlainVector CenterDifference() const {
     return PlainVector(a_->rotated_center()) - (PlainVector(b_->rotated_center()) + offset_);
   }
-  // What the hulls' bounds about their centres say along n_W.
+  // The hulls' bounds about their centres along n_W.
   class CenterView;
   CenterView ViewCenters(const PlainVector& n_W) const;
   // The difference of the means of the hulls' inner vertices, within the same bound.
   Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + Vector(offset_)); }
 
  private:
-  // Where a pose is a product: the offset with what its rounding lacks.
+  // Adds the rounding remainders of poses that are products to the offset.
   void TakeProducts();
   static Vector InnerPoint(const PlacedHull& placed);
-  // How far the value of a candidate may be below the largest. Products of edges may be beyond the
-  // range of directions: even then nothing overflows, and what underflows, 2^-1070, is far below
-  // the part of `error`, which is at least 2^-41 S^3.
+  // Returns the greatest amount by which a candidate's value may be below the maximum. Products of
+  // edges may be outside the range of directions. Even then nothing overflows, and the underflow,
+  // 2^-1070, is far below the part of `error`, which is at least 2^-41 S^3.
   double Slack(const PlainVector& n_W, double error) const {
     return 2 * (kSupportErrorFactor * LargestComponent(n_W) * size_) +
            kDirectionErrorFactor * error * size_;
   }
-  // What errors of up to `error` per component of n_W become in a hull's own frame, with those of
-  // turning it there (see kSupportErrorFactor).
+  // Returns the error per component of n_W in a hull's own frame: errors of up to `error`, rotated,
+  // plus rotation errors (see kSupportErrorFactor).
   static double TurnedError(const PlainVector& n_W, double error) {
     return 2 * error + 64 * kUnitRoundoff * LargestComponent(n_W);
   }
@@ -122,7 +122,7 @@ class FloatPair {
     return {R[0] * v.x + R[3] * v.y + R[6] * v.z, R[1] * v.x + R[4] * v.y + R[7] * v.z,
             R[2] * v.x + R[5] * v.y + R[8] * v.z};
   }
-  // n_W in a hull's own frame.
+  // Returns n_W in a hull's own frame.
   static PlainVector InOwnFrame(const PlacedHull& placed, const PlainVector& n_W) {
     const double* const R = placed.R_WH().data();
     return {R[0] * n_W.x + R[1] * n_W.y + R[2] * n_W.z, R[3] * n_W.x + R[4] * n_W.y + R[5] * n_W.z,
@@ -140,12 +140,11 @@ class FloatPair {
 
 class FloatPair::CenterView {
  public:
-  // Whether both hulls have bounds there.
+  // True if both hulls have bounds in this direction.
   bool known() const { return place_a_.known() && place_b_.known(); }
   CenterBounds::Bounds bounds_a() const { return pair_->a_->query_hull().BoundsAt(place_a_, n_a_); }
   CenterBounds::Bounds bounds_b() const { return pair_->b_->query_hull().BoundsAt(place_b_, n_b_); }
-  // About the direction from A's surface to B's, where the line of the centres crosses them; zero
-  // where unknown.
+  // Approximate direction from A's surface to B's at the line of the centres; zero if unknown.
   PlainVector LikelyAxis() const {
     return OutOfOwnFrame(*pair_->a_, center_bounds_a().NormalAt(place_a_)) -
            OutOfOwnFrame(*pair_->b_, center_bounds_b().NormalAt(place_b_));
@@ -174,8 +173,8 @@ inline FloatPair::CenterView FloatPair::ViewCenters(const PlainVector& n_W) cons
   return CenterView(*this, n_W);
 }
 
-// In the header, as it is the step of every search. The values are those that the support maps
-// found in the hulls' own frames, so that the bound on the maximum holds for them.
+// Inline, because every search step calls it. The values come from the support maps in the hulls'
+// own frames, so that the bound on the maximum applies to them.
 inline FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
   const SupportPoint a = a_->query_hull().Farthest(InA(n_W));
   const SupportPoint b = b_->query_hull().Farthest(-InB(n_W));

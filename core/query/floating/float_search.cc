@@ -14,15 +14,15 @@
 namespace hulld {
 namespace {
 
-// More directions than this are spent only near contact, where exact signs are needed anyway.
+// Direction limit. More directions occur only near contact, where exact signs are needed anyway.
 // Observed: random pairs of 10000 vertices, 1e-6 apart, need 18 on average.
 constexpr uint64_t kMaxDirections = 64;
 
 using Corner = MinkowskiVertex<PlainVector>;
 
 // The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, a
-// triangle or a tetrahedron. The newest comes last. Corners stay where they are written; only their
-// order changes.
+// triangle or a tetrahedron. The newest comes last. Corners are not moved after they are written;
+// only their order changes.
 class Simplex {
  public:
   uint32_t count() const { return count_; }
@@ -38,7 +38,7 @@ class Simplex {
   // Drops all but the newest.
   void KeepNewest() { Keep(order_[count_ - 1]); }
 
-  // Requires count() < 4.
+  // Requires: count() < 4.
   void Add(const PlainVector& w, VertexPair pair) {
     HULLD_DCHECK(count_ < 4);
     uint32_t taken = 0;
@@ -52,8 +52,8 @@ class Simplex {
     order_[count_++] = slot;
   }
 
-  // Reduces to the corners of the face nearest to the origin, up to rounding, and gives a direction
-  // from that face towards the origin. False when the origin is in the tetrahedron.
+  // Reduces to the corners of the face nearest to the origin, up to rounding, and sets n to a
+  // direction from that face towards the origin. Returns false if the origin is in the tetrahedron.
   bool Reduce(PlainVector& n) {
     switch (count_) {
       case 1:
@@ -72,8 +72,8 @@ class Simplex {
     }
   }
 
-  // Reduces a tetrahedron that holds the origin to the nearest of its faces, up to rounding; gives
-  // the face's normal, outwards.
+  // Reduces a tetrahedron that contains the origin to the nearest of its faces, up to rounding.
+  // Returns the outward normal of that face.
   PlainVector ReduceToNearestFace() {
     double nearest = INFINITY;
     uint32_t off_face = 3;
@@ -93,8 +93,8 @@ class Simplex {
     return outwards;
   }
 
-  // A point of the simplex near to the origin: the nearest but for rounding once it is reduced.
-  // Whatever the rounding, weights are in [0, 1] and it is in the simplex, but for the rounding of
+  // Returns a point of the simplex near to the origin; after Reduce, the nearest up to rounding.
+  // For any rounding, weights are in [0, 1] and the point is in the simplex, up to the rounding of
   // the weighted sum.
   PlainVector NearPoint() const {
     const PlainVector& p = corner(count_ - 1).w;
@@ -103,7 +103,7 @@ class Simplex {
     if (count_ == 2) return p + Weight(-Dot(q - p, p), SquaredNorm(q - p)) * (q - p);
     const PlainVector& r = corner(count_ - 3).w;
     const PlainVector normal = Cross(q - p, r - p);
-    // The origin's coordinates in the triangle, by areas; for a tetrahedron that of its last face.
+    // The origin's coordinates in the triangle, by areas; for a tetrahedron, in its last face.
     const double area = SquaredNorm(normal);
     const double along_q = Weight(-Dot(Cross(r - p, normal), p), area);
     const double along_r = Weight(-Dot(Cross(normal, q - p), p), area);
@@ -115,7 +115,7 @@ class Simplex {
   static double Weight(double part, double whole) {
     return whole > 0 ? std::clamp(part / whole, 0.0, 1.0) : 0;
   }
-  // By their places in slots_, the newest last.
+  // Keeps the corners at these places in slots_, the newest last.
   void Keep(uint8_t p) {
     order_[0] = p;
     count_ = 1;
@@ -132,7 +132,7 @@ class Simplex {
     count_ = 3;
   }
 
-  // From the edge's line towards the origin.
+  // Returns the direction from the edge's line towards the origin.
   static PlainVector AcrossEdge(const PlainVector& p, const PlainVector& e) {
     return (Dot(e, p) / SquaredNorm(e)) * e - p;
   }
@@ -148,9 +148,10 @@ class Simplex {
     }
   }
 
-  // Which part of the triangle of the newest corner p and of p + e and p + f is nearest. The edge
-  // between the latter two and its ends are not, as p was farther towards the origin: three of the
-  // seven parts that FindNearestOnTriangle tells apart need no look. `normal`: e x f.
+  // Finds the nearest part of the triangle of the newest corner p, and of p + e and p + f. The edge
+  // between the latter two and its ends are not nearest, because p was farther towards the origin;
+  // so three of the seven parts that FindNearestOnTriangle distinguishes need no test. `normal`: e
+  // x f.
   enum class Part { kCorner, kEdgeToQ, kEdgeToR, kInside };
   static Part NearestPart(const PlainVector& p, const PlainVector& e, const PlainVector& f,
                           const PlainVector& normal, PlainVector& n) {
@@ -194,7 +195,8 @@ class Simplex {
     KeepPart(NearestPart(p, e, f, Cross(e, f), n), order_[2], order_[1], order_[0]);
   }
 
-  // Squared distance from the origin along n, which leads there from the part that holds p.
+  // Returns the squared distance from the origin along n, which leads there from the part that
+  // contains p.
   static double SquaredDistance(const PlainVector& n, const PlainVector& p) {
     const double along = Dot(n, p);
     return along * along / SquaredNorm(n);
@@ -210,7 +212,7 @@ class Simplex {
     const PlainVector normal_fg = Cross(f, g);
     const PlainVector normal_ge = Cross(g, e);
     const double turn = Dot(normal_ef, g) > 0 ? -1 : 1;
-    // The origin is beyond a face that p is a corner of.
+    // The origin is beyond a face that has p as a corner.
     const bool beyond_ef = turn * Dot(normal_ef, p) < 0;
     const bool beyond_fg = turn * Dot(normal_fg, p) < 0;
     const bool beyond_ge = turn * Dot(normal_ge, p) < 0;
@@ -241,7 +243,8 @@ class Simplex {
   uint32_t count_ = 0;
 };
 
-// Whether the origin is certain to be strictly inside a tetrahedron of computed Minkowski vertices.
+// Returns true if the origin is certainly strictly inside a tetrahedron of computed Minkowski
+// vertices.
 template <typename Pair>
 bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, const PlainVector& r,
                  const PlainVector& s) {
@@ -250,7 +253,7 @@ bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, c
   const double position_error = kMinkowskiErrorFactor * pair.size();
   const double bound = kTetrahedronErrorFactor * largest * largest * position_error;
   // The origin's barycentric coordinates, determinants of three corners each, up to a common factor
-  // whose sign is that of the first.
+  // with the sign of the first.
   const PlainVector p_q = Cross(p, q);
   const PlainVector r_s = Cross(r, s);
   const double first = Dot(p_q, r);
@@ -259,7 +262,7 @@ bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, c
          -turn * Dot(r_s, q) > bound;
 }
 
-// The search of a FloatPair or of a SmallPair.
+// A search for a FloatPair or a SmallPair.
 template <typename Pair>
 class FloatSearch {
  public:
@@ -278,7 +281,7 @@ class FloatSearch {
   }
 
  private:
-  // Explores along n and gives the next direction; false when the search is over.
+  // Explores along n and sets n to the next direction. Returns false if the search is over.
   bool Explore(PlainVector& n) {
     double largest = LargestComponent(n);
     if (!IsFilterDirection(largest)) {
@@ -293,15 +296,15 @@ class FloatSearch {
     if (farthest.value < -error) return EndSeparated(n);
     const PlainVector along = n;
     along_ = along;
-    // Without progress, nothing is farther towards the origin.
+    // Without progress, no vertex is farther towards the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
     bool outside = true;
     bool at_corner = false;
     if (progress) {
       const PlainVector w = pair_.Difference(farthest.pair);
       simplex_.Add(w, farthest.pair);
-      // The direction of a vertex this near to the origin is rounding, and what is certain only
-      // beyond the same bound cannot be shown from there.
+      // The direction of a vertex this near to the origin is dominated by rounding, and it cannot
+      // show anything that is certain only beyond the same bound.
       at_corner = LargestComponent(w) <= kMinkowskiErrorFactor * pair_.size();
       if (at_corner) {
         simplex_.KeepNewest();
@@ -316,7 +319,7 @@ class FloatSearch {
         return false;
       }
       if (tolerance_ == 0) return false;
-      // Near the boundary of A - B: on through the nearest face, to see how far it reaches there.
+      // Near the boundary of A - B: continues through the nearest face, to find the reach there.
       n = simplex_.ReduceToNearestFace();
     }
     if (tolerance_ > 0 && IsWithinTolerance(along, farthest, error)) {
@@ -332,9 +335,9 @@ class FloatSearch {
     return false;
   }
 
-  // Whether |separation| <= tolerance is certain: A - B has a point so near to the origin, and
-  // along some direction does not reach farther than that beyond it. `farthest` is that along n.
-  // The reach is looked at first, as it costs little to see that it is too long.
+  // Returns true if |separation| <= tolerance is certain: A - B has a point that near to the origin
+  // and, along some direction, reaches no farther than that beyond it. `farthest` is the vertex
+  // farthest along n. Tests the reach first, because a reach that is too long is cheap to detect.
   bool IsWithinTolerance(const PlainVector& n, const FloatPair::Support& farthest, double error) {
     if (!reach_is_short_) {
       const double allowed = tolerance_ * Norm(n);
@@ -351,8 +354,8 @@ class FloatSearch {
   Simplex simplex_;
   // The last direction tried.
   PlainVector along_;
-  // With a tolerance: whether A - B is known to reach no farther than that beyond the origin along
-  // some direction.
+  // With a tolerance: true if A - B is known to reach no farther than the tolerance beyond the
+  // origin along some direction.
   bool reach_is_short_ = false;
   FloatSearchResult result_;
 };
@@ -365,7 +368,7 @@ FloatSearchResult SearchSmallPortably(const FloatPair& pair, double tolerance,
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
-// All of it is compiled for AVX2, so that lanes stay in registers.
+// The entire call tree is compiled for AVX2, so that lanes stay in registers.
 template <uint32_t kMostVertices>
 __attribute__((target("avx2"), flatten)) FloatSearchResult SearchSmallAvx2(
     const FloatPair& pair, double tolerance, const PlainVector& first) {

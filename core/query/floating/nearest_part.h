@@ -10,14 +10,14 @@
 
 namespace hulld {
 
-// The part of a triangle whose inside holds its point nearest to the origin.
+// The part of a triangle that contains the point nearest to the origin in its interior.
 struct NearestPart {
   uint32_t count = 0;
-  // Which corners, and their weights: not negative, with sum 1 up to rounding.
+  // Indices and weights of the corners. Weights are not negative, with sum 1 up to rounding.
   std::array<uint8_t, 3> corners = {};
   std::array<double, 3> weights = {};
   Vector point = Vector::Zero();
-  // Towards the origin across the part, of any length; more accurate than -point.
+  // Direction towards the origin across the part, of any length; more accurate than -point.
   Vector towards = Vector::Zero();
 };
 
@@ -34,7 +34,7 @@ inline NearestPart NearestOnEdge(const Vector& p, const Vector& q, uint8_t i, ui
   return {2, {i, j}, {1 - t, t}, point, -t * e - p};
 }
 
-// In floating point, up to rounding.
+// Finds the nearest part in floating point, up to rounding.
 inline NearestPart NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
   const Vector e = b - a;
   const Vector f = c - a;
@@ -58,7 +58,7 @@ inline NearestPart NearestOnTriangle(const Vector& a, const Vector& b, const Vec
     case TrianglePart::kInside:
       break;
   }
-  // Rounding may turn a weight near 0 negative, and a sliver may have none.
+  // Rounding may make a weight near 0 negative, and a sliver may have no positive weight.
   const double x = std::max(nearest.a, 0.0);
   const double y = std::max(nearest.b, 0.0);
   const double z = std::max(nearest.c, 0.0);

@@ -13,14 +13,14 @@
 
 namespace hulld {
 
-// A pair of small hulls, as most scenes hold them: what a search asks of a FloatPair, with all
-// vertices turned into the pair's frame beforehand. So a direction need not be turned, and a vertex
-// of A - B is a difference of two that are known. The farthest is found without a branch, as which
-// vertex it is cannot be predicted.
+// A pair of small hulls, the common case in scenes. Offers the search interface of FloatPair with
+// all vertices rotated into the pair's frame in advance: directions need no rotation, and a vertex
+// of A - B is a difference of two known vertices. The farthest vertex is found without a branch,
+// because it is unpredictable.
 //
-// kMostVertices: the most that either hull may have; more of them need bounds of their own
-// (kSupportErrorFactor). Positions are those of FloatPair, to the bit. Everything is inlined, so
-// that it is compiled for the registers of the function that searches.
+// kMostVertices: the most vertices of either hull; more would need bounds of their own
+// (kSupportErrorFactor). Positions have the same bits as in FloatPair. Everything is inlined, so
+// that it is compiled for the registers of the calling search.
 template <uint32_t kMostVertices>
 class SmallPair {
   static_assert(kMostVertices == 8 || kMostVertices == 16);
@@ -34,7 +34,7 @@ class SmallPair {
     return fits(pair.a().query_hull()) && fits(pair.b().query_hull());
   }
 
-  // Requires Fits(pair).
+  // Requires: Fits(pair).
   [[gnu::always_inline]] explicit SmallPair(const FloatPair& pair) : size_(pair.size()) {
     HULLD_DCHECK(Fits(pair));
     a_.Fill(pair.a(), PlainVector(0, 0, 0), 1);
@@ -43,7 +43,8 @@ class SmallPair {
 
   double size() const { return size_; }
 
-  // The farthest: its value is within FloatPair::SupportError of the largest (kSupportErrorFactor).
+  // Returns the farthest vertex: its value is within FloatPair::SupportError of the maximum
+  // (kSupportErrorFactor).
   [[gnu::always_inline]] FloatPair::Support Farthest(const PlainVector& n) const {
     const Lanes x = {n.x, n.x, n.x, n.x};
     const Lanes y = {n.y, n.y, n.y, n.y};
@@ -51,7 +52,7 @@ class SmallPair {
     Lanes best_a, best_b;
     a_.Best(x, y, z, best_a);
     against_b_.Best(x, y, z, best_b);
-    // Both at once: A in the lower half, B in the upper.
+    // Reduces both hulls at once: A in the lower half, B in the upper.
     Lanes best = __builtin_shufflevector(best_a, best_b, 0, 1, 4, 5);
     const Lanes rest = __builtin_shufflevector(best_a, best_b, 2, 3, 6, 7);
     best = best > rest ? best : rest;
@@ -68,14 +69,14 @@ class SmallPair {
   }
 
  private:
-  // Four doubles, and four integers as wide, in whatever registers the function is compiled for.
+  // Four doubles, and four integers of the same width, in the registers of the compilation target.
   using Lanes = double __attribute__((vector_size(32)));
   using LaneIds = int64_t __attribute__((vector_size(32)));
-  // The low bits of a value that number its vertex.
+  // The low bits of a value that hold its vertex number.
   static constexpr int64_t kIdMask = kMostVertices - 1;
 
   struct Side {
-    // The vertices in the pair's frame, times `sign`; the last one repeated where there are fewer.
+    // Stores the vertices in the pair's frame, times `sign`; repeats the last one to fill up.
     [[gnu::always_inline]] void Fill(const PlacedHull& placed, const PlainVector& offset,
                                      double sign) {
       const std::span<const Vector> vertices = placed.query_hull().points_together();
@@ -100,7 +101,8 @@ class SmallPair {
       }
     }
 
-    // Values along a direction, of every fourth vertex the largest, the low bits numbering it.
+    // Computes values along a direction; keeps the largest of every fourth vertex, with the vertex
+    // number in the low bits.
     [[gnu::always_inline]] void Best(const Lanes& n_x, const Lanes& n_y, const Lanes& n_z,
                                      Lanes& best) const {
       Number(0, n_x, n_y, n_z, best);

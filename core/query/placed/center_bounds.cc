@@ -13,29 +13,28 @@ namespace hulld {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-// Cells along a side of a face, a power of two so that corners are exact. A choice: with it half of
-// the pairs of round hulls of 512 vertices a few percent apart are settled, and nearly all that are
-// deep in each other (observed: relation/ of tests/bench/queries/query_benchmark).
+// Cells along a side of a face, a power of two so that corners are exact. A choice. Observed: it
+// settles half of the pairs of round hulls of 512 vertices a few percent apart, and nearly all deep
+// overlaps (relation/ of tests/bench/queries/query_benchmark).
 constexpr uint32_t kCoarseSide = 2;
 constexpr uint32_t kFineSide = 8;
-// A word has a bit for each cell of a face.
+// A word has one bit for each cell of a face.
 static_assert(kFineSide * kFineSide <= 64);
 uint32_t SideFor(size_t vertices) { return vertices < 24 ? kCoarseSide : kFineSide; }
-// With more cells than this along a side the gauge is made at every other corner.
+// With more cells than this along a side, the gauge is computed only at every other corner.
 constexpr uint32_t kMostGaugedCells = 4;
 
-// The points of a ray that are tried whether they are inside, relative to the ray's part in the
-// hull.
+// Trial points on a ray, relative to the length of the ray within the hull.
 constexpr double kShrink[] = {1 - 0x1p-22, 1 - 0x1p-16, 1 - 0x1p-10};
-// A portal whose plane the hull exceeds by less than this, relative to its distance, is as good as
-// a facet: the bounds between corners are no closer.
+// A portal is as good as a facet if the hull exceeds its plane by less than this, relative to its
+// distance: the bounds between corners are no tighter.
 constexpr double kLeastGain = 0x1p-8;
-// Far more than needed. Observed on points of a sphere, even with a gain of 2^-26: one step to find
-// a portal, 5 to 13 to refine it, for 64 to 10000 points.
+// Far more than needed. Observed on 64 to 10000 points of a sphere, even with a gain of 2^-26: one
+// step to find a portal, and 5 to 13 to refine it.
 constexpr int kMostSteps = 64;
 
-// How far apart the directions are along which a portal is guessed, about: the distance between
-// points on a sphere.
+// Approximate angle between the directions that guess a portal, times the square root of the number
+// of points: the spacing of points on a sphere. kMostTilt limits the angle.
 constexpr double kTilt = 4;
 constexpr double kMostTilt = 0.7;
 
@@ -47,14 +46,14 @@ float RoundedUp(double value) {
                      : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
 
-// A corner of a cell: its direction, and the first corner that has the same one, on another face
-// where faces meet.
+// A corner of a cell: its direction, and the first corner with the same direction, on another face
+// along the edges of the cube.
 struct CornerPlace {
   Vector direction;
   uint32_t twin;
 };
 
-// The corners of a cube map, face by face, row by row.
+// Returns the corners of a cube map, by faces, then rows.
 std::vector<CornerPlace> CornersOf(uint32_t side) {
   const uint32_t row = side + 1;
   const double half = 0.5 * side;
@@ -75,21 +74,21 @@ std::vector<CornerPlace> CornersOf(uint32_t side) {
   return corners;
 }
 
-// Made once, as they are the same for all hulls.
+// Built once; the corners are the same for all hulls.
 std::span<const CornerPlace> Corners(uint32_t side) {
   static const auto& fine = *new std::vector<CornerPlace>(CornersOf(kFineSide));
   static const auto& coarse = *new std::vector<CornerPlace>(CornersOf(kCoarseSide));
   return side == kFineSide ? fine : coarse;
 }
 
-// Whether p is in the tetrahedron of a point o strictly inside a hull and a triangle of a facet.
-// Exact.
+// Returns true if p is in the tetrahedron of a point o strictly inside a hull and a triangle of a
+// facet. Exact.
 bool IsInCone(const Vector& o, const Vector& a, const Vector& b, const Vector& c, const Vector& p) {
   return Orient3d(o, a, b, p) >= 0 && Orient3d(o, b, c, p) >= 0 && Orient3d(o, c, a, p) >= 0 &&
          Orient3d(a, b, c, p) <= 0;
 }
 
-// Whether p is in the tetrahedron of four points. Exact; false for a flat one.
+// Returns true if p is in the tetrahedron of four points. Exact; false for a flat one.
 bool IsInTetrahedron(const std::array<Vector, 4>& t, const Vector& p) {
   const int turn = Orient3d(t[0], t[1], t[2], t[3]);
   return turn != 0 && turn * Orient3d(p, t[1], t[2], t[3]) >= 0 &&
@@ -97,7 +96,7 @@ bool IsInTetrahedron(const std::array<Vector, 4>& t, const Vector& p) {
          turn * Orient3d(t[0], t[1], t[2], p) >= 0;
 }
 
-// 1 over the width of a hull along each axis.
+// Returns 1 over the width of a hull along each axis.
 Vector PerWidth(const SupportMap& support) {
   Vector per_width;
   for (int axis = 0; axis < 3; ++axis) {
@@ -107,7 +106,7 @@ Vector PerWidth(const SupportMap& support) {
   return per_width;
 }
 
-// Looks from a point o inside a hull along rays, by the hull's support points alone.
+// Casts rays from a point o inside a hull, using only the hull's support points.
 class Lookout {
  public:
   Lookout(std::span<const Vector> points, const Vector& o, const SupportMap& support,
@@ -118,8 +117,8 @@ class Lookout {
         tilt_(std::min(kMostTilt, kTilt / std::sqrt(static_cast<double>(points.size())))),
         per_width_(per_width) {}
 
-  // Whether o is in the hull: in a tetrahedron of its points, exactly. May say false of a point
-  // near the boundary.
+  // Returns true if o is in the hull: exactly in a tetrahedron of its points. May return false for
+  // a point near the boundary.
   bool IsInside() const {
     const Vector first(1, 0.3, 0.2);
     std::array<Vector, 4> t = {Farthest(first), Farthest(-first), o_, o_};
@@ -127,7 +126,7 @@ class Lookout {
     Vector n = (t[1] - t[0]).cross(t[2] - t[0]);
     const double side = n.dot(o_ - t[0]);
     t[3] = side == 0 ? FartherOf(n, t[0]) : Farthest(side > 0 ? n : Vector(-n));
-    // Walks through the face that o is beyond, while there is one.
+    // Walks through a face that has o beyond it, while one exists.
     for (int step = 0; step < kMostSteps; ++step) {
       if (IsInTetrahedron(t, o_)) return true;
       double farthest = 0;
@@ -149,13 +148,13 @@ class Lookout {
     return false;
   }
 
-  // A value t, almost as large as possible, such that o + t d as rounded is in the hull; 0 when
-  // none was found. Requires o in the hull.
+  // Returns an almost maximal t such that o + t d, as rounded, is in the hull; 0 if none was found.
+  // Requires: o in the hull.
   double Reach(const Vector& d) {
-    // What was found for another ray may serve this one, but then t would depend on the order.
+    // Reusing the portal of another ray would make t depend on the order of the calls.
     found_ = false;
-    // Rays through corners and edges, as symmetric hulls have many, would have no portal of their
-    // own: one beside them is looked for, on the other side if the first will not do.
+    // Rays through corners and edges, common in symmetric hulls, may have no portal of their own.
+    // Tries rays slightly to one side or another instead.
     constexpr double kBeside = 0x1p-24;
     const Vector beside = d.cwiseAbs().maxCoeff() * kBeside * Vector(0.7, -0.4, 0.9);
     const Vector across = kBeside * d.cross(Vector(0.9, 0.7, 0.4));
@@ -187,7 +186,7 @@ class Lookout {
   }
 
   Vector Farthest(const Vector& n) const { return points_[support_.Farthest(n).vertex]; }
-  // The farthest point along n or the farthest one against it: the one that is farther from p.
+  // Returns the point farthest along n or against it, choosing the one farther from p.
   Vector FartherOf(const Vector& n, const Vector& p) const {
     const Vector along = Farthest(n);
     const Vector against = Farthest(-n);
@@ -199,16 +198,16 @@ class Lookout {
     y = From(ids_[corner]);
   }
 
-  // Whether the ray passes through the portal.
+  // Returns true if the ray passes through the portal.
   bool Sees(const PlainVector& d) const {
     return found_ && Turn(p_, q_, d) > 0 && Turn(q_, r_, d) > 0 && Turn(r_, p_, d) > 0;
   }
   PlainVector NormalOfPortal() const { return Cross(q_ - p_, r_ - p_); }
 
-  // Tries the farthest points along three directions around the one that an ellipsoid of the hull's
-  // widths would have as its normal where the ray leaves it.
+  // Tries the farthest points along three directions around an estimated normal: the normal of an
+  // ellipsoid with the hull's widths at the point where the ray leaves it.
   bool GuessPortal(const PlainVector& d) {
-    // On a sphere, to which widths scale that ellipsoid.
+    // The widths scale that ellipsoid to a sphere.
     const Vector n = Vector(d.x, d.y, d.z).cwiseProduct(per_width_).normalized();
     const Vector u = tilt_ * AnyPerpendicularTo(n).normalized();
     const Vector v = n.cross(u);
@@ -223,8 +222,8 @@ class Lookout {
     return Sees(d);
   }
 
-  // Finds a triangle that the ray passes through: a point p along the ray, q and r on either side
-  // of the plane through p and the ray, moved until their segment passes beyond the ray.
+  // Finds a triangle that the ray passes through: a point p along the ray, and q and r on opposite
+  // sides of the plane through p and the ray, moved until their segment passes beyond the ray.
   bool FindPortal(const PlainVector& d) {
     found_ = false;
     LookUp(d, 0, p_);
@@ -245,11 +244,11 @@ class Lookout {
     return false;
   }
 
-  // Moves the portal outwards until it is a facet, about.
+  // Moves the portal outwards until it is approximately a facet.
   bool RefinePortal(const PlainVector& d) {
     for (int step = 0; step < kMostSteps; ++step) {
       const PlainVector n = NormalOfPortal();
-      // Below 0 while the ray's other half passes through the portal.
+      // Negative while the opposite ray passes through the portal.
       const double height = Dot(n, p_);
       const uint32_t id = support_.Farthest(n).vertex;
       const PlainVector w = From(id);
@@ -277,10 +276,10 @@ class Lookout {
   const std::span<const Vector> points_;
   const Vector o_;
   const SupportMap& support_;
-  // How far GuessPortal looks to the sides.
+  // Sideways extent of the search of GuessPortal.
   const double tilt_;
   const Vector per_width_;
-  // The portal: points of the hull and, relative to o, where they are; turning left seen from
+  // The portal: points of the hull and their positions relative to o, counter-clockwise seen from
   // outside.
   bool found_ = false;
   std::array<uint32_t, 3> ids_ = {};
@@ -296,8 +295,8 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   if (dimension < 3) return;
   double radius = 0;
   for (const Vector& v : points) radius = std::max(radius, (v - center).cwiseAbs().maxCoeff());
-  // Such radii are beyond what pairs may have, or so small against the coordinates that rounding
-  // counts.
+  // Such radii exceed the range of pairs, or are so small relative to the coordinates that rounding
+  // matters.
   if (!IsFilterSize(radius)) return;
   if (radius < kCenterLeastRadius * max_abs) return;
   side_ = SideFor(points.size());
@@ -328,8 +327,8 @@ void CenterBounds::MakeCell(uint32_t face, uint32_t i, uint32_t j) const {
   map_->cells[face].fetch_or(uint64_t{1} << (i * side_ + j), std::memory_order_release);
 }
 
-// Makes room for the corners and finds the largest gauge: that of the cube's eight own corners, as
-// the gauge is convex on each face. It stays unknown unless the centre is certain to be inside.
+// Allocates the corners and computes the largest gauge: the maximum over the cube's eight corners,
+// because the gauge is convex on each face. It stays unknown unless the centre is certainly inside.
 void CenterBounds::Begin() const {
   map_->corners.resize(corner_count(), {kUnknown, kUnknown});
   map_->per_width = PerWidth(*map_->support);
@@ -339,7 +338,7 @@ void CenterBounds::Begin() const {
   for (uint32_t octant = 0; octant < 8; ++octant) {
     const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
     least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
-    // Only a centre that is surrounded is strictly inside, up to rounding.
+    // The centre is strictly inside only if it is surrounded, up to rounding.
     if (!(least > 0 && least >= kCenterLeastRadius * map_->max_abs)) return;
   }
   map_->largest_gauge = (1 + kCenterMargin) / least;
@@ -353,11 +352,11 @@ void CenterBounds::MakeSupport(uint32_t corner) const {
     const double reach = map_->support->Farthest(n).value - n.dot(map_->center);
     corners[twin].support = RoundedUp((reach + margin) * per_unit_);
   }
-  // A twin that is made already may be read by others.
+  // Other threads may be reading a twin that has been computed.
   if (std::isnan(corners[corner].support)) corners[corner].support = corners[twin].support;
 }
 
-// Requires a largest gauge that is known.
+// Requires: a known largest gauge.
 float CenterBounds::MakeGauge(uint32_t corner) const {
   std::vector<Corner>& corners = map_->corners;
   float& gauge = corners[corner].gauge;
@@ -372,12 +371,12 @@ float CenterBounds::MakeGauge(uint32_t corner) const {
   if (!std::isnan(corners[twin].gauge)) return gauge = corners[twin].gauge;
   Lookout lookout(map_->points, map_->center, *map_->support, map_->per_width);
   const double t = lookout.Reach(d);
-  // Infinite where nothing was found.
+  // Infinite if no point was found.
   gauge = RoundedUp(std::min((1 + kCenterMargin) / t, map_->largest_gauge) * unit_);
   return corners[twin].gauge = gauge;
 }
 
-// The mean of the two or four around a corner, which are as far on either side.
+// Returns the mean over the two or four equidistant neighbours of a corner.
 float CenterBounds::MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const {
   const double sum = double{MakeGauge(corner - down - right)} + MakeGauge(corner - down + right) +
                      MakeGauge(corner + down - right) + MakeGauge(corner + down + right);

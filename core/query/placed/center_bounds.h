@@ -22,66 +22,67 @@
 
 namespace hulld {
 
-// How far a hull reaches as seen from its centre c, bounded from above and from below for every
-// direction, without a look at its vertices.
+// Upper and lower bounds of a hull's extent as seen from its centre c, for every direction, without
+// access to its vertices.
 //
-// From above, the support function h(n): the largest n . (v - c). From below, the gauge g(d): the
-// least g with c + d / g in the hull. Both are convex and grow in proportion to their argument, so
-// that a value between others is at most their interpolation. They are kept at the corners of the
-// cells of a cube map; on a face of the cube a direction is the bilinear mean of the corners of its
-// cell, and the same mean of their values bounds its own. Where the hull is round, what is lost
-// shrinks with the square of a cell's width.
+// The upper bound is the support function h(n): the largest n . (v - c). The lower bound is the
+// gauge g(d): the least g with c + d / g in the hull. Both are convex and positively homogeneous,
+// so interpolation between known values gives an upper bound. The values are stored at the corners
+// of the cells of a cube map. On a face of the cube, a direction is the bilinear mean of the
+// corners of its cell, and the same mean of their values bounds its value. For a round hull, the
+// loss shrinks with the square of the cell width.
 //
-// A cell is made when a direction leads into it, for the first or the second time: most hulls are
-// looked at from few sides. What it holds does not depend on when it is made. Readable by any
-// thread.
+// A cell is computed when a direction first leads into it, or on the second time: most hulls are
+// viewed from few sides. Its content does not depend on the time of computation. Thread-safe.
 class CenterBounds {
  public:
-  // When a cell is made. At the first look, so that answers do not depend on what was asked before,
-  // or at the second, so that a hull that is asked about a few times costs less: a cell costs as
-  // much as several questions. Until then the bounds are unknown there.
+  // When to compute a cell. At the first look, answers do not depend on earlier queries. At the
+  // second look, a hull with few queries costs less, because a cell costs as much as several
+  // queries; until then the bounds of the cell are unknown.
   enum class Making { kAtFirstLook, kAtSecondLook };
 
-  // None: every bound is unknown.
+  // Has no bounds: every bound is unknown.
   CenterBounds() = default;
-  // Bounds for the hull of some points about a centre. A flat hull (`dimension` below 3) has none.
-  // The gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
-  // largest absolute coordinate. The points and the support map must outlive the bounds and stay in
-  // place. Cost: O(V) comparisons; the first cell that is made takes some 100 support points more,
-  // and each of 24 or 384 cells some 25.
+  // Bounds for the hull of the points about a centre. A flat hull (`dimension` below 3) has none.
+  // The gauge is unknown unless the centre is certainly strictly inside. max_abs: the largest
+  // absolute coordinate of the points. The points and the support map must outlive the bounds and
+  // must not move. Cost: O(V) comparisons; the first computed cell takes some 100 support points
+  // more, and each of 24 or 384 cells some 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
                const SupportMap& support, Making making);
   CenterBounds(const Hull& hull, const SupportMap& support)
       : CenterBounds(hull.vertices(), hull.dimension(), hull.center(), hull.max_abs_coordinate(),
                      support, Making::kAtFirstLook) {}
 
-  // Not a number where unknown.
+  // NaN if unknown.
   struct Bounds {
     double support = std::numeric_limits<double>::quiet_NaN();
     double gauge = std::numeric_limits<double>::quiet_NaN();
   };
-  // The place of a direction among the corners; no place when there are none.
+  // The location of a direction among the corners; unknown if there are no corners.
   class Place;
-  // Requires n in the range of FloatPair's directions (IsFilterDirection). Looks at n's cell.
+  // Locates n, and counts as a look at its cell. Requires: n in the range of FloatPair's directions
+  // (IsFilterDirection).
   Place PlaceOf(const PlainVector& n) const;
-  // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
-  // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
+  // Returns upper bounds of h(n) and g(n) for the n of a place, up to errors of the hull's
+  // coordinates and of n (see kCenterSupportFactor and kCenterGaugeFactor in
+  // core/numeric/error_bounds.h).
   Bounds At(const Place& place) const;
   Bounds Along(const PlainVector& n) const;
-  // About the outward normal of the hull where the ray from c along the n of a place leaves it,
-  // longer where the hull is narrow. Zero where that is coarse or unknown.
+  // Returns the approximate outward normal of the hull at the point where the ray from c along the
+  // n of a place leaves it; longer where the hull is narrow. Zero if coarse or unknown.
   PlainVector NormalAt(const Place& place) const;
-  // Whether there are few corners or none. Then the bounds say little except about what is deep
-  // inside, and the normals say nothing.
+  // True if there are few corners or none. The bounds then help only with points deep inside, and
+  // the normals are useless.
   bool coarse() const { return side_ < kLeastFineSide; }
-  // At least g(d) for all d with components of at most 1; infinite where unknown. Requires that
-  // this thread had a known place.
+  // At least g(d) for all d with components of at most 1; infinite if unknown. Requires: this
+  // thread has obtained a known place.
   double largest_gauge() const {
     HULLD_DCHECK(map_ != nullptr);
     return map_->largest_gauge;
   }
 
-  // With all cells. Bytes.
+  // Memory in bytes, with all cells.
   size_t MemoryBytes() const {
     return map_ == nullptr ? 0 : sizeof(Map) + corner_count() * sizeof(Corner);
   }
@@ -89,16 +90,14 @@ class CenterBounds {
  private:
   // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
   static constexpr uint32_t kLeastFineSide = 4;
-  // The values for directions whose largest component is 1: the support function in units, and the
-  // gauge per unit.
+  // Values for directions with largest component 1: the support function in units, and the gauge
+  // per unit.
   struct Corner {
     float support;
     float gauge;
   };
 
-  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-  // What cells are made from, and those that are made.
+  // Inputs of the cells, and the computed cells.
   struct Map {
     std::span<const Vector> points;
     Vector center;
@@ -106,14 +105,14 @@ class CenterBounds {
     double max_abs;
     const SupportMap* support;
 
-    // By face, a bit for each cell, by rows: whether its corners are made. A thread that sees a bit
-    // set may read these corners, and the largest gauge.
+    // By face, one bit for each cell, by rows: set if its corners have been computed. A thread that
+    // sees a bit set may read these corners, and the largest gauge.
     std::array<std::atomic<uint64_t>, 6> cells = {};
-    // Likewise: whether the next look makes it.
+    // In the same layout: set if the next look computes the cell.
     std::array<std::atomic<uint64_t>, 6> awaited = {};
-    // Held by the thread that makes a cell.
+    // Held by the thread that computes a cell.
     std::mutex mutex;
-    // (side + 1)^2 for each of the six faces; none before the first cell is made.
+    // (side + 1)^2 for each of the six faces; empty before the first cell is computed.
     std::vector<Corner> corners;
     double largest_gauge = kInfinity;
     // 1 over the hull's width along each axis.
@@ -121,7 +120,7 @@ class CenterBounds {
   };
 
   size_t corner_count() const { return size_t{6} * (side_ + 1) * (side_ + 1); }
-  // Whether the cell is made: before, or by this look.
+  // Returns true if the cell has been computed, before or by this call.
   bool LookAtCell(uint32_t face, uint32_t i, uint32_t j) const {
     const uint64_t bit = uint64_t{1} << (i * side_ + j);
     if ((map_->cells[face].load(std::memory_order_acquire) & bit) != 0) [[likely]]
@@ -136,7 +135,7 @@ class CenterBounds {
   float MakeGauge(uint32_t corner) const;
   float MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const;
 
-  // Null where there are no bounds.
+  // Null if there are no bounds.
   std::unique_ptr<Map> map_;
   uint32_t side_ = 0;
   double half_ = 0;
@@ -147,7 +146,7 @@ class CenterBounds {
 
 class CenterBounds::Place {
  public:
-  // Whether there are bounds there.
+  // True if the place has bounds.
   bool known() const { return low_ != nullptr; }
 
  private:
@@ -168,7 +167,7 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   Place place;
   if (map_ == nullptr) return place;
   const OnCube on_cube(n.x, n.y, n.z);
-  // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
+  // Rotation into a hull's frame changes the largest component by a factor of at most sqrt(3).
   HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
                IsFilterDirection(on_cube.largest() / 2));
   place.largest_ = on_cube.largest();
@@ -187,7 +186,7 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   if (!LookAtCell(face, i, j)) return place;
   place.low_ = map_->corners.data() + CubeCell(face, row, i, j);
   place.high_ = place.low_ + row;
-  // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
+  // Keeps the weights non-negative: by rounding, u and v may exceed side_ or be below 0.
   place.s_ = std::clamp(u - i, 0.0, 1.0);
   place.t_ = std::clamp(v - j, 0.0, 1.0);
   return place;
@@ -212,8 +211,8 @@ inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
   return At(PlaceOf(n));
 }
 
-// The gradient of the gauge per unit, which on a face is the largest component times a function of
-// the others over it.
+// Computes the gradient of the gauge per unit. On a face, the gauge is the largest component times
+// a function of the ratios of the other components to it.
 inline PlainVector CenterBounds::NormalAt(const Place& place) const {
   if (!place.known() || coarse() || !(largest_gauge() < kInfinity)) return {0, 0, 0};
   const double corner = place.low_[0].gauge;
@@ -224,7 +223,7 @@ inline PlainVector CenterBounds::NormalAt(const Place& place) const {
   const double slope_t = along_low + place.s_ * twist;
   const double value = corner + place.t_ * along_low + place.s_ * slope_s;
   const double slope = value - (place.across_s_ * slope_s + place.across_t_ * slope_t);
-  // After the component along the axis come the next two, the first after the last.
+  // The component along the axis is followed by the next two, cyclically.
   double normal[5];
   normal[place.axis_] = place.negative_ ? -slope : slope;
   normal[place.axis_ + 1] = half_ * slope_s;

@@ -13,11 +13,11 @@
 
 namespace hulld {
 
-// An append-only array of points with a capacity. One thread appends; any number read prefixes that
-// were there when they heard of them.
+// An append-only array of points with fixed capacity. One thread appends; any number of threads
+// read prefixes whose size was published to them.
 class GrowthTail {
  public:
-  // `center`: what distances are measured from.
+  // `center`: the origin of distances.
   GrowthTail(size_t capacity, const Vector& center)
       : blocks_((capacity + 3) / 4), radii_(4 * blocks_.size()), center_(center) {}
 
@@ -25,7 +25,7 @@ class GrowthTail {
   size_t size() const { return size_; }  // for the thread that appends
   const Vector& center() const { return center_; }
 
-  // Requires size() < capacity().
+  // Requires: size() < capacity().
   void Append(const Vector& p) {
     HULLD_DCHECK(size_ < capacity());
     blocks_[size_ / 4].Set(size_ % 4, p);
@@ -35,9 +35,9 @@ class GrowthTail {
   }
 
   Vector point(size_t i) const { return blocks_[i / 4].point(i % 4); }
-  // How far the first `count` points are from the centre; rounded up.
+  // Returns the largest distance of the first `count` points from the centre; rounded up.
   double RadiusOf(size_t count) const { return count == 0 ? 0 : radii_[count - 1]; }
-  // The farthest of the first `count` points.
+  // Returns the farthest of the first `count` points.
   SupportPoint Farthest(size_t count, const PlainVector& n) const {
     return FarthestOf(blocks_, count, n);
   }

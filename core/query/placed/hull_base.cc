@@ -52,7 +52,7 @@ HullBase::HullBase(std::vector<Vector> points, int dimension)
   Span(dimension);
 }
 
-// The axis extremes, the centre, and sizes.
+// Computes the axis extremes, the centre, and sizes.
 void HullBase::Measure() {
   std::array<uint32_t, 6> extremes = {};
   exponent_ = kAboveAllExponents;
@@ -60,13 +60,13 @@ void HullBase::Measure() {
     const Vector& p = points_[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (p[axis] < points_[extremes[axis]][axis]) extremes[axis] = i;
-      // The last of equal ones counts, so that a box has a centre in its middle.
+      // The last of several equal points is taken, so that the centre of a box is its middle.
       if (p[axis] >= points_[extremes[axis + 3]][axis]) extremes[axis + 3] = i;
     }
     exponent_ = LowestBitExponent(p, exponent_);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    // As Hull does. Each is divided first, so that no sum overflows.
+    // Same as in Hull. Divides each point first, so that no sum overflows.
     center_ += points_[extremes[axis]] / 6 + points_[extremes[axis + 3]] / 6;
   }
   for (const uint32_t i : extremes) {
@@ -76,8 +76,8 @@ void HullBase::Measure() {
   for (const Vector& p : points_) radius_ = std::max(radius_, RadiusTo(p - center_));
 }
 
-// Adds the point of largest size, in floating point, that is_off says is off the span so far; the
-// first of equal ones.
+// Adds the point of largest size, in floating point, for which is_off holds: it is off the span so
+// far. The first of equal points wins.
 template <typename Size, typename IsOff>
 void HullBase::SpanWith(Size size, IsOff is_off) {
   uint32_t farthest = 0;
@@ -89,7 +89,7 @@ void HullBase::SpanWith(Size size, IsOff is_off) {
     farthest = i;
   }
   if (!is_off(points_[farthest])) {
-    // Sizes overflowed, underflowed, or rounding hid them.
+    // The sizes overflowed or underflowed, or rounding hid them.
     farthest = 0;
     while (farthest < points_.size() && !is_off(points_[farthest])) ++farthest;
     HULLD_CHECK(farthest < points_.size());

@@ -14,11 +14,11 @@
 
 namespace hulld {
 
-// At least the length of a computed difference of two points; hardly more, but for differences so
-// small or so large that their squares are not doubles.
+// Returns an upper bound of the length of a computed difference of two points. Nearly tight, except
+// for differences so small or so large that their squares are not doubles.
 double RadiusTo(const Vector& difference);
 
-// Points and what finds the farthest of them.
+// Points and their support map.
 struct MappedPoints {
   explicit MappedPoints(std::vector<Vector> all) : points(std::move(all)), support(points) {}
   MappedPoints(MappedPoints&&) = default;  // the map refers to the elements, which stay in place
@@ -28,37 +28,40 @@ struct MappedPoints {
   SupportMap support;
 };
 
-// A point set whose hull is the hull that is asked about, and what questions need of it. Immutable.
+// A point set that generates the queried hull, and the data that queries need. Immutable.
 class HullBase {
  public:
-  // The vertices of a canonical snapshot, which must outlive the base; prepared.
+  // Takes the vertices of a canonical snapshot, which must outlive the base. The result is
+  // prepared.
   explicit HullBase(const Hull& hull);
-  // Points, not none, whose hull has this dimension: prepared.
+  // Takes one or more points with a hull of this dimension. The result is prepared.
   HullBase(MappedPoints mapped, int dimension);
-  // The same, but no more than questions need that scan. Cost: O(V), comparisons and distances.
+  // Takes points for scanning: computes only the data that scanning queries need. Cost: O(V),
+  // comparisons and distances.
   HullBase(std::vector<Vector> points, int dimension);
   HullBase(const HullBase&) = delete;
   HullBase& operator=(const HullBase&) = delete;
 
   std::span<const Vector> points() const { return points_; }
   const SupportMap& support() const { return support_; }
-  // About center(). None where the base is made for scanning.
+  // Bounds about center(). None if the base is built for scanning.
   const CenterBounds& center_bounds() const { return center_bounds_; }
   bool prepared() const { return prepared_; }
-  // The mean of the points that are extreme along the axes: a place in the hull to search from.
+  // The mean of the points extreme along the axes: a point in the hull where searches start.
   const Vector& center() const { return center_; }
   // Every point is within this distance of center(); rounded up.
   double radius() const { return radius_; }
   double max_abs_coordinate() const { return max_abs_; }
-  // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents when there is none.
+  // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents if all are zero.
   int exponent() const { return exponent_; }
   // Points that span the hull: one more than its dimension, affinely independent.
   std::span<const uint32_t> spanning() const { return std::span(spanning_).first(spanning_count_); }
-  // Points, with repetitions, whose mean is in the relative interior of the hull and not near its
-  // boundary unless the hull is flat or a needle: the axis extremes, and those that span the hull.
+  // Points, with repetitions: the axis extremes, and the points that span the hull. Their mean is
+  // in the relative interior of the hull, and not near its boundary unless the hull is flat or a
+  // needle.
   std::span<const uint32_t> inner() const { return std::span(inner_).first(inner_count_); }
 
-  // Beyond what a canonical snapshot holds. Bytes.
+  // Memory beyond that of a canonical snapshot, in bytes.
   size_t MemoryBytes() const {
     return sizeof(*this) + own_.capacity() * sizeof(Vector) + support_.MemoryBytes() +
            center_bounds_.MemoryBytes();

@@ -11,11 +11,11 @@ namespace hulld {
 namespace {
 
 constexpr size_t kFirstTailCapacity = 16;
-// What preparing a point costs, in points scanned. Observed: 0.3 to 1 us beside 0.3 to 1 ns.
+// Cost of preparing a point, in scanned points. Observed: 0.3 to 1 us against 0.3 to 1 ns.
 constexpr uint64_t kScansPerPrepared = 800;
-// Directions that a question looks along, on average.
+// Average number of directions per query.
 constexpr uint64_t kDirectionsPerQuestion = 6;
-// A new level takes up those before it that are at most this many times larger.
+// A new level absorbs preceding levels that are at most this many times larger.
 constexpr size_t kMergeRatio = 2;
 
 std::vector<Vector> PointsOf(const LiveParts& parts, uint64_t count) {
@@ -30,7 +30,8 @@ std::vector<Vector> PointsOf(const LiveParts& parts, uint64_t count) {
   return points;
 }
 
-// A tail with the first points of another from `begin` to `end`, and room for more; null for none.
+// Returns a tail with the points [begin, end) of another and spare capacity; null if there are
+// none.
 std::shared_ptr<GrowthTail> CopyOf(const GrowthTail* tail, size_t begin, size_t end,
                                    const Vector& center) {
   if (begin == end) return nullptr;
@@ -40,7 +41,7 @@ std::shared_ptr<GrowthTail> CopyOf(const GrowthTail* tail, size_t begin, size_t 
   return copy;
 }
 
-// Prepares points. Where many of them are found by no question, the others alone.
+// Prepares points. If no query can find many of them, drops these and prepares the rest.
 MappedPoints Map(std::vector<Vector> points) {
   MappedPoints mapped(std::move(points));
   const std::vector<uint32_t> listed = mapped.support.Listed();
@@ -75,7 +76,7 @@ LiveHull::LiveHull(const LiveHull& other, const Mark& mark) : LiveHull() {
                 CopyOf(parts->tail.get(), 0, tail_count, parts->base->center())});
 }
 
-// All points that there are so far become a base to be scanned.
+// Makes all points so far a base to be scanned.
 void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
   for (const Vector& p : points) {
     next.low_ = next.low_.cwiseMin(p);
@@ -90,8 +91,7 @@ void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
 }
 
 LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
-  // Only the holder of this mutex changes now_ and the tail, so both can be read without the other
-  // mutex.
+  // Only the holder of this mutex changes now_ and the tail, so both can be read without mutex_.
   const std::lock_guard changing(changing_);
   if (points.empty()) return now_;
   Mark next = now_;
@@ -110,7 +110,7 @@ LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
   return next;
 }
 
-// Nobody reads a tail beyond what a mark says.
+// Readers never read a tail beyond the count in their mark.
 void LiveHull::AppendToTail(std::span<const Vector> points, Mark& next) {
   const size_t tail_count = next.count_ - next.parts_->covered;
   const GrowthTail* const former = next.parts_->tail.get();
@@ -139,8 +139,8 @@ LiveHull::Mark LiveHull::Now() const {
   return now_;
 }
 
-// What is prepared by now may stand for points that came after the mark; then what there was at
-// the mark serves it.
+// The current parts may cover points appended after the mark; then the parts stored in the mark are
+// used.
 const LiveHull::Parts& LiveHull::PartsFor(const Mark& mark) const {
   return mark.count_ >= now_.parts_->covered ? now_.parts_ : mark.parts_;
 }
@@ -211,19 +211,19 @@ void LiveHull::Prepare(const Mark& mark) {
 
   const std::lock_guard changing(changing_);
   const LiveParts& current = *now_.parts_;
-  // When the dimension grew meanwhile, all points are in a new base.
+  // If the dimension grew during the preparation, a new base holds all points.
   if (current.covered > mark.count_) return;
   after.tail = CopyOf(current.tail.get(), mark.count_ - current.covered,
                       now_.count_ - current.covered, after.base->center());
   Parts parts = std::make_shared<const LiveParts>(std::move(after));
   auto scanned = std::make_shared<std::atomic<uint64_t>>(0);
   const std::lock_guard lock(mutex_);
-  // What was before goes after the mutex is released.
+  // The replaced parts are destroyed after the mutex is released.
   std::swap(now_.parts_, parts);
   std::swap(scanned_, scanned);
 }
 
-// What there was at the mark as base and levels, all prepared, without a tail.
+// Returns the state at the mark as base and levels, all prepared, without a tail.
 LiveParts LiveHull::Prepared(const LiveParts& before, const Mark& mark) {
   const size_t tail_count = mark.count_ - before.covered;
   LiveParts after = {before.base, before.levels, mark.count_, nullptr};
@@ -273,7 +273,7 @@ std::vector<LiveHull::Shared> LiveHull::SharedBy(const Mark& mark) const {
   return shared;
 }
 
-// Those that are not among them.
+// Parts that are not yet in `shared`.
 void LiveHull::AddShared(const LiveParts& parts, std::vector<Shared>& shared) {
   const auto add = [&](const void* what, size_t bytes) {
     const auto is_it = [what](const Shared& known) { return known.what == what; };

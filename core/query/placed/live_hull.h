@@ -15,31 +15,31 @@
 
 namespace hulld {
 
-// A growing hull, ready for questions at every step at the price of a resting one.
+// A growing hull that can be queried at every step at the price of a resting one.
 //
-// What a question needs is a support function, and that of a union is the larger of the two. So a
-// hull is a prepared base, a few prepared levels, and a tail of the points that became vertices
-// since, which a question scans. A version is a prefix of all of these: it is made in O(1), is
-// immutable, and shares everything with other versions. Points that stopped being extreme do no
-// harm; preparing drops most of them.
+// A query needs a support function, and the support function of a union is the maximum over its
+// parts. A hull is therefore a prepared base, a few prepared levels, and a tail of the points that
+// have become vertices since, which a query scans. A version is a prefix of all of these: it takes
+// O(1) to create, is immutable, and shares all data with other versions. Points that are no longer
+// extreme are harmless; preparing drops most of them.
 //
-// Questions pay for what is prepared (ski rental): each counts what it scanned, and once the scans
-// have cost what preparing costs, WantsPreparing() says so. So the total is at most about twice the
-// best in hindsight, and a hull that nobody asks about is never prepared. Prepare() makes a level
-// of the tail and merges it with those that are not much larger (Bentley and Saxe 1980,
+// Queries pay for preparation (ski rental): each counts the points it scanned, and after the scans
+// have cost as much as preparation, WantsPreparing() returns true. The total is at most about twice
+// the optimum in hindsight, and a hull that is never queried is never prepared. Prepare() builds a
+// level from the tail and merges it with levels that are not much larger (Bentley and Saxe 1980,
 // Decomposable searching problems), so that each point is moved O(log n) times.
 //
-// Thread-safe: one thread at a time appends, one at a time prepares, any number make versions.
+// Thread-safe: one thread appends, one prepares, and any number create versions, concurrently.
 class LiveHull {
  public:
-  // A moment in the growth: what was appended up to then. It keeps alive what its version needs.
+  // A position in the growth: everything appended up to it. Keeps alive the data of its version.
   class Mark {
    public:
-    // The mark of a LiveHull that nothing was appended to.
+    // The mark of an empty LiveHull.
     Mark() = default;
 
     int dimension() const { return dimension_; }
-    // The bounding box; `low` exceeds `high` when empty.
+    // The bounding box; `low` exceeds `high` if empty.
     const Vector& low() const { return low_; }
     const Vector& high() const { return high_; }
 
@@ -53,65 +53,66 @@ class LiveHull {
     Vector high_ = Vector::Constant(-kLargestDouble);
   };
 
-  // Nothing yet.
+  // Empty.
   LiveHull();
-  // `points`: at least the vertices of a hull of this dimension, and no point outside it. None for
+  // `points`: at least the vertices of a hull of this dimension, and no point outside it. Empty for
   // dimension -1. Cost: O(n), comparisons and distances.
   LiveHull(std::vector<Vector> points, int dimension);
-  // What `other` was at `mark`. Cost: O(points of its tail).
+  // Copies the state of `other` at `mark`. Cost: O(points of its tail).
   LiveHull(const LiveHull& other, const Mark& mark);
   LiveHull& operator=(const LiveHull&) = delete;
 
-  // Appends what a block brought: at least its points that became vertices, none outside the hull
-  // after it. `dimension`: the hull's after the block. Returns the moment after it.
-  // Cost: O(points), amortized; O(n) when the dimension grew.
+  // Appends the points of a block: at least its points that became vertices, none outside the hull
+  // after it. `dimension`: the hull's after the block. Returns the mark after it. Cost: O(points),
+  // amortized; O(n) if the dimension grew.
   Mark Append(std::span<const Vector> points, int dimension);
-  // The moment after the last Append.
+  // Returns the mark after the last Append.
   Mark Now() const;
 
-  // The hull as it was at `mark`, for questions. Requires a mark of this object, or one up to which
-  // it was copied (unchecked: a mark does not tell whose it is). Cost: O(1).
+  // Returns the hull at `mark`, for queries. Requires: a mark of this object, or one up to which it
+  // was copied (unchecked: a mark does not record its owner). Cost: O(1).
   std::shared_ptr<const QueryHull> VersionAt(const Mark& mark) const;
-  // At least the vertices of the hull at `mark`, and no point outside it. Cost: O(n).
+  // Returns at least the vertices of the hull at `mark`, and no point outside it. Cost: O(n).
   std::vector<Vector> PointsAt(const Mark& mark) const;
 
-  // Whether questions have paid for preparing what they scan; as if `more_questions` more had been
-  // asked.
+  // Returns true if queries have paid for preparing the points that they scan, assuming
+  // `more_questions` additional queries.
   bool WantsPreparing(const Mark& mark, uint64_t more_questions = 0) const;
-  // Prepares what there is up to `mark`; versions made from then on use it. Appending and questions
-  // go on meanwhile. Cost: O(m log m) for the m points that it moves.
+  // Prepares the state up to `mark`; later versions use it. Appends and queries may run
+  // concurrently. Cost: O(m log m) for the m points that it moves.
   void Prepare(const Mark& mark);
 
-  // What it holds, shared with its versions. Bytes.
+  // Memory, including data shared with its versions, in bytes.
   size_t MemoryBytes() const;
-  // Something that it shares with versions, which may outlive it; told from others by its address,
-  // which is never followed.
+  // Data shared with versions, which may outlive this object. Identified by its address, which is
+  // never dereferenced.
   struct Shared {
     const void* what;
     size_t bytes;
   };
-  // What a version at `mark` shares, and what one after the last Append does; each once.
+  // Returns the data shared with a version at `mark` and with one after the last Append, without
+  // duplicates.
   std::vector<Shared> SharedBy(const Mark& mark) const;
-  // MemoryBytes() without that.
+  // MemoryBytes() without shared data.
   static size_t OwnBytes();
-  // Points that Prepare() moved so far, each as often as it was moved: for tests.
+  // Number of points that Prepare() has moved, counting repeated moves. For tests.
   uint64_t points_moved() const { return points_moved_.load(std::memory_order_relaxed); }
 
  private:
   using Parts = std::shared_ptr<const LiveParts>;
 
-  // What serves a mark best. Requires the mutex (unchecked: a std::mutex does not tell who holds
-  // it).
+  // Returns the best parts for a mark. Requires mutex_ (unchecked: a std::mutex does not record its
+  // holder).
   const Parts& PartsFor(const Mark& mark) const;
   LiveParts Prepared(const LiveParts& before, const Mark& mark);
   static void AddShared(const LiveParts& parts, std::vector<Shared>& shared);
   static void Begin(std::vector<Vector> points, int dimension, Mark& next);
   static void AppendToTail(std::span<const Vector> points, Mark& next);
 
-  // Held by the thread that appends, and at the end of Prepare() for as long as that copies points.
-  // Taken before mutex_.
+  // Held during appends, and at the end of Prepare() while it copies points. Acquired before
+  // mutex_.
   std::mutex changing_;
-  // Held for moments only, so that no version waits for what is appended.
+  // Held briefly, so that creating a version never waits for an append.
   mutable std::mutex mutex_;
   Mark now_;
   // Points scanned since the last Prepare().

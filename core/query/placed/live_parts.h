@@ -12,26 +12,26 @@
 
 namespace hulld {
 
-// Points that were appended to a base, prepared. Immutable.
+// Prepared points that were appended to a base. Immutable.
 struct PreparedLevel {
   PreparedLevel(MappedPoints mapped_in, double radius_in)
       : mapped(std::move(mapped_in)), radius(radius_in) {}
 
   const MappedPoints mapped;
-  // The radius of the points about the base's centre.
+  // Radius of the points about the base's centre.
   const double radius;
 };
 
-// What a LiveHull consists of between two changes of its structure. Immutable, but for the tail,
-// which grows.
+// The parts of a LiveHull between two changes of its structure. Immutable, except for the growing
+// tail.
 struct LiveParts {
-  // Null as long as nothing was appended.
+  // Null before the first append.
   std::shared_ptr<const HullBase> base;
-  // The larger come first.
+  // Larger levels come first.
   std::vector<std::shared_ptr<const PreparedLevel>> levels;
-  // How many of the appended points base and levels stand for; the tail has those after.
+  // Number of appended points that base and levels represent; the tail holds the later ones.
   uint64_t covered = 0;
-  // Null as long as there are none.
+  // Null while empty.
   std::shared_ptr<GrowthTail> tail;
 };
 

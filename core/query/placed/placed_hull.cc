@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-// R(q) / |q|^2, within kRotationEntryError.
+// Returns R(q) / |q|^2, each entry within kRotationEntryError.
 Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
   auto [w, x, y, z] = q;
   const double largest =
@@ -50,7 +50,7 @@ PlacedHull::PlacedHull(const QueryHull& hull, const PoseProduct& X_WH)
 }
 
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {
-  // Both returns name this one variable, so that the hull is constructed in the caller's place.
+  // Both returns name this variable, so that the hull is constructed in the caller's storage.
   absl::StatusOr<PlacedHull> placed;
   if (IsValidPose(X_WH)) {
     placed.emplace(hull, X_WH);

@@ -9,24 +9,24 @@
 
 namespace hulld {
 
-// A hull at a pose, and what every query of it needs of the pose: made once, used for many pairs.
+// A hull at a pose, with the pose's derived data: built once, used for many pairs.
 class PlacedHull {
  public:
-  // `hull` must outlive the result. INVALID_ARGUMENT: ValidatePose.
+  // `hull` must outlive the result. INVALID_ARGUMENT: see ValidatePose.
   static absl::StatusOr<PlacedHull> Make(const QueryHull& hull, const Pose& X_WH);
-  // The same for a pose that was validated before. Requires a valid pose (ValidatePose).
+  // Takes a pose that has been validated. Requires: a valid pose (ValidatePose).
   PlacedHull(const QueryHull& hull, const Pose& X_WH);
-  // A piece of a body. Both must outlive the result. Exact questions are answered for the product
-  // as it is, not for a rounding of it.
+  // Places a piece of a body. Both arguments must outlive the result. Exact queries use the exact
+  // product, not its rounding.
   PlacedHull(const QueryHull& hull, const PoseProduct& X_WH);
 
   const QueryHull& query_hull() const { return *hull_; }
-  // Requires a canonical one.
+  // Requires: a canonical hull.
   const Hull& hull() const { return hull_->hull(); }
   bool empty() const { return hull_->empty(); }
   // Rounded for a piece of a body (PoseProduct::rounded).
   const Pose& X_WH() const { return X_WH_; }
-  // Null but for a piece of a body.
+  // Null except for a piece of a body.
   const PoseProduct* product() const { return product_; }
   // The rotation R(q) / |q|^2, each entry within kRotationEntryError.
   const Eigen::Matrix3d& R_WH() const { return R_WH_; }

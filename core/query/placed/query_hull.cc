@@ -42,7 +42,7 @@ SupportPoint QueryHull::FartherInGrowth(const PlainVector& n, SupportPoint found
   }
   if (growth_->tail_count > 0) consider(parts.tail->Farthest(growth_->tail_count, n));
   if (growth_->scans > 0) {
-    // A counter shared by all threads is expensive to raise each time.
+    // Batches the updates: incrementing a counter shared by all threads is expensive.
     constexpr uint32_t kBetween = 16;
     thread_local uint32_t questions = 0;
     if (++questions % kBetween == 0) {
@@ -56,7 +56,7 @@ CenterBounds::Bounds QueryHull::BoundsWithGrowth(CenterBounds::Bounds bounds,
                                                  const PlainVector& n) const {
   const double reach = Farthest(n).value - Dot(n, PlainVector(center_));
   const double margin = kCenterMargin * radius_ * LargestComponent(n);
-  // Not a number where the base's is unknown.
+  // NaN if the base's is unknown.
   bounds.support = std::max(bounds.support, reach + margin);
   return bounds;
 }

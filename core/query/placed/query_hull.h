@@ -19,13 +19,13 @@ namespace hulld {
 class GrowthTail;
 struct LiveParts;
 
-// A hull as questions need it: a finite point set whose hull it is, and what finds the points that
-// lie farthest along a direction. Points are known by their index.
+// A hull in the form that queries need: a finite point set that generates it, and the search for
+// points farthest along a direction. Points are identified by index.
 //
-// It is made of a canonical snapshot: then the points are the vertices, in canonical order, and
-// every question may be asked. Or it is a version of a LiveHull: then the points are in no
-// particular order, some may not be vertices, and what may be asked is the relation, with or
-// without a tolerance, and the clearance. Immutable; readable by any thread.
+// Built from a canonical snapshot, the points are the vertices in canonical order, and every query
+// is supported. As a version of a LiveHull, the points are in no particular order and need not all
+// be vertices; the supported queries are the relation, with or without a tolerance, and the
+// clearance. Immutable and thread-safe.
 class QueryHull {
  public:
   // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.
@@ -33,7 +33,7 @@ class QueryHull {
 
   // Null for a version of a LiveHull.
   const Hull* canonical() const { return canonical_; }
-  // Requires canonical().
+  // Requires: canonical() is not null.
   const Hull& hull() const {
     HULLD_CHECK(canonical_ != nullptr);
     return *canonical_;
@@ -42,62 +42,63 @@ class QueryHull {
   bool empty() const { return base_ == nullptr; }
   int dimension() const { return dimension_; }
   uint32_t point_count() const { return point_count_; }
-  // Requires i < point_count().
+  // Requires: i < point_count().
   Vector point(uint32_t i) const {
     HULLD_DCHECK(i < point_count_);
     return i < base_->points().size() ? base_->points()[i] : GrownPoint(i);
   }
-  // All points, where they lie together in memory: not so in a version that has grown, nor when
-  // empty.
+  // All points if they are contiguous in memory. Empty for a version that has grown and for an
+  // empty hull.
   std::span<const Vector> points_together() const {
     return base_ == nullptr || growth_ != nullptr ? std::span<const Vector>() : base_->points();
   }
-  // Largest absolute coordinate; 0 when empty.
+  // Largest absolute coordinate; 0 if empty.
   double max_abs_coordinate() const { return max_abs_; }
-  // A place in the hull to search from; zero when empty.
+  // A point in the hull where searches start; zero if empty.
   const Vector& center() const { return center_; }
-  // Every point is within this distance of center(); rounded up. 0 when empty.
+  // Every point is within this distance of center(); rounded up. 0 if empty.
   double radius() const { return radius_; }
-  // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents when there is none.
+  // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents if all are zero.
   int exponent() const { return exponent_; }
-  // Points that span the hull: one more than its dimension, affinely independent. Requires a hull
-  // that is not empty.
+  // Points that span the hull: one more than its dimension, affinely independent. Requires:
+  // !empty().
   std::span<const uint32_t> spanning() const {
     HULLD_DCHECK(!empty());
     return base_->spanning();
   }
-  // Points, with repetitions, whose mean is in the relative interior of the hull and not near its
-  // boundary unless the hull is flat or a needle. Requires a hull that is not empty.
+  // Points, with repetitions. Their mean is in the relative interior of the hull, and not near its
+  // boundary unless the hull is flat or a needle. Requires: !empty().
   std::span<const uint32_t> inner_points() const {
     HULLD_DCHECK(!empty());
     return base_->inner();
   }
 
-  // A point farthest along n: its computed value is the largest of all but for the rounding of two
-  // values. Requires a hull that is not empty. Cost: SupportMap's, for each of a few maps.
+  // Returns a point farthest along n: its computed value is the maximum, up to the rounding of two
+  // values. Requires: !empty(). Cost: SupportMap's, for each of a few maps.
   SupportPoint Farthest(const PlainVector& n) const {
     HULLD_DCHECK(!empty());
     const SupportPoint found = base_->support().Farthest(n);
     return growth_ == nullptr ? found : FartherInGrowth(n, found);
   }
-  // All points, ascending, that may be exactly farthest along a direction whose components differ
-  // from those of n by up to `error`, when two values are ordered rightly if they differ by more
-  // than `slack`. Requires a hull that is not empty.
+  // Returns all points, ascending, that may be exactly farthest along a direction with components
+  // that differ from n's by up to `error`. `slack`: values that differ by more than this compare
+  // correctly. Requires: !empty().
   std::vector<uint32_t> Candidates(const PlainVector& n, double error, double slack) const;
 
-  // About center(), of the base alone; BoundsAt tells of the whole hull. Both require a hull that
-  // is not empty.
+  // Bounds about center() for the base alone; BoundsAt covers the whole hull. Both require
+  // !empty().
   const CenterBounds& center_bounds() const {
     HULLD_DCHECK(!empty());
     return base_->center_bounds();
   }
-  // Upper bounds as CenterBounds gives them, of the whole hull, along n at its place.
+  // Returns upper bounds for the whole hull, as defined by CenterBounds, along n at its place.
   CenterBounds::Bounds BoundsAt(const CenterBounds::Place& place, const PlainVector& n) const {
     const CenterBounds::Bounds bounds = center_bounds().At(place);
     return growth_ == nullptr ? bounds : BoundsWithGrowth(bounds, n);
   }
 
-  // What it holds alone, beyond a canonical snapshot and what it shares with its LiveHull. Bytes.
+  // Memory owned by this object, without a canonical snapshot and data shared with a LiveHull, in
+  // bytes.
   size_t MemoryBytes() const {
     return sizeof(*this) + (canonical_ == nullptr || empty() ? 0 : base_->MemoryBytes());
   }
@@ -105,14 +106,14 @@ class QueryHull {
  private:
   friend class LiveHull;
 
-  // What was appended to the base.
+  // The points appended to the base.
   struct Growth {
     std::shared_ptr<const LiveParts> parts;
-    // Points of the tail.
+    // Number of points of the tail.
     size_t tail_count = 0;
-    // Counts the points that are scanned where preparing would save it.
+    // Counts the scanned points that preparation would save.
     std::shared_ptr<std::atomic<uint64_t>> scanned;
-    // How many a question along one direction scans.
+    // Number of points scanned per direction.
     uint64_t scans = 0;
   };
 
@@ -124,7 +125,7 @@ class QueryHull {
 
   const Hull* canonical_ = nullptr;
   std::shared_ptr<const HullBase> base_;
-  // Null where the base is all there is, and prepared.
+  // Null if the whole hull is a prepared base.
   std::unique_ptr<const Growth> growth_;
   int dimension_ = -1;
   uint32_t point_count_ = 0;

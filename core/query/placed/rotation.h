@@ -6,17 +6,18 @@
 
 namespace hulld {
 
-// Products with a matrix, in registers, each product and sum rounded by itself. Eigen's own fuse
-// them where the processor can, whatever the compiler is told, and processors would differ.
+// Matrix products in registers, with every product and sum rounded separately. Eigen's own products
+// use fused operations where the processor has them, whatever the compiler flags, so results would
+// differ between processors.
 
-// R p.
+// Returns R p.
 inline Vector Product(const Eigen::Matrix3d& R, const PlainVector& p) {
   const double* const r = R.data();  // column by column
   return {r[0] * p.x + r[3] * p.y + r[6] * p.z, r[1] * p.x + r[4] * p.y + r[7] * p.z,
           r[2] * p.x + r[5] * p.y + r[8] * p.z};
 }
 
-// The transpose of R, times p.
+// Returns the transpose of R, times p.
 inline Vector TransposedProduct(const Eigen::Matrix3d& R, const PlainVector& p) {
   const double* const r = R.data();  // column by column
   return {r[0] * p.x + r[1] * p.y + r[2] * p.z, r[3] * p.x + r[4] * p.y + r[5] * p.z,

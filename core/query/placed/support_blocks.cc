@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-// Four doubles, and four integers as wide, in whatever registers the function is compiled for.
+// Four doubles, and four integers of the same width, in the registers of the compilation target.
 using Lanes = double __attribute__((vector_size(32)));
 using LaneIds = int64_t __attribute__((vector_size(32)));
 // Above every index.
@@ -24,7 +24,7 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   lanes = Lanes{value, value, value, value};
 }
 
-// The values along (x, y, z) of four points.
+// Computes the values along (x, y, z) of four points.
 [[gnu::always_inline]] inline void Evaluate(const SupportBlock& block, const Lanes& x,
                                             const Lanes& y, const Lanes& z, Lanes& values) {
   Lanes px, py, pz;
@@ -34,7 +34,8 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   values = (x * px + y * py) + z * pz;
 }
 
-// The farthest of whole blocks; the first of equal ones. Requires at least one block.
+// Returns the farthest point of whole blocks; the first of equal points. Requires: at least one
+// block.
 [[gnu::always_inline]] inline SupportPoint ScanWhole(std::span<const SupportBlock> blocks,
                                                      const PlainVector& n) {
   HULLD_DCHECK(!blocks.empty());
@@ -53,13 +54,13 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
     best = better ? values : best;
     best_ids = better ? ids : best_ids;
   }
-  // Which lane wins cannot be foreseen, so no branch depends on it.
+  // Branch-free: the winning lane is unpredictable.
   Lanes largest = best;
   Lanes other = __builtin_shufflevector(largest, largest, 2, 3, 0, 1);
   largest = largest > other ? largest : other;
   other = __builtin_shufflevector(largest, largest, 1, 0, 3, 2);
   largest = largest > other ? largest : other;
-  // Where nothing is equal to itself, as for a direction that is not a number, any point will do.
+  // If no value equals itself, as for a NaN direction, any point is valid.
   const LaneIds none = {kNone, kNone, kNone, kNone};
   LaneIds first = best >= largest ? best_ids : none;
   LaneIds other_ids = __builtin_shufflevector(first, first, 2, 3, 0, 1);
@@ -81,8 +82,8 @@ __attribute__((target("avx2"))) SupportPoint ScanAvx2(std::span<const SupportBlo
 #endif
 
 #ifdef HULLD_HAS_NEON_PATH
-// ScanWhole with each four lanes as two registers of two, step by step. The compiler compares the
-// lanes of a vector wider than a register one after the other.
+// ScanWhole with each vector of four lanes split into two registers of two lanes. For vectors wider
+// than a register, the compiler would compare the lanes one by one.
 using Pair = double __attribute__((vector_size(16)));
 using PairIds = int64_t __attribute__((vector_size(16)));
 

@@ -13,21 +13,30 @@
 namespace hulld {
 namespace {
 
-// Up to this many points are scanned: ten blocks of four. A choice, not tuned.
+// Sets of up to this many points are scanned: ten blocks of four. A choice, not tuned.
 constexpr size_t kMostScanned = 40;
 // Cells of the cube map per point. A choice: with two, of 16 bytes each, most cells list at most
 // four points.
 constexpr double kCellsPerPoint = 2;
-// A cell with more points than this is divided.
+// Cells with more points than this are divided.
 constexpr size_t kMostListed = 12;
-// Among at most this many points each is compared with each.
+// Lists of at most this many points are compared pairwise.
 constexpr size_t kMostCompared = 16;
-// No cell is made narrower than this; it stays far wider than kCellMargin. Observed: points this
-// near to a common plane come from rounding, and a list of them is as good as a finer division.
+// Least width of a cell; far wider than kCellMargin. Observed: points this near to a common plane
+// come from rounding, and a list of them is as good as a finer division.
 constexpr double kLeastWidth = 0x1p-22;
-// Cells per point beyond which none is divided any more.
+// Cells per point beyond which no further cell is divided.
 constexpr size_t kMostCellsPerPoint = 8;
-// Coordinates beyond these are scanned: products might overflow, or underflow where it counts.
+// Limit on the estimated number of times that each point is listed in the parts of the enclosing
+// squares. Beyond it, a square with more points than kMostCompared gets no list. Observed: 8 on
+// average for points all over a surface. The bound is for points along curves, where the number
+// doubles with every second division of a square.
+constexpr double kMostCopies = 64;
+// Fraction of candidates among all points beyond which scanning all is faster than sorting the
+// candidates.
+constexpr size_t kPointsPerCandidate = 16;
+// Sets with coordinates beyond these are scanned: products might overflow, or underflow with
+// effect.
 constexpr double kLargestCoordinate = 0x1p900;
 constexpr double kLeastExtent = 0x1p-800;
 
@@ -43,8 +52,8 @@ using Lanes = double __attribute__((vector_size(32)));
   lanes = lanes > -lanes ? lanes : -lanes;
 }
 
-// Powers of two that make the extents of the points about equal, none below 2^-10: the size along
-// each axis relative to the largest.
+// Returns powers of two that make the extents of the points about equal: the size along each axis
+// relative to the largest, at least 2^-10.
 Vector ScaleOf(const Vector& extents) {
   constexpr int kLeast = -10;
   int exponents[3];
@@ -57,13 +66,13 @@ Vector ScaleOf(const Vector& extents) {
   return scale;
 }
 
-// Points seen on a face of the cube: along direction (s, t) the value is s a + t b + c.
+// Points as seen on a face of the cube: along direction (s, t) the value is s a + t b + c.
 struct FacePoints {
   std::vector<double> a;
   std::vector<double> b;
   std::vector<double> c;
   std::vector<uint32_t> ids;
-  // The arrays are longer: the last point is repeated up to a multiple of four.
+  // The arrays are padded to a multiple of four by repeating the last point.
   size_t size = 0;
 
   void Reserve(size_t n) {
@@ -83,7 +92,7 @@ struct FacePoints {
   }
 };
 
-// A square on a face, widened.
+// A widened square on a face.
 struct Square {
   double s;
   double t;
@@ -91,8 +100,7 @@ struct Square {
   double half_t;
 };
 
-// The largest value at any of the square's corners that the first point has beyond the second, but
-// for rounding.
+// Returns the largest lead of p over q at any of the square's corners, up to rounding.
 [[gnu::always_inline]] inline double LeadOf(const FacePoints& points, size_t p, size_t q,
                                             const Square& square) {
   const double a = points.a[p] - points.a[q];
@@ -102,7 +110,7 @@ struct Square {
          (square.half_s * std::abs(a) + square.half_t * std::abs(b));
 }
 
-// Directions (s, t) in the middle of a square, in all lanes.
+// The direction (s, t) at the middle of a square, broadcast to all lanes.
 struct Middle {
   [[gnu::always_inline]] explicit Middle(const Square& square) {
     Broadcast(square.s, s);
@@ -119,7 +127,7 @@ struct Middle {
   Lanes t;
 };
 
-// The first of the points that are farthest along the middle.
+// Returns the first of the points that are farthest along the middle.
 [[gnu::always_inline]] inline size_t FarthestAlong(const Middle& middle, const FacePoints& points) {
   Lanes best, values;
   Broadcast(-INFINITY, best);
@@ -140,8 +148,8 @@ struct Middle {
   return 0;
 }
 
-// Keeps those points of `from` that may be farthest along a direction in the square. `bound`: what
-// a lead may err.
+// Keeps the points of `from` that may be farthest along a direction in the square. `bound`: error
+// bound of a lead.
 [[gnu::always_inline]] inline void FilterWith(const FacePoints& from, const Square& square,
                                               double bound, FacePoints& to) {
   const Middle middle(square);
@@ -216,12 +224,15 @@ class SupportMap::Filling {
     const uint32_t side = map_.side_;
     for (uint32_t face = 0; face < 6; ++face) {
       SeeFrom(face);
-      FillRange(seen_, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0);
+      FillRange(seen_, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0, 1);
     }
   }
 
+  // True if some cell has no list.
+  bool needs_tree() const { return needs_tree_; }
+
  private:
-  // Cells: `side` rows of as many, of a width on the face, from a corner on.
+  // A grid of `side` by `side` cells, of a given width on the face, from a corner on.
   struct Grid {
     uint32_t first;
     uint32_t side;
@@ -236,13 +247,13 @@ class SupportMap::Filling {
     uint32_t j_end;
   };
 
-  // All points, as they are seen on a face.
+  // Projects all points onto a face.
   void SeeFrom(uint32_t face) {
     const uint32_t axis = face / 2;
     const uint32_t first = kCubeAxisAfter[axis];
     const uint32_t second = kCubeAxisAfter[axis + 1];
     const double sign = face % 2 == 0 ? 1 : -1;
-    // A direction is scaled by what coordinates are divided by: powers of two.
+    // Coordinates are divided by powers of two, so a direction is multiplied by them.
     const Vector scale = map_.scale_;
     const Vector per_scale = scale.cwiseInverse();
     seen_.Reserve(map_.points_.size());
@@ -258,7 +269,7 @@ class SupportMap::Filling {
   }
 
   static Square Widened(const Grid& grid, const Range& range) {
-    // Twice the margin: the rest is for the rounding of all this.
+    // Twice the margin: the excess covers the rounding of this computation.
     const double half_s = 0.5 * grid.width * (range.i_end - range.i_begin);
     const double half_t = 0.5 * grid.width * (range.j_end - range.j_begin);
     return {grid.s + grid.width * range.i_begin + half_s,
@@ -266,15 +277,28 @@ class SupportMap::Filling {
             half_t + 2 * kCellMargin};
   }
 
-  // Fills the cells of a range, whose farthest points are among those given.
-  void FillRange(const FacePoints& points, const Grid& grid, const Range& range, size_t depth) {
-    if (depth >= lists_.size()) lists_.emplace_back(std::make_unique<FacePoints>());
-    FacePoints& found = *lists_[depth];
+  FacePoints& ListAt(size_t index) {
+    while (index >= lists_.size()) lists_.emplace_back(std::make_unique<FacePoints>());
+    return *lists_[index];
+  }
+
+  // Fills the cells of a range, given a superset of their farthest points.
+  void FillRange(const FacePoints& points, const Grid& grid, const Range& range, size_t depth,
+                 double copies) {
+    FacePoints& found = ListAt(2 * depth);
     Filter(points, Widened(grid, range), bound_, found);
+    FillFiltered(found, grid, range, depth, copies);
+  }
+
+  // FillRange for points that have been filtered. `copies`: the average number of times that each
+  // point is listed in all ranges made by the divisions down to this one.
+  void FillFiltered(FacePoints& found, const Grid& grid, const Range& range, size_t depth,
+                    double copies) {
     const uint32_t rows = range.i_end - range.i_begin;
     const uint32_t columns = range.j_end - range.j_begin;
     if (found.size <= 4) return FillAll(found, grid, range);
-    if (rows == 1 && columns == 1) return FillCell(found, grid, range, depth);
+    if (found.size > kMostCompared && copies > kMostCopies) return LeaveToTree(grid, range);
+    if (rows == 1 && columns == 1) return FillCell(found, grid, range, depth, copies);
     Range low = range;
     Range high = range;
     if (rows >= columns) {
@@ -282,8 +306,13 @@ class SupportMap::Filling {
     } else {
       low.j_end = high.j_begin = range.j_begin + columns / 2;
     }
-    FillRange(found, grid, low, depth + 1);
-    FillRange(found, grid, high, depth + 1);
+    FacePoints& of_low = ListAt(2 * depth + 2);
+    FacePoints& of_high = ListAt(2 * depth + 3);
+    Filter(found, Widened(grid, low), bound_, of_low);
+    Filter(found, Widened(grid, high), bound_, of_high);
+    copies *= static_cast<double>(of_low.size + of_high.size) / static_cast<double>(found.size);
+    FillFiltered(of_low, grid, low, depth + 1, copies);
+    FillFiltered(of_high, grid, high, depth + 1, copies);
   }
 
   void FillAll(const FacePoints& found, const Grid& grid, const Range& range) {
@@ -296,14 +325,24 @@ class SupportMap::Filling {
     }
   }
 
-  void FillCell(FacePoints& found, const Grid& grid, const Range& range, size_t depth) {
+  void LeaveToTree(const Grid& grid, const Range& range) {
+    needs_tree_ = true;
+    for (uint32_t i = range.i_begin; i < range.i_end; ++i) {
+      for (uint32_t j = range.j_begin; j < range.j_end; ++j) {
+        map_.cells_[grid.first + i * grid.side + j] = {{0, 0, 0, kNoList}};
+      }
+    }
+  }
+
+  void FillCell(FacePoints& found, const Grid& grid, const Range& range, size_t depth,
+                double copies) {
     if (found.size <= kMostCompared) CompareEach(found, Widened(grid, range));
     if (found.size <= 4) return FillAll(found, grid, range);
     Cell& cell = map_.cells_[grid.first + range.i_begin * grid.side + range.j_begin];
     const bool divides = found.size > kMostListed && grid.width > 2 * kLeastWidth &&
                          map_.cells_.size() < most_cells_;
-    // Beyond, ids would not tell points, lists and parts apart.
-    HULLD_CHECK(map_.cells_.size() < kDivided - kLong && map_.lists_.size() < kDivided - kLong);
+    // Beyond this, ids of points, lists and parts would be ambiguous.
+    HULLD_CHECK(map_.cells_.size() < kDivided - kLong && map_.lists_.size() < kNoList - kLong);
     if (!divides) {
       const auto others = found.ids.begin() + 3;
       std::copy(found.ids.begin(), others, cell.ids);
@@ -317,16 +356,16 @@ class SupportMap::Filling {
     map_.cells_.resize(first + 4);
     const Grid quarters = {first, 2, grid.s + grid.width * range.i_begin,
                            grid.t + grid.width * range.j_begin, 0.5 * grid.width};
-    FillRange(found, quarters, {0, 2, 0, 2}, depth + 1);
+    FillRange(found, quarters, {0, 2, 0, 2}, depth + 1, copies);
   }
 
-  // Drops those that another is ahead of all over the square.
+  // Drops every point that another point leads all over the square.
   void CompareEach(FacePoints& found, const Square& square) const {
     for (size_t p = found.size; p-- > 0;) {
       for (size_t q = 0; q < found.size; ++q) {
         if (p == q || LeadOf(found, p, q, square) > -bound_) continue;
         const size_t last = --found.size;
-        // Those before p stay where they are.
+        // Points before p keep their places.
         for (size_t k = p; k < last; ++k) {
           found.a[k] = found.a[k + 1];
           found.b[k] = found.b[k + 1];
@@ -342,10 +381,11 @@ class SupportMap::Filling {
   SupportMap& map_;
   double bound_ = 0;
   size_t most_cells_ = 0;
-  // All points, on the face that is being filled.
+  // All points, as seen on the face being filled.
   FacePoints seen_;
-  // One for each depth.
+  // Two for each depth.
   std::vector<std::unique_ptr<FacePoints>> lists_;
+  bool needs_tree_ = false;
 };
 
 SupportMap SupportMap::ForScanning(std::span<const Vector> points) {
@@ -379,7 +419,9 @@ SupportMap::SupportMap(std::span<const Vector> points) : points_(points) {
   half_ = 0.5 * side_;
   below_side_ = std::nextafter(static_cast<double>(side_), 0.0);
   cells_.resize(size_t{6} * side_ * side_);
-  Filling(*this).Fill(kLeadErrorFactor * extents.cwiseQuotient(scale).maxCoeff());
+  Filling filling(*this);
+  filling.Fill(kLeadErrorFactor * extents.cwiseQuotient(scale).maxCoeff());
+  if (filling.needs_tree()) tree_ = SupportTree(points_);
   cells_.shrink_to_fit();
   lists_.shrink_to_fit();
 }
@@ -401,7 +443,8 @@ void SupportMap::BuildBlocks() {
   }
 }
 
-// Where within a cell a coordinate lies, as bits: the first one tells the half, and so on.
+// Returns the position of a coordinate within its cell as bits; the first bit selects the half, and
+// so on.
 uint32_t BitsWithin(double coordinate) {
   return static_cast<uint32_t>((coordinate - std::floor(coordinate)) * 0x1p32);
 }
@@ -422,6 +465,7 @@ SupportMap::Support SupportMap::LookUpDeep(const Cell& cell, const Place& place,
                                            const PlainVector& n) const {
   const Cell& found = cell.ids[3] >= kDivided ? QuarterAt(cell, place) : cell;
   if (found.ids[3] < kLong) return BestOfFour(found, n);
+  if (found.ids[3] == kNoList) return tree_.Farthest(points_, n);
   Support best{found.ids[0], ValueOf(found.ids[0], n)};
   const auto consider = [&](uint32_t id) {
     const double value = ValueOf(id, n);
@@ -449,6 +493,10 @@ void SupportMap::AppendCandidates(const PlainVector& n, double error, double lea
   const Place place = PlaceOf(n);
   const Cell& top = CellAt(place);
   const Cell& cell = top.ids[3] >= kDivided ? QuarterAt(top, place) : top;
+  if (cell.ids[3] == kNoList) {
+    AppendFromTree(n, least, first, candidates);
+    return;
+  }
   for (const uint32_t id : std::span(cell.ids).first(3)) consider(id);
   if (cell.ids[3] < kLong) {
     consider(cell.ids[3]);
@@ -459,10 +507,26 @@ void SupportMap::AppendCandidates(const PlainVector& n, double error, double lea
   candidates.erase(std::unique(candidates.begin() + begin, candidates.end()), candidates.end());
 }
 
+// Large results come from scanning, which needs no sorting.
+void SupportMap::AppendFromTree(const PlainVector& n, double least, uint32_t first,
+                                std::vector<uint32_t>& candidates) const {
+  const size_t begin = candidates.size();
+  const bool are_few = tree_.ForEachAtLeast(points_, n, least, [&](uint32_t id) {
+    candidates.push_back(first + id);
+    return candidates.size() - begin <= points_.size() / kPointsPerCandidate;
+  });
+  if (are_few)
+    return std::sort(candidates.begin() + static_cast<ptrdiff_t>(begin), candidates.end());
+  candidates.resize(begin);
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    if (ValueOf(i, n) >= least) candidates.push_back(first + i);
+  }
+}
+
 std::vector<uint32_t> SupportMap::Listed() const {
-  std::vector<char> is_listed(points_.size(), scans());
+  std::vector<char> is_listed(points_.size(), scans() || !tree_.empty());
   for (const Cell& cell : cells_) {
-    if (cell.ids[3] >= kDivided) continue;
+    if (cell.ids[3] >= kNoList) continue;
     for (const uint32_t id : std::span(cell.ids).first(3)) is_listed[id] = 1;
     if (cell.ids[3] < kLong) is_listed[cell.ids[3]] = 1;
   }
@@ -478,7 +542,7 @@ std::vector<uint32_t> SupportMap::Listed() const {
 
 size_t SupportMap::MemoryBytes() const {
   return blocks_.capacity() * sizeof(SupportBlock) + cells_.capacity() * sizeof(Cell) +
-         lists_.capacity() * sizeof(uint32_t);
+         lists_.capacity() * sizeof(uint32_t) + tree_.MemoryBytes();
 }
 
 }  // namespace hulld

@@ -18,27 +18,28 @@
 namespace hulld {
 namespace {
 
-// Candidates are gathered for a window of placements side by side: for about as many placements as
-// had kCandidatesPerWindow candidates last time, enough to keep the threads busy.
+// Candidates are gathered for a window of consecutive placements. A window has about as many
+// placements as produced kCandidatesPerWindow candidates in the previous window, enough to keep the
+// threads busy.
 constexpr uint64_t kCandidatesPerWindow = 16384;
 constexpr uint32_t kFirstPlacements = 16;
 constexpr uint32_t kMostPlacements = 1024;
-// What a thread takes at a time: some microseconds.
+// Pairs per task of a thread: some microseconds of work.
 constexpr size_t kPairsPerTask = 64;
-// Nodes of the tree between two polls.
+// Tree nodes visited between two polls.
 constexpr uint64_t kNodesPerPoll = 1024;
-// Beyond this many candidates, a bit for each placement takes less memory.
+// Beyond this many candidates, one bit for each placement takes less memory.
 constexpr size_t kMostListed = 1024;
 constexpr size_t kWordBits = 64;
 
-// What a thread found of its pairs.
+// Results of a thread.
 struct Part {
   std::vector<SceneAnswer> answers;
   RungCounts rungs;
 };
 
-// Gathers the candidates of a window of placements, then asks about them, a bounded number at a
-// time: threads share both, and what is held does not grow with what collides.
+// Gathers the candidates of a window of placements, then queries them in bounded batches. Threads
+// share both phases. Memory does not grow with the number of collisions.
 class Search {
  public:
   Search(const SceneSearch& scene, const SceneOptions& options)
@@ -69,7 +70,7 @@ class Search {
   }
 
  private:
-  // A caller that said stop is not asked again.
+  // After should_stop returns true it is not polled again.
   bool Stopped() {
     if (!stopped_ && StopPoll(options_.query.should_stop, 1).Poll()) stopped_ = true;
     return stopped_;
@@ -84,7 +85,7 @@ class Search {
     }
   }
 
-  // Answers the pairs that wait, in their order. False: stopped, and nothing was emitted.
+  // Answers the pending pairs in order. Returns false if stopped; then nothing was emitted.
   bool AskAndEmit(const std::function<void(std::span<const SceneAnswer>)>& emit) {
     const size_t tasks = (pairs_.size() + kPairsPerTask - 1) / kPairsPerTask;
     if (parts_.size() < tasks) parts_.resize(tasks);
@@ -123,7 +124,7 @@ class Search {
   const int threads_;
   std::atomic<bool> stopped_ = false;
   SceneTotals totals_;
-  // Candidates to be asked about, and what was found of them.
+  // Pending candidates, and their results.
   std::vector<PlacedPair> pairs_;
   std::vector<Part> parts_;
 };
@@ -203,14 +204,14 @@ bool SceneSearch::IsIgnored(uint32_t a, uint32_t b) const {
   return ignored_.contains(std::minmax(options_->groups[a], options_->groups[b]));
 }
 
-// Pairs that are asked about, by counting groups rather than pairs.
+// Counts the pairs to query by groups, without enumerating them.
 uint64_t SceneSearch::CountPairs() const {
   const auto pairs_among = [](uint64_t n) { return n * (n - (n > 0)) / 2; };
   const uint64_t count = placements_.size();
   const uint64_t movers = options_->movers ? std::min<uint64_t>(*options_->movers, count) : count;
   uint64_t pairs = pairs_among(count) - pairs_among(count - movers);
   if (options_->groups.empty()) return pairs;
-  // How many members of each group are movers, and how many are not.
+  // Number of members of each group that are movers, and that are not.
   std::map<uint32_t, std::pair<uint64_t, uint64_t>> sizes;
   for (uint32_t i = 0; i < count; ++i) {
     auto& [moving, resting] = sizes[options_->groups[i]];

@@ -24,71 +24,72 @@
 
 namespace hulld {
 
-// Two groups of placements; the same twice: pairs within that group.
+// Two groups of placements. Equal groups select the pairs within that group.
 struct GroupPair {
   uint32_t first;
   uint32_t second;
 };
 
 struct SceneOptions {
-  // What is asked of each pair. A pair is found when it is not SEPARATED, or with a clearance when
-  // its separation is within that. What else is wanted is computed of found pairs alone.
+  // Options for each pair. A pair is found if it is not SEPARATED or, with a clearance, if its
+  // separation is within the clearance. Further details are computed for found pairs only.
   QueryOptions query;
-  // The group of each placement, or empty when there are no groups.
+  // Group of each placement, or empty if there are no groups.
   std::span<const uint32_t> groups;
-  // Pairs of groups that are never asked about.
+  // Pairs of groups to skip.
   std::span<const GroupPair> ignored_groups;
-  // Empty, or each placement as a body: those that are no hulls are asked about in this form.
+  // Empty, or each placement as a body. Placements that are not hulls are queried in this form.
   std::span<const PlacedBody> bodies;
-  // One against many: only pairs that include at least one of the first `movers` placements.
+  // One against many: restricts the pairs to those with at least one of the first `movers`
+  // placements.
   std::optional<uint32_t> movers;
   // OpenMP threads.
   int threads = 1;
 };
 
-// A found pair, a < b, or one that could not be answered.
+// A found pair, a < b, or a pair with an error.
 struct SceneAnswer {
   PlacedPair pair;
   absl::StatusOr<Answer> answer;
 };
 
 struct SceneTotals {
-  // Pairs that the groups and movers leave; those of them whose boxes meet; and those of the latter
-  // that are found.
+  // Number of pairs selected by groups and movers; of these, pairs with intersecting boxes; of
+  // these, found pairs.
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;
-  // Candidates by the rung that decided.
+  // Candidates by deciding rung.
   RungCounts rungs;
 };
 
-// A scene for callers that have threads of their own: FindCollisions is the SceneCandidates of
-// every placement, and of each candidate Ask. Const functions may be called by several threads at
-// once.
+// A scene for callers with their own threads. FindCollisions is equivalent to iterating the
+// SceneCandidates of every placement and calling Ask for each candidate. Const functions are
+// thread-safe.
 class SceneSearch {
  public:
-  // Both must outlive this; bodies, if there are any, are one for each placement. Cost: O(n log n);
-  // boxes are computed on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for
-  // each placement. CANCELLED: should_stop said so.
+  // Both arguments must outlive this object; bodies, if any, are one for each placement. Computes
+  // boxes on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for each
+  // placement. CANCELLED: should_stop returned true. Cost: O(n log n).
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
-  // The same for a caller that computed the boxes: BoundingBox of each placement.
+  // Takes precomputed boxes: BoundingBox of each placement.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options, std::vector<Box> boxes);
 
-  // Pairs that the groups and movers leave.
+  // Pairs selected by the groups and movers.
   uint64_t pairs() const { return pairs_; }
-  // Placements that have candidates of their own: all, or the movers.
+  // Number of placements with candidates of their own: all, or the movers.
   uint32_t size() const { return size_; }
 
-  // The answer of a candidate, and what else is wanted of it if it is found. of_body: where not
-  // null, takes what an answer about a body has beside that. CANCELLED: should_stop said so.
-  // INVALID_ARGUMENT, RESOURCE_EXHAUSTED: a candidate with a body, as in CheckBodies.
+  // Returns the answer of a candidate, with the requested details if the pair is found. `of_body`:
+  // if not null, receives the details specific to bodies. CANCELLED: should_stop returned true.
+  // INVALID_ARGUMENT, RESOURCE_EXHAUSTED: for a candidate with a body, as in CheckBodies.
   absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body = nullptr) const;
-  // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
+  // Returns true if the pair is not SEPARATED or is within the clearance.
   bool IsFound(const Answer& answer) const;
 
-  // What this holds: the boxes and their tree.
+  // Memory of the boxes and their tree.
   size_t MemoryBytes() const {
     return boxes_.capacity() * sizeof(Box) + tree_.MemoryBytes() + sizeof *this;
   }
@@ -101,7 +102,7 @@ class SceneSearch {
   static absl::StatusOr<SceneSearch> MakeWith(std::span<const PlacedHull> placements,
                                               const SceneOptions& options,
                                               std::optional<std::vector<Box>> boxes);
-  // False: should_stop said so, and what was made is to be dropped.
+  // Both return false if should_stop returned true; the result must then be discarded.
   bool ComputeBoxes();
   bool BuildTree();
   bool IsIgnored(uint32_t a, uint32_t b) const;
@@ -114,7 +115,7 @@ class SceneSearch {
 
   std::span<const PlacedHull> placements_;
   const SceneOptions* options_;
-  // The relation, and whether it is within the clearance.
+  // Computes the relation, and the comparison with the clearance.
   QueryOptions first_look_;
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
   std::vector<Box> boxes_;
@@ -123,19 +124,21 @@ class SceneSearch {
   uint32_t size_ = 0;
 };
 
-// The candidates of one placement: those after it whose boxes meet its own (grown by the clearance)
-// and that the groups leave, ascending. They are found piece by piece, so that a caller may leave
-// off between any two, and take n / 8 bytes at most, however many of the n placements they are.
+// The candidates of one placement: the placements after it, in ascending order, with boxes that
+// intersect its own (grown by the clearance) and that the groups do not exclude. The search is
+// resumable between any two steps. Memory: at most n / 8 bytes, for any number of candidates among
+// the n placements.
 class SceneCandidates {
  public:
-  // Begins with placement `a` of a scene, which must outlive this. Requires a < scene.size().
+  // Starts with placement `a` of a scene, which must outlive this object. Requires: a <
+  // scene.size().
   void Start(const SceneSearch& scene, uint32_t a);
 
-  // Looks at `nodes` nodes of the tree at most. Whether all candidates are gathered by now. Cost:
-  // O(nodes); all of it is O(log n) beyond what it finds.
+  // Visits at most `nodes` nodes of the tree. Returns true if all candidates have been gathered.
+  // Cost: O(nodes); in total O(log n) plus the output.
   bool Gather(uint64_t nodes);
 
-  // The next candidate; none after the last. Requires that all are gathered.
+  // Returns the next candidate; none after the last. Requires: all candidates have been gathered.
   std::optional<uint32_t> Next();
 
   size_t MemoryBytes() const {
@@ -148,25 +151,25 @@ class SceneCandidates {
   Box box_;
   BoxTree::Cursor cursor_;
   bool is_gathered_ = false;
-  // A few are listed. Beyond that, a bit marks each, which also sorts them.
+  // A few candidates are listed. Larger sets use a bit for each placement, which also sorts them.
   std::vector<uint32_t> listed_;
   std::vector<uint64_t> marked_;
   bool is_marked_ = false;
-  // The first that is not taken yet: an index into one or the other.
+  // Index of the next candidate in the list or the bits.
   size_t next_ = 0;
 };
 
-// The answers that FindCollisions holds at a time. A choice: three or four MiB with certificates,
-// and enough for many threads.
+// The most answers that FindCollisions buffers. A choice: three or four MiB with certificates, and
+// enough for many threads.
 inline constexpr size_t kMostEmittedAnswers = 4096;
 
-// Which of all pairs of placements collide: a tree of bounding boxes leaves the pairs whose boxes
-// meet, and each of these is answered as CheckCollision answers it. Answers are handed to `emit`,
-// on the calling thread, in ascending order of (a, b); neither they nor their order depend on the
-// number of threads. `emit` may wait, which holds the search back. However many pairs collide, at
-// most kMostEmittedAnswers of them are held at a time.
-// INVALID_ARGUMENT: `groups` is neither empty nor one for each placement. CANCELLED: should_stop
-// said so; what was emitted before stands. Cost: O(n log n) beyond the candidates.
+// Finds all colliding pairs of placements. A tree of bounding boxes yields the pairs with
+// intersecting boxes, and each of these is answered like CheckCollision. Calls `emit` on the
+// calling thread, in ascending order of (a, b); neither the answers nor their order depend on the
+// number of threads. `emit` may block, which holds the search back. At most kMostEmittedAnswers
+// answers are buffered, for any number of collisions. INVALID_ARGUMENT: `groups` is neither empty
+// nor one for each placement. CANCELLED: should_stop returned true; answers emitted before remain
+// valid. Cost: O(n log n) plus the candidates.
 absl::StatusOr<SceneTotals> FindCollisions(
     std::span<const PlacedHull> placements, const SceneOptions& options,
     const std::function<void(std::span<const SceneAnswer>)>& emit);

@@ -9,15 +9,15 @@
 
 namespace hulld {
 
-// The report of the textbook method; the search fills what applies to it.
+// A report in the form of the textbook method; the search fills the applicable fields.
 struct Analysis {
   std::chrono::nanoseconds time{0};
-  // Textbook: up to and including the reported axis, counted as if serial, or all. Search:
-  // directions tried.
+  // Textbook: number of axes up to and including the reported one, counted as if serial, or all.
+  // Search: directions tried.
   uint64_t axes_tested = 0;
-  // Textbook: candidates in all, parallel edge pairs included. Otherwise 0.
+  // Textbook: number of candidates, parallel edge pairs included. Otherwise 0.
   uint64_t axes_total = 0;
-  // Where separation, or when touching the first zero gap, was found: the kind of the axis.
+  // Kind of the axis that showed the separation or, if touching, the first zero gap.
   std::optional<AxisKind> stage;
   std::optional<uint64_t> axis_index;  // textbook: the index of that axis, from 0
 };

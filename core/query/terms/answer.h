@@ -13,25 +13,25 @@
 
 namespace hulld {
 
-// The relation of a pair and what else was wanted. An answer of the relation alone is small and
+// The relation of a pair and the requested details. An answer with the relation alone is small and
 // allocates nothing.
 struct Answer {
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
-  // When wanted: whether separation <= QueryOptions::clearance. False when a hull is empty.
+  // If requested: true if separation <= QueryOptions::clearance. False if a hull is empty.
   std::optional<bool> within_clearance;
-  // When wanted; infinite when a hull is empty.
+  // If requested; infinite if a hull is empty.
   std::optional<Separation> separation;
-  // When wanted and neither hull is empty.
+  // If requested and neither hull is empty.
   Boxed<Witness> witness;
-  // When wanted, the relation is SEPARATED or TOUCHING, and neither hull is empty.
+  // If requested, the relation is SEPARATED or TOUCHING, and neither hull is empty.
   Boxed<SeparatingAxis> axis;
-  // When wanted.
+  // If requested.
   Boxed<Analysis> analysis;
-  // When wanted and neither hull is empty.
+  // If requested and neither hull is empty.
   Boxed<Certificate> certificate;
 };
-// A batch holds one for each of its pairs.
+// A batch holds one answer for each of its pairs.
 static_assert(sizeof(Answer) <= 64);
 
 }  // namespace hulld

@@ -17,17 +17,17 @@ enum class AxisKind {
   kGeneral,   // a support direction found by search
 };
 
-// The vertices of one hull that lie farthest along an axis.
+// The vertices of one hull that are farthest along an axis.
 struct Feature {
   std::vector<uint32_t> vertices;  // indices into Hull::vertices(), ascending
   std::optional<uint32_t> facet;   // when the feature is a whole facet
 };
 
-// World frame, from A towards B: max n.A <= min n.B over the reals for the n that was found, of
-// which `direction` is the rounding to unit length.
+// A direction (world frame) from A towards B, with max n.A <= min n.B over the reals. `direction`
+// is n rounded to unit length.
 //
 // FACET_A and FACET_B name the line: the direction may be minus the facet's outward normal, as in
-// the textbook, which tests each line once. The features are those of the direction.
+// the textbook, which tests each line once. The features belong to the direction.
 struct SeparatingAxis {
   Vector direction;
   AxisKind kind;

@@ -10,14 +10,14 @@
 
 namespace hulld {
 
-// What makes a relation checkable in O(V) exact operations by code that trusts nothing, from the
-// vertices and the poses.
+// A proof of a relation. Independent code can check it in O(V) exact operations from the vertices
+// and the poses.
 //
 // SEPARATED: the direction n, world frame, with max n.A < min n.B. TOUCHING: n not zero, max n.A <=
-// min n.B, and at most four pairs whose differences hold 0 in their hull. OVERLAPPING: no
-// direction, and at most six pairs whose differences hold 0 strictly inside their hull (Steinitz
-// 1913). The direction is exact as it stands, of any length: doubles where these suffice, otherwise
-// integers.
+// min n.B, and at most four pairs with differences that contain 0 in their hull. OVERLAPPING: no
+// direction, and at most six pairs with differences that contain 0 strictly inside their hull
+// (Steinitz 1913). The direction is exact as given and of any length: in doubles if these suffice,
+// otherwise in integers.
 struct Certificate {
   std::variant<std::monostate, Vector, IntegerVector> direction;
   std::vector<VertexPair> pairs;

@@ -5,8 +5,8 @@
 
 namespace hulld {
 
-// A corner of a simplex or of a polytope in A - B: its position w = a - b, and the vertices a and
-// b. Position: Vector, PlainVector or IntegerVector.
+// A corner of a simplex or polytope in A - B: its position w = a - b, and the vertices a and b.
+// Position: Vector, PlainVector or IntegerVector.
 template <typename Position>
 struct MinkowskiVertex {
   Position w;

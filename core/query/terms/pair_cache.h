@@ -9,9 +9,9 @@
 
 namespace hulld {
 
-// What a query of one pair leaves for the next one of the same hulls at other poses: an axis that
-// separated them, or vertex pairs whose differences surrounded the origin. It is never an answer:
-// the next query proves what it suggests anew, or drops it. It belongs to one caller at a time.
+// A suggestion left by a query for the next query of the same two hulls at other poses: an axis
+// that separated them, or vertex pairs with differences that surrounded the origin. It is never an
+// answer: the next query proves the suggestion again, or drops it. Not thread-safe.
 struct PairCache {
   // World frame, from A towards B.
   std::optional<Vector> axis;

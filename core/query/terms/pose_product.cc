@@ -15,11 +15,11 @@ namespace {
 
 using Quaternion = std::array<double, 4>;
 
-// Whether it turns by no angle.
+// Returns true if the rotation angle is zero.
 bool IsScalar(const Quaternion& q) { return q[1] == 0 && q[2] == 0 && q[3] == 0; }
 
-// The same rotation with the largest component in [1/2, 1). Components too small to matter are left
-// out (kProductLeastComponent).
+// Scales q, without changing the rotation, so that its largest component is in [1/2, 1). Omits
+// components too small to matter (kProductLeastComponent).
 Quaternion Scaled(const Quaternion& q) {
   double largest = 0;
   for (const double component : q) largest = std::max(largest, std::abs(component));
@@ -33,15 +33,15 @@ Quaternion Scaled(const Quaternion& q) {
   return scaled;
 }
 
-// Whether its largest component is in [1/2, 1).
+// Returns true if the largest component is in [1/2, 1).
 bool IsScaled(const Quaternion& q) {
   double largest = 0;
   for (const double component : q) largest = std::max(largest, std::abs(component));
   return largest >= 0.5 && largest < 1;
 }
 
-// Hamilton's product, each component rounded once but for terms of the size of u^2. Requires that
-// both are scaled.
+// Returns Hamilton's product, with each component rounded once except for terms of the size of u^2.
+// Requires: both factors scaled.
 Quaternion Product(const Quaternion& p, const Quaternion& q) {
   HULLD_DCHECK(IsScaled(p) && IsScaled(q));
   const auto sum = [](DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
@@ -54,7 +54,7 @@ Quaternion Product(const Quaternion& p, const Quaternion& q) {
           sum(times(0, 3), times(1, 2), -times(2, 1), times(3, 0))};
 }
 
-// R(q) v / |q|^2. Requires that q is scaled.
+// Returns R(q) v / |q|^2. Requires: q scaled.
 std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
   HULLD_DCHECK(IsScaled(q));
   const auto times = [&](int i, int j) { return ExactProduct(q[i], q[j]); };
@@ -92,7 +92,7 @@ PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP
 
   const double size = t_B.cwiseAbs().maxCoeff() + t_P.cwiseAbs().maxCoeff();
   if (!(size <= kProductMaxTranslation)) {
-    // Somewhere in range: nothing but exact arithmetic will use it.
+    // Any value in range: only exact arithmetic will use this pose.
     rounded_.t = (t_B / 4 + t_P / 4).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
     translation_error_ = std::numeric_limits<double>::infinity();
     return;

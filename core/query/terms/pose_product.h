@@ -7,25 +7,25 @@
 namespace hulld {
 
 // X_WP = X_WB X_BP, the pose of a piece P of a body B in the world: p_W = R(q_B) (R(q_P) p_P /
-// |q_P|^2 + t_P) / |q_B|^2 + t_B over the reals for the doubles given. The product itself is
-// rational and mostly no pose of doubles; exact arithmetic takes it as it is, from the two factors,
-// and floating point takes a rounding of it whose error is known.
+// |q_P|^2 + t_P) / |q_B|^2 + t_B over the reals for the given doubles. The product is rational, and
+// in general no pose of doubles represents it. Exact arithmetic uses the two factors; floating
+// point uses a rounding with a known error.
 class PoseProduct {
  public:
-  // Requires both valid (ValidatePose). Cost: about 100 ns, less where one turns by no angle.
+  // Requires: both poses valid (ValidatePose). Cost: about 100 ns, less if one has no rotation.
   PoseProduct(const Pose& X_WB, const Pose& X_BP);
 
   const Pose& X_WB() const { return X_WB_; }
   const Pose& X_BP() const { return X_BP_; }
 
-  // The product, rounded: its translation is finite and, where translation_error() is, the nearest
-  // doubles but for the error; the entries of the rotation computed from it are within
-  // kRotationEntryError of the true ones.
+  // The rounded product. Its translation is finite. If translation_error() is finite, the
+  // translation is within that error of the nearest doubles. The entries of the rotation computed
+  // from it are within kRotationEntryError of the true ones.
   const Pose& rounded() const { return rounded_; }
-  // What the rounded translation lacks.
+  // The remainder that the rounded translation omits.
   const Vector& translation_rest() const { return translation_rest_; }
-  // How far the sum of both may be from the true translation, per component. Infinite where
-  // translations are near the largest doubles.
+  // Error bound of rounded translation plus remainder, per component. Infinite if translations are
+  // near the largest doubles.
   double translation_error() const { return translation_error_; }
 
  private:

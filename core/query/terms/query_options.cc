@@ -14,7 +14,7 @@ absl::Status CheckLength(const char* name, double length) {
                                                  "; it is a length of at least 0"));
 }
 
-// The name of an option that needs the exact relation; null when there is none.
+// Returns the name of an option that needs the exact relation, or null if none is set.
 const char* ExactOption(const QueryOptions& options, const OptionNames& names) {
   return options.method == Method::kTextbookSat ? names.textbook
          : options.want_certificate             ? names.certificate

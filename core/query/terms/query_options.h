@@ -10,8 +10,8 @@
 
 namespace hulld {
 
-// QueryOptions::max_error by default, relative to the largest absolute coordinates of the two
-// hulls, each about its centre, and the separation.
+// Default of QueryOptions::max_error, relative to the separation and the largest absolute
+// coordinates of the two hulls, each about its centre.
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
 enum class Method : uint8_t { kCertifiedSearch, kTextbookSat };
@@ -23,42 +23,44 @@ struct QueryOptions {
   bool want_certificate = false;
   bool want_separation = false;
   bool want_witness = false;
-  // The largest bound of a wanted separation that will do, in the caller's length unit; absent:
-  // kDefaultRelativeMaxError times the sizes of the hulls and the separation. Where a double cannot
-  // hold the value so well, the bound is that of its rounding.
+  // The largest acceptable bound of a requested separation, in the caller's length unit. If absent:
+  // kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
+  // represent the value that accurately, the bound is its rounding error.
   std::optional<double> max_error;
-  // Answer::within_clearance: separation <= this, exactly; always at infinity, never at -infinity.
+  // Requests Answer::within_clearance: separation <= clearance, exactly. Always true at infinity,
+  // never at -infinity.
   std::optional<double> clearance;
-  // tau >= 0, length. 0: the relation is exact, always. Positive: it may be kWithinTolerance where
-  // |separation| <= tau. Not with a wanted separation, witness, clearance or certificate, nor the
-  // textbook: these need the relation (ValidateOptions).
+  // tau >= 0, length. 0: the relation is always exact. Positive: the relation may be
+  // kWithinTolerance if |separation| <= tau. Cannot be combined with a requested separation,
+  // witness, clearance or certificate, or with the textbook method, which need the exact relation
+  // (ValidateOptions).
   double tolerance = 0;
-  // Textbook only: more candidate axes than this are refused.
+  // Textbook only: the most candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
-  // Bodies only: more certificates of pieces than this are refused.
+  // Bodies only: the most certificates of pieces; more are refused.
   uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
-  // Polled inside long loops, possibly from several threads; true ends the query with CANCELLED.
-  // May be empty.
+  // Polled in long loops, possibly from several threads; true ends the query with CANCELLED. May be
+  // empty.
   std::function<bool()> should_stop;
   // Textbook only: threads of the loop over axes.
   int threads = 1;
 
-  // Whether an answer holds more than the relation and within_clearance.
+  // True if an answer contains more than the relation and within_clearance.
   bool WantsDetails() const {
-    // Every pair asks this, so it has no branches.
+    // Branch-free, because every pair evaluates it.
     return (want_axis | want_analysis | want_certificate | want_separation | want_witness) != 0;
   }
-  // Whether an answer names vertices or facets by index, or depends on a hull's canonical snapshot
-  // otherwise: then a version of a LiveHull will not do.
+  // True if an answer names vertices or facets by index, or depends on a hull's canonical snapshot
+  // in another way. A version of a LiveHull is then not sufficient.
   bool WantsCanonical() const { return method == Method::kTextbookSat || WantsDetails(); }
-  // Whether the search may stop as soon as it knows the relation, which is the cheapest question.
-  // Nothing else decides this.
+  // True if the search may stop as soon as it knows the relation, the cheapest kind of query. The
+  // only place that decides this.
   bool WantsRelationOnly() const {
     return method == Method::kCertifiedSearch && !WantsDetails() && !clearance.has_value();
   }
 };
 
-// The names of the options in error messages, as the interface of the caller has them.
+// Option names for error messages, as spelled in the caller's interface.
 struct OptionNames {
   const char* tolerance = "tolerance";
   const char* max_error = "max_error";
@@ -69,14 +71,14 @@ struct OptionNames {
   const char* textbook = "the textbook method";
 };
 
-// OK, or INVALID_ARGUMENT: a tolerance or max_error that is negative or NaN, a clearance that is
-// NaN, or a tolerance > 0 beside what needs the exact relation.
+// Returns OK, or INVALID_ARGUMENT for a tolerance or max_error that is negative or NaN, a clearance
+// that is NaN, or a tolerance > 0 combined with an option that needs the exact relation.
 absl::Status ValidateOptions(const QueryOptions& options, const OptionNames& names = {});
 
-// Whether these want the relation alone and are such as ValidateOptions passes; false where that is
-// not seen at once. Cost: a few comparisons, so that most pairs need no status.
+// Returns true if the options request the relation alone and pass ValidateOptions. May return false
+// for valid options. Cost: a few comparisons, so that most pairs need no status.
 inline bool IsValidRelationOnly(const QueryOptions& options) {
-  // Nothing that needs the exact relation is wanted, so any tolerance of at least 0 will do.
+  // No requested detail needs the exact relation, so any tolerance of at least 0 is valid.
   return options.tolerance >= 0 && !options.max_error.has_value() && options.WantsRelationOnly();
 }
 

@@ -6,7 +6,7 @@
 namespace hulld {
 
 // The relation of two closed convex sets A and B, over the reals. An empty hull is separated from
-// all.
+// every set.
 enum class Relation : uint8_t {
   kSeparated,        // no common point
   kTouching,         // 0 is on the boundary of A - B

@@ -7,17 +7,17 @@
 
 namespace hulld {
 
-// What decided an answer.
+// The step of the ladder that decided an answer.
 enum class Rung : uint8_t {
-  kBounds,         // a hull is empty, or spheres round the hulls; for the relation alone, also how
-                   // far the hulls reach along the line of their centres
+  kBounds,         // an empty hull, or bounding spheres; for the relation alone, also bounds of the
+                   // hulls along the line of their centres
   kCached,         // the axis or the vertex pairs of the previous query of the pair
   kFloatingPoint,  // the hulls, in floating point with a proven error bound
   kExact,          // exact arithmetic
 };
 inline constexpr size_t kRungCount = 4;
 
-// How many answers each rung gave.
+// Number of answers by rung.
 struct RungCounts {
   // In the order of Rung.
   std::array<uint64_t, kRungCount> by_rung = {};

@@ -10,17 +10,18 @@
 
 namespace hulld {
 
-// When bounds of a length are close enough.
+// The required accuracy of bounds of a length.
 struct SeparationGoal {
-  // Half the width may be absolute_error + relative_error * (size + length).
+  // Reached if half the width is at most absolute_error + relative_error * (size + length).
   double absolute_error = 0;
   double relative_error = 0;
   double size = 0;
-  // Or it shows on which side of this the length is. NaN: no such way.
+  // Also reached if the bounds show the side of `threshold` on which the length lies. NaN: not
+  // used.
   double threshold = std::numeric_limits<double>::quiet_NaN();
 
   bool Met(double low, double high) const {
-    // Where nothing is known yet, both sides below would be infinite.
+    // Before any upper bound is known, both sides below would be infinite.
     if (!(high < std::numeric_limits<double>::infinity())) return low > threshold;
     const double middle = low + (high - low) / 2;
     return (high - low) / 2 <= absolute_error + relative_error * (size + middle) ||
@@ -35,17 +36,18 @@ struct FloatCombination {
   std::array<double, 3> weights = {};
 };
 
-// What floating point proves of the distance of the origin from A - B, or from its boundary.
+// Bounds proven in floating point of the distance of the origin from A - B, or from its boundary.
 struct SeparationBounds {
   double low = 0;
   double high = std::numeric_limits<double>::infinity();
-  // Where it is attained, as far as found; count 0 when unknown.
+  // The best point found that attains the distance; count 0 if unknown.
   FloatCombination point;
   // The length of that point as a vector, within kCombinationErrorFactor times the pair's size.
   double point_length = 0;
 };
 
-// An integer power of two near a positive size: lengths divided by it are near 1.
+// Returns a power of two with an integer exponent near a positive size: lengths divided by it are
+// near 1.
 inline double UnitOf(double size) { return std::ldexp(1.0, std::ilogb(size)); }
 
 }  // namespace hulld

@@ -5,8 +5,8 @@
 
 namespace hulld {
 
-// A vertex of A and a vertex of B, by index into Hull::vertices(); it stands for the point a - b of
-// A - B.
+// A vertex of A and a vertex of B, by index into Hull::vertices(). Represents the point a - b of A
+// - B.
 struct VertexPair {
   uint32_t a;
   uint32_t b;

@@ -11,10 +11,10 @@
 namespace hulld::server {
 namespace {
 
-// Two indices, as varints.
+// Two indices as varints.
 constexpr size_t kPiecesBytes = 10;
 // Tag and length of an entry within its message, and the row of a proof.
-constexpr size_t kEntryBytes = 10;
+constexpr size_t kAnswerEntryBytes = 10;
 
 size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
                  const std::optional<PiecePair>& pieces, v1::AnswerColumns* columns) {
@@ -26,22 +26,22 @@ size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
   return kPiecesBytes;
 }
 
-// What proves the answer; the bytes that it takes.
+// Encodes the proof of the answer; returns its bytes.
 size_t EncodeProof(const PlacementTable& table, uint32_t a, uint32_t b,
                    const std::vector<PieceCertificate>& certificates, v1::PieceProof* proof) {
-  size_t bytes = kEntryBytes;
+  size_t bytes = kAnswerEntryBytes;
   for (const PieceCertificate& certificate : certificates) {
     v1::PieceCertificate* const message = proof->add_certificates();
     EncodePieceCertificate(certificate, table.HullOfPiece(a, certificate.pieces.a).hull(),
                            table.HullOfPiece(b, certificate.pieces.b).hull(), message);
-    bytes += kEntryBytes + message->ByteSizeLong();
+    bytes += kAnswerEntryBytes + message->ByteSizeLong();
     if (bytes > Config::kMaxRowProofBytes) break;
   }
   return bytes;
 }
 
-// The row of a pair with a body that comes with certificates. It is made apart, as it may turn out
-// to be too large.
+// Adds the row of a pair with a body and its certificates. The proof is encoded aside, because it
+// may turn out too large.
 size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
@@ -103,7 +103,7 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   const size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
                                  table.HullOfPiece(b, pieces.b), wanted, columns);
-  // Without an answer nothing decided, although the relation alone may have been found.
+  // Without an answer no pieces decided, although the relation alone may have been found.
   return bytes +
          AddPieces(table, a, b, answer.answer.ok() ? answer.of_body.pieces : std::nullopt, columns);
 }

@@ -16,30 +16,30 @@
 
 namespace hulld::server {
 
-// The answer for two placements, or why there is none, and the pair of pieces that decided where
-// one is a body.
+// The answer for two placements, or its error, and the deciding pair of pieces if one is a body.
 struct PlacedAnswer {
   absl::StatusOr<Answer> answer;
   PiecesAnswer of_body = {};
 };
 
-// Asks about a pair of placements. A pair with a body gets no answer to a question for hulls alone,
-// or if it needs more certificates than a reply holds. cache: that of a pair of hulls; may be null.
+// Queries a pair of placements. A pair with a body gets an error for queries restricted to hulls,
+// or if it needs more certificates than a reply holds. cache: of a pair of hulls; may be null.
 // Requires that both are answerable.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// Whether it takes about as long as many pairs of hulls, so that one looks at the clock after it.
+// True if the query takes about as long as many pairs of hulls, so that the clock must be checked
+// after it.
 inline bool IsLongToAsk(const PlacementTable& table, uint32_t a, uint32_t b) {
   return table.is_body(a) || table.is_body(b);
 }
 
-// An error of a query, with the limit that it met.
+// Returns the error of a query, with the limit that it hit.
 absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
                        const absl::Status& status, const QueryOptions& options);
 
-// Adds the row of such an answer, as AddAnswer; and one without an answer. Certificates of pieces
-// that take more than Config::kMaxRowProofBytes leave a row without an answer.
+// Adds the row of such an answer as AddAnswer does, or a row without an answer if the pieces'
+// certificates exceed Config::kMaxRowProofBytes.
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns);

@@ -20,16 +20,16 @@ namespace hulld::server {
 namespace {
 
 // Tag and length of an entry within its message.
-constexpr size_t kEntryBytes = 4;
+constexpr size_t kVersionEntryBytes = 4;
 
-// Stands in for the hull of placements that cannot be answered for.
+// Stand-in hull of placements that cannot be answered.
 const QueryHull& NoHull() {
   static const Hull kEmpty;
   static const QueryHull kNoQueryHull(kEmpty);
   return kNoQueryHull;
 }
 
-// Stands in for the body of such placements.
+// Stand-in body of such placements.
 const QueryBody& NoBody() {
   static const QueryBody kNoBody(NoHull());
   return kNoBody;
@@ -51,14 +51,13 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
   return IsSame(*a, *b);
 }
 
-// What is asked of a hull, or stands in for it.
+// Query structure of a hull, or its stand-in.
 const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonical) {
   if (!hull.ok() || hull->body != nullptr) return NoHull();
   return canonical ? hull->served->canonical_query_hull() : hull->served->query_hull();
 }
 
-// About what an error takes beside the pointer to it: its message, its reason, and what they are
-// kept in, which is a guess.
+// Approximate bytes of an error, excluding its pointer: message, reason, and containers (a guess).
 size_t ErrorBytes(const absl::Status& status) {
   constexpr size_t kReasonBytes = 384;
   return status.ok() ? 0 : kReasonBytes + status.message().size();
@@ -69,7 +68,7 @@ absl::Status CheckCount(int count, const char* of, uint64_t max_placements, cons
   return LimitExceeded(absl::StrCat(what, " holds ", count, of), max_placements, "max-placements");
 }
 
-// Whether the lists fit each other.
+// INVALID_ARGUMENT: the lists do not match.
 absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
       packed.poses_size() % kPoseNumbers != 0) {
@@ -161,7 +160,7 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   }
 }
 
-// of, after: what an error says before and after the index.
+// of, after: text of the error before and after the index.
 void PlacementTable::CheckPose(size_t i, const char* of, const char* after) {
   const Pose pose = PoseAt(i);
   if (IsValidPose(pose)) return;
@@ -173,10 +172,10 @@ size_t PlacementTable::MemoryBytes() const {
   for (const std::string& id : ids_) of_ids += id.capacity();
   size_t of_errors = 0;
   for (const auto& [i, status] : malformed_) {
-    // What it takes in the map; a guess.
+    // Bytes of a map node; a guess.
     constexpr size_t kNodeBytes = 64;
     of_errors += kNodeBytes;
-    // Placements share what is wrong with an ID that packed ones name.
+    // Packed placements share the error of an ID.
     if (!is_packed_ || HasHull(i)) of_errors += ErrorBytes(status);
   }
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
@@ -184,12 +183,12 @@ size_t PlacementTable::MemoryBytes() const {
   const size_t of_poses = static_cast<size_t>(poses_.Capacity()) * sizeof(double);
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() *
-             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownInShards::kBytesEach +
+             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
          of_ids + of_errors + BodyBytes();
 }
 
-// Known once they are resolved.
+// Valid after resolution.
 size_t PlacementTable::BodyBytes() const {
   size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes() +
                  hulls_of_pieces_.capacity() * sizeof(const HullRecord*);
@@ -199,38 +198,38 @@ size_t PlacementTable::BodyBytes() const {
   return bytes;
 }
 
-PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ShardsPlan& plan) const {
+PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPlan& plan) const {
   return {options.WantsCanonical(), prefix_, plan};
 }
 
-absl::Status PlacementTable::Resolve(Shards& shards, const QueryOptions& options,
-                                     const ShardsPlan& plan) {
+absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
+                                     const ReadPlan& plan) {
   KnownPlaced known;
-  return ResolveFrom(shards, known, options, plan);
+  return ResolveFrom(registry, known, options, plan);
 }
 
-absl::Status PlacementTable::Refresh(Shards& shards, const QueryOptions& options,
-                                     const ShardsPlan& plan) {
-  return ResolveFrom(shards, known_, options, plan);
+absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& options,
+                                     const ReadPlan& plan) {
+  return ResolveFrom(registry, known_, options, plan);
 }
 
-absl::Status PlacementTable::ResolveFrom(Shards& shards, KnownPlaced& known,
-                                         const QueryOptions& options, const ShardsPlan& plan) {
-  absl::StatusOr<ShardsResolved> resolved =
-      RefreshPlaced(shards, ids_, known, LookupFor(options, plan), options.should_stop);
+absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
+                                         const QueryOptions& options, const ReadPlan& plan) {
+  absl::StatusOr<Resolved> resolved =
+      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
-  Take(shards, *std::move(resolved), options);
+  Take(registry.store(), *std::move(resolved), options);
   return absl::OkStatus();
 }
 
-absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& options,
+absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions& options,
                                          std::span<const size_t> hulls) {
   HULLD_CHECK(by_hull_begin_.size() == ids_.size() + 1);
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
-  absl::StatusOr<ShardsResolved> resolved =
-      ResolvePlaced(shards, ids, LookupFor(options, {.freshness = ShardsFreshness::OfWhatIsHere()}),
+  absl::StatusOr<Resolved> resolved =
+      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::OfWhatIsHere()}),
                     options.should_stop);
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
@@ -238,7 +237,7 @@ absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& opt
   is_all_answerable_ = false;
   for (size_t n = 0; n < hulls.size(); ++n) {
     const size_t k = hulls[n];
-    // The one before ends only when nothing is placed of it any more.
+    // The former hull lives until no placement uses it.
     const absl::StatusOr<HullView> before = std::exchange(hulls_[k], std::move(resolved->hulls[n]));
     const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
     changed_[k] = !IsSame(before, hulls_[k]);
@@ -247,22 +246,21 @@ absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& opt
     for (const uint32_t i : placements_of(k)) PlaceAgain(i);
   }
   if (!has_bodies()) TakeBodies();
-  as_of_ = resolved->as_of;
+  as_of_ = resolved->as_of();
   NoteProblems();
   return absl::OkStatus();
 }
 
-bool PlacementTable::TryResolve(Shards& shards, const QueryOptions& options,
-                                const ShardsPlan& plan) {
-  std::optional<ShardsResolved> resolved = TryResolvePlaced(shards, ids_, LookupFor(options, plan));
+bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
+                                const ReadPlan& plan) {
+  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
   if (!resolved.has_value()) return false;
-  Take(shards, *std::move(resolved), options);
+  Take(registry.store(), *std::move(resolved), options);
   return true;
 }
 
-// Where the options need canonical snapshots, all that were found have one, and that is asked.
-void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
-                          const QueryOptions& options) {
+// If the options need canonical snapshots, every resolved hull has one, and queries use it.
+void PlacementTable::Take(const Store& store, Resolved resolved, const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(ids_.size());
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
@@ -274,12 +272,12 @@ void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
     changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
     query_hull_changed_[i] = query_hulls_[i] != query_hulls[i];
   }
-  // Those before end only now: an address tells them from their successors.
+  // Keeps the former hulls alive until now: their addresses distinguish them from the new ones.
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
-  shards_ = &shards;
-  as_of_ = resolved.as_of;
+  store_ = &store;
+  as_of_ = resolved.as_of();
   NoteProblems();
   placed_.clear();
   if (!places_on_demand_) {
@@ -297,7 +295,7 @@ void PlacementTable::NoteProblems() {
   told_placements_ = is_packed_ && is_all_answerable_ ? 0 : size();
 }
 
-// Where there are bodies, hulls are asked about as bodies of one piece.
+// If there are bodies, hulls are queried as bodies with a single piece.
 void PlacementTable::TakeBodies() {
   bodies_.clear();
   bodies_of_hulls_.clear();
@@ -391,8 +389,8 @@ void PlacementTable::PlaceAgain(size_t i) {
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
-void PlacementTable::EncodeHeader(const Shards& shards, v1::ResponseHeader* header) const {
-  server::EncodeHeader(shards.store_ids(), as_of_, header);
+void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
+  server::EncodeHeader(store, as_of_, header);
 }
 
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
@@ -401,20 +399,20 @@ size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
   size_t bytes = 0;
   size_t row = first;
   for (; row < rows && bytes < Config::kReplyMessageBytes; ++row) {
-    bytes += kEntryBytes;
+    bytes += kVersionEntryBytes;
     if (row < placements) {
       bytes += EncodePlacement(row, to);
       continue;
     }
     v1::HullVersion* const version = to.piece_hulls->Add();
     const HullRecord& hull = *hulls_of_pieces_[row - placements];
-    EncodeVersion(shards_->store_id_of(hull.hull_id), hull, version);
+    EncodeVersion(*store_, hull, version);
     bytes += version->ByteSizeLong();
   }
   return row;
 }
 
-// Returns about what it takes.
+// Returns the approximate bytes added.
 size_t PlacementTable::EncodePlacement(size_t row, const RowFields& to) const {
   size_t bytes = 0;
   const bool is_name = row < named_.size();
@@ -429,11 +427,11 @@ size_t PlacementTable::EncodePlacement(size_t row, const RowFields& to) const {
   if (is_name || problem(i).ok()) return bytes;
   v1::PlacementProblem* const encoded = to.problems->Add();
   EncodeProblem(i, encoded);
-  return bytes + kEntryBytes + encoded->ByteSizeLong();
+  return bytes + kVersionEntryBytes + encoded->ByteSizeLong();
 }
 
 void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {
-  EncodeVersion(shards_->store_id_of(ids_[k]), hulls_[k]->record, version);
+  EncodeVersion(*store_, hulls_[k]->record, version);
 }
 
 void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) const {

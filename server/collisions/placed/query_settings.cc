@@ -53,9 +53,9 @@ absl::Status ValidateForBodies(const QueryOptions& options) {
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {
-  // Observed: exact contact of hulls of 10000 vertices takes 60 us
-  // (tests/bench/results/query_relation_*.csv). The first few questions about one that is not
-  // prepared look through all of its points.
+  // **Observed**: exact contact of hulls of 10000 vertices takes 60 us
+  // (tests/bench/results/query_relation_*.csv). The first few queries of an unprepared hull scan
+  // all of its points.
   constexpr size_t kMostPoints = 10000;
   return hull.point_count() <= kMostPoints;
 }
@@ -65,12 +65,12 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
   if (options.method != Method::kTextbookSat) return false;
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
-  // Some 10 ms of one thread: far more than a team waits for its slowest thread, and not so much
-  // that it matters to other calls when one thread of the pool is busy with it.
+  // Some 10 ms of a single thread: far longer than a team waits for its slowest thread, and short
+  // enough that other calls do not notice one busy thread of the pool.
   constexpr double kTeamProjections = 1e7;
   const auto edges_a = static_cast<double>(a.edges().size());
   const auto edges_b = static_cast<double>(b.edges().size());
-  // Edges count once more, as a flat difference has an axis for each.
+  // Edges count once more, because a flat difference has an axis for each.
   const double axes = edges_a * edges_b + edges_a + edges_b +
                       static_cast<double>(a.facet_count() + b.facet_count());
   return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;

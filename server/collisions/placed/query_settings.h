@@ -11,36 +11,35 @@
 
 namespace hulld::server {
 
-// The options of core for what a request wants; the query ends with `lifetime`, which must outlive
-// it. INVALID_ARGUMENT, naming the field: a number that stands for no method, a length that is
-// negative or NaN, or wishes that exclude each other.
+// Returns core's options for a request; the query ends with `lifetime`, which must outlive it.
+// INVALID_ARGUMENT, naming the field: an unknown method, a negative or NaN length, or options that
+// exclude each other.
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
-// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone.
+// INVALID_ARGUMENT, naming the field: an option restricted to pairs of hulls.
 absl::Status ValidateForBodies(const QueryOptions& options);
 
-// Whether all that is wanted are relations, and all that is placed are hulls: the most frequent
-// call, which has a path of its own.
+// True if only relations are wanted and all placements are hulls: the most frequent call, which has
+// a separate path.
 inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
   return options.WantsRelationOnly() && !table.has_bodies();
 }
 
-// Whether the relation of this hull and another such takes no longer than moving the bytes of the
-// question and of the answer does, so that one of gRPC's threads may find it.
+// True if the relation of two such hulls takes no longer than moving the bytes of request and
+// response, so that a gRPC thread may compute it.
 bool IsQuickToRelate(const QueryHull& hull);
 
-// Whether the textbook's axes of this pair are worth a team of threads (Executor); always false for
-// other methods. Requires canonical hulls for the textbook. Cost: a few operations, whatever the
-// size of the hulls.
+// True if the textbook's axes of this pair justify a team of threads (Executor); always false for
+// other methods. Requires canonical hulls for the textbook. Cost: O(1).
 bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const PlacedHull& b);
 
-// An error of a query with these options in the words of the server: RESOURCE_EXHAUSTED names the
-// limit and its flag.
+// Returns the server's error for an error of a query with these options: RESOURCE_EXHAUSTED names
+// the limit and its flag.
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
 
-// The same of a question about bodies: RESOURCE_EXHAUSTED means that it would need too many
+// As above for a query with bodies: RESOURCE_EXHAUSTED means that it would need too many
 // certificates.
 absl::Status NameProofLimit(const absl::Status& status);
 

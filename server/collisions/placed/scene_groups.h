@@ -12,11 +12,11 @@
 #include "core/query/scene/scene.h"
 #include "server/collisions/placed/placement_table.h"
 
-// Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
+// Pairs of a scene to query. Scene: a message with the groups and movers of a
 // v1::FindCollisionsRequest.
 namespace hulld::server {
 
-// INVALID_ARGUMENT: groups that do not fit the placements.
+// INVALID_ARGUMENT: the groups do not match the placements.
 template <typename Scene>
 absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   if (!scene.groups().empty() && static_cast<size_t>(scene.groups_size()) != placements) {
@@ -42,7 +42,7 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   return absl::OkStatus();
 }
 
-// The groups that are never asked about together.
+// Returns the pairs of groups that are excluded from queries.
 template <typename Scene>
 std::vector<GroupPair> IgnoredGroups(const Scene& scene) {
   std::vector<GroupPair> ignored;

@@ -12,19 +12,19 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/contract/status_map.h"
+#include "server/registry/body_resolution.h"
 #include "server/settings/config.h"
-#include "server/shards/body_resolution.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
 namespace {
 
 // Pairs between two looks at the clock.
-constexpr size_t kPairsPerLook = 16;
+constexpr size_t kPairsPerPoll = 16;
 // A watch lasts for many changes; how many is a guess.
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
-constexpr size_t kEntryBytes = 4;
+constexpr size_t kEntryHeaderBytes = 4;
 // Decoding the poses of an update up to this size takes less than a slice.
 constexpr int kMostShortUpdate = 4096;
 
@@ -49,32 +49,20 @@ v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, 
   return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
 }
 
-// Takes what is later in some shard; whether anything is. Both ascend by shard.
-bool TakeLater(const ShardRevisions& from, ShardRevisions* to) {
-  bool is_later = false;
-  for (const ShardRevision& now : from) {
-    auto place = std::ranges::lower_bound(*to, now.shard, {}, &ShardRevision::shard);
-    if (place == to->end() || place->shard != now.shard) place = to->insert(place, {now.shard, 0});
-    is_later |= now.revision > place->revision;
-    place->revision = std::max(place->revision, now.revision);
-  }
-  return is_later;
-}
-
 }  // namespace
 
 BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                   Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
-                                   TaskPool& pool) {
+                                   Registry& registry, WorkerPool& readers,
+                                   WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionWatch>(
-      new CollisionWatch(context, admission, shards, readers, long_readers, pool)));
+      new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
 }
 
 void CollisionWatch::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
   if (watch_ == nullptr) return;
-  watch_->Close();
+  registry_.CloseWatch(watch_);
   watch_.reset();
 }
 
@@ -150,7 +138,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   }
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
-  const Limits& limits = shards_.limits();
+  const Limits& limits = registry_.limits();
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
   if (!options.ok()) return options.status();
@@ -182,9 +170,9 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   // It is worth the wait, as each hull is asked about again and again.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
   const absl::Status resolved =
-      table_.Resolve(shards_, options_, {kExpectedRounds * per_hull, true});
+      table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
   if (!resolved.ok()) return resolved;
-  revisions_ = table_.revisions();
+  revision_ = table_.revision();
   for (const size_t k : all_hulls) {
     if (table_.hull(k).ok()) TellOf(k);
   }
@@ -209,7 +197,7 @@ absl::Status CollisionWatch::WatchHulls() {
   }
   // No hull has this ID; the watch ends when the server drains, like any other.
   if (target.ids.empty()) target.ids.emplace_back();
-  absl::StatusOr<std::shared_ptr<ShardsWatch>> watch = shards_.OpenWatch(
+  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
       target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
   if (!watch.ok()) return watch.status();
   watch_ = *std::move(watch);
@@ -219,13 +207,13 @@ absl::Status CollisionWatch::WatchHulls() {
 
 // From now on, changes of the hulls of pieces are noticed, for those of `hulls`, as the table
 // numbers them, that are bodies. A body that changes after this is noticed itself: then it is
-// followed, and resolved, once more. As Shards::FindBodies where a body cannot be read.
+// followed, and resolved, once more. As Registry::FindBodies where a body cannot be read.
 absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
-  if (!shards_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
+  if (!registry_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
-  const FoundBodies found = shards_.FindBodies(ids, [this] { return call().ShouldStop(); });
+  const FoundBodies found = registry_.FindBodies(ids, [this] { return call().ShouldStop(); });
   if (!found.status.ok()) return found.status;
   FollowedPieces::Difference difference;
   for (size_t n = 0; n < hulls.size(); ++n) {
@@ -239,7 +227,7 @@ absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   std::erase_if(difference.added, is_placed);
   std::erase_if(difference.dropped, is_placed);
   if (!difference.added.empty() || !difference.dropped.empty()) {
-    watch_->WatchAlso(difference.added, difference.dropped);
+    registry_.WatchAlso(*watch_, difference.added, difference.dropped);
   }
   return absl::OkStatus();
 }
@@ -277,7 +265,7 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
 }
 
 void CollisionWatch::TakeChanges() {
-  const absl::StatusOr<ShardsWatchPiece> piece = watch_->TakeChanges();
+  const absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
   if (!piece.ok()) return EndWork(piece.status());
   if (piece->waits) return EndWork(absl::OkStatus());
   // There may be more.
@@ -290,7 +278,7 @@ void CollisionWatch::TakeChanges() {
 }
 
 // Hulls and bodies of the table, each once.
-std::vector<size_t> CollisionWatch::ConcernedBy(const ShardsWatchPiece& piece) const {
+std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
   if (piece.anew) {
     // Which of them changed is not known.
     std::vector<size_t> all(table_.hull_ids().size());
@@ -306,12 +294,13 @@ std::vector<size_t> CollisionWatch::ConcernedBy(const ShardsWatchPiece& piece) c
   return {hulls.begin(), hulls.end()};
 }
 
-absl::Status CollisionWatch::HandleChanges(const ShardsWatchPiece& piece) {
+absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
   const std::vector<size_t> hulls = ConcernedBy(piece);
-  const bool has_moved_on = TakeLater(piece.revisions, &revisions_);
+  const bool has_moved_on = piece.revision > revision_;
+  revision_ = std::max(revision_, piece.revision);
   if (hulls.empty() && !has_moved_on) return absl::OkStatus();
   if (absl::Status s = FollowPieces(hulls); !s.ok()) return s;
-  if (absl::Status s = table_.ResolveSome(shards_, options_, hulls); !s.ok()) return s;
+  if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
@@ -335,7 +324,7 @@ absl::Status CollisionWatch::HandleChanges(const ShardsWatchPiece& piece) {
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
   if (absl::Status s = pairs_.AskAbout(changed, table_); !s.ok()) return s;
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + pieces_.MemoryBytes());
-  if (absl::Status s = shards_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   call().AddPairs(pairs_.asked().size());
   next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
   is_telling_ = true;
@@ -351,7 +340,7 @@ void CollisionWatch::Tell() {
     const absl::Status status = TellPair(pairs_.pair(asked[next_pair_++]));
     if (!status.ok()) return EndWork(status);
     is_full = reply_bytes_ >= Config::kReplyMessageBytes;
-    if (!table_.has_bodies() && next_pair_ % kPairsPerLook != 0) continue;
+    if (!table_.has_bodies() && next_pair_ % kPairsPerPoll != 0) continue;
     if (call().ShouldStop()) return EndWork(call().StopStatus());
     if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { Tell(); });
   }
@@ -364,7 +353,7 @@ void CollisionWatch::Tell() {
     problems_to_tell_.clear();
     if (answers_message_) call().EndMessage();
   }
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{revisions_}, reply_.mutable_header());
+  EncodeHeader(registry_.store(), revision_, reply_.mutable_header());
   reply_.set_update(messages_);
   reply_.set_synced(is_told);
   Locked([&] {
@@ -384,16 +373,16 @@ bool CollisionWatch::TellHulls() {
     if (next_hull_ < hulls_to_tell_.size()) {
       v1::HullVersion* const version = reply_.add_hulls();
       table_.EncodeHull(hulls_to_tell_[next_hull_++], version);
-      reply_bytes_ += kEntryBytes + version->ByteSizeLong();
+      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
     } else if (next_piece_hull_ < piece_hulls_to_tell_.size()) {
       v1::HullVersion* const version = reply_.add_piece_hulls();
       const HullRecord& hull = piece_hulls_to_tell_[next_piece_hull_++];
-      EncodeVersion(shards_.store_id_of(hull.hull_id), hull, version);
-      reply_bytes_ += kEntryBytes + version->ByteSizeLong();
+      EncodeVersion(registry_.store(), hull, version);
+      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
       table_.EncodeProblem(problems_to_tell_[next_problem_++], problem);
-      reply_bytes_ += kEntryBytes + problem->ByteSizeLong();
+      reply_bytes_ += kEntryHeaderBytes + problem->ByteSizeLong();
     }
   }
   return true;
@@ -434,13 +423,13 @@ void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pa
                                      v1::DecidingPiece* message) {
       message->set_index(piece);
       const HullRecord& hull = view.body->hull_of(piece).record;
-      EncodeVersion(shards_.store_id_of(hull.hull_id), hull, message->mutable_hull());
+      EncodeVersion(registry_.store(), hull, message->mutable_hull());
     };
     if (pieces && a.body != nullptr) encode_piece(a, pieces->a, event->mutable_piece_a());
     if (pieces && b.body != nullptr) encode_piece(b, pieces->b, event->mutable_piece_b());
     if (options_.clearance.has_value()) event->set_within_clearance(pair.is_within_clearance);
   }
-  reply_bytes_ += kEntryBytes + event->ByteSizeLong();
+  reply_bytes_ += kEntryHeaderBytes + event->ByteSizeLong();
 }
 
 }  // namespace hulld::server

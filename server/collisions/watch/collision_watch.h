@@ -21,14 +21,14 @@
 #include "server/collisions/watch/watched_pairs.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
 // One WatchCollisions call. It works in rounds: each takes up one message of the client, or the
 // hulls and bodies that the registry says have changed, asks about the pairs that are concerned,
 // and tells how they are other than before. A round begins when the one before is told and its
-// replies are written. Meanwhile messages wait in gRPC's window, and changes in the shards, where
+// replies are written. Meanwhile messages wait in gRPC's window, and changes in the registry, where
 // the last state of each hull wins; so a client that reads slowly costs a message of memory.
 //
 // The mutex guards which work is under way. What the work itself uses belongs to the one task that
@@ -37,19 +37,19 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
                                             v1::WatchCollisionsRequest> {
  public:
   static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
+                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
                             TaskPool& pool);
 
  private:
-  CollisionWatch(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+  CollisionWatch(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
                  WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
       : ReadingStream(context, admission, Rpc::kWatchCollisions),
-        shards_(shards),
+        registry_(registry),
         readers_(readers),
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
-        charge_(shards.memory(), MemoryUse::kReading) {}
+        charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override {
     Locked([] {});
@@ -68,12 +68,12 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status HandleOpen(v1::CollisionWatchOpen& open);
   absl::Status WatchHulls();
   absl::Status FollowPieces(std::span<const size_t> hulls);
-  std::vector<size_t> ConcernedBy(const ShardsWatchPiece& piece) const;
+  std::vector<size_t> ConcernedBy(const WatchPiece& piece) const;
   void TellOf(size_t hull);
   void TellOfPieces(size_t hull);
   absl::Status HandleUpdate(const v1::CollisionWatchUpdate& update);
   void TakeChanges();
-  absl::Status HandleChanges(const ShardsWatchPiece& piece);
+  absl::Status HandleChanges(const WatchPiece& piece);
   absl::Status AskAbout(const std::vector<uint32_t>& changed);
   void Tell();
   bool TellHulls();
@@ -83,7 +83,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   // The task ends; `error`, if there is one, ends the call.
   void EndWork(const absl::Status& error);
 
-  Shards& shards_;
+  Registry& registry_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
   TaskPool& pool_;
@@ -98,7 +98,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   bool are_hulls_due_ = false;
 
   // Belongs to the work. Written once, before hulls can be due.
-  std::shared_ptr<ShardsWatch> watch_;
+  std::shared_ptr<ChangeWatch> watch_;
   // Covers placements and pairs.
   MemoryCharge charge_;
   bool is_open_ = false;
@@ -110,7 +110,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   FollowedPieces pieces_;
   uint64_t messages_ = 0;
   // Every change of a hull up to this one is taken into account.
-  ShardRevisions revisions_;
+  uint64_t revision_ = 0;
 
   // The round that is being told: what is next of hulls, problems and pairs.
   bool is_telling_ = false;

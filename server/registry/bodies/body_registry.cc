@@ -38,7 +38,8 @@ absl::Status HullHasTheId(const std::string& id) {
 
 absl::Status BodyRegistry::Load(Locked& locked) {
   return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
-    // Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
+    // The server never writes two records for one ID. The hull wins: its vertices cannot be
+    // restored.
     if (catalog_.hulls().contains(id)) {
       spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
       return;
@@ -53,7 +54,7 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
   freshness_.WhenFresh(done, [=, this](Locked& locked) {
-    // Counted by now. What waits for others is not counted twice.
+    // The body is counted by now. A retry after a wait does not count it twice.
     if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
       return Answer<PutBodyResult>(locked, done, s);
     }
@@ -61,7 +62,7 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
   });
 }
 
-// Whether a body may be put. OK also where it takes the place of another.
+// OK if the body may be put, also as a replacement.
 absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
   if (catalog_.hulls().contains(id)) return HullHasTheId(id);
   const std::shared_ptr<const Body> body = catalog_.FindBody(id);
@@ -102,7 +103,7 @@ void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
   change.body = body->stored();
   uint64_t& created = change.body->record.create_revision;
   created = is_new ? 0 : entry.committed()->record().create_revision;
-  // One that was damaged begins anew.
+  // A damaged body starts over.
   change.begins = created == 0;
   change.replaces_body = change.begins && !is_new;
   Submit(locked, std::move(change),
@@ -167,8 +168,8 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
          });
 }
 
-// finish: called once the change is committed and visible, or refused, before what waits for the
-// body goes on.
+// finish: called after the change is committed and visible, or refused, before waiting tasks
+// resume.
 void BodyRegistry::Submit(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
   HULLD_CHECK(!std::exchange(catalog_.bodies().Find(id)->in_flight, true));
@@ -184,7 +185,7 @@ void BodyRegistry::Complete(Locked& locked, const std::string& id,
                             Change& change) {
   const std::shared_ptr<const Body> former = catalog_.FindBody(id);
   if (status.ok()) catalog_.Publish(change.revision);
-  // Where readers look for a hull with this ID.
+  // For readers that look for a hull with this ID.
   if (status.ok()) catalog_.recent_changes().Note(id);
   finish(locked, status, change);
   BodyTable::Entry& entry = *catalog_.bodies().Find(id);
@@ -196,7 +197,7 @@ void BodyRegistry::Complete(Locked& locked, const std::string& id,
   }
   entry.in_flight = false;
   std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
-  // Nothing was there before a creation that was refused, nor is after a deletion.
+  // Either a creation was refused, or a deletion was committed.
   if (entry.committed() == nullptr) catalog_.EraseBody(locked, id);
   for (LockedTask& next : waiting) {
     if (Committer::IsSuperseded(status)) {
@@ -229,9 +230,9 @@ absl::StatusOr<BodyPage> BodyRegistry::List(const std::string& prefix, const std
   return page;
 }
 
-// kMostLookupsPerHold at a time. Of those what is not known is read, all at once; a reader of much
-// may drop it again meanwhile, so what was found before is not looked for again. nullopt: it would
-// have to wait, and may not.
+// Looks up kMostLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
+// many bodies may evict them again, so bodies already found are not looked up again. Returns
+// nullopt if it would have to wait but may not.
 std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const std::string> ids,
                                               const std::function<bool()>& should_stop,
                                               bool may_wait) {
@@ -248,7 +249,7 @@ std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const st
         if (!may_wait) return std::nullopt;
         found.status = records_.AwaitMissing(locked, ids.subspan(i, end - i), should_stop);
       }
-      // Also what could not be read may be known by now.
+      // A body that could not be read may be known by now.
       found.bodies[i] = catalog_.FindBody(ids[i]);
       locked.NoteLookup();
     }

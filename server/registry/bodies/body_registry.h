@@ -27,20 +27,20 @@
 
 namespace hulld::server {
 
-// Bodies: how they begin, change and end, and how they are found. A body is small beside the hulls
-// of its pieces, so what is known of one is all of it, counted as what calls hold for long is.
+// Creation, change, deletion, and lookup of bodies. A body is small compared to the hulls of its
+// pieces, so a known body is complete in memory, counted like memory that calls hold for long.
 //
 // Invariants:
-//   - One change of a body is in flight at a time (BodyTable::Entry::in_flight); what depends on
-//     the ID waits for it in the entry, and goes on after it, in its order. Where another server
-//     was first, it goes on once what that did is taken over (AfterOthers).
-//   - A body is seen once the store has kept it, at once by all readers. A refusal leaves what
-//   there
-//     was.
-//   - A hull and a body never have the same ID: a put is refused where there is a hull, and waits
-//     where one is about to begin or to end.
+//   - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
+//     the ID wait in the entry and resume in order after it, or, if a peer server committed first,
+//     after its change is applied (AfterOthers).
+//   - A body becomes visible to all readers atomically after its commit. A refusal leaves the
+//   former
+//     state.
+//   - A hull and a body never share an ID: a put is refused if a hull has it, and waits if the
+//     creation or end of a hull is in flight.
 //
-// Guarded by the registry's mutex, which the functions that take no Locked take.
+// Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class BodyRegistry {
  public:
   // All must outlive this. The mutex is the registry's.
@@ -60,7 +60,7 @@ class BodyRegistry {
   BodyRegistry(const BodyRegistry&) = delete;
   BodyRegistry& operator=(const BodyRegistry&) = delete;
 
-  // Reads all bodies of the store, after the hulls; where it does not find records.
+  // Loads all bodies of a store that does not find records. Call after loading the hulls.
   absl::Status Load(Locked& locked);
 
   // As PutBody, DeleteBody, FindBodies, TryFindBodies and ListBodies in Registry.

@@ -12,8 +12,7 @@
 
 namespace hulld::server {
 
-// A body as one call sees it, with the hulls of its pieces, which it keeps; counted against
-// --memory-limit while it is there.
+// A body as seen by one call. Holds the hulls of its pieces; charged to --memory-limit.
 struct ServedBody {
   std::shared_ptr<const Body> body;
   // In the order of Body::hull_ids().

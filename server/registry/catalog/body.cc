@@ -14,7 +14,7 @@ std::shared_ptr<const PieceBoxes> Body::BoxesOf(std::span<const BodyPiece> piece
     const std::lock_guard lock(mutex_);
     if (boxes_ != nullptr && box_revisions_ == hull_revisions) return boxes_;
   }
-  // Without the mutex: two readers may make the same.
+  // Built without the mutex: two readers may build the same boxes.
   auto boxes = std::make_shared<const PieceBoxes>(pieces);
   const std::lock_guard lock(mutex_);
   boxes_ = boxes;

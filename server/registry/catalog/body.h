@@ -19,16 +19,16 @@
 
 namespace hulld::server {
 
-// A body of one revision. Immutable but for the boxes about its pieces, which are made when the
-// first question needs them, and again when a hull of a piece has changed since. Thread-safe.
+// A body at one revision. Immutable except for the boxes of its pieces, which are built by the
+// first query and rebuilt after a hull of a piece changed. Thread-safe.
 class Body {
  public:
-  // use: for whom it is held.
+  // use: the use to which it is charged.
   Body(StoredBody stored, MemoryBudget& budget, MemoryUse use)
       : stored_(std::make_shared<StoredBody>(std::move(stored))),
         charge_(budget, use, stored_->MemoryBytes()),
         box_charge_(budget, MemoryUse::kReading) {}
-  // As the store gives it back. Not OK: it cannot.
+  // A body as read from the store; damaged if `stored` is not OK.
   Body(const std::string& id, const absl::StatusOr<StoredBody>& stored, MemoryBudget& budget,
        MemoryUse use)
       : Body(stored.ok() ? *stored : StoredBody{{id, 0, 0}, {}, {}}, budget, use) {
@@ -38,17 +38,17 @@ class Body {
   const BodyRecord& record() const { return stored_->record; }
   const std::vector<std::string>& hull_ids() const { return stored_->hull_ids; }
   const std::vector<StoredPiece>& pieces() const { return stored_->pieces; }
-  // OK unless the store cannot give it back.
+  // OK unless the store cannot read it back.
   const absl::Status& damage() const { return damage_; }
-  // As watches are told of it.
+  // Describes the body for watches.
   HullChange Describe() const { return Describe(*stored_, damage_); }
   static HullChange Describe(const StoredBody& stored, const absl::Status& damage);
 
-  // Boxes about these pieces, which are those of this body, of hulls at these revisions.
+  // Returns boxes of the pieces. Requires: `pieces` are this body's, of hulls at `hull_revisions`.
   std::shared_ptr<const PieceBoxes> BoxesOf(std::span<const BodyPiece> pieces,
                                             std::vector<uint64_t> hull_revisions) const;
 
-  // For the store, which gives it its revisions as it commits it, before others know it.
+  // For the store, which assigns revisions at commit, before the body is visible.
   const std::shared_ptr<StoredBody>& stored() const { return stored_; }
 
  private:
@@ -58,13 +58,13 @@ class Body {
   const MemoryCharge charge_;
 
   mutable Mutex mutex_;
-  // Guarded by mutex_.
+  // mutex_ guards the members below.
   mutable MemoryCharge box_charge_;
   mutable std::vector<uint64_t> box_revisions_;
   mutable std::shared_ptr<const PieceBoxes> boxes_;
 };
 
-// ALREADY_EXISTS: a hull cannot have the ID.
+// ALREADY_EXISTS: a body has the ID that a hull requests.
 absl::Status BodyExists(const std::string& id);
 absl::Status BodyNotFound(const std::string& id);
 std::string QuotedBody(const std::string& id);

@@ -16,24 +16,24 @@
 
 namespace hulld::server {
 
-// The bodies of a registry, by ID; of each all that is known, its pieces.
+// Bodies of a registry by ID, complete with their pieces.
 //
-// Where the store finds records, this is a cache of them: what is not here is not known, unless the
-// table of hulls knows that there is a hull, or nothing, under the ID. Bodies differ in size, from
-// a few hundred bytes to --max-pieces-per-body, so a number of bytes bounds it. Those that nobody
-// holds go first that were not looked for since longest.
+// If the store finds records, this is a cache: an ID without an entry is unknown, unless the hull
+// table knows its hull or its absence. Bodies range from a few hundred bytes to
+// --max-pieces-per-body pieces, so the bound is in bytes. Eviction removes unreferenced bodies,
+// least recently used first.
 //
 // Guarded by the registry's mutex.
 class BodyTable {
  public:
-  // What is known of an ID that is, or is about to be, a body's.
+  // State of an ID that is, or is about to become, a body's.
   struct Entry {
-    // Null until the first is committed.
+    // Null until the first commit.
     const std::shared_ptr<const Body>& committed() const { return body_; }
-    // Whether nothing would be lost with it but what the store finds again.
+    // True if the store can restore everything that the entry holds.
     bool IsUnused() const { return !in_flight && waiting.empty() && body_.use_count() == 1; }
 
-    // A change of it is submitted and neither committed nor refused; others wait for that.
+    // A change is submitted, but neither committed nor refused; `waiting` runs after it.
     bool in_flight = false;
     std::deque<std::function<void(Locked&)>> waiting;
 
@@ -41,43 +41,44 @@ class BodyTable {
     friend class BodyTable;
 
     std::shared_ptr<const Body> body_;
-    // In used_.
+    // Position in used_.
     std::list<const std::string*>::iterator place_;
   };
   using Entries = std::map<std::string, Entry>;
 
-  // About what an entry takes beside the pieces and names of its body. Bytes.
+  // Approximate bytes of an entry, excluding the pieces and names of its body.
   static constexpr uint64_t kBytesOfEntry = 512;
 
-  // This is a cache of so many bytes, and of more only where they are in use. Before the first.
+  // Makes this a cache of at most `bytes`, exceeded only by entries in use. Requires an empty
+  // table.
   void KeepAtMost(uint64_t bytes) { most_ = bytes; }
 
   size_t size() const { return entries_.size(); }
   bool contains(const std::string& id) const { return entries_.contains(id); }
-  // For walks in the byte order of the IDs.
+  // Entries in the byte order of the IDs.
   const Entries& entries() const { return entries_; }
-  // Null: there is none, or that is not known. Cost: O(log n).
+  // Returns null if there is no body or the ID is unknown. Cost: O(log n).
   Entry* Find(const std::string& id);
-  // The same; adds one without a body where there is none.
+  // As Find, but adds an entry without a body if there is none.
   Entry& Add(const std::string& id);
-  // What is committed from now on; null for none. Requires that it is here.
+  // Sets the committed body; null for none. Requires an entry.
   void Set(Locked& locked, const std::string& id, std::shared_ptr<const Body> body);
-  // Requires that it is here.
+  // Requires an entry.
   void Erase(Locked& locked, const std::string& id);
 
-  // A cache drops what is too much. Cost: O(log n) for each body that goes.
+  // Evicts down to the limit of a cache. Cost: O(log n) per evicted body.
   void DropSome(Locked& locked);
-  // Bodies that are in use, which it looks at in vain at a time, at most: a microsecond.
+  // Maximum number of bodies in use that one call skips: a microsecond.
   static constexpr int kMostAsked = 16;
 
  private:
   static uint64_t BytesOf(const Entry& entry);
 
   Entries entries_;
-  // The last used in front.
+  // Most recently used first.
   std::list<const std::string*> used_;
   uint64_t bytes_ = 0;
-  // Set: a cache of so many bytes.
+  // Limit in bytes; set if this is a cache.
   std::optional<uint64_t> most_;
 };
 

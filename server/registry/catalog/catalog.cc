@@ -15,12 +15,12 @@
 namespace hulld::server {
 namespace {
 
-// A sixteenth of the limit, beside what it holds of points.
+// A sixteenth of the limit, in addition to the memory held for points.
 size_t MostRecords(uint64_t memory_limit) {
   return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
 }
 
-// Bodies that nobody uses may take one part in so many of the limit.
+// Unused bodies may take up to 1/kBodiesShare of the limit.
 constexpr uint64_t kBodiesShare = 16;
 
 }  // namespace
@@ -124,13 +124,11 @@ void Catalog::EraseBody(Locked& locked, const std::string& id) {
 }
 
 absl::Status Catalog::CheckHullCount() const {
-  const uint64_t elsewhere = held_elsewhere_ ? held_elsewhere_() : 0;
   const uint64_t hulls = HullCount();
   const uint64_t bodies = BodyCount();
-  if (hulls + bodies + elsewhere < max_hulls_) return absl::OkStatus();
+  if (hulls + bodies < max_hulls_) return absl::OkStatus();
   std::string held = absl::StrCat("the store holds ", hulls, " hulls");
   if (bodies > 0) absl::StrAppend(&held, " and ", bodies, " bodies");
-  if (elsewhere > 0) absl::StrAppend(&held, ", and other shards ", elsewhere);
   return LimitExceeded(held, max_hulls_, "max-hulls");
 }
 

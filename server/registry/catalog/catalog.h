@@ -23,77 +23,77 @@
 
 namespace hulld::server {
 
-// What is known of the hulls and bodies of a registry, at one revision: what there is under each
-// ID, how many there are, and which changed lately. Every part of the registry looks here for what
-// is committed, and notes here what became of it. It decides nothing and waits for nothing.
+// In-memory state of a registry's hulls and bodies at one revision: the entry of each ID, the
+// counts, and the recent changes. All parts of the registry read committed state here and record
+// the outcome of changes here. The catalog makes no decisions and never blocks.
 //
 // Invariants:
-//   - No ID is in both tables. Where the store finds records, the tables are caches: what is in
-//     neither is not known (IsKnown), and an ID of which it is known that there is neither hull nor
-//     body is in that of hulls.
-//   - The tables hold the last committed version of everything that they know, of revision() or
-//     earlier. Beside it they hold what is about to begin: a hull that is kCreating, a body without
-//     a committed version.
-//   - A hull whose readers are given something else from now on is in recent_changes(), whatever
-//     changed it.
+//   - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither
+//   is
+//     unknown (IsKnown). Known absence of both hull and body is an entry of the hull table.
+//   - The tables hold the last committed version of each known entry, of revision() or earlier.
+//   They
+//     also hold entries being created: a hull in kCreating, a body without a committed version.
+//   - Every change of what readers see of a hull is in recent_changes(), whatever caused it.
 //
-// Guarded by the registry's mutex, which is required for all but what says that it takes no lock.
+// Guarded by the registry's mutex, which every function requires unless it says that it takes no
+// lock.
 class Catalog {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // limits: those in force. Store and budget must outlive this.
+  // limits: the limits in force. Store and budget must outlive this.
   Catalog(const Store& store, const Limits& limits, MemoryBudget& budget);
   Catalog(const Catalog&) = delete;
   Catalog& operator=(const Catalog&) = delete;
 
-  // Whether the tables are caches of what the store finds.
+  // True if the tables cache records that the store can find.
   bool is_cache() const { return is_cache_; }
   HullTable& hulls() { return hulls_; }
   const HullTable& hulls() const { return hulls_; }
   BodyTable& bodies() { return bodies_; }
   const BodyTable& bodies() const { return bodies_; }
   RecentChanges& recent_changes() { return recent_changes_; }
-  // Hits, misses, loads, growth and damage; the rest is the budget's.
+  // Hits, misses, loads, growth and damage; the budget counts the rest.
   CacheStatistics& statistics() { return statistics_; }
   const CacheStatistics& statistics() const { return statistics_; }
 
-  // The last revision that is committed and visible; 0 before Begin.
+  // Last committed and visible revision; 0 before Begin.
   uint64_t revision() const { return revision_; }
-  // Nothing is known yet of what the store holds at this revision. First of all.
+  // Starts at this revision of the store with empty tables. Must be called first.
   void Begin(uint64_t revision);
-  // The revision that the store gave the last change becomes visible. It is greater than the last.
+  // Makes the revision of the last change visible. Requires: it is greater than revision().
   void Publish(uint64_t revision);
 
-  // Whether it is known what there is under an ID. Cost: O(log n).
+  // Returns true if the ID's state is known, including absence. Cost: O(log n).
   bool IsKnown(const std::string& id) const { return hulls_.Knows(id) || bodies_.contains(id); }
-  // The hull, as in HullTable; null when there is none. The ID must be known.
+  // Returns the hull as HullTable does; null if there is none. Requires IsKnown(id).
   HullPointer Find(const std::string& id);
   HullPointer FindVisible(const std::string& id);
-  // The committed body; null when there is none. The ID must be known (unchecked: a body that could
-  // not be read is not).
+  // Returns the committed body; null if there is none. Requires IsKnown(id) (not checked: a body
+  // whose read failed is unknown).
   std::shared_ptr<const Body> FindBody(const std::string& id);
-  // Null where no change of it is submitted. Otherwise what is under the ID is not known before
-  // that is committed or refused, so what depends on it waits.
+  // Returns the entry of a body with a change in flight, or null. A caller that depends on the ID
+  // must wait until that change is committed or refused.
   BodyTable::Entry* BodyInFlight(const std::string& id);
-  // NOT_FOUND, which says so where the ID is a body's.
+  // NOT_FOUND; its message says so if the ID is a body's.
   absl::Status NoSuchHull(const std::string& id) const;
 
-  // Adds what the store holds under an ID of which no hull is here: at rest, or as damaged.
+  // Adds a stored hull, at rest or as damaged. Requires: the ID has no hull here.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
-  // Several threads may find the same damage.
+  // Marks a hull as damaged. Idempotent, because several threads may find the same damage.
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
-  // Readers are given something else of it from now on.
+  // Records that what readers see of the hull changed.
   void NoteChange(const RegisteredHull& hull);
-  // Takes a hull that is gone out of sight and out of memory, and tells its sessions why.
+  // Removes a hull that is gone, discards its memory, and ends its sessions with `reason`.
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
-  // What the store holds, in the place of what was known.
+  // Replaces the known state of the body with the stored one.
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  // There is no body any more. Requires that one was here.
+  // Removes a body. Requires that it is here.
   void EraseBody(Locked& locked, const std::string& id);
 
-  // How many there are. Those whose creation is in flight are counted from its submission on, so
-  // that --max-hulls holds. Take no lock.
+  // Counts of hulls and bodies. Creations count from submission on, so that --max-hulls holds.
+  // These functions take no lock.
   uint64_t HullCount() const {
     return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
                            creating_hulls_.load(std::memory_order_relaxed)
@@ -103,32 +103,28 @@ class Catalog {
     return kept_bodies_.load(std::memory_order_relaxed) +
            creating_bodies_.load(std::memory_order_relaxed);
   }
-  // RESOURCE_EXHAUSTED: --max-hulls allows no more.
+  // RESOURCE_EXHAUSTED: --max-hulls is reached.
   absl::Status CheckHullCount() const;
-  // Hulls and bodies of other registries count, too. Before any call.
-  void CountAlso(std::function<uint64_t()> held_elsewhere) {
-    held_elsewhere_ = std::move(held_elsewhere);
-  }
-  // Without those whose creation is in flight.
+  // Returns the counts without creations in flight.
   RegistrySizes Sizes() const;
 
-  // A creation is submitted; it is committed, or refused.
+  // Count a creation at its submission, and at its commit or refusal.
   void BeginCreatingHull() { ++creating_hulls_; }
   void EndCreatingHull(bool is_committed);
   void BeginCreatingBody() { ++creating_bodies_; }
   void EndCreatingBody(bool is_committed);
-  // A deletion is committed.
+  // Count a committed deletion.
   void NoteHullEnded() { --kept_hulls_; }
   void NoteBodyEnded() { --kept_bodies_; }
-  // A body that is kept by the store was found there, and not created here.
+  // Counts a body found in the store rather than created here.
   void NoteBodyFound() { ++kept_bodies_; }
-  // A hull that had so many vertices has so many now.
+  // Updates the vertex total after a hull's count changed.
   void NoteVertices(uint64_t before, uint64_t now) { vertex_count_ += now - before; }
-  // Where this is a cache: what the store holds at revision().
+  // Sets the totals of the store at revision(). Requires is_cache().
   void SetTotals(const StoreTotals& totals);
 
  private:
-  // For whom a body that was read is held.
+  // Memory use to which a body read from the store is charged.
   MemoryUse UseOfRead() const { return is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting; }
 
   const bool is_cache_;
@@ -139,11 +135,9 @@ class Catalog {
   BodyTable bodies_;
   RecentChanges recent_changes_;
   CacheStatistics statistics_;
-  // May be empty.
-  std::function<uint64_t()> held_elsewhere_;
   uint64_t vertex_count_ = 0;
-  // How many the store holds at revision_ (hulls: where hulls_ is a cache), and those whose
-  // creation is not committed yet. Changed under the mutex.
+  // Numbers of hulls and bodies in the store at revision_ (hulls: only if hulls_ is a cache), and
+  // of uncommitted creations. Changed under the mutex.
   std::atomic<uint64_t> kept_hulls_ = 0;
   std::atomic<uint64_t> creating_hulls_ = 0;
   std::atomic<uint64_t> kept_bodies_ = 0;

@@ -49,7 +49,7 @@ void HullState::Commit() {
     case Life::kGone:
       break;
   }
-  HULLD_UNREACHABLE();  // nothing of it is in flight
+  HULLD_UNREACHABLE();  // nothing in flight
 }
 
 void HullState::Refuse() {
@@ -68,7 +68,7 @@ void HullState::Refuse() {
     case Life::kGone:
       break;
   }
-  HULLD_UNREACHABLE();  // nothing of it is in flight
+  HULLD_UNREACHABLE();  // nothing in flight
 }
 
 void HullState::Supersede() {

@@ -5,8 +5,8 @@
 
 namespace hulld::server {
 
-// The state of one hull in the registry, and the only steps from one state to another. Each step
-// checks that it is legal; an illegal one ends the process. Not thread-safe.
+// State machine of a hull in the registry. Each transition checks that it is legal; an illegal
+// one aborts the process. Not thread-safe.
 //
 // A state has two named parts. The life of the hull:
 //
@@ -14,91 +14,90 @@ namespace hulld::server {
 //       \                     ^_________Refuse__________/                 ^
 //        \___________________________Refuse_______________________________/
 //
-// and the work on its builder, which one thread owns at a time:
+// and the work on its builder, which one thread owns exclusively:
 //
 //   kIdle --Schedule--> kScheduled --StartBuilding--> kBuilding --Refuse--> kReverting
 //   kScheduled, kBuilding, kReverting --EndWork--> kIdle
 //
-// Where other servers change hulls, too, Supersede takes a hull that is present to another version,
-// and Vanish makes it gone; what a thread builds on it then is reverted.
+// Changes committed by peer servers: Supersede moves a present hull to another version, and Vanish
+// makes it gone; work of a thread on it is then reverted.
 //
-// Beside them it counts the changes in flight (submitted to the store, neither committed nor
-// refused), and knows whether the hull is damaged. Readers take no part: they never touch the
-// builder, and find what is committed at any moment. Steps are legal only where these agree:
+// The state also counts the changes in flight (submitted to the store, neither committed nor
+// refused) and records damage. Readers never touch the builder and see the committed state at any
+// time. Further conditions on transitions:
 //
-//   - Only a hull that is present and not damaged grows. A creation and an end are one change in
-//     flight; only chunks overlap, kMaxInFlight of them at most.
-//   - A hull ends here only when it is quiet: idle, with nothing in flight. What others do to it
-//     finds nothing in flight, but maybe a thread at work.
+//   - Only a present, undamaged hull grows. A creation or an end is a single change in flight; only
+//     chunks overlap, at most kMaxInFlight of them.
+//   - A local change ends a hull only when it is quiet: idle, with nothing in flight. A peer change
+//     requires that nothing is in flight, but a thread may be at work.
 class HullState {
  public:
   enum class Life {
-    // The creation is in flight: readers do not see the hull yet.
+    // The creation is in flight; readers do not see the hull yet.
     kCreating,
     kPresent,
-    // A deletion or a replacement is in flight: readers still see the hull.
+    // A deletion or a replacement is in flight; readers still see the hull.
     kEnding,
-    // It is found no more; open sessions and readers may still hold it.
+    // Lookups no longer find the hull; open sessions and readers may still hold it.
     kGone,
   };
   enum class Work {
     kIdle,
-    // The next chunk waits for a thread. The builder is in its place.
+    // The next chunk waits for a thread. No thread owns the builder.
     kScheduled,
-    // A chunk is being built: its thread owns the builder.
+    // A chunk is being built; its thread owns the builder.
     kBuilding,
-    // A chunk is being built on one that was refused since: the result must be dropped.
+    // A chunk is being built on one that was refused since; its result must be dropped.
     kReverting,
   };
 
-  // Enough chunks of one hull to keep a builder busy through the slowest sync.
+  // Enough chunks of a hull to keep a builder busy during the slowest sync.
   static constexpr int kMaxInFlight = 64;
 
-  // The state of a hull that is committed.
+  // State of a committed hull.
   static HullState Present() { return HullState(Life::kPresent, 0); }
-  // The state of a hull whose creation, or replacement of another, is submitted.
+  // State of a hull after its creation, or its replacement of another hull, is submitted.
   static HullState Creating() { return HullState(Life::kCreating, 1); }
 
   Life life() const { return life_; }
   Work work() const { return work_; }
   int in_flight() const { return in_flight_; }
-  // OK unless the store cannot give the hull back.
+  // OK unless the store cannot read the hull back.
   const absl::Status& damage() const { return damage_; }
 
   bool visible() const { return life_ == Life::kPresent || life_ == Life::kEnding; }
   bool gone() const { return life_ == Life::kGone; }
-  // Whether the hull is about to begin or to end: whatever depends on which has to wait.
+  // True if a creation or an end is in flight; dependent calls must wait.
   bool changing_life() const { return life_ == Life::kCreating || life_ == Life::kEnding; }
   bool damaged() const { return !damage_.ok(); }
   bool quiet() const { return work_ == Work::kIdle && in_flight_ == 0; }
-  // Whether Schedule is legal.
+  // True if Schedule is legal.
   bool can_schedule() const {
     return life_ == Life::kPresent && work_ == Work::kIdle && !damaged() &&
            in_flight_ < kMaxInFlight;
   }
 
-  // A thread is asked to build the next chunk.
+  // Requests a thread for the next chunk.
   void Schedule();
-  // It has begun: the builder is its own.
+  // Gives the builder to the scheduled thread.
   void StartBuilding();
-  // The chunk that is being built is submitted.
+  // Counts the chunk being built as in flight.
   void Submit();
-  // The thread that was scheduled or built has put the builder back, if it had it. Returns false
-  // after kReverting: the builder holds points that were refused.
+  // Ends the work of the scheduled or building thread, which has returned the builder if it owned
+  // it. Returns false after kReverting: the builder then holds refused points.
   bool EndWork();
 
-  // A deletion or a replacement is submitted.
+  // Submits a deletion or a replacement.
   void StartEnding();
-  // The oldest change in flight is committed, or refused.
+  // Commits or refuses the oldest change in flight.
   void Commit();
   void Refuse();
 
-  // Another server changed the hull, or ended it. Requires that it is present, and that nothing is
-  // in flight.
+  // A peer server changed or ended the hull. Requires: the hull is present, with nothing in flight.
   void Supersede();
   void Vanish();
 
-  // The store cannot give back what it holds of the hull. damage: not OK.
+  // Records that the store cannot read the hull back. Requires: `damage` is not OK.
   void Damage(const absl::Status& damage);
 
  private:

@@ -75,7 +75,7 @@ std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
   return entry.awake_;
 }
 
-// There must be none, which may be known.
+// Requires: no hull has the ID. Its absence may be known.
 HullTable::Entry& HullTable::Add(const std::string& id) {
   const auto [place, is_new] = entries_.try_emplace(id);
   HULLD_CHECK(is_new || place->second.is_absent_);
@@ -122,7 +122,7 @@ void HullTable::Erase(const HullPointer& hull) {
   found->second.is_absent_ = true;
 }
 
-// Whether nothing would be lost with it but what its record says.
+// True if the record alone can restore the hull.
 bool HullTable::IsUnused(const HullPointer& hull) const {
   const RegisteredHull& h = *hull;
   return hull.use_count() == 1 && h.state.life() == HullState::Life::kPresent && h.state.quiet() &&

@@ -16,36 +16,36 @@
 
 namespace hulld::server {
 
-// The hulls of a registry, by ID.
+// Hulls of a registry by ID.
 //
-// A store may hold millions of hulls, of which few are in use. A hull that nobody used since it was
-// read from the store, or that came to rest, takes a record here and no more: 240 bytes of heap,
-// its ID included, instead of 1120; with an ID of 32 bytes 289 instead of 1271 (observed: mallinfo2
-// of glibc 2.36 over 200 000 hulls; IDs of up to 15 bytes cost nothing more). It becomes a
-// RegisteredHull when it is looked for, and a record again when a hand that goes round the table
-// finds that nothing of it is in use. Each operation moves the hand by a few hulls, so there is no
-// pass over all of them.
+// A store may hold millions of hulls with few in use. A hull that is unused since its load, or that
+// came to rest, takes only a record: 240 bytes of heap including its ID instead of 1120; with a
+// 32-byte ID 289 instead of 1271 (**observed**: mallinfo2 of glibc 2.36 over 200 000 hulls; IDs of
+// up to 15 bytes cost nothing more). A lookup turns the record into a RegisteredHull. A clock hand
+// turns it back into a record when it finds the hull unused. Each operation advances the hand by a
+// few hulls, so no pass over all of them is needed.
 //
-// Where the store finds records, this is a cache of them, and of IDs of which it is known that
-// there is neither hull nor body: what is not here is not known. The hand then drops what it finds
-// at rest, and not looked for since it came by last, once there is more than was asked for.
+// If the store finds records, this is a cache of records and of known absences of both hull and
+// body: an ID without an entry is unknown. When the cache exceeds its limit, the hand evicts
+// entries that are at rest and were not looked up since its last visit.
 //
 // Guarded by the registry's mutex.
 class HullTable {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // About what a record takes, with its ID. Bytes.
+  // Approximate bytes of a record with its ID.
   static constexpr uint64_t kBytesOfRecord = 320;
 
-  // readable: whether the store gives back what it keeps of hulls. The budget must outlive this.
+  // readable: true if the store can read hulls back. The budget must outlive this.
   HullTable(bool readable, MemoryBudget& budget) : readable_(readable), budget_(budget) {}
 
-  // This is a cache of so many records, and of more only where they are in use. Before the first.
+  // Makes this a cache of at most `records`, exceeded only by hulls in use. Requires an empty
+  // table.
   void KeepAtMost(size_t records) { most_ = records; }
 
  private:
-  // What is known of a hull at rest, beside its ID.
+  // State of a hull at rest, except its ID.
   struct RestingHull {
     RestingHull() = default;
     explicit RestingHull(const StoredHull& stored);
@@ -67,54 +67,54 @@ class HullTable {
   class Entry {
    public:
     bool visible() const;
-    // The revision of the committed hull.
+    // Revision of the committed hull.
     uint64_t revision() const;
     // Null for a hull at rest.
     const HullPointer& awake() const { return awake_; }
-    // The committed hull, as watches and lists are told of it. id: its own.
+    // Describes the committed hull for watches and lists. id: the hull's own.
     HullChange Describe(const std::string& id) const;
 
    private:
     friend class HullTable;
 
-    // Null: at rest, or there is none.
+    // Null: the hull is at rest, or absent.
     HullPointer awake_;
     RestingHull resting_;
     bool is_absent_ = false;
-    // Looked for since the hand came by.
+    // Looked up since the last visit of the hand.
     bool is_used_ = false;
   };
   using Entries = std::map<std::string, Entry>;
 
-  // How many hulls are here; any thread.
+  // Number of hulls in memory; any thread.
   size_t size() const { return size_.load(std::memory_order_relaxed); }
   bool contains(const std::string& id) const;
   bool IsVisible(const std::string& id) const;
-  // Whether it is known what there is, or that there is nothing. A cache does not know what is not
-  // here; otherwise that is not there.
+  // Returns true if the ID's state is known, including absence. Unless this is a cache, an ID
+  // without an entry is absent.
   bool Knows(const std::string& id) const { return !is_cache() || entries_.contains(id); }
-  // For walks in the byte order of the IDs. Of a cache, also those of which there is none.
+  // Entries in the byte order of the IDs. A cache includes known absences.
   const Entries& entries() const { return entries_; }
 
-  // The hull, no longer at rest; null when there is none; nothing when that is not known. Cost:
-  // O(log n).
+  // Returns the hull and wakes it if it is at rest; null if it is absent; nullopt if it is unknown.
+  // Cost: O(log n).
   std::optional<HullPointer> Ask(const std::string& id);
-  // The same; null also when it is not known.
+  // As Ask, but returns null for an unknown ID.
   HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
-  // Adds a hull of the store, at rest. Requires that there is none with its ID.
+  // Adds a stored hull, at rest. Requires: no hull has its ID.
   void AddResting(const StoredHull& stored);
-  // There is nothing under this ID. Requires that nothing is known.
+  // Records that the ID is absent. Requires: the ID is unknown.
   void NoteAbsent(const std::string& id);
-  // A body has the ID, so that there is no hull while that is known (BodyTable), but something.
+  // Removes a known absence, because a body now has the ID (BodyTable).
   void ForgetAbsent(const std::string& id);
-  // Adds a hull that is in use. Requires that there is none with its ID.
+  // Adds a hull in use. Requires: no hull has its ID.
   HullPointer Insert(const StoredHull& stored, const HullState& state);
   void Insert(const HullPointer& hull);
-  // Requires that it is there. From then on it is known that there is none.
+  // Removes the hull; its absence is known from then on. Requires an entry.
   void Erase(const HullPointer& hull);
 
-  // Moves the hand by kHullsPerStep, and puts to rest what it finds unused; a cache drops what is
-  // too much. Cost: O(log n).
+  // Advances the hand by kHullsPerStep and puts unused hulls to rest; a cache also evicts down to
+  // its limit. Cost: O(log n).
   void RestSome();
   static constexpr int kHullsPerStep = 4;
 
@@ -126,11 +126,11 @@ class HullTable {
   const bool readable_;
   MemoryBudget& budget_;
   Entries entries_;
-  // Those that are hulls.
+  // Number of entries that are hulls.
   std::atomic<size_t> size_ = 0;
-  // Set: a cache of so many.
+  // Limit in records; set if this is a cache.
   std::optional<size_t> most_;
-  // After the last hull that RestSome looked at.
+  // ID of the last hull that RestSome visited.
   std::string hand_;
 };
 

@@ -9,9 +9,9 @@
 
 namespace hulld::server {
 
-// Equal IDs have equal hashes, so they come together once sorted. Hulls are numbered in the order
-// in which they are named first: those that are named one after the other were mostly made so, too,
-// so that a store has them in one place.
+// Equal IDs have equal hashes, so sorting by hash groups them. Hulls are numbered by their first
+// occurrence: neighbours in a request were mostly created together, so a store has them in one
+// place.
 void KnownHulls::Begin(std::span<const std::string> ids) {
   HULLD_CHECK(!has_begun_ || hull_of_.size() == ids.size());
   if (std::exchange(has_begun_, true)) return;
@@ -23,7 +23,7 @@ void KnownHulls::Begin(std::span<const std::string> ids) {
     const int compared = ids[a.second].compare(ids[b.second]);
     return compared != 0 ? compared < 0 : a.second < b.second;
   });
-  // At first, where each ID is named first.
+  // Maps each occurrence to the index of the ID's first occurrence.
   hull_of_.resize(ids.size());
   for (size_t n = 0; n < order.size(); ++n) {
     const auto [hash, i] = order[n];
@@ -41,7 +41,7 @@ void KnownHulls::Begin(std::span<const std::string> ids) {
   ForgetAll();
 }
 
-// The first is to come first.
+// In reverse, so that the first hull is processed first.
 void KnownHulls::ForgetAll() {
   for (size_t k = hulls_.size(); k-- > 0;) MakeDue(static_cast<uint32_t>(k));
 }

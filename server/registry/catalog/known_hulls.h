@@ -22,11 +22,11 @@ namespace hulld::server {
 
 struct RegisteredHull;
 
-// The last changes of what readers are given of hulls, in their order, each as a hash of the hull's
-// ID. Not thread-safe.
+// Recent changes of what readers see of hulls, in order, each stored as a hash of the hull's ID.
+// Not thread-safe.
 class RecentChanges {
  public:
-  // Half a megabyte, once there were as many.
+  // Half a megabyte when full.
   static constexpr uint64_t kMost = 1 << 16;
 
   static uint64_t HashOf(std::string_view id) { return std::hash<std::string_view>()(id); }
@@ -39,9 +39,9 @@ class RecentChanges {
     }
     ++end_;
   }
-  // After the last change.
+  // Position after the last change.
   uint64_t end() const { return end_; }
-  // Whether all changes from this one on are known.
+  // Returns true if all changes from this position on are retained.
   bool Knows(uint64_t change) const { return end_ - change <= kMost; }
   uint64_t at(uint64_t change) const { return hashes_[change % kMost]; }
 
@@ -50,82 +50,78 @@ class RecentChanges {
   uint64_t end_ = 0;
 };
 
-// What a reader knows of the hulls that it asks for: each once, however often it is named, and
-// which of them must be looked up because they changed since. A reader that asks again and again
-// keeps it (Registry::Resolve). Not thread-safe.
+// A reader's knowledge of the hulls that it requests: each hull once, however often it is named,
+// and the hulls that must be looked up because they changed. A reader that repeats its request
+// keeps this between calls (Registry::Refresh). Not thread-safe.
 class KnownHulls {
  public:
   KnownHulls() = default;
 
-  // Begins with these IDs, of which nothing is known, so that all must be looked up; does nothing
-  // when it has begun. They stay the same. Cost: O(n log n).
+  // Sets the IDs; all hulls must be looked up. Does nothing after the first call: the IDs stay the
+  // same. Cost: O(n log n).
   void Begin(std::span<const std::string> ids);
 
-  // Hulls by index: each ID once.
+  // Hulls by index, each ID once.
   size_t size() const { return hulls_.size(); }
-  // How many were looked up so far; where it is the same as before, nothing of them has changed
-  // meanwhile, what there is none of included.
-  uint64_t lookups() const { return lookups_; }
 
  private:
   friend class HullReader;
 
   struct Known {
-    // Where the ID is among those asked for.
+    // Index of the ID's first occurrence in the request.
     uint32_t first = 0;
     bool is_due = false;
     bool is_prepared = false;
-    // It was read from the store for this lookup, with others; or it is among those that are.
+    // is_loaded: read from the store for this lookup, in a batch. is_ahead: in a batch being read.
     bool is_loaded = false;
     bool is_ahead = false;
-    // What was found when that began; null where it must be looked for.
+    // Hull found when the read began; null if it must be looked up.
     std::shared_ptr<RegisteredHull> found;
-    // About what it holds of the hull.
+    // Approximate bytes of the hull that this holds.
     uint64_t bytes = 0;
     absl::StatusOr<HullView> view = absl::UnknownError("not looked up");
   };
 
-  // Hulls that are read from the store before they are looked up.
+  // Hulls being read from the store before their lookup.
   struct Loading {
     std::shared_ptr<LoadJob> job;
-    // Each hull of it, and its index here.
+    // Each hull of the job, and its index in hulls_.
     std::vector<std::shared_ptr<RegisteredHull>> found;
     std::vector<uint32_t> hulls;
     uint64_t points = 0;
   };
 
  public:
-  // About what it holds of each ID, in bytes, the ID and the hull apart.
+  // Approximate bytes held per ID, excluding the ID itself and the hull.
   static constexpr size_t kBytesEach =
       sizeof(Known) + 2 * sizeof(uint32_t) + sizeof(std::pair<uint64_t, uint32_t>);
 
  private:
-  // Every hull must be looked up.
+  // Marks every hull for lookup.
   void ForgetAll();
-  // Those that a change with this hash may have been of must be looked up. Cost: O(log n).
+  // Marks for lookup all hulls that a change with this hash may concern. Cost: O(log n).
   void NoteChange(uint64_t hash);
   void MakeDue(uint32_t hull);
-  // Looks again for what could not be read, and begins to prepare anew.
+  // Marks hulls with failed reads for lookup, and all hulls as unprepared.
   void BeginLookup();
-  // About what is held of all hulls.
+  // Approximate bytes held of all hulls.
   uint64_t HullBytes() const;
-  // In the order asked for.
+  // Returns the views in the order of the request.
   std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids) const;
 
   bool has_begun_ = false;
-  uint64_t lookups_ = 0;
   std::vector<Known> hulls_;
-  // The hull of each ID asked for.
+  // Index of the hull of each requested ID.
   std::vector<uint32_t> hull_of_;
-  // By the hash of their IDs.
+  // Hulls sorted by the hash of their IDs.
   std::vector<std::pair<uint64_t, uint32_t>> by_hash_;
-  // Those that must be looked up; the last one comes first.
+  // Hulls to look up; processed from the back.
   std::vector<uint32_t> due_;
-  // What is read from the store, in the order in which it is due; none between lookups.
+  // Reads from the store, in the order of processing; empty between lookups.
   std::deque<Loading> ahead_;
-  // The hulls of due_ from here on were looked through for what is to be read.
+  // The hulls of due_ from this index on were already scanned for hulls to read.
   size_t ahead_end_ = 0;
-  // Changes before this one were taken into account; none at first.
+  // Changes before this position were applied; empty before the first lookup.
   std::optional<uint64_t> next_change_;
 };
 

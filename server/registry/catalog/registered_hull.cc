@@ -39,7 +39,7 @@ void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
   KeepBox();
 }
 
-// Notes the box at the mark, if there is one.
+// Records the bounding box at the mark, if it has one.
 void RegisteredHull::KeepBox() {
   if (committed_mark.low()[0] > committed_mark.high()[0]) return;
   has_box = true;
@@ -62,7 +62,7 @@ bool RegisteredHull::HoldsMuchElse() const {
   return points_since_prepared > 2 * committed.record.vertex_count + kFewPoints;
 }
 
-// A mark may be the last to hold what was prepared before.
+// The old mark may hold the last reference to a previous preparation.
 void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
   locked.Afterwards([before = std::exchange(committed_mark, mark)] {});
   KeepBox();
@@ -97,7 +97,7 @@ void RegisteredHull::DiscardServed(Locked& locked) {
 void RegisteredHull::RevertLive(Locked& locked) {
   if (!std::exchange(live_is_ahead, false)) return;
   HULLD_CHECK(live != nullptr);
-  // A thread that builds on what was refused goes on with the former one, which is its own now.
+  // A thread that builds on refused points keeps the former LiveHull, now as its only owner.
   auto reverted = std::make_shared<LiveHull>(*live, committed_mark);
   locked.Discard(std::exchange(live, std::move(reverted)));
   DiscardServed(locked);
@@ -118,7 +118,7 @@ void RegisteredHull::Requeue(PendingChunk chunk) {
   chunks.insert(next, std::move(chunk));
 }
 
-// Not where the dimension grows, as that moves all points.
+// Growth in dimension moves all points, so it does not qualify.
 bool RegisteredHull::GrewInto(const StoredHull& stored) const {
   const HullRecord& now = stored.record;
   const HullRecord& before = committed.record;
@@ -147,8 +147,8 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
   committed = head = stored;
   writers.clear();
   ++supersessions;
-  // Nobody asked here for what another server added: it is no reason to keep the hull, unless
-  // somebody appends to it here, too.
+  // No local caller requested the points of a peer server: they are no reason to keep the hull in
+  // memory, unless it is also appended to here.
   if (grows && !is_built_here) {
     CountParts();
   } else {
@@ -157,8 +157,8 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
   return grows;
 }
 
-// Readers keep the versions that they hold. A thread that builds has the builder and, as `live` was
-// reverted, another LiveHull than this.
+// Readers keep their versions. A building thread owns the builder and, because `live` was reverted,
+// a LiveHull other than this one.
 void RegisteredHull::Grow(Locked& locked, const std::vector<Vector>& points, int dimension) {
   SetCommittedMark(locked, live->Append(points, dimension));
   DiscardServed(locked);
@@ -177,7 +177,7 @@ void RegisteredHull::NoteUse() {
               is_for_writing);
 }
 
-// A part whose address comes again is free memory that was used again: nobody held it.
+// A part at a repeated address reuses free memory: the former part had no holder.
 void RegisteredHull::CountParts() {
   std::vector<std::shared_ptr<MemoryPart>> parts;
   if (live != nullptr) {
@@ -200,7 +200,7 @@ uint64_t RegisteredHull::SharedBytes() const {
 
 void RegisteredHull::DropUnused(Locked& locked) {
   if (state.quiet() && chunks.empty()) {
-    // What a reader holds would not go, and be there twice after the next one.
+    // Memory referenced by a reader would not be freed, and the next reader would duplicate it.
     const bool is_read = IsRead();
     if (readable_from_store) {
       DiscardBuilder(locked);

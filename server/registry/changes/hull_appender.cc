@@ -22,18 +22,18 @@ struct HullAppender::OpenRequest {
   std::function<void(const absl::Status&)> on_gone;
   Reply<OpenResult> done;
   ClientId client = kNoClient;
-  // What was read for it, so that it stays known until its turn comes.
+  // The hull read for the request; keeps it known until the request is processed.
   HullPointer known = nullptr;
 };
 
-// What the rules say of a chunk that they allow.
+// Result of checking a chunk that is allowed.
 enum class HullAppender::Verdict { kNew, kAlreadyApplied };
 
-// A chunk that is in the builder, and the change that makes it durable.
+// A chunk added to the builder, and its change to commit.
 struct HullAppender::BuiltChunk {
   Change change;
   PointCounts counts;
-  // The moment of the LiveHull with this chunk.
+  // Prefix of the LiveHull that includes this chunk.
   LiveHull::Mark mark;
 };
 
@@ -77,8 +77,8 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   return RevisionMismatch(record, *chunk.if_revision);
 }
 
-// Adds what a builder lacks. False: it holds another hull then than the record says, and is to be
-// made anew.
+// Adds the points missing from a builder. Returns false if the result differs from the record; the
+// builder must then be rebuilt.
 bool BringUp(HullBuilder& builder, std::span<const Vector> lacks, const HullRecord& record) {
   if (lacks.empty()) return true;
   return builder.Add(lacks).ok() && builder.vertex_count() == record.vertex_count &&
@@ -119,7 +119,7 @@ void HullAppender::OpenAppend(const std::string& id, const std::string& writer_i
                               Reply<OpenResult> done, ClientId client) {
   const auto request = std::make_shared<OpenRequest>(OpenRequest{
       id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
-  // The store may have to be read.
+  // May read the store.
   if (!store_.is_shared()) return RunOpen(request);
   freshness_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
@@ -133,7 +133,7 @@ void HullAppender::RunOpen(const std::shared_ptr<OpenRequest>& request) {
       request->client);
 }
 
-// On a thread of `writers_`. May release the mutex to ask the store.
+// Runs on a thread of `writers_`. May release the mutex to query the store.
 void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
@@ -144,7 +144,7 @@ void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>
     return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
       const bool is_known = catalog_.IsKnown(request->hull_id);
       if (is_known) request->known = catalog_.Find(request->hull_id);
-      // Where there is none, nothing of the store is to be read any more.
+      // Without a hull, no further store read is needed.
       if (is_known && request->known == nullptr) return OpenLocked(later, request);
       RunOpen(request);
     });
@@ -156,7 +156,7 @@ void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>
   const HullPointer hull = catalog_.Find(id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(locked, catalog_.NoSuchHull(request->hull_id));
-    // The session opens at the very moment of the creation: the hull may be gone right after.
+    // The session opens in the completion of the creation: the hull may be gone right after.
     return lifecycle_.CreateNew(
         locked, request->hull_id,
         [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
@@ -173,7 +173,7 @@ void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>
   if (hull->state.damaged()) return refuse(locked, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
   if (!last.ok()) return refuse(locked, last.status());
-  // The end of a hull takes its sequences out of the store before the registry knows.
+  // The end of a hull removes its sequences from the store before the registry learns of it.
   if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
   if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
     return refuse(locked, TooManyWriters(hull->head, limits_.max_writers_per_hull));
@@ -194,7 +194,7 @@ void HullAppender::OpenSession(Locked& locked, const HullPointer& hull,
   Answer<OpenResult>(locked, request->done, std::move(result));
 }
 
-// The last committed sequence of a writer. May release the mutex to ask the store.
+// Returns the last committed sequence of a writer. May release the mutex to query the store.
 absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, RegisteredHull& hull,
                                                          const std::string& writer_id) {
   auto writer = hull.writers.find(writer_id);
@@ -209,7 +209,7 @@ absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, Registe
   --hull.sequence_readers;
   if (absl::IsAborted(sequence.status())) {
     if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
-    // Each caller looks for that.
+    // Every caller checks for this.
     if (hull.state.gone()) return 0;
     if (hull.supersessions == supersessions && hull.committed.record == record) {
       return StoreDisagrees(record);
@@ -217,12 +217,12 @@ absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, Registe
     return CommittedSequence(locked, hull, writer_id);
   }
   if (!sequence.ok()) return sequence.status();
-  // Another server may have taken a chunk of the writer since.
+  // A peer server may have committed a chunk of the writer since.
   if (hull.supersessions != supersessions) return CommittedSequence(locked, hull, writer_id);
-  // What was committed meanwhile is newer, and still there.
+  // A commit during the read is newer and still in the map.
   writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
-  // A writer that has not written yet leaves nothing behind.
+  // A writer that has not written yet gets no entry.
   if (*sequence > 0) {
     hull.writers.emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence});
   }
@@ -264,7 +264,7 @@ void HullAppender::RunNextChunk(const HullPointer& hull) {
   changes_.Advance(locked, hull);
 }
 
-// Refuses the chunks of a hull that cannot grow any more.
+// Refuses the chunks of a hull that can no longer grow.
 void HullAppender::RefuseChunks(const HullPointer& hull) {
   Locked locked(mutex_);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
@@ -276,17 +276,17 @@ void HullAppender::RefuseChunks(const HullPointer& hull) {
   }
 }
 
-// Answers a chunk, or submits the change that it makes, whose end answers it. Releases the mutex
-// meanwhile.
+// Answers a chunk, or submits its change, the completion of which answers it. Releases the mutex
+// while building.
 void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
-  // What is not committed now is compared by the store.
+  // Without a commit, no store write detects a stale state, so compare explicitly.
   const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
   if (!is_new && store_.is_shared()) {
     const absl::Status fresh = freshness_.AwaitOthers(locked, pending.should_stop);
     verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
-    // One that was sent before it has to be made anew meanwhile.
+    // An earlier chunk must be rebuilt first.
     if (hull->IsQueuedBefore(pending)) {
       hull->Requeue(std::move(pending));
       return;
@@ -302,7 +302,7 @@ void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
     if (!Stopped(pending.should_stop)) {
-      // Its turn comes again.
+      // It will be rebuilt.
       hull->Requeue(std::move(pending));
       return;
     }
@@ -312,7 +312,7 @@ void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   SubmitChunk(locked, hull, pending, *std::move(built));
 }
 
-// What the rules say before anything is built. May release the mutex to ask the store.
+// Checks a chunk before building. May release the mutex to query the store.
 absl::StatusOr<HullAppender::Verdict> HullAppender::CheckChunk(Locked& locked, RegisteredHull& hull,
                                                                const PendingChunk& pending) {
   if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
@@ -346,7 +346,7 @@ absl::StatusOr<HullAppender::Verdict> HullAppender::CheckChunk(Locked& locked, R
 // sequence include it.
 absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, RegisteredHull& hull,
                                                              PendingChunk& pending) {
-  // A reader may have found that meanwhile.
+  // A reader may have found damage during a release of the mutex.
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
   const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
@@ -396,9 +396,8 @@ absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, Reg
   return built;
 }
 
-// What a chunk is to be appended to. Releases the mutex to read it from the store where it is not
-// in memory: a writer does not wait for a reader that does the same, and whichever is first
-// decides.
+// Returns the LiveHull to append to. Releases the mutex to read it from the store if it is not in
+// memory. A writer does not wait for a reader that loads the same hull; the first to finish wins.
 absl::StatusOr<std::shared_ptr<LiveHull>> HullAppender::LiveForWriter(Locked& locked,
                                                                       RegisteredHull& hull) {
   if (hull.live != nullptr) return hull.live;
@@ -427,9 +426,9 @@ absl::StatusOr<std::shared_ptr<LiveHull>> HullAppender::LiveForWriter(Locked& lo
   return hull.live;
 }
 
-// The points of a chunk go into its hull's builder, which first gets what other servers added, and
-// is made of the committed points where there is none; what became vertices goes into the LiveHull,
-// and what the store is to keep of it into the change. Without the mutex.
+// Adds a chunk's points to its hull's builder, after the points of peer servers that it lacks;
+// builds it from the committed points if it is missing. Appends the new vertices to the LiveHull
+// and fills the change with the data to store. Called without the mutex.
 absl::StatusOr<PointCounts> HullAppender::AddPoints(
     PendingChunk& pending, const LiveHull::Mark& committed, std::span<const Vector> builder_lacks,
     LiveHull& live, std::unique_ptr<HullBuilder>& builder, BuiltChunk& built) {
@@ -463,7 +462,7 @@ absl::StatusOr<PointCounts> HullAppender::AddPoints(
   return added;
 }
 
-// What a writer is told when AddPoints failed.
+// Returns the writer's status for a failure of AddPoints.
 absl::Status HullAppender::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
   if (absl::IsDataLoss(cause)) catalog_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
@@ -472,7 +471,7 @@ absl::Status HullAppender::WhyNotBuilt(RegisteredHull& hull, const absl::Status&
       limits_.max_vertices_per_hull, "max-vertices-per-hull");
 }
 
-// The record and the layout of the hull as it is with the points that were added.
+// Sets the record and layout of the hull with the added points.
 void HullAppender::FillChange(const RegisteredHull& hull, const PointCounts& added,
                               Change& change) {
   HullRecord& record = change.hull.record;
@@ -493,7 +492,7 @@ void HullAppender::FillChange(const RegisteredHull& hull, const PointCounts& add
 
 void HullAppender::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                                BuiltChunk built) {
-  // Where another server may be first, the chunk is kept until that is decided.
+  // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
   const std::string writer_id = pending.session.writer_id;
@@ -547,9 +546,9 @@ void HullAppender::CommitChunk(Locked& locked, const HullPointer& hull, const St
   hull->NoteUse();
 }
 
-// A chunk in flight was refused, and with it all that follow: the hull returns to what is
-// committed. The first of them does it, the others find it done. A thread that is building on them
-// drops the builder itself, as its state says.
+// Returns the hull to its committed state after a chunk in flight, and with it all later ones, was
+// refused. The first refusal reverts; the later ones find it done. A thread building on refused
+// chunks drops the builder itself (kReverting).
 void HullAppender::Revert(Locked& locked, RegisteredHull& hull) {
   hull.head = hull.committed;
   for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;

@@ -32,25 +32,25 @@ namespace hulld::server {
 struct PendingChunk;
 struct RegisteredHull;
 
-// How hulls grow: the sessions of writers, and their chunks.
+// Growth of hulls: writers' sessions and their chunks.
 //
-// A chunk is built first, without the mutex, by the one thread that owns the hull's builder
-// (HullState); what became vertices is appended to the LiveHull. The change that this makes is then
-// submitted. Meanwhile the next chunk of the same hull may be built on it. If the batch fails, so
-// do all chunks that follow, and the hull returns to its last committed state (Revert). Where
-// another server was first, a chunk waits again in its old place instead, and is made anew.
+// The thread that owns the hull's builder (HullState) builds a chunk without the mutex and appends
+// the new vertices to the LiveHull. The resulting change is then submitted, and the next chunk of
+// the hull may be built on it immediately. If the batch fails, all later chunks fail too, and the
+// hull returns to its last committed state (Revert). If a peer server committed first, a chunk
+// instead returns to its place in the queue and is rebuilt.
 //
-// Invariants, of each hull and writer: chunks are committed in the order of their sequences, each
+// Invariants, per hull and writer: chunks commit in the order of their sequences, each exactly
 // once; `head` and the writer's `head` include every chunk in flight, `committed` only what the
-// store has kept. Chunks of one hull queue up and occupy no thread meanwhile.
+// store has committed. Queued chunks of a hull occupy no thread.
 //
-// Guarded by the registry's mutex, which the functions that take no Locked take.
+// Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class HullAppender {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // All must outlive this. limits: those in force. Chunks are built on `writers`, as HullChanges
-  // tells it.
+  // All must outlive this. limits: the limits in force. Registers the chunk tasks with HullChanges,
+  // which runs them on `writers`.
   HullAppender(Store& store, const Limits& limits, WorkerPool& writers, FairMutex& mutex,
                Catalog& catalog, MemoryBudget& memory, ChangeFeed& feed, FreshnessGate& freshness,
                RecordReader& records, Preparer& preparer, HullLifecycle& lifecycle,
@@ -58,7 +58,7 @@ class HullAppender {
   HullAppender(const HullAppender&) = delete;
   HullAppender& operator=(const HullAppender&) = delete;
 
-  // As in Registry.
+  // See Registry.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
                   ClientId client);
@@ -107,7 +107,7 @@ class HullAppender {
   Preparer& preparer_;
   HullLifecycle& lifecycle_;
   HullChanges& changes_;
-  // The key of the last session in RegisteredHull::watches. Guarded by mutex_.
+  // Key of the newest session in RegisteredHull::watches. Guarded by mutex_.
   uint64_t last_watch_ = 0;
 };
 

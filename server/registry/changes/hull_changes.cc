@@ -20,9 +20,9 @@ void HullChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
                         hull->state.Refuse();
                       }
                       finish(later, status, committed);
-                      // What other servers did comes first.
+                      // Peer changes must be applied first.
                       if (Committer::IsSuperseded(status)) return AdvanceLater(hull);
-                      // One that has come to rest may be dropped.
+                      // A hull at rest may be evicted.
                       if (hull->state.quiet() && !hull->state.gone()) {
                         hull->NoteUse();
                         memory_.Evict(later);
@@ -41,16 +41,16 @@ void HullChanges::Advance(Locked& locked, const HullPointer& hull) {
   }
   if (hull->chunks.empty()) return;
   if (hull->state.gone() || hull->state.damaged()) {
-    // Where a thread is at work, it comes here once it has ended.
+    // A thread at work calls this again when it ends.
     if (hull->state.work() != HullState::Work::kIdle) return;
-    // Replies come on other threads than the one that asks.
+    // Replies must run on a thread other than the caller's.
     writers_.Submit([this, hull] { refuse_chunks_(hull); }, hull->chunks.front().session.client);
     return;
   }
   if (!hull->state.can_schedule() || !hull->exclusive.empty()) return;
   const PendingChunk& next = hull->chunks.front();
   const bool repeated = next.chunk.sequence <= hull->HeadSequence(next.session.writer_id);
-  // What such a chunk finds must be committed.
+  // These chunks depend on the committed state.
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
   writers_.Submit([this, hull] { run_chunk_(hull); }, next.session.client);

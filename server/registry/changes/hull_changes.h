@@ -16,12 +16,12 @@ namespace hulld::server {
 
 struct RegisteredHull;
 
-// Brings the changes of hulls to the committer, and lets what waits for a hull go on in its order:
-// first what needs the hull to be quiet (RegisteredHull::exclusive: creations, deletions,
-// replacements), then chunks (RegisteredHull::chunks), which may overlap.
+// Submits changes of hulls to the committer and resumes the tasks that wait for a hull: first tasks
+// that need the hull to be quiet (RegisteredHull::exclusive: creations, deletions, replacements),
+// then chunks (RegisteredHull::chunks), which may overlap.
 //
-// Invariant: after each step of a hull's HullState, Advance is called, so that nothing that could
-// go on waits. Guarded by the registry's mutex.
+// Invariant: Advance follows each transition of a hull's HullState, so no runnable task is left
+// waiting. Guarded by the registry's mutex.
 class HullChanges {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
@@ -38,21 +38,21 @@ class HullChanges {
   HullChanges(const HullChanges&) = delete;
   HullChanges& operator=(const HullChanges&) = delete;
 
-  // What is to be done with chunks, on a thread of the writers and without the mutex. run: with the
-  // next one of a hull, which is kScheduled. refuse: with all of a hull that cannot grow any more.
-  // Before the first chunk.
+  // Sets the tasks for chunks, called on a thread of `writers` without the mutex. run: processes
+  // the next chunk of a hull in kScheduled. refuse: refuses all chunks of a hull that can no longer
+  // grow. Call before the first chunk.
   void SetChunkTasks(ChunkTask run, ChunkTask refuse) {
     run_chunk_ = std::move(run);
     refuse_chunks_ = std::move(refuse);
   }
 
-  // Submits a change that follows all changes of its hull submitted before; `hull` is in the state
-  // that says so. finish: called after the step of the state, before what waits for the hull goes
-  // on.
+  // Submits a change that follows all earlier changes of its hull. Requires: the state of `hull`
+  // counts it as in flight. finish: called after the state's transition, before waiting tasks
+  // resume.
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
-  // Lets whatever waits for the hull go on.
+  // Resumes the tasks that wait for the hull.
   void Advance(Locked& locked, const HullPointer& hull);
-  // The same once everything that other servers did is taken over.
+  // As Advance, after all pending peer changes are applied.
   void AdvanceLater(const HullPointer& hull);
 
  private:

@@ -160,7 +160,7 @@ void HullLifecycle::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacem
   CommitReplacement(locked, former, replacement, done);
 }
 
-// Whether the rules allow it. former: null when there is none.
+// Returns OK if the replacement is allowed. former: null if no hull exists.
 absl::Status HullLifecycle::CheckReplacement(const RegisteredHull* former,
                                              const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
@@ -183,7 +183,7 @@ absl::Status HullLifecycle::CheckReplacement(const RegisteredHull* former,
   return catalog_.CheckHullCount();
 }
 
-// former: null when there is none. Takes the replacement's vertices.
+// Moves the replacement's vertices into the change. former: null if no hull exists.
 Change HullLifecycle::MakeChange(const RegisteredHull* former, Replacement& replacement) {
   Change change;
   change.begins = true;
@@ -201,7 +201,8 @@ Change HullLifecycle::MakeChange(const RegisteredHull* former, Replacement& repl
   return change;
 }
 
-// former: null when there is none, else quiet. Takes the replacement's builder and points.
+// Submits a replacement, moving its builder and points. former: null if no hull exists; otherwise
+// quiet.
 void HullLifecycle::CommitReplacement(Locked& locked, const HullPointer& former,
                                       const std::shared_ptr<Replacement>& replacement,
                                       const Reply<ReplaceResult>& done) {
@@ -211,7 +212,7 @@ void HullLifecycle::CommitReplacement(Locked& locked, const HullPointer& former,
     hull = catalog_.hulls().Insert(change.hull, HullState::Creating());
     catalog_.BeginCreatingHull();
   } else {
-    // Unknown to others until it takes the place of the former.
+    // Not in the catalog until it replaces the former hull.
     hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
                                             store_.keeps_hulls(), memory_);
     former->state.StartEnding();
@@ -232,7 +233,7 @@ void HullLifecycle::CommitReplacement(Locked& locked, const HullPointer& former,
                   });
 }
 
-// The replacement is to be submitted again.
+// Moves the data back into the replacement for a retry.
 void HullLifecycle::TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement) {
   *replacement.builder = std::move(*hull.builder);
   replacement.live = hull.live;
@@ -241,7 +242,7 @@ void HullLifecycle::TakeBack(RegisteredHull& hull, Change& change, Replacement& 
   }
 }
 
-// hull: what takes the place of `former`, or of none, if the status allows.
+// hull: replaces `former`, which may be null, if `status` is OK.
 absl::StatusOr<ReplaceResult> HullLifecycle::FinishReplacement(Locked& locked,
                                                                const HullPointer& former,
                                                                const HullPointer& hull,

@@ -24,14 +24,14 @@ namespace hulld::server {
 
 struct RegisteredHull;
 
-// How hulls begin and end: creation, deletion, and replacement, which is both at once.
+// Creation, deletion, and replacement of hulls.
 //
-// Each of them depends on what there is under an ID, so it first makes that known, waits until no
-// change under the ID is in flight, and decides then, in one hold of the mutex. What it decided is
-// one change. Nothing of it is seen before the store has kept it; a refusal leaves what there was.
-// A change that another server preceded is made anew of what there is by then.
+// Each depends on the state of an ID: it loads that state, waits until no change of the ID is in
+// flight, and then decides within one hold of the mutex. The decision is a single change, invisible
+// until the store commits it; a refusal leaves the former state. If a peer server committed first,
+// the change is retried on the new state.
 //
-// Guarded by the registry's mutex, which the functions that take no Locked take.
+// Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class HullLifecycle {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
@@ -50,15 +50,15 @@ class HullLifecycle {
   HullLifecycle(const HullLifecycle&) = delete;
   HullLifecycle& operator=(const HullLifecycle&) = delete;
 
-  // As in Registry.
+  // See Registry.
   void Create(const std::string& id, bool if_absent, Reply<CreateResult> done);
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
   void Replace(Replacement replacement, Reply<ReplaceResult> done);
 
-  // Creates a hull. done: told of it with the mutex held, at the moment when it becomes visible, or
-  // why it does not; ABORTED (Committer::IsSuperseded): another server changed the ID first.
-  // Requires that it is known that there is no hull, which is checked, and that no change of a body
-  // with the ID is in flight (unchecked: its completion would find the hull).
+  // Creates a hull. done: called with the mutex held when the hull becomes visible, or with an
+  // error; ABORTED (Committer::IsSuperseded): a peer server changed the ID first. Requires: the ID
+  // is known to have no hull (checked), and no change of a body with the ID is in flight (not
+  // checked: its completion would find the hull).
   void CreateNew(Locked& locked, const std::string& id, const Creation& done);
 
  private:

@@ -8,14 +8,14 @@
 
 namespace hulld::server {
 
-// What there was under an ID when everything was taken over up to `since`.
+// State of an ID after all changes up to `since` were applied.
 struct Takeover::Former {
-  // Whether that was known. Otherwise the rest is told from what others say of it.
+  // True if the state was known. If not, the peer change supplies the rest.
   bool was_known = false;
-  // Null also where it was not known.
+  // Null also if unknown.
   HullPointer hull;
   std::optional<BodyRecord> body;
-  // Something that was not known was there, and has ended: this is its create_revision; else 0.
+  // create_revision of an unknown hull or body that has ended; otherwise 0.
   uint64_t ended_began = 0;
 };
 
@@ -58,15 +58,15 @@ void Takeover::Take(Locked& locked, const OtherChanges& others) {
   after_others_.Run(locked);
 }
 
-// since: the revision up to which everything was taken over before.
+// since: all earlier changes up to this revision were applied.
 void Takeover::TakeOne(Locked& locked, const std::string& id, const OtherChange& other,
                        uint64_t since) {
   const Former former = FindFormer(id, other, since);
-  // Not what was read when the store was loaded.
+  // False for changes that were part of the initial load.
   const bool is_news = other.revision > catalog_.revision();
   if (is_news) {
     catalog_.Publish(other.revision);
-    // Also what came and went: a reader has to know that there was nothing all the while.
+    // Includes hulls that were created and deleted in between: a reader must learn of the interval.
     catalog_.recent_changes().Note(id);
   }
   if (former.hull != nullptr) {
@@ -108,14 +108,14 @@ std::optional<BodyRecord> Takeover::FindFormerBody(const std::string& id, const 
   return was_there ? std::optional((*other.body)->record) : std::nullopt;
 }
 
-// Whether it is another version of the hull that was known.
+// Returns true if `other` is another version of the known hull, and applies it.
 bool Takeover::TakeVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                            bool is_news) {
   if (!other.hull.has_value() || !other.hull->ok() || hull->state.damaged()) return false;
   const StoredHull& stored = **other.hull;
   const HullRecord& before = hull->committed.record;
   if (before.create_revision != stored.record.create_revision) return false;
-  // Also where the record is the same: an empty chunk counts in the sequences of its writer.
+  // Applies even if the record is the same: an empty chunk advances its writer's sequence.
   if (!catalog_.is_cache()) {
     catalog_.NoteVertices(before.vertex_count, stored.record.vertex_count);
   }
@@ -128,7 +128,7 @@ bool Takeover::TakeVersion(Locked& locked, const HullPointer& hull, const OtherC
   return true;
 }
 
-// The hull that was known is there no more, or another one is in its place.
+// Ends the known hull, which was deleted or replaced.
 void Takeover::EndFormer(Locked& locked, const HullPointer& former, const OtherChange& other) {
   const HullRecord& record = former->committed.record;
   if (!catalog_.is_cache()) catalog_.NoteVertices(record.vertex_count, 0);
@@ -152,7 +152,7 @@ void Takeover::TakeBody(Locked& locked, const std::string& id, const OtherChange
   }
 }
 
-// Tells the feed what became of an ID, now that the catalog holds it.
+// Notes the change in the feed. Requires: the catalog holds it.
 void Takeover::Tell(Locked& locked, const std::string& id, const OtherChange& other,
                     const Former& former, uint64_t since) {
   const std::shared_ptr<const Body> body = catalog_.FindBody(id);
@@ -164,7 +164,7 @@ void Takeover::Tell(Locked& locked, const std::string& id, const OtherChange& ot
   } else if (hull == nullptr) {
     TellOfEnd(locked, id, other, former, body != nullptr);
   } else {
-    // What is damaged cannot be told.
+    // A damaged record cannot be described.
     feed_.NoteOther(locked, other.revision);
   }
 }
@@ -196,14 +196,14 @@ void Takeover::TellOfHull(Locked& locked, const HullPointer& hull, const Former&
   }
 }
 
-// has_body: there is a body now, which is damaged.
+// has_body: a damaged body has the ID now.
 void Takeover::TellOfEnd(Locked& locked, const std::string& id, const OtherChange& other,
                          const Former& former, bool has_body) {
   const bool is_deletion = !other.body.has_value() && other.ended_at == other.revision;
   if (former.body.has_value() && !has_body) {
     feed_.NoteBodyDeleted(locked, *former.body, other.revision);
   } else if (former.hull != nullptr || is_deletion) {
-    // A watch that resumes may know one that was never known here.
+    // A resumed watch may know a hull that was never known here.
     HullRecord record;
     record.hull_id = id;
     record.create_revision = other.revision;

@@ -23,21 +23,21 @@ namespace hulld::server {
 
 struct RegisteredHull;
 
-// Takes over what other servers committed to the same store, as of one of their batches: puts it in
-// the place of what was known, tells watches, and lets go on what waited for it.
+// Applies a batch of changes that peer servers committed to the same store: replaces the known
+// state, notifies watches, and resumes tasks that waited for it.
 //
-// It runs on the committer's thread, so that nothing of what it takes over is being committed here
-// meanwhile, after the changes that it supersedes were refused. Invariant: nothing of these IDs is
-// in flight; but a thread may build a chunk on a hull, or read a record, and finds by the state of
-// the hull, or of the reading, that it was overtaken.
+// Runs on the committer's thread, after the superseded local changes were refused, so nothing that
+// it touches is being committed. Invariant: no change of these IDs is in flight. A thread may still
+// build a chunk on such a hull, or read its record; the state of the hull, or of the reading, shows
+// that it was superseded.
 //
 // Guarded by the registry's mutex.
 class Takeover {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // Hulls that are advanced at a time by what other servers added, and the points of all of them:
-  // some milliseconds under the mutex.
+  // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
+  // their points in total: some milliseconds.
   static constexpr size_t kMostGrownHulls = 1 << 10;
   static constexpr uint64_t kMostGrowth = 1 << 16;
 
@@ -54,9 +54,9 @@ class Takeover {
   Takeover(const Takeover&) = delete;
   Takeover& operator=(const Takeover&) = delete;
 
-  // Hulls whose points are in memory and that only grew, as far as they can be added within one
-  // hold of the mutex. What is committed here stays so until Take is told of the same changes, as
-  // the same thread does both.
+  // Returns the hulls that are in memory and only grew, up to the limits of a single hold of the
+  // mutex. The committed state does not change before Take applies the same changes, because the
+  // same thread calls both.
   std::vector<HullGrowth> GrownHulls(const OtherChanges& others) const;
   void Take(Locked& locked, const OtherChanges& others);
 

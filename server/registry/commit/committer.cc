@@ -58,7 +58,7 @@ void Committer::FollowNow(Locked& locked, Follower follower) {
   {
     const std::lock_guard lock(mutex_);
     may_ask = store_.is_shared() && is_idle_ && !is_asking_ && !asked_.asked.has_value() &&
-              queue_.empty() && followers_.empty() && holds_.empty();
+              queue_.empty() && followers_.empty();
     followers_.push_back(std::move(follower));
     if (may_ask) is_asking_ = true;
   }
@@ -69,7 +69,7 @@ void Committer::FollowNow(Locked& locked, Follower follower) {
   }
 }
 
-// Followers that come meanwhile are told of the next question.
+// Followers that arrive during the query wait for the next one.
 void Committer::AskNow() {
   {
     const std::lock_guard lock(mutex_);
@@ -80,15 +80,6 @@ void Committer::AskNow() {
   {
     const std::lock_guard lock(mutex_);
     is_asking_ = false;
-  }
-  ready_.notify_one();
-}
-
-void Committer::Hold(const Locked& locked, std::shared_ptr<CommitHold> hold) {
-  HULLD_CHECK(locked.Holds(order_));
-  {
-    const std::lock_guard lock(mutex_);
-    holds_.push_back(std::move(hold));
   }
   ready_.notify_one();
 }
@@ -115,20 +106,18 @@ void Committer::Run() {
   while (true) {
     Round round = WaitForRound();
     if (round.IsEmpty()) return;
-    std::vector<std::shared_ptr<CommitHold>> holds = std::exchange(round.holds, {});
-    if (!round.batch.empty() || !round.followers.empty()) CommitAndFollow(std::move(round));
-    if (!holds.empty()) HoldFor(std::move(holds));
+    CommitAndFollow(std::move(round));
   }
 }
 
 void Committer::CommitAndFollow(Round round) {
-  // Before anything is sent: a commit asks as well.
+  // Taken before anything is sent, because a commit queries peer changes as well.
   const SteadyClock::time_point asked = round.asked.has_value() ? *round.asked : SteadyClock::now();
   absl::Status status;
   if (!round.batch.empty()) status = Write(round.batch);
   if (!status.ok()) {
-    // Refused before anybody looks at what others did: where the outcome is not known, what is
-    // there by then may be this very batch.
+    // Refused before the query for peer changes: if the outcome is unknown, the store may contain
+    // this very batch at that point.
     Round looking;
     looking.followers = std::exchange(round.followers, {});
     Settle(round, status, absl::OkStatus(), asked);
@@ -136,18 +125,17 @@ void Committer::CommitAndFollow(Round round) {
     round = std::move(looking);
     status = absl::OkStatus();
   }
-  // A commit has followed the others.
+  // A commit has already queried the peer changes.
   absl::Status followed;
   if (round.batch.empty()) {
-    // A follower that waits to know all that the store holds must not wait for the next change to
-    // find out what became of the last.
+    // A follower needs the outcome of the last batch now, not at the next change.
     if (!store_.is_shared()) followed = RecoverIfFailing();
     if (followed.ok()) followed = store_.Follow();
   }
   Settle(round, status, followed, asked);
 }
 
-// Before a question without a commit: what is committed next tells for itself whether it fails.
+// Recovers before a query without a commit; a commit reports its own failure.
 absl::Status Committer::RecoverIfFailing() {
   if (!Statistics().failing) return absl::OkStatus();
   absl::Status status = store_.Recover();
@@ -156,39 +144,17 @@ absl::Status Committer::RecoverIfFailing() {
   return status;
 }
 
-// One hold for all readers that want one by now.
-void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
-  std::erase_if(holds, [](const auto& hold) { return !hold->is_wanted(); });
-  if (holds.empty()) return;
-  const SteadyClock::time_point asked = SteadyClock::now();
-  absl::Status status = RecoverIfFailing();
-  if (status.ok()) status = store_.HoldOthers();
-  Round nothing_else;
-  Settle(nothing_else, absl::OkStatus(), status, asked);
-  for (const auto& hold : holds) hold->Begin(status);
-  if (!status.ok()) return;
-  {
-    const std::lock_guard lock(mutex_);
-    ++statistics_.holds;
-  }
-  for (const auto& hold : holds) hold->Last();
-  const bool lasted = store_.ReleaseOthers();
-  for (const auto& hold : holds) hold->Finish(lasted);
-}
-
-// Empty: this is to end.
+// Returns an empty round when the thread must end.
 Committer::Round Committer::WaitForRound() {
   std::unique_lock lock(mutex_);
   is_idle_ = true;
   ready_.wait(lock, [this] {
     if (is_asking_) return false;
-    return ending_ || asked_.asked.has_value() || !queue_.empty() || !followers_.empty() ||
-           !holds_.empty();
+    return ending_ || asked_.asked.has_value() || !queue_.empty() || !followers_.empty();
   });
   is_idle_ = false;
   if (asked_.asked.has_value()) return std::exchange(asked_, {});
-  Round round = {
-      std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {}), {}};
+  Round round = {std::exchange(queue_, {}), std::exchange(followers_, {}), {}};
   has_ended_ = round.IsEmpty();
   return round;
 }
@@ -209,8 +175,8 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   return status;
 }
 
-// What other servers did, with what hulls that are in memory grew by. status: that of asking what
-// they did; a store that could not be asked that is asked no more.
+// Returns the peer changes, with the growth of hulls in memory. status: the result of the query;
+// after an error the store is not queried again.
 OtherChanges Committer::TakeOthers(const absl::Status& status) {
   OtherChanges others = store_.TakeOthers();
   if (!status.ok() || others.revision == 0 || grown_ == nullptr) return others;
@@ -227,12 +193,12 @@ OtherChanges Committer::TakeOthers(const absl::Status& status) {
   return others;
 }
 
-// Completes a batch that the store kept; or, if it refused the batch, that and all that waits.
-// asked: when the store was, at the earliest.
+// Completes a committed batch; or refuses a failed batch and everything pending. asked: the
+// earliest time of the store query.
 void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed,
                        SteadyClock::time_point asked) {
   std::vector<Pending>& batch = round.batch;
-  // Before others take changes out of it.
+  // Evaluated before superseded changes are removed from the batch.
   const bool was_written = !batch.empty();
   OtherChanges others;
   if (store_.is_shared()) others = TakeOthers(was_written ? status : followed);
@@ -264,11 +230,12 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
     ++completed;
   }
   for (const Follower& follower : round.followers) follower(locked, followed);
-  // Replies go out now; the changes themselves, which may be large, end without a lock.
+  // Sends the replies here; the changes, which may be large, are destroyed without a lock.
   locked.Unlock();
 }
 
-// Refuses what other servers superseded, of the batch and of what waits, and tells of them.
+// Refuses the changes superseded by peer servers, in the batch and in the queue, then passes the
+// peer changes to the callback.
 void Committer::TellOthers(Locked& locked, const OtherChanges& others,
                            std::vector<Pending>& batch) {
   std::vector<Pending> superseded;
@@ -289,7 +256,7 @@ void Committer::TellOthers(Locked& locked, const OtherChanges& others,
     it->done(locked, status, it->change);
   }
   others_(locked, others);
-  // Large ones end without a lock.
+  // Destroys large changes without a lock.
   locked.Afterwards([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
 }
 

@@ -16,7 +16,7 @@
 namespace hulld::server {
 namespace {
 
-// Whether a few of the points span space. May say false of points that do.
+// Returns true if a few of the points span space. May return false for points that do.
 bool SpanSpace(std::span<const Vector> points) {
   const size_t third = points.size() / 3;
   return third > 0 && std::ranges::any_of(points, [&](const Vector& point) {
@@ -24,17 +24,17 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-// Points that a thread takes at once, the last hull apart, and hulls, at most: some 50 us.
+// Maximum points, not counting the last hull, and hulls that a thread takes per step: some 50 us.
 constexpr uint64_t kPointsAtOnce = 1024;
 constexpr size_t kHullsAtOnce = 16;
-// A thread takes a small part of a job at once, so that all of them end together.
+// Small parts of a job, so that all threads finish together.
 constexpr size_t kLeastParts = 8;
 
 uint64_t PointCount(const StoredHull& stored) {
   return stored.layout.base_vertices + stored.layout.delta_vertices;
 }
 
-// points: what the store says are those of the hull.
+// points: the hull's points as read from the store.
 absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
                                                    absl::StatusOr<std::vector<Vector>> points) {
   if (!points.ok()) return points.status();
@@ -68,7 +68,7 @@ LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
       order_(hulls_.size()),
       loaded_(hulls_.size(), Cancelled()) {
   std::iota(order_.begin(), order_.end(), 0);
-  // Those that were made one after the other are in one place of the store.
+  // Hulls created one after the other are adjacent in the store.
   std::ranges::sort(order_, {}, [&](uint32_t i) { return hulls_[i].record.create_revision; });
   const size_t most = std::clamp<size_t>(order_.size() / kLeastParts, 1, kHullsAtOnce);
   uint64_t points = 0;
@@ -85,7 +85,7 @@ LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
 
 std::shared_ptr<LoadJob> LoadJob::Start(Store& store, std::vector<StoredHull> hulls,
                                         WorkerPool& helpers) {
-  // So many small hulls take longer than to wake a thread.
+  // Loading this many small hulls takes longer than waking a thread.
   constexpr size_t kWorthAThread = 8;
   const auto job = std::make_shared<LoadJob>(store, std::move(hulls));
   const size_t shares = std::min<size_t>(helpers.threads(), job->hulls_.size() / kWorthAThread);
@@ -93,7 +93,8 @@ std::shared_ptr<LoadJob> LoadJob::Start(Store& store, std::vector<StoredHull> hu
   return job;
 }
 
-// Until none is left to begin. Once should_stop, which may be empty, says so, none is loaded.
+// Loads parts until none is left. Skips the rest after should_stop, which may be empty, returns
+// true.
 void LoadJob::Work(const std::function<bool()>& should_stop) {
   for (size_t part = next_++; part < ends_.size(); part = next_++) {
     const uint32_t begin = part == 0 ? 0 : ends_[part - 1];

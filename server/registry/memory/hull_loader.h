@@ -19,29 +19,29 @@
 
 namespace hulld::server {
 
-// A committed hull, ready for questions and for growth, of the points that the store keeps of it:
-// at least its vertices, and none outside it. The result is never null. Their number and dimension
-// are checked; whether they make the hull that the record describes is left to whatever builds it
-// of them. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost:
-// O(n), but that of building the hull where it is flat.
+// Loads a committed hull from its stored points, ready for queries and growth. The points include
+// at least its vertices, and none outside it. The result is never null. Checks the number and
+// dimension of the points; that they form the hull described by the record is checked by later
+// builds. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost:
+// O(n); building the hull if it is flat.
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored);
 
-// Hulls that are read from the store together, by threads of a pool that are free and by the one
-// that asks for the results, each of which takes a few at a time. Thread-safe, but for Finish.
+// A batch of hulls loaded together, by free threads of a pool and by the thread that asks for the
+// results; each takes a few hulls per step. Thread-safe except for Finish.
 class LoadJob {
  public:
   using Loaded = absl::StatusOr<std::shared_ptr<LiveHull>>;
 
-  // Store and pool must outlive what Start submits, which ends soon after Finish.
+  // Store and pool must outlive the tasks that Start submits, which end soon after Finish.
   LoadJob(Store& store, std::vector<StoredHull> hulls);
-  // Has the threads of the pool begin; nobody needs to wait for them.
+  // Starts loading on the threads of the pool, without blocking.
   static std::shared_ptr<LoadJob> Start(Store& store, std::vector<StoredHull> hulls,
                                         WorkerPool& helpers);
 
   const std::vector<StoredHull>& hulls() const { return hulls_; }
-  // LoadLive of each, in their order: loads what nobody has begun, and waits for what others have.
-  // CANCELLED for those that are left when should_stop, which may be empty and is asked by this
-  // thread alone, says so. Once.
+  // Returns LoadLive of each hull, in order: loads the hulls that no thread has taken and waits for
+  // the rest. Remaining hulls get CANCELLED after should_stop, which may be empty and is called
+  // only on this thread, returns true. Call at most once.
   std::vector<Loaded> Finish(const std::function<bool()>& should_stop);
 
  private:
@@ -50,22 +50,22 @@ class LoadJob {
 
   Store& store_;
   const std::vector<StoredHull> hulls_;
-  // In the order in which they are loaded, and where the parts end that a thread takes.
+  // Hulls in the order of loading, and the end of each part.
   std::vector<uint32_t> order_;
   std::vector<uint32_t> ends_;
-  // Each is written by the thread that took it, and read once all have ended.
+  // Each element is written by the thread that took it, and read after all threads have ended.
   std::vector<Loaded> loaded_;
   std::atomic<size_t> next_ = 0;
   std::atomic<bool> is_stopped_ = false;
   Mutex mutex_;
   ConditionVariable all_ended_;
-  // Parts.
+  // Number of finished parts.
   size_t ended_ = 0;
 };
 
-// A builder that holds the hull of these points; the result is never null. DATA_LOSS naming the
-// hull: they do not make what the record says. CANCELLED: should_stop, which may be empty, said so.
-// Cost: that of adding n points to a builder.
+// Returns a builder with the hull of these points; never null. DATA_LOSS naming the hull: the
+// points contradict the record. CANCELLED: should_stop, which may be empty, returned true. Cost:
+// adding n points to a builder.
 absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
                                                        std::span<const Vector> points,
                                                        const std::function<bool()>& should_stop);

@@ -16,30 +16,29 @@
 
 namespace hulld::server {
 
-// Hulls and bodies that are looked up within one hold of the registry's mutex, at most: some 50 us.
+// Maximum number of hulls and bodies looked up within one hold of the registry's mutex: some 50 us.
 inline constexpr uint64_t kMostLookupsPerHold = 128;
 
-// How long a mutex was held at once, and for how much work.
+// Longest hold of a mutex, and the most work within one.
 struct HoldStatistics {
-  // The longest hold within this minute and the one before. Waiting on a condition is none.
+  // Longest hold within this minute and the one before. Waiting on a condition is not a hold.
   std::chrono::nanoseconds longest{0};
-  // Hulls that were looked up within one hold, at most.
+  // Maximum number of hulls looked up within one hold.
   uint64_t most_lookups = 0;
 };
 
-// A mutex without barging: a waiting thread gets it before the thread that releases it can take it
-// again. So work that is cut in slices lets others pass between them. It knows how long it was
-// held.
+// A mutex without barging: a waiting thread gets it before the releasing thread can acquire it
+// again, so work cut into slices yields between them. Measures its hold times.
 //
-// The next thread in line holds `entry_` while it waits. A thread that comes again waits for that,
-// and so until the next one has the mutex.
+// The next thread in line holds `entry_` while it waits. A returning thread waits for `entry_`, and
+// thus until the next one has the mutex.
 class FairMutex {
  public:
   FairMutex() = default;
   FairMutex(const FairMutex&) = delete;
   FairMutex& operator=(const FairMutex&) = delete;
 
-  // As std::lock_guard wants them. Cost: two mutexes, and a look at the clock.
+  // Interface of std::lock_guard. Cost: two mutexes, and a clock read.
   void lock() {
     const std::lock_guard entry(entry_);
     is_wanted_ = true;
@@ -52,10 +51,10 @@ class FairMutex {
     mutex_.unlock();
   }
 
-  // Whether a thread is the next to have it.
+  // True if a thread is next in line.
   bool is_wanted() const { return is_wanted_; }
 
-  // Requires that it is held (unchecked: it does not tell which thread holds it).
+  // Requires that it is held (not checked: it does not know its holder).
   HoldStatistics Statistics() const {
     const int64_t age = MinuteOf(Clock::now()) - minute_;
     const auto longest = age == 0   ? std::max(longest_, longest_before_)
@@ -90,7 +89,7 @@ class FairMutex {
   Mutex mutex_;
   // Written by the thread that holds entry_.
   std::atomic<bool> is_wanted_ = false;
-  // The rest is guarded by mutex_.
+  // mutex_ guards the members below.
   Clock::time_point since_;
   uint64_t lookups_ = 0;
   uint64_t most_lookups_ = 0;
@@ -99,9 +98,9 @@ class FairMutex {
   std::chrono::nanoseconds longest_before_{0};
 };
 
-// A mutex that is held, and the work that is due once it is not: callbacks, which may call back,
-// and the end of large objects. A function that takes a Locked requires the mutex; its type is the
-// check. Not thread-safe.
+// A held mutex, and the tasks deferred until its release: callbacks, which may call back, and the
+// destruction of large objects. A function with a Locked parameter requires the mutex; the type
+// enforces it. Not thread-safe.
 class Locked {
  public:
   explicit Locked(FairMutex& mutex) : mutex_(mutex) { Lock(); }
@@ -111,10 +110,10 @@ class Locked {
     if (is_held_) Unlock();
   }
 
-  // Whether it is this mutex that is held.
+  // True if this mutex is the one held.
   bool Holds(const FairMutex& mutex) const { return is_held_ && &mutex_ == &mutex; }
 
-  // Releases the mutex, and does what is due, in the order in which it was given.
+  // Releases the mutex and runs the deferred tasks in order.
   void Unlock() {
     HULLD_CHECK(is_held_);
     const std::vector<std::function<void()>> due = std::exchange(afterwards_, {});
@@ -138,12 +137,11 @@ class Locked {
     mutex_.BeginHold();
   }
 
-  // A hull is looked up. Counts those since the mutex was taken.
+  // Counts a lookup within this hold of the mutex.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
 
-  // Before a lookup that is one of many: counts it, and lets others have the mutex after
-  // kMostLookupsPerHold of them.
+  // Counts one of many lookups; first yields the mutex after kMostLookupsPerHold of them.
   void LetOthersPass() {
     if (lookups() == kMostLookupsPerHold) {
       Unlock();
@@ -153,7 +151,7 @@ class Locked {
   }
 
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
-  // The same for a task that needs the mutex, which is taken anew for it.
+  // Defers a task that acquires the mutex again.
   void AfterwardsLocked(std::function<void(Locked&)> task) {
     Afterwards([&mutex = mutex_, task = std::move(task)] {
       Locked again(mutex);
@@ -175,7 +173,7 @@ class Locked {
   std::vector<std::function<void()>> afterwards_;
 };
 
-// Something that is done with the mutex held.
+// A task that runs with the mutex held.
 using LockedTask = std::function<void(Locked&)>;
 
 }  // namespace hulld::server

@@ -12,7 +12,7 @@
 namespace hulld::server {
 namespace {
 
-// When calls may have let go of hulls, and hulls in use may have come to rest.
+// Retry delay after which calls may have released hulls, and hulls in use may have come to rest.
 constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace

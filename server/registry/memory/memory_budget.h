@@ -17,62 +17,62 @@
 
 namespace hulld::server {
 
-// For whom memory is held that cannot be made free at once.
+// Use of memory that cannot be freed immediately.
 enum class MemoryUse {
-  // Calls that ask: versions of hulls that they hold, placements and pairs of streams, what watches
-  // were not told yet.
+  // Queries: versions of hulls that they hold, placements and pairs of streams, pending changes of
+  // watches.
   kReading,
-  // Hulls that are being changed, points on their way to them, replacements; and every hull that no
-  // store keeps.
+  // Hulls being changed, points on their way to them, replacements; and every hull that no store
+  // keeps.
   kWriting,
 };
 
 struct MemoryStatistics {
-  // Everything that is counted now, and what of it is held for whom; the rest can be let go.
+  // All memory counted now, and its parts held for readers and writers; the rest can be evicted.
   uint64_t bytes = 0;
   uint64_t reading = 0;
   uint64_t writing = 0;
   uint64_t limit_bytes = 0;
-  // How often an account was made to let go of something.
+  // Number of evictions from an account.
   uint64_t evictions = 0;
 };
 
 class MemoryPart;
 
-// Counts how much memory each use holds, and says what lets go first once the limit is exceeded.
+// Counts the memory of each use and chooses evictions when the limit is exceeded.
 //
-// There are three kinds of memory. What is held for readers and what is held for writers stays
-// until they are done; each of the two has a share of the limit, and Check refuses more to the one
-// whose share is used up, whatever the other does. The rest is hulls at rest, which can be made
-// again; they fill what the others leave, and the one that was not used for longest goes first.
+// Memory is of three kinds. Memory held for readers and for writers stays until they are done; each
+// of the two has a share of the limit, and Check refuses more to a use that exceeds its share,
+// independent of the other. The rest is hulls at rest, which can be reloaded; they fill the
+// remaining memory, and the least recently used is evicted first.
 //
-// An Account counts what a hull holds, which is of the third kind unless a writer needs it. What
-// readers may hold for longer than the hull does is a MemoryPart of its own: it is held for readers
-// while a MemoryPin is on it, and counts until the last holder is gone. A MemoryCharge counts
-// whatever else a call holds.
+// An Account counts the memory of a hull, which is of the third kind unless a writer needs it.
+// Memory that readers may hold longer than the hull is a separate MemoryPart: it is held for
+// readers while a MemoryPin is on it, and counts until its last holder is gone. A MemoryCharge
+// counts any other memory of a call.
 //
-// Thread-safe. Its mutex is the innermost one: it is taken while other locks are held, and nothing
-// is called under it. All accounts of one budget are guarded by one mutex of their owners (the
-// registry's). Evict and Check require it, which they check.
+// Thread-safe. Its mutex is the innermost one: it is acquired while other locks are held, and no
+// callback runs under it. One mutex of the owners (the registry's) guards all accounts of a budget.
+// Evict and Check require it (checked).
 class MemoryBudget {
  private:
   enum Kind : size_t { kForReading, kForWriting, kAtRest };
-  // Outlives the budget where parts do.
+  // Outlives the budget as long as parts do.
   struct Books {
     Mutex mutex;
     std::array<uint64_t, 3> bytes{};
 
-    // Requires the mutex (unchecked: a Mutex does not tell).
+    // Requires the mutex (not checked: a Mutex does not know its holder).
     void Add(Kind kind, uint64_t amount) { bytes[kind] += amount; }
     void Remove(Kind kind, uint64_t amount);
   };
 
  public:
-  // What one owner holds and can make again. Used under the owners' mutex. The destructor may run
-  // without it, if the account is empty.
+  // Evictable memory of an owner. Requires the owners' mutex, except for the destructor of an
+  // empty account.
   class Account {
    public:
-    // Lets go of what is not in use and can be made again, and says so by Set and Hold.
+    // Evicts unused memory that can be rebuilt, and reports it through Set and Hold.
     using Drop = std::function<void(Locked& owners)>;
 
     // The budget must outlive the account, or Close must come first.
@@ -81,14 +81,13 @@ class MemoryBudget {
     Account& operator=(const Account&) = delete;
     ~Account() { Close(); }
 
-    // What it holds now beside its parts, whether a writer needs it and them, and that it was used
-    // just now. Cost: O(1).
+    // Sets the memory excluding parts, and if a writer needs it and the parts; marks the account as
+    // just used. Cost: O(1).
     void Set(uint64_t bytes, bool is_for_writing);
-    // The parts that it holds now. Those before are counted no more, unless readers hold them.
-    // Cost: O(parts).
+    // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
     void Hold(std::vector<std::shared_ptr<MemoryPart>> parts);
     const std::vector<std::shared_ptr<MemoryPart>>& parts() const { return parts_; }
-    // It holds nothing from now on; the budget may go.
+    // Empties the account; the budget may be destroyed afterwards.
     void Close();
 
     MemoryBudget& budget() const { return budget_; }
@@ -97,7 +96,7 @@ class MemoryBudget {
     friend class MemoryBudget;
     friend class MemoryPart;
 
-    // Counts all that it holds, or no more. Require the budget's mutex.
+    // Add the account's memory to the budget, and remove it. Require the budget's mutex.
     void Enter();
     void Leave();
 
@@ -106,7 +105,7 @@ class MemoryBudget {
     // Changed under both mutexes.
     uint64_t bytes_ = 0;
     bool is_for_writing_ = false;
-    // The sums over parts that no reader holds, and over the others. Guarded by the budget's mutex.
+    // Sums over parts without readers, and over parts with readers. Guarded by the budget's mutex.
     uint64_t resting_ = 0;
     uint64_t pinned_ = 0;
     // Guarded by the owners' mutex.
@@ -114,7 +113,7 @@ class MemoryBudget {
     std::list<Account*>::iterator place_;
   };
 
-  // Accounts that one eviction asks to let go, at most: some ten microseconds.
+  // Maximum number of accounts visited by one eviction: some ten microseconds.
   static constexpr size_t kMostAsked = 64;
 
   // limit_bytes: --memory-limit. reading_bytes: the readers' share; writers have the rest. owners:
@@ -126,13 +125,13 @@ class MemoryBudget {
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
-  // Makes accounts let go, the one not used for longest first, until the rest is within the limit
-  // or kMostAsked were asked. One that cannot let go is asked again after all others.
+  // Evicts from accounts, least recently used first, until the memory is within the limit or
+  // kMostAsked accounts were visited. An account that cannot evict is visited again after all other
+  // accounts.
   void Evict(Locked& owners);
-  // The same; RESOURCE_EXHAUSTED, with a time to retry, when more than the share of this use is
-  // held for it.
+  // As Evict. RESOURCE_EXHAUSTED, with a retry delay: this use exceeds its share.
   absl::Status Check(Locked& owners, MemoryUse use);
-  // The share of a use, and whether more is held for it.
+  // Share of a use, and true if the use exceeds it.
   uint64_t share(MemoryUse use) const { return shares_[static_cast<size_t>(use)]; }
   bool IsOver(MemoryUse use) const;
 
@@ -148,16 +147,16 @@ class MemoryBudget {
   const std::array<uint64_t, 2> shares_;
   const FairMutex& owners_;
   const std::shared_ptr<Books> books_ = std::make_shared<Books>();
-  // The rest is guarded by the owners' mutex. Accounts that hold something, the last used in front.
+  // The owners' mutex guards the members below. Non-empty accounts, most recently used first.
   std::list<Account*> used_;
   uint64_t evictions_ = 0;
 };
 
-// Something that a hull holds and that readers may hold for longer: counted once, however many hold
-// it, until nobody does. Thread-safe; may outlive the budget.
+// Memory of a hull that readers may hold longer than the hull: counted once, however many holders
+// it has, until the last one is gone. Thread-safe; may outlive the budget.
 class MemoryPart {
  public:
-  // what: tells parts of one account from each other; never followed.
+  // what: identifies the part within its account; never dereferenced.
   MemoryPart(MemoryBudget& budget, const void* what, uint64_t bytes = 0)
       : books_(budget.books_), what_(what), bytes_(bytes) {}
   MemoryPart(const MemoryPart&) = delete;
@@ -183,7 +182,7 @@ class MemoryPart {
   MemoryBudget::Account* account_ = nullptr;
 };
 
-// Readers hold these parts, until it goes. Any thread may end it.
+// Counts parts as held for readers during its lifetime. Any thread may destroy it.
 class MemoryPin {
  public:
   explicit MemoryPin(std::vector<std::shared_ptr<MemoryPart>> parts) : parts_(std::move(parts)) {
@@ -199,8 +198,8 @@ class MemoryPin {
   const std::vector<std::shared_ptr<MemoryPart>> parts_;
 };
 
-// Memory that stays until its owner is done. Counted until it goes. Not thread-safe; the budget
-// must outlive it.
+// Memory that stays until its owner is done, counted during the lifetime of this. Not thread-safe;
+// the budget must outlive it.
 class MemoryCharge {
  public:
   MemoryCharge(MemoryBudget& budget, MemoryUse use, uint64_t bytes = 0)
@@ -212,7 +211,7 @@ class MemoryCharge {
   MemoryCharge& operator=(MemoryCharge&&) = delete;
   ~MemoryCharge() { Set(0); }
 
-  // What is held now. Cost: O(1).
+  // Sets the memory held. Cost: O(1).
   void Set(uint64_t bytes);
 
  private:

@@ -8,13 +8,13 @@
 
 namespace hulld::server {
 
-// What goes on once all that other servers did is taken over: work that depends on an ID which one
-// of them changed, and which is to find what is there by then. Takeover runs it, after the change
-// that made it wait. Guarded by the registry's mutex.
+// Tasks deferred until all known peer changes are applied: they depend on an ID that a peer server
+// changed, and must see its new state. Takeover runs them after the change that deferred them.
+// Guarded by the registry's mutex.
 class AfterOthers {
  public:
   void Add(LockedTask task) { tasks_.push_back(std::move(task)); }
-  // Runs those that are here by now, in their order. What they add waits for the next time.
+  // Runs the present tasks in order. Tasks that they add wait for the next run.
   void Run(Locked& locked) {
     for (const LockedTask& task : std::exchange(tasks_, {})) task(locked);
   }

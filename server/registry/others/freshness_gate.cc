@@ -48,7 +48,7 @@ absl::Status FreshnessGate::AwaitOthers(Locked& locked, const std::function<bool
     wait->status = status;
     wait->changed.notify_all();
   });
-  // What is due does not wait meanwhile.
+  // Runs the deferred tasks before waiting.
   locked.Unlock();
   locked.Lock();
   const auto is_over = [&] { return wait->status.has_value(); };
@@ -99,13 +99,6 @@ absl::StatusOr<nanoseconds> FreshnessGate::AwaitFresh(Locked& locked, const Fres
   }
   if (catalog_.revision() >= freshness.at_least_revision) return nanoseconds(0);
   return FutureRevision(freshness.at_least_revision, catalog_.revision());
-}
-
-void FreshnessGate::StartFollow(std::function<void(const absl::Status&)> done) {
-  Locked locked(mutex_);
-  const Committer::Follower tell = Telling(std::move(done));
-  if (!store_.is_shared()) return tell(locked, absl::OkStatus());
-  committer_.FollowNow(locked, tell);
 }
 
 bool FreshnessGate::StartFresh(const Freshness& freshness,

@@ -16,13 +16,12 @@
 
 namespace hulld::server {
 
-// Lets a call go on once the catalog is as fresh as the call asks. Where other servers commit to
-// the same store, it has the committer ask the store what they did; the answer is taken over before
-// the gate opens. Where the store is not shared, the catalog is always up to date, and every gate
-// is open.
+// Blocks calls until the catalog satisfies their freshness. If peer servers commit to the same
+// store, the committer queries their changes and applies them before the gate opens. If the store
+// is not shared, the catalog is always current, and the gate is open.
 //
-// The functions that take a Locked require the registry's mutex; those that may wait release it
-// meanwhile. The others take it themselves.
+// Functions with a Locked parameter require the registry's mutex; blocking ones release it. The
+// other functions acquire it.
 class FreshnessGate {
  public:
   // All must outlive this.
@@ -31,38 +30,37 @@ class FreshnessGate {
   FreshnessGate(const FreshnessGate&) = delete;
   FreshnessGate& operator=(const FreshnessGate&) = delete;
 
-  // Waits until all that other servers had committed by now is taken over. CANCELLED: should_stop,
-  // which may be empty, said so. UNAVAILABLE: the store cannot be asked. Cost: a question to the
-  // store, one for all that wait; nothing where it is not shared.
+  // Read barrier: blocks until all changes that peer servers have committed so far are applied.
+  // CANCELLED: should_stop, which may be empty, returned true. UNAVAILABLE: the store cannot be
+  // queried. Cost: one store query shared by all waiting calls; none if the store is not shared.
   absl::Status AwaitOthers(const std::function<bool()>& should_stop);
-  // The same for a thread that holds the mutex. The committer is asked whether the store is shared
-  // or not: then this waits for the changes that were submitted before.
+  // As above for a thread that holds the mutex. Always goes through the committer, so it waits for
+  // earlier submitted changes even if the store is not shared.
   absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
 
-  // Where what is here is as fresh as this: how stale it may be; otherwise nullopt. A read that is
-  // content, but would soon not be, has the store asked for the reads to come, so that none of them
-  // waits.
+  // Returns the bound on staleness if the catalog satisfies `freshness`, else nullopt. If it will
+  // soon be too stale, prefetches from the store so that later reads need not wait.
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
   std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
-  // Waits for that, and returns the same. FAILED_PRECONDITION: the store has not given that
-  // revision. Otherwise as AwaitOthers. Cost: a question to the store only where it is not so yet.
+  // Blocks until TryFresh succeeds and returns its result. FAILED_PRECONDITION: the store has not
+  // assigned that revision. Other errors as AwaitOthers. Cost: a store query only if the catalog is
+  // too stale.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
 
-  // Has what other servers had committed by now taken over, and calls `done` then, once, on this
-  // or another thread, without any lock. UNAVAILABLE: as AwaitOthers.
-  void StartFollow(std::function<void(const absl::Status&)> done);
-  // The same where what is here is not as fresh as this; false, and nothing, where it is.
+  // If the catalog does not satisfy `freshness`, requests the changes committed by peer servers so
+  // far and calls `done` exactly once after they are applied, on this or another thread, without
+  // any lock. Returns false and does nothing if it does. UNAVAILABLE: as AwaitOthers.
   bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done);
 
-  // Goes on with something that the answer to a call depends on: at once, or once what other
-  // servers had committed by now is taken over. Otherwise refuses, without any lock.
+  // Runs `next`, on which the answer to a call depends: immediately, or after the changes committed
+  // by peer servers so far are applied. Otherwise refuses, without any lock.
   void WhenFresh(Refusal refuse, LockedTask next);
 
  private:
-  // Whether what is here needs no comparing with what others did.
+  // True if no comparison with peer servers is needed.
   bool IsAlwaysFresh(const Freshness& freshness) const {
     return !store_.is_shared() && freshness.at_least_revision == 0;
   }
@@ -72,7 +70,7 @@ class FreshnessGate {
   FairMutex& mutex_;
   const Catalog& catalog_;
   Committer& committer_;
-  // The store is being asked for reads to come. Guarded by mutex_.
+  // A prefetch is in flight. Guarded by mutex_.
   bool is_asking_ahead_ = false;
 };
 

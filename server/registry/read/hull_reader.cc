@@ -21,15 +21,15 @@ struct HullReader::HullsRead {
   KnownHulls& known;
   const std::function<bool()>& should_stop;
   const ReadPlan& plan;
-  // Whether it may release the mutex to read from the store, and to prepare.
+  // True if it may release the mutex to read from the store and to prepare.
   bool may_wait = true;
 };
 
-// Brings what is known of each hull up to this moment. Releases the mutex after a number of
-// lookups, and to read from the store and to prepare, where it may. CANCELLED: should_stop said so.
+// Updates the views of all due hulls. Releases the mutex after a number of lookups, and, if
+// allowed, to read from the store and to prepare. CANCELLED: should_stop returned true.
 absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
   const absl::StatusOr<LookUpEnd> end = LookUpAll(locked, read);
-  // Nothing is left where it is done, so that the mutex is held all the while.
+  // After kDone no load is left, so the mutex stays held.
   if (!end.ok() || *end != LookUpEnd::kDone) {
     KnownHulls& known = read.known;
     const std::function<bool()> stop = [] { return true; };
@@ -58,7 +58,6 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, cons
       if (!end.ok() || *end != LookUpEnd::kDone) return end;
       due.is_due = false;
       known.due_.pop_back();
-      ++known.lookups_;
     } else if (!known.ahead_.empty()) {
       EndAllLoading(locked, read);
     } else {
@@ -74,11 +73,11 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, cons
   }
 }
 
-// Whether readers may hold more.
+// RESOURCE_EXHAUSTED: readers exceed their share.
 absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
   const uint64_t share = memory_.share(MemoryUse::kReading);
-  // Trying again does not help a read that holds most of it.
+  // A retry does not help a read that holds most of the memory itself.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
     return LimitExceeded(
         absl::StrCat("the hulls that the call names take ", bytes,
@@ -89,7 +88,7 @@ absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   return memory_.Check(locked, MemoryUse::kReading);
 }
 
-// What readers are given of one hull now, or why there is nothing.
+// Looks up the view of a hull, or its error.
 absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const HullsRead& read,
                                                          uint32_t k) {
   KnownHulls::Known& known = read.known.hulls_[k];
@@ -116,8 +115,8 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
       return LookUpEnd::kDone;
     }
     if (!hull->IsReady()) {
-      // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
-      // drop another one of the same read, and so on for ever.
+      // The hull was looked up, prepared, and evicted since. Loading and preparing it again could
+      // evict another hull of the same read, and so on without end.
       if (IsHeld(known, *hull)) {
         ++catalog_.statistics().hits;
         return LookUpEnd::kDone;
@@ -142,8 +141,8 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
   }
 }
 
-// Finds out from the store whether there is this hull, and some of those that are due next. False:
-// look again; true: it could not be found out, which is noted. Releases the mutex.
+// Loads the records of this hull and of some hulls due next. Returns false if the caller must look
+// again, true if the read failed, which is recorded. Releases the mutex.
 absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   if (!hulls.ahead_.empty()) {
@@ -162,8 +161,8 @@ absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& re
   return true;
 }
 
-// Reads the points of this hull, and at first of those that are due next as well. False: look
-// again; true: they cannot be read, which is noted. Releases the mutex.
+// Loads the points of this hull, and at first of the hulls due next. Returns false if the caller
+// must look again, true if the read failed, which is recorded. Releases the mutex.
 absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
                                              RegisteredHull& hull, bool& was_missing) {
   KnownHulls& hulls = read.known;
@@ -185,7 +184,7 @@ absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& re
   return true;
 }
 
-// Prepares what questions look through, before the first of them. Releases the mutex.
+// Prepares the hull before its first query. Releases the mutex.
 absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
   if (!read.known.ahead_.empty()) {
     EndAllLoading(locked, read);
@@ -195,12 +194,12 @@ absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, Reg
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
-// Whether a reader holds what is committed of a hull.
+// True if this reader already holds the committed state of the hull.
 bool HullReader::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
   return known.view.ok() && known.view->record == hull.committed.record;
 }
 
-// Notes what readers are given of a hull that is ready. was_missing: its points were read for that.
+// Records the view of a hull that is ready. was_missing: its points were read for it.
 void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
                           bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
@@ -208,7 +207,7 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
   if (!was_missing) ++(was_loaded ? catalog_.statistics().misses : catalog_.statistics().hits);
   known.view = HullView{hull->committed.record, hull->Serve()};
   known.bytes = hull->SharedBytes();
-  // One that was just loaded was noted then, and Serve counted the rest.
+  // A freshly loaded hull was counted at its load; Serve counted the rest.
   if (!was_loaded) hull->NoteUse();
   if (was_missing || was_loaded) {
     memory_.Evict(locked);
@@ -216,11 +215,10 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
   }
 }
 
-// Reads the points of this hull, which is due, and of those that are due next from the store, as
-// far as they are missing and nobody else reads them, by several threads at a time. While these
-// hulls are looked up, others read the next. A read that waits for others meanwhile
-// ends all that first, since others may wait for it. Releases the mutex. What cannot be read, or
-// was left behind by a writer, stays missing.
+// Loads the missing points of this hull and of the hulls due next, on several threads, except hulls
+// that another reader is loading. While these hulls are looked up, threads load the next ones. A
+// read finishes its own loads before it waits for another reader, which may wait for them. Releases
+// the mutex. Points that cannot be read, or that a writer superseded, stay missing.
 void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   const bool& is_ahead = hulls.hulls_[k].is_ahead;
@@ -229,13 +227,13 @@ void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
   while (is_ahead) EndLoading(locked, read);
 }
 
-// Whether there are some that are worth it.
+// Starts a load if enough hulls are missing. Returns false if not.
 bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
-  // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
-  // asks whether readers hold too much.
+  // At some 200 bytes per point, a twentieth of the memory limit: the readers' share is not checked
+  // until each hull is looked up.
   uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
-  // Two of them, so that more wait while the first are looked up.
+  // Two jobs, so that the second loads while the hulls of the first are looked up.
   const uint64_t enough_points = most_points / 2;
   for (const KnownHulls::Loading& loading : hulls.ahead_) {
     most_points -= std::min(most_points, loading.points);
@@ -246,7 +244,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   }
   KnownHulls::Loading next;
   std::vector<StoredHull> stored;
-  // The last one that is due comes first.
+  // due_ is processed from the back.
   size_t& end = hulls.ahead_end_;
   end = std::min(end, hulls.due_.size());
   for (uint64_t looked_at = 1; end > 0 && looked_at < kMostLookupsPerHold; ++looked_at) {
@@ -279,7 +277,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   return true;
 }
 
-// Waits for the first of those that are read.
+// Waits for the first job and installs its hulls.
 void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
@@ -342,7 +340,7 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
     const auto end = LookUpDue(locked, read);
-    // A refusal is told by Refresh, as it may be over by then.
+    // Refresh reports an error, which may be gone later.
     if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
     resolved.store_revision = catalog_.revision();
   }
@@ -365,7 +363,7 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
   }
   Locked locked(mutex_);
   const std::string& id = view.record.hull_id;
-  // What is not known any more has nothing to be noted of.
+  // An unknown hull has no state to update.
   const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed.record.revision == view.record.revision;
@@ -376,8 +374,8 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
   return view.served->canonical();
 }
 
-// Reads a hull's points from the store, unless they are in memory or the hull is gone. Releases the
-// mutex meanwhile.
+// Reads a hull's points from the store unless they are in memory or the hull is gone. Releases the
+// mutex.
 absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
                                  const std::function<bool()>& should_stop) {
   bool failed = false;
@@ -385,7 +383,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     if (hull.state.damaged()) return hull.state.damage();
     const bool is_ending = hull.state.life() == HullState::Life::kEnding;
     if (hull.loading || (failed && is_ending)) {
-      // Answers that are due do not wait meanwhile.
+      // Runs the deferred tasks before waiting.
       locked.Unlock();
       locked.Lock();
       const auto may_go_on = [&] {
@@ -408,10 +406,11 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
     }
-    // A writer was faster. What was read, or not found, is of a state that was left since.
+    // A writer was faster. The points read, or missing, belong to a state that is no longer
+    // current.
     const bool is_current = hull.committed.record.revision == stored.record.revision;
     if (hull.live != nullptr || hull.state.gone() || !is_current) {
-      // Others may be faster again and again.
+      // Writers may be faster repeatedly.
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
@@ -421,8 +420,8 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
       hull.NoteUse();
       return absl::OkStatus();
     }
-    // The end of a hull that is on its way takes its points out of the store first: how that ends
-    // tells whether they are damaged.
+    // A pending end of the hull first removes its points from the store; its outcome shows if they
+    // are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
     if (absl::IsDataLoss(loaded.status())) catalog_.MarkDamaged(hull, loaded.status());

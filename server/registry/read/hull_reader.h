@@ -26,26 +26,26 @@
 
 namespace hulld::server {
 
-// Gives readers hulls that are ready to be served, all current at one revision.
+// Returns hulls ready to be served, all at one revision.
 //
-// A read looks up its hulls kMostLookupsPerHold at a time and lets others pass in between. At the
-// end it looks again for those that changed meanwhile, until the mutex was held since the first of
-// what is left: then all are of one moment. That comes to an end, since a commit takes longer than
-// a lookup. Readers and writers never wait for each other: a reader takes the version of what is
-// committed, which is made in O(1), and never touches a builder.
+// A read looks up kMostLookupsPerHold hulls per hold of the mutex and releases it in between. At
+// the end it looks up the hulls that changed since, until one hold covers all that are left: then
+// all are at one revision. This terminates, because a commit takes longer than a lookup. Readers
+// and writers never wait for each other: a reader takes the version of the committed state, made in
+// O(1), and never touches a builder.
 //
-// A read waits for the store at most: for the record of a hull that is not known (RecordReader),
-// and for points that are not in memory. Those one reader reads for all that ask
-// (RegisteredHull::loading); a read of many hulls has threads read the next ones while the first
-// are looked up. Before a read waits for anything that another one does, it ends all such loading
-// of its own, since others may wait for that.
+// A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
+// that are not in memory. One reader loads a hull for all that request it
+// (RegisteredHull::loading). A read of many hulls has threads load the next ones while the first
+// are looked up. It finishes all such loads of its own before it waits for another read, which may
+// wait for them.
 //
-// Guarded by the registry's mutex, which it takes, and releases while it waits and prepares.
+// Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // All must outlive this. limits: those in force. loaders: threads that help readers of many
+  // All must outlive this. limits: the limits in force. loaders: threads that help readers of many
   // hulls.
   HullReader(Store& store, const Limits& limits, FairMutex& mutex, Catalog& catalog,
              MemoryBudget& memory, FreshnessGate& freshness, RecordReader& records,
@@ -62,23 +62,23 @@ class HullReader {
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
 
-  // As in Registry.
+  // See Registry.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop, const ReadPlan& plan);
   std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan);
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
                                         const std::function<bool()>& should_stop);
-  // Where the making of canonical snapshots is timed; set before the first, and outlives this.
+  // Sets the histogram of snapshot build times. Call before the first; it must outlive this.
   void SetMetrics(prometheus::Histogram& snapshot_seconds) {
     snapshot_seconds_ = &snapshot_seconds;
   }
 
  private:
   struct HullsRead;
-  // How a lookup ended that was not refused.
+  // Outcome of a lookup without an error.
   enum class LookUpEnd {
     kDone,
-    // It would have to wait, and may not.
+    // The lookup would have to wait, but may not.
     kWouldWait,
   };
 
@@ -110,7 +110,7 @@ class HullReader {
   RecordReader& records_;
   Preparer& preparer_;
   WorkerPool& loaders_;
-  // Null: nowhere.
+  // May be null.
   prometheus::Histogram* snapshot_seconds_ = nullptr;
 };
 

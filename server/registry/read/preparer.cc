@@ -22,7 +22,7 @@ void Preparer::Prepare(Locked& locked, RegisteredHull& hull) {
   locked.Lock();
   hull.preparing = false;
   if (hull.live != live) return;
-  // Nothing came after: the mark lets go of what there was before.
+  // Nothing was appended since: the new mark releases the previous preparation.
   if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
   hull.DiscardServed(locked);
   catalog_.NoteChange(hull);

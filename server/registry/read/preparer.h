@@ -15,37 +15,37 @@ namespace hulld::server {
 
 struct RegisteredHull;
 
-// Prepares hulls: once questions about a hull have paid for it (LiveHull::WantsPreparing), and
-// where a hull would otherwise come to hold many points that are no vertices any more. A thread of
-// its own does it, for which nobody waits, or a reader that expects to ask that much.
+// Prepares hulls: after queries have paid for it (LiveHull::WantsPreparing), or before a hull holds
+// too many points that are no longer vertices. Runs on its own thread, for which no call waits, or
+// on the thread of a reader that expects enough queries.
 //
-// Invariant: one thread at a time prepares a hull, or is about to: RegisteredHull::preparing.
-// Guarded by the registry's mutex, which is released while a hull is prepared.
+// Invariant: at most one thread prepares a hull, or is about to: RegisteredHull::preparing. Guarded
+// by the registry's mutex, which is released during preparation.
 class Preparer {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // All must outlive this. metrics: where to report what waits to be prepared.
+  // All must outlive this. metrics: metrics of the queue of hulls to prepare.
   Preparer(FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
            std::optional<PoolMetrics> metrics)
       : mutex_(mutex), catalog_(catalog), memory_(memory), thread_(std::in_place, 1, metrics) {}
   Preparer(const Preparer&) = delete;
   Preparer& operator=(const Preparer&) = delete;
 
-  // Whether questions have paid for preparing what they look through, these included that a reader
-  // expects to ask, and nobody does it yet.
+  // True if past and expected queries pay for preparation of the hull, and no thread prepares it.
   static bool IsWanted(const RegisteredHull& hull, uint64_t expected_questions);
-  // Prepares what is committed of a hull. Releases the mutex meanwhile. Requires that the hull has
-  // points in memory, and that nobody prepares it.
+  // Prepares the committed state of a hull. Releases the mutex. Requires: the hull has points in
+  // memory, and no thread prepares it.
   void Prepare(Locked& locked, RegisteredHull& hull);
-  // Has the thread do it. Requires that nobody prepares the hull.
+  // Prepares the hull on the preparer's thread. Requires: no thread prepares it.
   void Schedule(const HullPointer& hull);
-  // The same where most points of the hull are no vertices any more, unless somebody does it.
+  // As Schedule if most points of the hull are no longer vertices; does nothing if a thread
+  // prepares it.
   void ScheduleIfWorn(const HullPointer& hull);
 
-  // Nothing more is prepared from now on.
+  // Stops further preparation.
   void Stop(const Locked& locked);
-  // Ends the thread. After Stop, without the mutex.
+  // Ends the thread. Call after Stop, without the mutex.
   void End() { thread_.reset(); }
 
  private:
@@ -54,7 +54,7 @@ class Preparer {
   MemoryBudget& memory_;
   // Guarded by mutex_.
   bool is_stopped_ = false;
-  // One thread: what it does is in nobody's way.
+  // One thread, to leave the CPUs to calls.
   std::optional<WorkerPool> thread_;
 };
 

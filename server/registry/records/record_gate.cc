@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace {
 
-// The store was asked after it had said to be at `asked_at`.
+// The store reported an older revision than `asked_at`, its revision before the query.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
   return absl::UnavailableError(
       absl::StrCat("the store answers as of revision ", found, ", and was at ", asked_at,
@@ -28,7 +28,7 @@ void RecordGate::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<F
                              FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
   if (!found.ok() || !IsBehind(*found)) return take(locked, found);
-  // After this round of the committer, what the store held is known here.
+  // After this round of the committer, the catalog includes everything that the store held.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.Follow(
       locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
@@ -57,8 +57,8 @@ absl::StatusOr<FoundRecords> RecordGate::AwaitReached(uint64_t asked_at,
   return found;
 }
 
-// Whether the store held more of this hull than is known here, under the same revision: points that
-// changed no vertex take none.
+// True if the store holds a later state of the hull than the catalog under the same revision:
+// points that change no vertex do not create a revision.
 bool RecordGate::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
   if (!stored.ok()) return false;
   const HullTable::Entries& all = catalog_.hulls().entries();
@@ -67,8 +67,8 @@ bool RecordGate::IsBehind(const std::string& id, const absl::StatusOr<StoredHull
   return known->second.Describe(id).record.counts.received < stored->record.counts.received;
 }
 
-// Whether what was found is of a later moment than what is known here: committed, perhaps by
-// others, and not taken over yet. An answer that told it would be followed by one of what is here.
+// True if the records are newer than the catalog: committed, perhaps by a peer server, but not yet
+// applied. An answer from them would be followed by an older one from the catalog.
 bool RecordGate::IsBehind(const FoundRecords& found) const {
   if (found.revision > catalog_.revision()) return true;
   return std::ranges::any_of(

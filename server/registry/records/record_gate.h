@@ -16,15 +16,15 @@
 
 namespace hulld::server {
 
-// Lets records count that the store found, once the catalog is of no earlier moment than they.
+// Releases records found in the store after the catalog has reached their revision.
 //
-// What was found is of a moment of the store, which may be later than what is known here: then what
-// came in between is taken over, or told by our own commits, first. An answer that mixed the two
-// would be of no revision, and a caller that is told of the later one would be answered from the
+// Found records are of a store revision that may be later than the catalog's. The changes in
+// between are then applied first, from peer servers or from local commits. An answer mixing both
+// revisions would be inconsistent, and a caller that saw the later one could be answered from the
 // earlier one next.
 class RecordGate {
  public:
-  // Told, with the registry's mutex held, what counts from then on, or why nothing does.
+  // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
   // All must outlive this. The mutex is the registry's.
@@ -34,13 +34,13 @@ class RecordGate {
   RecordGate(const RecordGate&) = delete;
   RecordGate& operator=(const RecordGate&) = delete;
 
-  // Passes on what was found, now or on the committer's thread. asked_at: the catalog's revision
-  // when the store was asked. UNAVAILABLE: the store went back, or cannot be asked what came in
+  // Passes `found` to `take`, now or on the committer's thread. asked_at: the catalog's revision at
+  // the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes in
   // between.
   void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                    FoundTaker take);
-  // The same for a thread that may wait, and does not hold the mutex. CANCELLED: should_stop said
-  // so.
+  // As WhenReached, but blocks. Requires that the thread does not hold the mutex. CANCELLED:
+  // should_stop returned true.
   absl::StatusOr<FoundRecords> AwaitReached(uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                                             const std::function<bool()>& should_stop);
 

@@ -12,7 +12,7 @@
 
 namespace hulld::server {
 
-// What the store lists, once it is of no later moment than what is known here.
+// Returns the store's list after the catalog has reached its revision.
 absl::StatusOr<FoundRecords> RecordLister::List(const std::string& prefix, const std::string& after,
                                                 size_t page_size, RecordKinds kinds,
                                                 const std::function<bool()>& should_stop) {
@@ -62,7 +62,7 @@ absl::StatusOr<HullPage> RecordLister::ListHulls(const std::string& prefix,
   return page;
 }
 
-// What is known of the same version is more than its record: its box, or that it is damaged.
+// The catalog may know more about this version than its record: its box, or its damage.
 HullChange RecordLister::Describe(const std::string& id,
                                   const absl::StatusOr<StoredHull>& stored) const {
   HullChange change;
@@ -79,10 +79,10 @@ HullChange RecordLister::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-// Has the store list what the watch is told next.
+// Starts the store query for the watch's next piece.
 void RecordLister::ReadPresent(Locked& locked, ChangeWatch& watch) {
   HULLD_CHECK(locked.Holds(mutex_));
-  // What changed before the first step need not be told twice.
+  // Changes before the first step are part of the list.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = ChangeFeed::TargetOf(watch);
   watch.is_reading = true;
@@ -117,7 +117,7 @@ absl::Status RecordLister::TakePresent(Locked& locked, ChangeWatch& watch, Watch
   }
   if (!watch.found->ok()) return std::exchange(watch.found, std::nullopt)->status();
   const FoundRecords found = **std::exchange(watch.found, std::nullopt);
-  // What is damaged has no revision that can be read.
+  // A damaged record has no readable revision.
   const auto tell = [&](HullChange change) {
     const bool is_new = watch.after_revision == 0 || change.record.revision > watch.after_revision;
     if (is_new) piece->changes.push_back(std::move(change));

@@ -19,15 +19,15 @@
 
 namespace hulld::server {
 
-// Lists what there is, where the store finds records and the catalog knows only a part: asks the
-// store for a page at a time, and makes nothing known. Where the catalog knows more of the same
-// version of a hull than its record (its box, or that it is damaged), that is told.
+// Lists hulls and bodies if the store finds records and the catalog holds only a part: queries the
+// store one page after another, without adding to the catalog. If the catalog knows more about the
+// same version of a hull than its record (its box, or its damage), the page includes that.
 //
-// Every page is of one revision, which the catalog has reached before the page is told
-// (RecordGate). Guarded by the registry's mutex, which is not held while the store is asked.
+// Each page is at one revision, which the catalog reaches before the page is returned (RecordGate).
+// Guarded by the registry's mutex, which is released during store queries.
 class RecordLister {
  public:
-  // All must outlive this. loaders: threads that read what watches are told.
+  // All must outlive this. loaders: threads that read for watches.
   RecordLister(Store& store, FairMutex& mutex, const Catalog& catalog, MemoryBudget& memory,
                ChangeFeed& feed, RecordGate& gate, WorkerPool& loaders)
       : store_(store),
@@ -40,16 +40,16 @@ class RecordLister {
   RecordLister(const RecordLister&) = delete;
   RecordLister& operator=(const RecordLister&) = delete;
 
-  // As Registry::List and ListBodies. Ask the store on this thread. Require that the mutex is not
-  // held (unchecked: a mutex does not tell which thread holds it).
+  // As Registry::List and ListBodies. Query the store on this thread. Require that the thread does
+  // not hold the mutex (not checked: a mutex does not know its holder).
   absl::StatusOr<HullPage> ListHulls(const std::string& prefix, const std::string& after,
                                      size_t page_size, const std::function<bool()>& should_stop);
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
                                       size_t page_size, const std::function<bool()>& should_stop);
 
-  // Takes what a watch of the stage kPresent is told next, and moves the watch on. Where that is
-  // not read yet, has it read, and the watch waits until it is. UNAVAILABLE: it could not be read;
-  // the next call tries again.
+  // Takes the next piece of a watch in stage kPresent and advances the watch. If the piece is not
+  // read yet, starts the read, and the watch waits for it. UNAVAILABLE: the read failed; the next
+  // call retries.
   absl::Status TakePresent(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
 
  private:

@@ -12,11 +12,11 @@
 namespace hulld::server {
 namespace {
 
-// IDs in one question to the store, and threads that ask.
+// IDs per store query, and threads that query.
 constexpr size_t kMostAtOnce = kMostLookupsPerHold;
 constexpr size_t kMostThreads = 2;
 
-// Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
+// The server never writes two records for one ID. The hull wins: its vertices cannot be restored.
 void NoteBodyUnderHull(const std::string& id) {
   spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
 }
@@ -40,8 +40,8 @@ void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refu
   loaders_.Submit([this] { ReadDue(); }, kRecordReader);
 }
 
-// One question; an ID that comes while it is under way is in the next one. In between others get
-// the thread, so that they do not wait as long as more comes.
+// Sends one query; IDs that arrive during it go into the next one. The thread is offered to other
+// clients in between, so that a steady supply of IDs does not starve them.
 void RecordReader::ReadDue() {
   Locked locked(mutex_);
   if (!due_.empty()) {
@@ -61,7 +61,7 @@ void RecordReader::ReadDue() {
 absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                                       const std::function<bool()>& should_stop) {
   HULLD_CHECK(!ids.empty() && ids.size() <= kMostAtOnce);
-  // What is due does not wait meanwhile.
+  // Runs the deferred tasks before waiting.
   locked.Unlock();
   locked.Lock();
   Readings own;
@@ -101,7 +101,7 @@ absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::str
   return read;
 }
 
-// Releases the mutex meanwhile. They may be over later than that.
+// Releases the mutex during the read. The readings may end later than this call.
 void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
   std::vector<std::string> ids;
   ids.reserve(readings.size());
@@ -118,7 +118,7 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
 
 void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
                                const absl::StatusOr<FoundRecords>& found) {
-  // Before, so that what comes now is there for those that wait for it.
+  // Evicts first, so that the new records are still there when their callers resume.
   for (size_t i = 0; i < readings.size(); ++i) catalog_.hulls().RestSome();
   catalog_.bodies().DropSome(locked);
   Readings open;

@@ -25,26 +25,25 @@
 
 namespace hulld::server {
 
-// What takes turns for the threads that read from the store, beside the readers that have points
-// loaded: records that are due, and what watches are told next (RecordLister).
+// Clients in fair scheduling of the threads that read the store, besides readers that load points:
+// pending record reads, and reads for watches (RecordLister).
 inline constexpr ClientId kRecordReader = 1;
 inline constexpr ClientId kWatchReader = 2;
 
-// Makes known what there is under an ID, where the store finds records and the catalog is a cache
-// of them: reads the record of the hull or of the body, or that there is neither, into the catalog.
+// Loads the records of IDs into the catalog if it is a cache of a store that finds records: the
+// record of the hull or of the body, or the absence of both.
 //
 // Invariants:
-//   - One thread at a time reads the record of an ID, whatever number of callers wait for it.
-//   - What is read is of IDs that are not known, so none of our own changes comes in between:
-//     those are of IDs that are known. What other servers did of an ID meanwhile takes the place of
-//     what is being read of it (EndReadingOf).
-//   - What was read is in the catalog when those that wait for it go on, or was and is dropped
-//     again. So a caller looks again for the ID, and may find that it is not known once more.
+//   - At most one thread reads the record of an ID, however many callers wait for it.
+//   - Only unknown IDs are read, so no local change interferes: local changes require known IDs.
+//     A change by a peer server replaces the read in progress (EndReadingOf).
+//   - When the waiting callers resume, the record is in the catalog, or was and is evicted again.
+//     A caller therefore looks the ID up again, and may find it unknown once more.
 //
-// Guarded by the registry's mutex, which is released while the store is asked.
+// Guarded by the registry's mutex, which is released during store queries.
 class RecordReader {
  public:
-  // All must outlive this. loaders: threads that read what nobody waits for with a thread.
+  // All must outlive this. loaders: threads for reads without a blocked caller.
   RecordReader(Store& store, FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
                RecordGate& gate, WorkerPool& loaders)
       : store_(store),
@@ -56,29 +55,29 @@ class RecordReader {
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
-  // Has the record of an ID read, and goes on with `next`, which must look anew whether it is known
-  // then; or refuses, without the mutex. Requires that the ID is not known.
+  // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
+  // refuses, without the mutex. Requires: the ID is unknown.
   void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
 
-  // For a reader: makes the first ID known, and with it others, at most kMostLookupsPerHold, that
-  // are due. Releases the mutex. Why it could not be read, or CANCELLED: should_stop, which may be
-  // empty, said so. OK: it was known at some moment since. Requires an ID.
+  // Blocks until the first ID is known; also reads up to kMostLookupsPerHold pending IDs. Releases
+  // the mutex. Returns the error of the read, or CANCELLED if should_stop, which may be empty,
+  // returned true. OK: the ID was known at some time since. Requires at least one ID.
   absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                           const std::function<bool()>& should_stop);
-  // The same for those of these IDs that are not known, of which the first is one.
-  // RESOURCE_EXHAUSTED: readers hold more than their share of --memory-limit.
+  // As AwaitKnown for the unknown ones among `ids`, which must include the first.
+  // RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
   absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
                             const std::function<bool()>& should_stop);
 
-  // What other servers did of an ID is in the catalog, in the place of what is being read of it.
-  // Returns what waited for that, to go on once everything that they did is taken over.
+  // Ends the read of an ID after a peer server's change of it was applied to the catalog. Returns
+  // the waiting tasks, to be run after all peer changes are applied.
   std::vector<LockedTask> EndReadingOf(const std::string& id);
 
  private:
   struct Reading {
     std::string id;
     bool is_over = false;
-    // Why it could not be read.
+    // Error of the read.
     absl::Status status;
     ConditionVariable over;
     std::vector<std::pair<Refusal, LockedTask>> waiting;
@@ -99,8 +98,8 @@ class RecordReader {
   RecordGate& gate_;
   WorkerPool& loaders_;
 
-  // Guarded by mutex_. Those that are not over, by ID; of these the ones that no thread has taken
-  // yet; and threads that take them.
+  // Guarded by mutex_: reads that are not over, by ID; the ones not yet taken by a thread; and the
+  // number of reading threads.
   std::map<std::string, std::shared_ptr<Reading>> readings_;
   Readings due_;
   size_t threads_ = 0;

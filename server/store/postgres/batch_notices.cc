@@ -18,14 +18,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A database holds one store, so the name of the channel need not say which.
+// A database holds one store, so the channel's name need not identify it.
 constexpr char kListen[] = "LISTEN hulld_batches";
 constexpr char kNotify[] = "NOTIFY hulld_batches";
 constexpr std::chrono::milliseconds kForEver{-1};
-// Before a database that refused to listen is asked again.
+// Retry delay after the database refused to listen.
 constexpr std::chrono::minutes kRefusedRetry{1};
 
-// How long it is until then, at least 0.
+// Time until `end`, at least 0.
 std::chrono::milliseconds UpTo(Clock::time_point end) {
   return std::max(std::chrono::milliseconds(0),
                   std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()));
@@ -84,20 +84,20 @@ void BatchNotices::Run() {
   }
 }
 
-// Listens and sends until the session is lost, or this is to end.
+// Listens and sends until the session is lost, or the thread must end.
 absl::Status BatchNotices::Serve() {
   absl::StatusOr<std::unique_ptr<Session>> opened = open_();
   if (!opened.ok()) return opened.status();
   Session& session = **opened;
   if (absl::Status s = session.Run(kListen).status(); !s.ok()) return s;
-  // From here on, each later batch is heard of by a notice.
+  // From here on, each later batch arrives as a notice.
   const absl::StatusOr<uint64_t> last = LastBatch(session);
   if (!last.ok()) return last.status();
   is_listening_ = true;
   Hear(*last);
   Clock::time_point next = Clock::now();
   while (true) {
-    // Before the look at what may have woken it: what comes later wakes it again.
+    // Cleared before the conditions are checked: later events wake the thread again.
     ClearWake();
     if (ending_) return absl::OkStatus();
     const uint64_t batch = to_send_;
@@ -107,7 +107,7 @@ absl::Status BatchNotices::Serve() {
       sent_ = batch;
       next = Clock::now() + kLeastPause;
     }
-    // They also come beside the answer to what was asked.
+    // Notices also arrive with the answers to queries.
     for (const std::string& payload : session.TakeNotices()) {
       uint64_t heard = 0;
       if (absl::SimpleAtoi(payload, &heard)) Hear(heard);
@@ -118,7 +118,7 @@ absl::Status BatchNotices::Serve() {
 }
 
 void BatchNotices::Hear(uint64_t batch) {
-  // Those of two servers may come in another order than their commits.
+  // Notices of two servers may arrive in another order than their commits.
   last_heard_ = std::max(last_heard_.load(), batch);
   on_batch_(batch);
 }
@@ -128,7 +128,7 @@ void BatchNotices::ClearWake() const {
   eventfd_read(wake_, &count);
 }
 
-// What is sent meanwhile is sent once there is a session.
+// Batches committed during the pause are sent after a session exists.
 void BatchNotices::AwaitRetry(std::chrono::milliseconds pause) const {
   const Clock::time_point end = Clock::now() + pause;
   while (!ending_ && Clock::now() < end) {

@@ -16,44 +16,44 @@
 
 namespace hulld::server {
 
-// The number of the last batch that was committed.
+// Returns the number of the last committed batch.
 absl::StatusOr<uint64_t> LastBatch(Session& session);
 
-// How the servers over one database tell each other that there is a new batch (LISTEN and NOTIFY).
-// A notice is a hint and holds no more than the number of a batch: a server that hears it looks at
-// the store, a server that does not hear it looks there now and then, and nothing depends on its
-// arrival.
+// Notifications of new batches between the servers of a database (LISTEN and NOTIFY). A notice is
+// a hint with only the number of a batch: a server that receives it queries the store, a server
+// that does not receive it polls the store, and correctness does not depend on its arrival.
 //
-// A notice is sent after the commit, in a transaction of its own that waits for no disk, and
-// notices that would follow each other within kLeastPause are one. NOTIFY within the transaction of
-// the batch would save the sending, but PostgreSQL holds a lock of the whole cluster from before
-// such a commit until its log is on disk, here and on synchronous standbys. The batches of one
-// store take turns anyway. But 8 writers that share nothing but the cluster, as those of 8 stores
-// do, went from 1460 commits a second to 430, and with notices after each commit, not put together,
-// to 1090 (observed: means of 2 runs of pgbench 15, 3 listeners, 2 cores, load 7).
+// A notice is sent after the commit, in a separate transaction that does not wait for the disk, and
+// notices within kLeastPause are merged. NOTIFY within the transaction of the batch would save the
+// extra send, but PostgreSQL then holds a cluster-wide lock from before the commit until its log is
+// on disk, here and on synchronous standbys. The batches of a store are serialized anyway. But 8
+// writers that share only the cluster, such as 8 stores, dropped from 1460 commits a second to 430,
+// and with unmerged notices after each commit to 1090 (**observed**: means of 2 runs of pgbench 15,
+// 3 listeners, 2 cores, load 7).
 //
-// One session, and a thread that both listens and sends. A session that is lost is opened again
-// after `retry`; a database that refuses to listen, as one that only speaks PostgreSQL's protocol
-// may, is asked again every minute.
+// Uses one session, and a thread that listens and sends. A lost session is reopened after `retry`;
+// a database that refuses to listen, as some implementations of PostgreSQL's protocol do, is
+// retried every minute.
 class BatchNotices {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
   static constexpr std::chrono::milliseconds kLeastPause{2};
 
-  // open: makes the session. on_batch: told, on the thread, the number of a batch that somebody
-  // committed, ourselves included, and of the last one whenever listening begins. fallback: what
-  // the log says is done without notices.
+  // open: creates the session. on_batch: receives, on the thread, the number of each committed
+  // batch, including this server's, and the last one whenever listening begins. fallback: text of
+  // the log for the behaviour without notices.
   BatchNotices(Opener open, std::chrono::milliseconds retry,
                std::function<void(uint64_t batch)> on_batch, std::string fallback);
   BatchNotices(const BatchNotices&) = delete;
   BatchNotices& operator=(const BatchNotices&) = delete;
   ~BatchNotices();
 
-  // Tells all servers soon that this batch is committed. Any thread. Cost: a system call.
+  // Schedules a notice of this committed batch to all servers. Any thread. Cost: a system call.
   void Send(uint64_t batch);
 
-  // Whether the session is there, as far as is known, and the last batch that was heard of.
+  // is_listening: true if the session exists, as far as is known. last_heard: the last batch
+  // received.
   bool is_listening() const { return is_listening_; }
   uint64_t last_heard() const { return last_heard_; }
 
@@ -68,14 +68,14 @@ class BatchNotices {
   const std::chrono::milliseconds retry_;
   const std::function<void(uint64_t batch)> on_batch_;
   const std::string fallback_;
-  // An eventfd: can be read when there is something to send, or the end has come.
+  // An eventfd: readable if a notice is due or the thread must end.
   const int wake_;
   std::atomic<bool> ending_ = false;
-  // The last batch to be sent.
+  // The last batch to send.
   std::atomic<uint64_t> to_send_ = 0;
   std::atomic<bool> is_listening_ = false;
   std::atomic<uint64_t> last_heard_ = 0;
-  // The thread's own: the last batch that was sent.
+  // Used only by the thread: the last batch sent.
   uint64_t sent_ = 0;
   std::thread thread_;
 };

@@ -14,17 +14,17 @@ namespace {
 
 using Element = ArrayParameter::Element;
 
-// A message of PostgreSQL's protocol ends at 1 GB; what goes into one statement stays far below.
+// A message of PostgreSQL's protocol is limited to 1 GB; statements stay far below.
 constexpr size_t kMostStatementBytes = 16 << 20;
 
-// What a batch leaves of one hull.
+// Rows of a hull after a batch.
 struct HullRows {
-  // Rows that may be there before: all of the hull, or those of its vertices.
+  // Existing rows to delete: all of the hull's, or only its vertices.
   bool drops_all = false;
   bool drops_vertices = false;
   // The hull's last change; null before the first.
   const Change* last = nullptr;
-  // New rows of the hull as it is then.
+  // New rows of the resulting hull.
   std::map<std::string, uint64_t> sequences;
   const Change* base = nullptr;
   std::vector<const Change*> deltas;
@@ -51,7 +51,7 @@ void HullRows::Add(const Change& change) {
   }
 }
 
-// Rows of one table, column by column.
+// Rows of a table, column by column.
 class RowsOfTable {
  public:
   RowsOfTable(const char* statement, std::initializer_list<Element> columns)

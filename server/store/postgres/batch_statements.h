@@ -10,16 +10,16 @@
 
 namespace hulld::server {
 
-// Statements that prepare those of StatementsOf in a session.
+// Statements that prepare the ones of StatementsOf in a session.
 std::string PrepareBatchStatements();
 
-// What a batch of changes does to the tables, all but the row of the store: deletions first, then
-// rows, each row once, however many changes of a hull there are. Cost: O(bytes of the vertices that
-// are kept).
+// Statements that apply a batch of changes to the tables, except the row of the store: deletions
+// first, then rows, each row once, however many changes of a hull there are. Cost: O(bytes of the
+// vertices that are kept).
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes);
 
-// What a batch adds to what the store holds, modulo 2^64. The vertices of a hull whose record was
-// damaged when it ended stay counted.
+// Change of the store's totals by a batch, modulo 2^64. The vertices of a hull that ended with a
+// damaged record stay counted.
 StoreTotals AddedBy(std::span<const Change* const> changes);
 
 }  // namespace hulld::server

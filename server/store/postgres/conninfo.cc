@@ -9,8 +9,8 @@
 namespace hulld::server {
 namespace {
 
-// For what the text leaves open. Times in seconds, that of TCP in milliseconds; a choice: longer
-// than a network stumbles, shorter than people wait.
+// Defaults for missing keywords. Times in seconds, TCP's in milliseconds; a choice: longer than a
+// network glitch, shorter than people's patience.
 constexpr struct {
   const char* keyword;
   const char* value;
@@ -30,7 +30,7 @@ constexpr struct {
 absl::StatusOr<Conninfo> Conninfo::Parse(const std::string& text) {
   const std::string trimmed(absl::StripAsciiWhitespace(text));
   if (trimmed.empty()) return absl::InvalidArgumentError("it is empty");
-  // libpq's words would quote the text.
+  // libpq's message would quote the text.
   char* words = nullptr;
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
       PQconninfoParse(trimmed.c_str(), &words), PQconninfoFree);

@@ -32,8 +32,8 @@ void ArrayParameter::Add(std::string_view value) {
   elements_ += value;
 }
 
-// Header: dimensions, whether there are nulls, the type of the elements; then, for the dimension,
-// its length and its first index. Source: array_recv in PostgreSQL's utils/adt/arrayfuncs.c.
+// Header: number of dimensions, null flag, element type; then, per dimension, its length and its
+// first index. Source: array_recv in PostgreSQL's utils/adt/arrayfuncs.c.
 std::string ArrayParameter::Take() {
   std::string array = EncodeInteger(1) + EncodeInteger(0) +
                       EncodeInteger(static_cast<uint32_t>(element_)) + EncodeInteger(count_) +

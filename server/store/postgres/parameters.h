@@ -8,10 +8,10 @@
 
 namespace hulld::server {
 
-// A bigint as PostgreSQL's binary format has it. Revisions and the like stay below 2^63.
+// Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
 std::string EncodeBigint(uint64_t number);
 uint64_t DecodeBigint(std::string_view bytes);
-// An integer likewise.
+// Encodes an integer likewise.
 std::string EncodeInteger(uint32_t number);
 
 // A one-dimensional array in PostgreSQL's binary format.
@@ -24,7 +24,7 @@ class ArrayParameter {
   void Add(std::string_view value);
   uint32_t count() const { return count_; }
   size_t bytes() const { return elements_.size(); }
-  // Leaves it empty.
+  // Returns the array and clears it.
   std::string Take();
 
  private:
@@ -33,7 +33,7 @@ class ArrayParameter {
   std::string elements_;
 };
 
-// One statement: the name of a prepared one, or its text where it has no parameters.
+// A statement: the name of a prepared one, or the text of a statement without parameters.
 struct Statement {
   const char* name = nullptr;
   const char* text = nullptr;

@@ -1,4 +1,4 @@
-// Which server is active, and how that ends.
+// Claim of the active server, and its loss.
 #include <absl/status/status.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -13,13 +13,13 @@
 namespace hulld::server {
 namespace {
 
-// Names the advisory lock of the active server within its database: "hulld" as a number.
+// Key of the active server's advisory lock within its database: "hulld" as a number.
 constexpr uint64_t kLock = 0x68756c6c64;
 constexpr int kBeatsPerMeasure = 10;
 
 }  // namespace
 
-// Whether there are tables of ours. FAILED_PRECONDITION: they are those of a newer hulld.
+// Returns true if the tables exist. FAILED_PRECONDITION: a newer hulld made them.
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<Rows> exists = session.Run("SELECT to_regclass('hulld.store') IS NOT NULL");
   if (!exists.ok()) return exists.status();
@@ -40,69 +40,6 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   return absl::FailedPreconditionError(absl::StrCat("it was written in format ", number,
                                                     "; this hulld knows format ", kFormat,
                                                     " at most; run the hulld that wrote it"));
-}
-
-// Whether the database holds the slots that this is to serve, or is to take them, as one that holds
-// nothing yet, and all slots so far, does. Changes nothing.
-absl::StatusOr<bool> PostgresStore::CheckSlots(Session& session) {
-  const absl::StatusOr<Rows> column = session.Run(
-      "SELECT 1 FROM pg_attribute WHERE attrelid = 'hulld.store'::regclass AND attname = 'slots'");
-  if (!column.ok()) return column.status();
-  std::string held;
-  if (column->count() > 0) {
-    const absl::StatusOr<Rows> slots = session.Run("SELECT coalesce(slots, '') FROM hulld.store");
-    if (!slots.ok()) return slots.status();
-    if (slots->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
-    held = std::string(slots->at(0, 0));
-  }
-  if (held == options_.slots) return true;
-  if (held.empty()) {
-    if (absl::Status s = CheckIsEmpty(session); !s.ok()) return s;
-    return false;
-  }
-  if (options_.slots.empty()) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("this database is one of several shards, and holds slots ", held,
-                     ": start hulld with the file that names them all (--postgres-shards)"));
-  }
-  return absl::FailedPreconditionError(
-      absl::StrCat("this database holds slots ", held,
-                   ", and the file of --postgres-shards gives it ", options_.slots,
-                   ": start hulld with the file that it was filled with; to move slots, end all "
-                   "servers and copy "
-                   "the hulls to other databases (hulld migrate)"));
-}
-
-absl::Status PostgresStore::CheckIsEmpty(Session& session) {
-  const absl::StatusOr<Rows> held = session.Run(
-      "SELECT revision > 0 OR EXISTS (SELECT 1 FROM hulld.hulls) OR EXISTS "
-      "(SELECT 1 FROM hulld.bodies) FROM hulld.store");
-  if (!held.ok()) return held.status();
-  if (held->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
-  if (held->at(0, 0) == "f") return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(
-      "this database holds hulls of all slots, and the file of --postgres-shards gives it ",
-      options_.slots,
-      ": end all servers and copy them to other databases, which that file names (hulld "
-      "migrate)"));
-}
-
-// Servers that are active over it with all slots, which know nothing of this, are shut out.
-absl::Status PostgresStore::TakeSlots(Session& session) {
-  absl::Status status = session.Run("BEGIN; SELECT 1 FROM hulld.store FOR UPDATE").status();
-  if (status.ok()) status = CheckIsEmpty(session);
-  if (status.ok()) {
-    status = session
-                 .Run(absl::StrCat("ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS slots text; "
-                                   "UPDATE hulld.store SET slots = '",
-                                   options_.slots, "', format = ", kFormat,
-                                   ", owner = '', epoch = epoch + 1, written_in = epoch + 1; "
-                                   "INSERT INTO hulld.epochs (epoch, owner, batch, revision) "
-                                   "SELECT epoch, owner, batch, revision FROM hulld.store; COMMIT"))
-                 .status();
-  }
-  if (!status.ok()) session.Run("ROLLBACK").status().IgnoreError();
-  return status;
 }
 
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
@@ -133,7 +70,7 @@ void PostgresStore::Keep() {
   const int64_t looks_per_beat = options_.beat / period;
   for (int64_t look = 1; !wake_.wait_for(lock, period, [this] { return ending_; }); ++look) {
     const bool is_beat = look % looks_per_beat == 0;
-    // A database that is gone is not asked more often than that.
+    // Retries an unreachable database only once per beat.
     if (keeper_session_ == nullptr && !is_beat) continue;
     lock.unlock();
     if (is_beat) {
@@ -141,7 +78,7 @@ void PostgresStore::Keep() {
       deaf_beats = is_deaf ? deaf_beats + 1 : 0;
       said_deaf = said_deaf && is_deaf;
     }
-    // Twice in a row is no accident.
+    // Two beats without the expected notice are no accident.
     if (deaf_beats == 2 && !std::exchange(said_deaf, true)) {
       spdlog::warn(
           "no notice comes of what other servers commit, although the session that listens is "
@@ -187,7 +124,7 @@ absl::Status PostgresStore::Beat() {
   return absl::OkStatus();
 }
 
-// What the tables take, as far as the role may ask.
+// Measures the size of the tables, if the role permits it.
 absl::Status PostgresStore::MeasureDisk() {
   const absl::StatusOr<Rows> size = keeper_session_->Run(
       "SELECT sum(pg_total_relation_size(oid)) FROM pg_class "
@@ -207,7 +144,7 @@ std::optional<StoreDisk> PostgresStore::disk() const {
   return disk_;
 }
 
-// This is not the active server any more, and never will be again.
+// Ends this store permanently: it is no longer the active server.
 void PostgresStore::End(const absl::Status& reason) {
   std::function<void()> on_ended;
   {

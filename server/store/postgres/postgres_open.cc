@@ -1,4 +1,4 @@
-// How the store is opened: its sessions, its tables, and its turn.
+// Opening of the store: sessions, tables, and waiting for its turn.
 #include <absl/status/status.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -24,22 +24,22 @@ constexpr char kLockNotAvailable[] = "55P03";
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
 constexpr std::chrono::milliseconds kLongestTurnPause{250};
 
-// hulld.store has one row. `revision`, and `batch`, the number of batches, are those of the last
-// one that was committed. `epoch` and `owner` are of the server that is active; a batch writes its
-// own epoch as `written_in`, and store_fence refuses it when that is not the same. `relaxed`: with
-// synchronous_commit = off, from the start of a server until it ends in order.
+// hulld.store has one row. `revision`, and `batch`, the number of batches, are of the last
+// committed batch. `epoch` and `owner` are of the active server; a batch writes its own epoch as
+// `written_in`, and store_fence refuses it if the two differ. `relaxed`: true with
+// synchronous_commit = off, from the start of a server until its orderly end.
 //
-// A database that holds some slots of IDs has a column `slots`, which says which. `hulls`,
-// `vertices` and `bodies` are how many there are of them.
+// `hulls`, `vertices` and `bodies` are the totals of the store.
 //
-// hulld.migration is there while a migration fills the store, and names its source.
+// hulld.migration exists while a migration fills the store, and names its source.
 //
-// hulld.epochs tells what each epoch began with. The other tables hold what store_keys.h lists, by
-// the ID of the hull or body first; an incarnation is a create_revision. record, body, sequence and
-// vertices are sealed values. Coordinates do not compress, hence EXTERNAL.
+// hulld.epochs holds the state at the start of each epoch. The other tables hold the values of
+// store_keys.h, keyed first by the ID of the hull or body; an incarnation is a create_revision.
+// record, body, sequence and vertices are sealed values. Coordinates do not compress, hence
+// EXTERNAL.
 //
-// Plain tables and statements, so that databases that speak PostgreSQL's protocol and spread rows
-// by key could take them.
+// Plain tables and statements only, for databases that speak PostgreSQL's protocol and shard rows
+// by key.
 constexpr char kTables[] = R"(
   CREATE TABLE hulld.store (
     one boolean PRIMARY KEY DEFAULT true CHECK (one),
@@ -89,8 +89,8 @@ constexpr char kTables[] = R"(
   ALTER TABLE hulld.bases ALTER COLUMN vertices SET STORAGE EXTERNAL;
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
 
-// Nobody reads or writes the row of the store until this is over. Servers of the former format take
-// the lock of the table first, too, so that none of them waits for the row meanwhile.
+// Blocks all reads and writes of the store's row until the end. Servers of the former format also
+// lock the table first, so none of them waits for the row in between.
 constexpr char kAddTotals[] = R"(
   BEGIN;
   LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE;
@@ -101,10 +101,10 @@ constexpr char kAddTotals[] = R"(
   ALTER TABLE IF EXISTS hulld.changes
     ADD COLUMN IF NOT EXISTS body_began bigint NOT NULL DEFAULT 0;)";
 
-// Hulls, or bodies, that are counted at a time: some 70 ms.
+// Hulls or bodies counted per statement: some 70 ms.
 constexpr uint64_t kCountedAtOnce = 100'000;
 constexpr uint64_t kFormatThatCountsHulls = 3;
-// A record holds numbers of 8 bytes, the lowest first; the fourth is that of the vertices.
+// A record holds 8-byte little-endian numbers; the fourth is the number of vertices.
 constexpr char kPrepareCount[] = R"(
     PREPARE hulld_count_bodies_after(text, bigint) AS
       SELECT count(*), 0::bigint, coalesce(max(body_id), '')
@@ -119,13 +119,13 @@ constexpr char kPrepareCount[] = R"(
       FROM (SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2) h;
     )";
 
-// What a table holds.
+// Totals of a table.
 struct Counted {
   uint64_t rows = 0;
   uint64_t vertices = 0;
 };
 
-// Portion by portion, so that no statement takes long. CANCELLED: should_stop said so.
+// Counts in portions, so that no statement takes long. CANCELLED: should_stop returned true.
 absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
                                  const std::function<bool()>& should_stop) {
   Counted all;
@@ -145,10 +145,10 @@ absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
   return all;
 }
 
-// Settings of every session. The database gives up what is asked by a server that is gone, or that
-// stands still while it holds locks; the times are a choice, as those in conninfo.cc, and shorter
-// than PostgresOptions::answer_time. Every statement has an index to go by, also where a plan was
-// made when its table was small.
+// Settings of every session. The database aborts statements of a server that is gone, or that
+// stalls while it holds locks; the times are a choice, as in conninfo.cc, and shorter than
+// PostgresOptions::answer_time. Every statement uses an index, even if its plan was made when the
+// table was small.
 constexpr char kSettings[] = R"(
   SET search_path = '';
   SET default_transaction_isolation = 'read committed';
@@ -229,14 +229,14 @@ constexpr char kPrepareReads[] = R"(
       SELECT writer_id, sequence FROM hulld.writers
       WHERE hull_id = $1 AND incarnation = $2 ORDER BY writer_id;)";
 
-// Machine and process for an operator; the rest makes it unique.
+// Machine and process for the operator; the rest makes the name unique.
 std::string OwnerName() {
   char host[256] = "";
   gethostname(host, sizeof host - 1);
   return absl::StrCat(host, " process ", getpid(), " ", RandomId());
 }
 
-// The error for the person who starts a server: what failed and, where we know it, what to do.
+// Returns the error for the person who starts a server: the failure and, if known, the remedy.
 absl::Status OpenFailed(const PostgresOptions& options, const absl::Status& status) {
   std::string advice;
   if (SqlState(status) == "42501") {
@@ -279,11 +279,11 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   return store;
 }
 
-// That it may connect is known by now, so what is lost here is lost for a while: as where sessions
-// of servers that were killed are still there, and the database gives no more.
+// The connection has worked before, so a loss is treated as temporary: for example, sessions of
+// killed servers still exist, and the database refuses more.
 absl::Status PostgresStore::BeginPatiently() {
   const auto deadline = std::chrono::steady_clock::now() + options_.patience;
-  // What was begun is not begun again: the store would take itself for one that was not closed.
+  // Begin must not run twice: the store would appear not to have been closed.
   bool has_begun = false;
   for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
     absl::Status status;
@@ -298,7 +298,7 @@ absl::Status PostgresStore::BeginPatiently() {
   }
 }
 
-// Those that loading takes.
+// Opens the sessions needed for loading.
 absl::Status PostgresStore::OpenFirstReaders() {
   const Statement owner = {.name = "hulld_owner"};
   const absl::Status status = readers_.Ask(std::span(&owner, 1)).status();
@@ -330,21 +330,21 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
                                   kPrepareReads, options_.shared ? PrepareFollow() : ""));
 }
 
-// The database ends this session, and with it our turn, when no beat has come for a while.
+// The database ends this session, and thus this server's turn, after several missed beats.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
   const auto patience = 10 * options_.beat;
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET idle_session_timeout = ", patience.count()));
 }
 
-// What it sends waits for no disk: it says nothing that must last.
+// Its transactions do not wait for the disk, because notices need not be durable.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET synchronous_commit = off"));
 }
 
-// A server that starts turns the tables of a former format into those of its own, and shuts all
-// others out meanwhile: for minutes where hulls are counted by hundreds of millions.
+// Retries while a starting server upgrades the tables of a former format, which locks out all other
+// servers: for minutes with hundreds of millions of hulls.
 absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::string& sql) const {
   for (bool is_first = true;; is_first = false) {
     absl::StatusOr<Rows> rows = session.Run(sql);
@@ -356,7 +356,7 @@ absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::st
   }
 }
 
-// What the server is and how it commits.
+// Checks the server's version and determines its durability.
 absl::Status PostgresStore::CheckServer(Session& session) {
   if (session.server_version() < kLeastServerVersion) {
     return absl::FailedPreconditionError(absl::StrCat("the database is PostgreSQL ",
@@ -379,15 +379,11 @@ absl::Status PostgresStore::CheckServer(Session& session) {
 
 absl::Status PostgresStore::MakeSchema(Session& session) {
   if (absl::Status s = MakeTables(session); !s.ok()) return s;
-  // Before a former format is given up.
-  const absl::StatusOr<bool> has_slots = CheckSlots(session);
-  if (!has_slots.ok()) return has_slots.status();
-  if (absl::Status s = AddTotals(session); !s.ok()) return s;
-  return *has_slots ? absl::OkStatus() : TakeSlots(session);
+  return AddTotals(session);
 }
 
-// What tables of a former format lack, counted. Nobody commits meanwhile, and servers that would
-// not count what they commit are shut out: they end. Cost: 0.7 s for a million hulls.
+// Adds the totals that tables of a former format lack. No server commits during this, and servers
+// that would not maintain the totals are locked out and end. Cost: 0.7 s for a million hulls.
 absl::Status PostgresStore::AddTotals(Session& session) const {
   const absl::StatusOr<Rows> format = session.Run("SELECT format FROM hulld.store");
   if (!format.ok()) return format.status();
@@ -430,7 +426,7 @@ absl::Status PostgresStore::AddTotals(Session& session) const {
   return status;
 }
 
-// What a server that is killed meanwhile leaves is nothing, or all.
+// Atomic: a server killed during this leaves all of the tables or none.
 absl::Status PostgresStore::MakeTables(Session& session) {
   const absl::StatusOr<bool> exists = CheckFormat(session);
   if (!exists.ok()) return exists.status();
@@ -449,7 +445,7 @@ absl::Status PostgresStore::MakeTables(Session& session) {
   return made;
 }
 
-// The store is ours from here on.
+// Makes this server the owner of the store.
 absl::Status PostgresStore::Begin() {
   absl::StatusOr<std::unique_ptr<Session>> writer = OpenWriter();
   if (!writer.ok()) return writer.status();
@@ -484,14 +480,14 @@ absl::Status PostgresStore::Begin() {
 
 absl::Status PostgresStore::WaitForTurn() {
   if (options_.take_over) return absl::OkStatus();
-  // Soon at first: a server that was killed just now is still leaving.
+  // Retries quickly at first: a server that was just killed may still hold the lock.
   for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
     absl::StatusOr<bool> locked = absl::UnavailableError("");
     if (keeper_session_ != nullptr) locked = TryLock(*keeper_session_);
     has_lock_ = locked.ok() && *locked;
     if (has_lock_) return absl::OkStatus();
     if (!locked.ok()) {
-      // A database that is started again, or that another took the place of, is waited for, too.
+      // Also waits for a database that restarts or fails over.
       absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
       keeper_session_ = session.ok() ? *std::move(session) : nullptr;
     } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {

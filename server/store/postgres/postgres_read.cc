@@ -1,4 +1,4 @@
-// How the store is read: records, the vertices of a hull, a sequence.
+// Reads of the store: records, the vertices of a hull, a sequence.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -14,21 +14,21 @@
 namespace hulld::server {
 namespace {
 
-// Rows that are read at a time: some 100 bytes each, but for bodies of many pieces.
+// Rows per portion: some 100 bytes each, except bodies with many pieces.
 constexpr uint32_t kRowsPerPortion = 4096;
 
-// The deltas of a hull after one revision and up to another.
+// Selects the deltas of a hull after one revision and up to another.
 Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
   return {.name = "hulld_deltas",
           .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), EncodeBigint(after),
                          EncodeBigint(up_to)}};
 }
 
-// A boolean in PostgreSQL's binary format.
+// Encodes a boolean in PostgreSQL's binary format.
 std::string EncodeBoolean(bool value) { return std::string(1, value ? '\1' : '\0'); }
 
-// rows: the store's revision and, for each hull or body, its ID, whether it is a body, whether its
-// value is left out, and the value. A row without an ID means that there is none.
+// rows: the store's revision and, for each hull or body: ID, true for a body, true if the value is
+// omitted, and the value. A row without an ID means that none was found.
 absl::StatusOr<FoundRecords> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
   FoundRecords found;
@@ -67,9 +67,8 @@ std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth
 
 }  // namespace
 
-// A server that became active meanwhile may have changed what was read. The owner is asked last, so
-// all that came before is of a time when the owner was still us, and so is what was found missing
-// or damaged.
+// A server that became active during the read may have changed the data. The owner is read last, so
+// if it is still this server, everything read before is valid, including missing or damaged data.
 absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
   if (absl::Status s = ended(); !s.ok()) return s;
   statements.push_back({.name = "hulld_owner"});
@@ -124,8 +123,8 @@ absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::str
   return FoundIn(rows->front(), "", SIZE_MAX);
 }
 
-// One row more tells whether there are others. A prefix that no ID can have may hold characters
-// that the database does not know: it is asked for what comes after all IDs.
+// Requests one extra row to detect more. An impossible prefix may hold characters that the database
+// does not know, so the query then starts after all IDs.
 absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefix,
                                                         const std::string& after, size_t most,
                                                         RecordKinds kinds) {
@@ -168,7 +167,7 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
   return WhyDamaged(hull, vertices.status());
 }
 
-// What is read here may be of a later moment than the versions; then it is not what they say.
+// The data may be later than the requested versions, and then does not match them.
 std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
     std::span<const HullGrowth> hulls) {
   std::vector<std::optional<std::vector<Vector>>> growth(hulls.size());

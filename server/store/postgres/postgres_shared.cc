@@ -1,4 +1,4 @@
-// Several active servers over one store: how they commit, and follow each other.
+// Several active servers over one store: their commits, and following each other.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
@@ -18,25 +18,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Names the advisory lock under which the tables are made.
+// Key of the advisory lock for creating the tables.
 constexpr uint64_t kSchemaLock = 0x68756c6c65;
-// Batches whose changes are kept for servers that did not read them yet, and after how many batches
-// older ones are dropped.
+// Number of batches with retained changes, for servers that have not read them yet; and the number
+// of batches between prunings of older ones.
 constexpr uint64_t kKeptBatches = 1 << 16;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
-// IDs that a server takes note of at a time, at most. That many took 0.2 s under the registry's
-// mutex (observed, with hulls that had come and gone, at load 6); they are one moment for readers,
-// so that they cannot be taken over in parts.
+// Maximum number of changed IDs that a server applies together. This many took 0.2 s under the
+// registry's mutex (**observed**, with hulls created and deleted in between, at load 6). They form
+// one version for readers, so they cannot be applied in parts.
 constexpr int kMostFollowed = 1 << 17;
-constexpr std::chrono::milliseconds kFirstPause{10};
-constexpr std::chrono::milliseconds kLongestPause{500};
 
-// hulld.changes tells which IDs each batch changed, for the other servers: `revision` is the
-// store's after the last change of the ID in the batch, `ended_at` that at which an incarnation of
-// it ended, or 0; `began` the create_revision of the first that did where that was a hull,
-// `body_began` where it was a body. hulld.store.pruned: batches up
-// to this one are not told any more. hulld.servers tells the last batch of each server, for one
-// that lost the answer to its COMMIT.
+// hulld.changes lists the IDs changed by each batch, for peer servers: `revision` is the store's
+// after the last change of the ID in the batch; `ended_at` is the revision at which an incarnation
+// of it ended, or 0; `began` is the create_revision of the first one that ended if it was a hull,
+// `body_began` if it was a body. hulld.store.pruned: batches up to this one are no longer listed.
+// hulld.servers holds the last batch of each server, for a server that lost the answer to its
+// COMMIT.
 constexpr char kSharedTables[] = R"(
   BEGIN;
   CREATE TABLE hulld.changes (
@@ -54,7 +52,7 @@ constexpr char kSharedTables[] = R"(
   ALTER TABLE hulld.store ADD COLUMN pruned bigint NOT NULL DEFAULT 0;
   COMMIT;)";
 
-// hulld_follow asks for one ID more than is taken note of. Its second parameter is that number.
+// hulld_follow requests one ID more than the limit, its second parameter.
 constexpr char kPrepareFollow[] = R"(
     PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
@@ -99,14 +97,14 @@ constexpr char kPrepareShared[] = R"(
       WITH pruned AS (UPDATE hulld.store SET pruned = $1)
       DELETE FROM hulld.changes WHERE batch <= $1;)";
 
-// What others did after this batch.
+// Selects the changes of peer servers after this batch.
 Statement AskForOthers(uint64_t batch) {
   return {.name = "hulld_follow",
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
 
-// The create_revision of the incarnation that a change ends; 0: it ends none. Nobody knows it of a
-// damaged hull; 1 says that the hull was there before, which is what others need to know.
+// Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
+// damaged hull; 1 then states that the hull existed, as peer servers need to know.
 uint64_t BeganOfEnded(const Change& change) {
   const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
   if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
@@ -115,7 +113,7 @@ uint64_t BeganOfEnded(const Change& change) {
                                       : change.hull.record.create_revision);
 }
 
-// What a batch tells the other servers.
+// Returns the statement that lists a batch's changes for peer servers.
 Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
   struct Row {
     uint64_t revision = 0;
@@ -132,12 +130,11 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
     if (row.began == 0) row.was_body = change->body != nullptr;
     if (row.began == 0) row.began = began;
   }
-  using Element = ArrayParameter::Element;
-  ArrayParameter ids(Element::kText);
-  ArrayParameter revisions(Element::kBigint);
-  ArrayParameter ends(Element::kBigint);
-  ArrayParameter began(Element::kBigint);
-  ArrayParameter bodies_began(Element::kBigint);
+  ArrayParameter ids(ArrayParameter::Element::kText);
+  ArrayParameter revisions(ArrayParameter::Element::kBigint);
+  ArrayParameter ends(ArrayParameter::Element::kBigint);
+  ArrayParameter began(ArrayParameter::Element::kBigint);
+  ArrayParameter bodies_began(ArrayParameter::Element::kBigint);
   for (const auto& [id, row] : rows) {
     ids.Add(id);
     revisions.Add(EncodeBigint(row.revision));
@@ -150,7 +147,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
                          began.Take(), bodies_began.Take()}};
 }
 
-// Which incarnation ended first. rows: those of hulld_follow.
+// Records the incarnation that ended first. rows: of hulld_follow.
 void NoteFormer(const Rows& rows, int row, OtherChange& other) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
@@ -177,7 +174,7 @@ absl::Status MakeSharedTables(Session& session) {
 std::string PostgresStore::PrepareFollow() { return kPrepareFollow; }
 std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFollow, kPrepareShared); }
 
-// Servers that start at the same time make the tables one after the other.
+// Serializes the creation of tables by servers that start together.
 absl::Status PostgresStore::MakeSharedSchema(Session& session) {
   const absl::Status locked =
       RunPatiently(session, absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
@@ -188,8 +185,7 @@ absl::Status PostgresStore::MakeSharedSchema(Session& session) {
   return made;
 }
 
-// The store is ours and that of others from here on, and not that of a server that was active alone
-// before.
+// Makes this server one of the store's owners and fences off a server that was active alone before.
 absl::Status PostgresStore::Join() {
   absl::StatusOr<std::unique_ptr<Session>> writer = OpenWriter();
   if (!writer.ok()) return writer.status();
@@ -203,7 +199,7 @@ absl::Status PostgresStore::Join() {
         "the store was open with synchronous_commit = off and was not closed: start and end one "
         "hulld with --postgres-servers one first, which makes it another store");
   }
-  // Drops servers that were killed. One that still asks for its last batch committed it just now.
+  // Drops killed servers. A server that still asks for its last batch committed it recently.
   const absl::Status dropped = writer_->Ask({.name = "hulld_drop_old_servers"}).status();
   if (!dropped.ok()) return dropped;
   epoch_ = joined->bigint(0, 0);
@@ -220,13 +216,14 @@ absl::Status PostgresStore::Join() {
   return absl::OkStatus();
 }
 
-// Others need not remember the last batch of a server that ended in order.
+// Removes this server's last batch, which is not needed after an orderly end.
 void PostgresStore::Leave() {
   if (writer_ == nullptr) return;
   writer_->Ask({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();
 }
 
-// What is not told any more, is not ours any more, or went back, ends this server.
+// Ends this server if changes that it needs were pruned, if the store has another owner, or if it
+// went back.
 absl::Status PostgresStore::CheckStore(const Rows& rows) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
   if (rows.bigint(0, 2) != epoch()) {
@@ -296,7 +293,7 @@ absl::Status PostgresStore::Follow() {
     follower_.GiveUp(std::move(asked));
     return s;
   }
-  // Nobody else commits.
+  // No other server commits.
   if (!options_.shared) return absl::OkStatus();
   const Statement follow = AskForOthers(batch_);
   const absl::StatusOr<std::vector<Rows>> rows =
@@ -312,7 +309,7 @@ absl::Status PostgresStore::Follow() {
                                              rows.status().message()));
 }
 
-// What a batch does before it is written: it takes the turn, and learns what others did before.
+// Takes the turn before a batch is written, and reads the preceding changes of peer servers.
 absl::Status PostgresStore::TakeTurn() {
   std::vector<Statement> turn;
   turn.push_back({.text = "BEGIN"});
@@ -322,43 +319,16 @@ absl::Status PostgresStore::TakeTurn() {
   return rows.ok() ? NoteOthers(rows->back()) : rows.status();
 }
 
-// Nothing was written. status: how it ended.
+// Returns the turn without a write. status: result of the transaction so far.
 void PostgresStore::GiveTurnBack(const absl::Status& status) {
   if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
   if (went_back_) GiveNewId();
 }
 
-// The turn of a batch that is not written.
-absl::Status PostgresStore::HoldOthers() {
-  if (!options_.shared) return absl::OkStatus();
-  if (absl::Status s = ended(); !s.ok()) return s;
-  absl::Status status;
-  if (writer_ == nullptr) {
-    absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-    status = session.status();
-    if (session.ok()) writer_ = *std::move(session);
-  }
-  if (status.ok()) {
-    status = TakeTurn();
-    if (status.ok()) return status;
-    GiveTurnBack(status);
-  }
-  return absl::UnavailableError(
-      absl::StrCat("cannot hold the database's turn: ", status.message()));
-}
-
-// The database may have ended the session, and the turn with it. What it answers is of the session
-// that took it.
-bool PostgresStore::ReleaseOthers() {
-  if (!options_.shared) return true;
-  if (writer_ != nullptr) GiveTurnBack(absl::OkStatus());
-  return writer_ != nullptr;
-}
-
-// One transaction, in two round trips. The first takes the turn, which lasts until the end of the
-// transaction: batches come one after the other, and what others committed before is known. So the
-// revisions that are given then are the next, and nobody reads a batch before one that goes before
-// it. batch: what may have been committed if the session is lost.
+// Runs one transaction in two round trips. The first takes the turn, which lasts until the end of
+// the transaction: batches are serialized, and all earlier commits of peer servers are known. So
+// the new revisions are the next ones, and no server reads a batch before its predecessor. batch:
+// the batch that may have been committed if the session is lost.
 absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, SharedBatch* batch) {
   absl::Status status = TakeTurn();
   std::vector<Change*> kept;
@@ -381,7 +351,8 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
     *batch = next;
     status = writer_->Ask(statements).status();
     if (status.ok() && writer_->TakeWarned()) {
-      // As when somebody ended the wait for a standby: it is committed, but not where it was to be.
+      // For example, the wait for a standby was interrupted: committed, but not replicated as
+      // required.
       writer_ = nullptr;
       return absl::Status(absl::StatusCode::kUnavailable, "PostgreSQL warned while it committed");
     }
@@ -394,7 +365,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
   return status;
 }
 
-// Revisions that were told are given to other changes from now on, so this is another store.
+// Published revisions will be assigned to other changes, so this is a different store now.
 void PostgresStore::GiveNewId() {
   went_back_ = false;
   const absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
@@ -413,9 +384,9 @@ void PostgresStore::KeepShared(const SharedBatch& batch) {
   if (notices_ != nullptr) notices_->Send(batch.number);
 }
 
-// Whether our batch was committed. Takes the turn: the transaction that had it has ended then, and
-// nothing of it can follow, as its COMMIT was sent before. Its own sync takes along what was
-// committed before.
+// Returns true if this server's batch was committed. Takes the turn: the transaction that held it
+// has ended then, and nothing of it can follow, because its COMMIT was sent before. Its sync covers
+// earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   if (!session.ok()) return session.status();
@@ -435,7 +406,7 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
 absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
   if (absl::Status s = ended(); !s.ok()) return s;
   const Clock::time_point deadline = Clock::now() + options_.patience;
-  for (auto pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
+  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
     absl::Status status;
     SharedBatch batch;
     if (writer_ == nullptr) {
@@ -470,7 +441,7 @@ absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
 }
 
 absl::StatusOr<bool> PostgresStore::FindSharedOutcome(uint64_t batch, Clock::time_point deadline) {
-  for (auto pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
+  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
     const absl::StatusOr<bool> outcome = SharedOutcome(batch);
     if (outcome.ok()) return outcome;
     writer_ = nullptr;
@@ -481,9 +452,9 @@ absl::StatusOr<bool> PostgresStore::FindSharedOutcome(uint64_t batch, Clock::tim
   }
 }
 
-// Ends sessions that hold the turn and send nothing, as those of a server that stands still in the
-// middle of sending a batch do: PostgreSQL bounds how long it waits between transactions and
-// between batches of statements, but not within these.
+// Ends sessions that hold the turn and send nothing, for example of a server that stalls while it
+// sends a batch: PostgreSQL has timeouts between transactions and between batches of statements,
+// but not within these.
 absl::Status PostgresStore::EndStuckTurns() {
   return keeper_session_
       ->Run(absl::StrCat(
@@ -504,13 +475,13 @@ void PostgresStore::StartNotices() {
       absl::StrCat("it is asked for that every ", options_.look.count(), " ms"));
 }
 
-// Whether notices come. The keeper looks at the store with each beat all the same; what it found
-// then, and nobody told it by now, was lost: then it looks more often, until it hears again.
+// True if notices arrive. The keeper still polls the store with each beat. A batch found that way
+// but not announced by now means a lost notice: then it polls more often until a notice arrives.
 bool PostgresStore::HearsOthers() const {
   return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
 }
 
-// Whether others have committed since this knew what they did; then it is told.
+// Polls for new commits of peer servers, and reports them.
 absl::Status PostgresStore::LookForOthers() {
   const absl::StatusOr<uint64_t> batch = LastBatch(*keeper_session_);
   if (!batch.ok()) return batch.status();
@@ -519,7 +490,7 @@ absl::Status PostgresStore::LookForOthers() {
   return absl::OkStatus();
 }
 
-// With the mutex, so that OnOthers waits until nobody calls the former one.
+// Under the mutex, so that OnOthers waits until the former callback is not running.
 void PostgresStore::TellOfOthers() {
   const std::lock_guard lock(mutex_);
   if (on_others_) on_others_();
@@ -530,7 +501,7 @@ void PostgresStore::OnOthers(std::function<void()> others) {
   on_others_ = std::move(others);
 }
 
-// The sequence, and whether the hull is still what it was known to be: the two are of one moment.
+// Reads the sequence, and compares the hull's record with `hull`, in one snapshot.
 absl::StatusOr<std::string> PostgresStore::ReadSequence(const HullRecord& hull,
                                                         const std::string& writer_id) {
   std::vector<Statement> statements(1);
@@ -546,8 +517,7 @@ absl::StatusOr<std::string> PostgresStore::ReadSequence(const HullRecord& hull,
   return std::string(row.at(0, 0));
 }
 
-// Whether the vertices that were read, and are not what the record says, are those of a hull that
-// another server changed since. ABORTED: they are.
+// Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.
 absl::Status PostgresStore::WhyDamaged(const StoredHull& hull, const absl::Status& damage) {
   std::vector<Statement> statements(1);
   statements[0] = {.name = "hulld_record", .parameters = {hull.record.hull_id}};

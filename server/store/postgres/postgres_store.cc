@@ -1,4 +1,4 @@
-// How the store is written: commits, what became of them, and the end.
+// Writes of the store: commits, their outcome, and the end.
 #include "server/store/postgres/postgres_store.h"
 
 #include <absl/status/status.h>
@@ -18,10 +18,6 @@ namespace hulld::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// Between attempts to reach the database.
-constexpr std::chrono::milliseconds kFirstPause{10};
-constexpr std::chrono::milliseconds kLongestPause{500};
 
 }  // namespace
 
@@ -55,11 +51,12 @@ PostgresStore::~PostgresStore() {
   notices_ = nullptr;
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
   if (options_.shared) Leave();
-  // A server that waits need not wait until the database sees that the session is closed.
+  // Unlocks explicitly, so that a waiting server need not wait until the database notices the
+  // closed session.
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
 
-// Its sync takes along what was committed before. If it fails, the mark stays.
+// Its sync covers earlier commits. If it fails, the mark stays.
 void PostgresStore::EndRelaxedRun() {
   if (writer_ == nullptr || !writer_->Run("SET synchronous_commit = on").ok()) return;
   writer_->Ask({.name = "hulld_close", .parameters = {EncodeBigint(epoch())}})
@@ -72,7 +69,8 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
   return status;
 }
 
-// Writes the revision, the number of the batch and the totals after it, if the epoch is still ours.
+// Writes the revision, the batch number and the resulting totals, if the epoch is still this
+// server's.
 Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const {
   return {.name = "hulld_fence",
           .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch()),
@@ -80,12 +78,13 @@ Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTot
                          EncodeBigint(added.bodies)}};
 }
 
-// One transaction. Lost: it may have been committed. Other errors: it was not.
+// Runs one transaction. If the session is lost, it may have been committed; after other errors it
+// was not.
 absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t revision,
                                     uint64_t batch) {
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
-  // First, so that a server that was superseded writes nothing.
+  // First, so that a superseded server writes nothing.
   statements.push_back(Fence(revision, batch, AddedBy(changes)));
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
   statements.push_back({.text = "COMMIT"});
@@ -93,18 +92,20 @@ absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint
   const absl::Status status = writer_->Ask(statements).status();
   if (status.ok() && !writer_->TakeWarned()) return status;
   if (status.ok()) {
-    // As when somebody ended the wait for a standby: it is committed, but not where it was to be.
+    // For example, the wait for a standby was interrupted: committed, but not replicated as
+    // required.
     writer_ = nullptr;
     return absl::Status(absl::StatusCode::kUnavailable, "PostgreSQL warned while it committed");
   }
-  // A transaction that failed cannot be committed, and ends with its session at the latest.
+  // A failed transaction cannot be committed, and ends with its session at the latest.
   if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
   return status;
 }
 
-// Whether batch was committed. UNAVAILABLE: that could not be found out until the deadline.
+// Returns true if the batch was committed. UNAVAILABLE: unknown at the deadline.
 absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_point deadline) {
-  for (std::chrono::milliseconds pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
+  for (std::chrono::milliseconds pause = kFirstRetryPause;;
+       pause = std::min(2 * pause, kLongestRetryPause)) {
     const absl::StatusOr<bool> outcome = Reclaim(batch);
     if (outcome.ok()) return outcome;
     writer_ = nullptr;
@@ -114,9 +115,8 @@ absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_poin
   }
 }
 
-// Raises the epoch in a new session. That waits until the transaction of the batch has ended, if it
-// has locked the row, and takes its right to write from it if it has not come so far. Its sync
-// takes along what was committed before.
+// Raises the epoch in a new session. This waits for the batch's transaction to end if it has locked
+// the row, and fences it off if it has not reached that point. Its sync covers earlier commits.
 absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   if (!session.ok()) return session.status();
@@ -129,8 +129,8 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   epoch_ = claimed->bigint(0, 0);
   const uint64_t found = claimed->bigint(0, 1);
   if (found >= batch_) return found >= batch;
-  // The database lost what it had said to have: an outage without sync, or it was put back to an
-  // earlier time. Its revisions will be given to other changes, so this is another store now.
+  // The database lost acknowledged commits: an outage without sync, or a restore of an earlier
+  // state. It will assign their revisions to other changes, so this is a different store now.
   const absl::StatusOr<Rows> renamed =
       writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}});
   if (!renamed.ok()) return renamed.status();
@@ -142,7 +142,7 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   return false;
 }
 
-// The first epoch after ours tells how many batches there were when it began.
+// The first epoch after this server's records the number of batches at its start.
 absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
   const absl::StatusOr<Rows> next =
       writer_->Ask({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}});
@@ -173,7 +173,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   const Clock::time_point deadline = Clock::now() + options_.patience;
   while (true) {
     if (writer_ == nullptr) {
-      // What the session before was doing is settled.
+      // The former session's outcome is known.
       absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
       if (!session.ok()) return WriteFailed(Refused(session.status()));
       writer_ = *std::move(session);
@@ -185,7 +185,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       End(Superseded(""));
       return ended();
     }
-    // An answer of the database, which is: no.
+    // The database answered with an error, so the batch was not committed.
     if (!SqlState(status).empty()) return WriteFailed(Refused(status));
     const absl::StatusOr<bool> committed = FindOutcome(batch, deadline);
     if (!committed.ok()) {
@@ -200,7 +200,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   }
 }
 
-// Finds out what is not known. What was refused and is there after all cannot be taken back, so
+// Determines unknown outcomes. A refused batch that was committed after all cannot be undone, so
 // the server that refused it ends, and the next one serves it.
 absl::Status PostgresStore::Recover() {
   if (absl::Status s = ended(); !s.ok()) return s;

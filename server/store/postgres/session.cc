@@ -25,7 +25,7 @@ std::string PayloadOf(const absl::Status& status, const char* name) {
   return payload.has_value() ? std::string(*payload) : "";
 }
 
-// libpq ends its messages with a line feed, and some hold several lines.
+// libpq ends its messages with a line feed, and some have several lines.
 std::string OneLine(const char* message) {
   return absl::StrReplaceAll(absl::StripAsciiWhitespace(message), {{"\n\t", " "}, {"\n", "; "}});
 }
@@ -97,7 +97,7 @@ absl::Status Session::Lost(const std::string& what) {
   return lost_;
 }
 
-// Waits until a result can be taken without waiting.
+// Waits until a result is available without blocking.
 absl::Status Session::AwaitResult() {
   PGconn* const connection = connection_.get();
   while (true) {
@@ -122,7 +122,7 @@ absl::StatusOr<PGresult*> Session::NextResult() {
 
 absl::Status Session::ErrorOf(const PGresult* result) {
   const std::string state = FieldOf(result, PG_DIAG_SQLSTATE);
-  // Not the details, which quote data.
+  // Omits the details, which quote data.
   std::string message = FieldOf(result, PG_DIAG_MESSAGE_PRIMARY);
   if (message.empty()) message = OneLine(PQresultErrorMessage(result));
   const std::string severity = FieldOf(result, PG_DIAG_SEVERITY_NONLOCALIZED);
@@ -188,7 +188,7 @@ absl::Status Session::Start(std::span<const Statement> statements) {
   for (const Statement& statement : statements) {
     if (absl::Status s = Send(statement); !s.ok()) return s;
   }
-  // Sends what the connection takes at once.
+  // Sends as much as the connection accepts without blocking.
   if (PQpipelineSync(connection) == 0) return Lost(OneLine(PQerrorMessage(connection)));
   return absl::OkStatus();
 }
@@ -203,7 +203,7 @@ absl::StatusOr<std::vector<Rows>> Session::Finish() {
     const absl::StatusOr<PGresult*> result = NextResult();
     if (!result.ok()) return result.status();
     if (*result == nullptr) {
-      // The end of one statement's results.
+      // The end of a statement's results.
       if (PQstatus(connection) == CONNECTION_OK) continue;
       return Lost(OneLine(PQerrorMessage(connection)));
     }

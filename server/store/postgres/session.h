@@ -19,13 +19,13 @@
 
 namespace hulld::server {
 
-// What one statement answered.
+// Result of a statement.
 class Rows {
  public:
   explicit Rows(PGresult* result) : result_(result, PQclear) {}
 
   int count() const { return PQntuples(result_.get()); }
-  // As the session sent it: text after Run, binary after Ask.
+  // Value as received: text after Run, binary after Ask.
   std::string_view at(int row, int column) const {
     return {PQgetvalue(result_.get(), row, column),
             static_cast<size_t>(PQgetlength(result_.get(), row, column))};
@@ -36,44 +36,46 @@ class Rows {
   std::unique_ptr<PGresult, decltype(&PQclear)> result_;
 };
 
-// Whether the session ended, or did not answer in time: what it was doing may have been done, not
-// have been done, or be done later.
+// True if the session ended, or did not answer in time: its last operation may have happened, may
+// not have happened, or may still happen.
 bool IsLost(const absl::Status& status);
-// PostgreSQL's code of an error that it answered, as "42501"; empty for others.
+// PostgreSQL's code of an error that it returned, as "42501"; otherwise empty.
 std::string SqlState(const absl::Status& status);
-// The constraint that a statement violated; empty for others.
+// The constraint violated by a statement; otherwise empty.
 std::string ViolatedConstraint(const absl::Status& status);
 
-// A connection to PostgreSQL. One thread at a time. Errors are UNAVAILABLE, and RESOURCE_EXHAUSTED
-// where PostgreSQL's disk is full; once one is lost (IsLost), so are all that follow.
+// A connection to PostgreSQL, used by one thread at any time. Errors are UNAVAILABLE, or
+// RESOURCE_EXHAUSTED if PostgreSQL's disk is full. After a session is lost (IsLost), all later
+// operations fail likewise.
 class Session {
  public:
-  // answer_time: how long nothing may come or go while an answer is due; then the session is lost.
+  // answer_time: maximum silence while an answer is due; the session is lost after it.
   static absl::StatusOr<std::unique_ptr<Session>> Open(const Conninfo& conninfo,
                                                        std::chrono::milliseconds answer_time);
 
-  // Statements without parameters, separated by semicolons; the rows of the last, as text.
+  // Runs statements without parameters, separated by semicolons; returns the rows of the last, as
+  // text.
   absl::StatusOr<Rows> Run(const std::string& text);
-  // All statements in one round trip. The first that fails ends it, and is the error; a transaction
-  // that they began stays open then, without being able to commit.
+  // Runs all statements in one round trip. The first failure ends it, and is the error; an open
+  // transaction then stays open, but cannot be committed.
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
   absl::StatusOr<Rows> Ask(Statement statement);
-  // The two halves of Ask: what is sent, and what comes of it. Start waits for nothing; Finish is
-  // next after it, on any thread.
+  // The two halves of Ask: send and receive. Start does not block; Finish must be the next call, on
+  // any thread.
   absl::Status Start(std::span<const Statement> statements);
   absl::StatusOr<std::vector<Rows>> Finish();
 
-  // Waits until something comes from the database, `wake` can be read, or `longest` is over;
-  // negative: never. wake: a file descriptor.
+  // Waits until data arrives from the database, `wake` is readable, or `longest` has passed;
+  // negative: no limit. wake: a file descriptor.
   absl::Status AwaitNotices(int wake, std::chrono::milliseconds longest);
-  // The payloads of the notices that came (LISTEN) since this was asked last.
+  // Returns the payloads of the notices (LISTEN) received since the last call.
   std::vector<std::string> TakeNotices();
 
-  // Whether PostgreSQL warned of anything since this was asked last.
+  // True if PostgreSQL sent a warning since the last call.
   bool TakeWarned() { return std::exchange(warned_, false); }
   // As in 150018.
   int server_version() const { return PQserverVersion(connection_.get()); }
-  // Where it is, without secrets: "database hulld at db.example".
+  // Describes the location without secrets: "database hulld at db.example".
   std::string Describe() const;
 
  private:

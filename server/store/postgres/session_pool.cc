@@ -9,7 +9,7 @@ namespace hulld::server {
 absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
   absl::StatusOr<std::unique_ptr<Session>> session = Take(false);
   if (!session.ok()) return session.status();
-  // Finish tells of what is lost.
+  // Finish reports a lost session.
   (*session)->Start(statements).IgnoreError();
   return Finish(*std::move(session), statements);
 }
@@ -42,7 +42,7 @@ absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> s
   return rows;
 }
 
-// fresh: those that are idle are as old as one that was lost.
+// fresh: drops idle sessions, which are as old as one that was lost.
 absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
   std::vector<std::unique_ptr<Session>> old;
   {
@@ -61,7 +61,7 @@ absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
   return session;
 }
 
-// session: null when it is lost.
+// session: null if it is lost.
 void SessionPool::GiveBack(std::unique_ptr<Session> session) {
   {
     const std::lock_guard lock(mutex_);

@@ -13,21 +13,21 @@
 
 namespace hulld::server {
 
-// Sessions that threads take in turn. Thread-safe.
+// Sessions shared by threads, one user each. Thread-safe.
 class SessionPool {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
-  // open: makes one. most: how many there are at a time; a thread that finds them all taken waits.
+  // open: creates a session. most: maximum number of sessions; a thread waits if all are taken.
   SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
 
-  // Session::Ask on one of them. If that was lost meanwhile, as after a restart of the database, it
-  // asks once more on a new one.
+  // Session::Ask on one of the sessions. If it was lost since its last use, for example by a
+  // restart of the database, retries once on a new one.
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
 
-  // The two halves of Ask. TryStart waits for nothing: null where no session is idle. What is
-  // started is to be finished or given up, on any thread, before anything else is asked where there
-  // is one session.
+  // The two halves of Ask. TryStart does not block: returns null if no session is idle. A started
+  // query must be finished or dropped, on any thread, before the next one if there is only one
+  // session.
   std::unique_ptr<Session> TryStart(std::span<const Statement> statements);
   // statements: the same.
   absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,

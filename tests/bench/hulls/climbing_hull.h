@@ -8,9 +8,9 @@
 
 namespace hulld::bench {
 
-// Support points as peers find them: a scan of a small hull, hill climbing along edges of a large
-// one, to the first neighbour that is farther, from the vertex found before. Scalar is the type
-// that vertices are rounded to.
+// Finds support points as peers do: scans a small hull; in a large one, climbs along edges from the
+// previous result, each time to the first farther neighbor. Scalar: the type that vertices are
+// rounded to.
 template <typename Scalar>
 class ClimbingHull {
  public:
@@ -43,10 +43,10 @@ class ClimbingHull {
 
   const Vector3& center() const { return center_; }
 
-  // Where to begin to climb, for a query that knows nothing yet: kNowhere.
+  // Start of the climb for a query without history: kNowhere.
   static constexpr uint32_t kNowhere = ~uint32_t{0};
 
-  // `from`: the vertex to climb from; becomes the one found.
+  // `from`: the vertex to climb from; set to the result.
   const Vector3& Farthest(const Vector3& n, uint32_t& from) const {
     if (starts_.empty()) return Scan(n);
     from = Climb(n, BestSeed(n, from));
@@ -54,8 +54,8 @@ class ClimbingHull {
   }
 
  private:
-  // FCL begins to climb at 32 vertices. Observed, libccd, questions that were not asked before: a
-  // scan of 64 takes 0.66 to 0.96 of the time of climbing, one of 72 to 220 1.2 to 2 times as long.
+  // FCL starts climbing at 32 vertices. **Observed**, libccd, queries without history: a scan of 64
+  // takes 0.66 to 0.96 of the time of climbing, one of 72 to 220 1.2 to 2 times as long.
   static constexpr size_t kScanLimit = 64;
 
   const Vector3& Scan(const Vector3& n) const {
@@ -71,7 +71,7 @@ class ClimbingHull {
     return vertices_[best];
   }
 
-  // Where it pays to look at the seeds each time.
+  // From this size on, checking the seeds each time pays off.
   static constexpr size_t kSeedLimit = 1000;
 
   uint32_t BestSeed(const Vector3& n, uint32_t last) const {
@@ -106,7 +106,8 @@ class ClimbingHull {
 
   std::vector<Vector3> vertices_;
   Vector3 center_;
-  // The neighbours of vertex i are those from starts_[i] to starts_[i + 1]. Empty when scanned.
+  // Vertex i has the neighbors neighbors_[starts_[i]] to neighbors_[starts_[i + 1] - 1]. Empty if
+  // all vertices are scanned.
   std::vector<uint32_t> starts_;
   std::vector<uint32_t> neighbors_;
   // Spread over the hull: the farthest along some directions.

@@ -1,11 +1,11 @@
-// What each extreme of tests/core/checks/extreme_clouds.h costs, relative to a cloud without
-// difficulty that has as many points and a hull with as many vertices:
+// Cost of each extreme of tests/core/checks/extreme_clouds.h, relative to an easy cloud with as
+// many points and a hull with as many vertices:
 //
 //   extreme_benchmark --benchmark_out=FILE
 //
-// Both are built in turn; times are CPU time, medians. Where the order forces quadratically many
-// facets, the time per facet created stands beside it. The signs that each stage of exact
-// arithmetic decided are those of one build.
+// Both are built alternately; times are CPU time, medians. If the order forces a quadratic number
+// of facets, the row includes the time per facet created. The signs decided by each stage of exact
+// arithmetic are counts of a single build.
 
 #include <benchmark/benchmark.h>
 
@@ -46,7 +46,7 @@ HullBuilder BuildOneByOne(const std::vector<Vector>& points) {
 
 using Build = HullBuilder (*)(const std::vector<Vector>&);
 
-// Seconds of one build, by the time of several where one is too short to measure.
+// Returns the seconds of a build; measures several if one is too short.
 double SecondsOf(Build build, const std::vector<Vector>& points) {
   int builds = 0;
   const double start = ThreadSeconds();

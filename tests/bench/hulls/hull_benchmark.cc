@@ -1,14 +1,14 @@
-// Hull building beside qhull and CGAL, on the same points, in one process. Four suites, each with
-// rows of its own columns:
+// Hull building compared with qhull and CGAL, on the same points, in one process. Four suites, each
+// with its own columns:
 //
-//   build     whole clouds at once
-//   snapshot  canonical snapshots beside what building their hulls costs
-//   stream    points one at a time, each a call of its own: the total, and percentiles of the
-//   latency cost      build and stream against the number of points
+//   build     whole clouds in one call
+//   snapshot  canonical snapshots, compared with building their hulls
+//   stream    points one by one, each in a separate call: the total, and percentiles of the latency
+//   cost      build and stream against the number of points
 //
 // tests/bench/hulls/run_hull_benchmark.sh runs all and keeps the rows as CSV.
-// `vertices_missing_or_extra` is by how many vertices a library's hull differs from hulld's exact
-// one, which is audited.
+// `vertices_missing_or_extra`: the difference between the vertices of a library's hull and of
+// hulld's exact, audited one.
 
 #include <benchmark/benchmark.h>
 
@@ -26,10 +26,10 @@
 namespace hulld::bench {
 namespace {
 
-// Passes over a stream whose index-wise minima are its latencies.
+// Passes over a stream; the index-wise minima are its latencies.
 constexpr int kPasses = 5;
 
-// One cloud, made when the first benchmark asks for it.
+// One cloud, created when the first benchmark needs it.
 class Workload {
  public:
   explicit Workload(std::string name) : name_(std::move(name)) {}
@@ -39,7 +39,7 @@ class Workload {
     if (points_.empty()) points_ = MakeCloud(name_);
     return points_;
   }
-  // The number of vertices of the exact hull; 0 when the audit found anything.
+  // Returns the number of vertices of the exact hull; 0 if the audit failed.
   size_t vertices() {
     if (vertices_ == 0) {
       HullBuilder builder;
@@ -58,7 +58,7 @@ class Workload {
 
 using Function = void (*)(benchmark::State&, Workload&);
 
-// False, with the reason in the state, when there is nothing to measure.
+// Returns false, with the reason in the state, if there is nothing to measure.
 bool IsReady(benchmark::State& state, Workload& workload) {
   if (workload.points().empty()) {
     state.SkipWithError("skipped: no data");
@@ -115,7 +115,7 @@ void BuildByCgal(benchmark::State& state, Workload& workload) {
   Report(state, workload, vertices);
 }
 
-// A hull that grows by one point at a time.
+// A hull that grows point by point.
 class HulldStream {
  public:
   void Insert(const Vector& point) {
@@ -139,8 +139,8 @@ void InsertOneByOne(benchmark::State& state, Workload& workload) {
   Report(state, workload, vertices);
 }
 
-// The least time that each point took in kPasses passes, ascending; includes reading the clock
-// once, some 20 to 30 ns.
+// Returns the minimum time of each point over kPasses passes, ascending. Includes one clock read,
+// some 20 to 30 ns.
 template <typename Stream>
 std::vector<double> SortedLatencies(const std::vector<Vector>& points) {
   using Clock = std::chrono::steady_clock;
@@ -192,7 +192,7 @@ void RegisterBuilds() {
         "mesh:spot.obj", "scan:134345", "lattice:50"}) {
     const auto workload = std::make_shared<Workload>(name);
     Add("build", "hulld", BuildByHulld, workload);
-    // What takes many seconds is measured once.
+    // Benchmarks of many seconds run one time.
     const int repetitions = workload->name() == "sphere:1000000" ? 1 : 3;
     Add("build", "qhull", BuildByQhull, workload)->Repetitions(repetitions);
     Add("build", "cgal", BuildByCgal, workload)->Repetitions(repetitions);

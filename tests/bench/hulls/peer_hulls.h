@@ -8,15 +8,15 @@
 
 namespace hulld::bench {
 
-// The hulls of peer libraries, with the options their users choose for speed. Each returns the
-// number of vertices of its hull. Copying the points into the peer's own type is not timed: it
+// Hulls of peer libraries, with the options that their users choose for speed. Each returns the
+// number of vertices of its hull. Conversion of the points to the peer's own type is not timed: it
 // happens before.
 
-// qhull, option Qt, on 3 doubles per point. Doubles, merges coplanar facets: inexact.
+// qhull, option Qt, on 3 doubles per point. Uses doubles and merges coplanar facets: inexact.
 size_t QhullVertices(std::vector<double>& coordinates);
 
-// CGAL convex_hull_3 with exact predicates and inexact constructions: exact up to points within
-// facets, which it may keep.
+// CGAL convex_hull_3 with exact predicates and inexact constructions: exact except for points
+// within facets, which it may keep.
 class CgalPoints {
  public:
   explicit CgalPoints(const std::vector<Vector>& points);
@@ -30,8 +30,8 @@ class CgalPoints {
   Data* data_;
 };
 
-// CGAL's Delaunay_triangulation_3 with fast location: what CGAL's manual recommends for hulls of
-// points that come and go. Its hull is what is next to the infinite vertex; exact as above. (qhull
+// CGAL's Delaunay_triangulation_3 with fast location, recommended by CGAL's manual for hulls of
+// dynamic points. Its hull consists of the neighbors of the infinite vertex; exact as above. (qhull
 // has no supported way to add points to a hull.)
 class CgalStream {
  public:

@@ -1,10 +1,10 @@
 #!/bin/bash
-# Draws hull_cost_MACHINE.csv of tests/bench/results/ as hull_cost_MACHINE.svg, with gnuplot: the
+# Plots hull_cost_MACHINE.csv of tests/bench/results/ as hull_cost_MACHINE.svg, with gnuplot: the
 # time of a whole hull against the number of points, for a ball and a sphere.
 #
 #   bash tests/bench/hulls/plot_hull_cost.sh [MACHINE] [png]
 #
-# With `png`, draws a PNG beside it instead, to look at.
+# With `png`, writes a PNG for viewing instead, in the same folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../results"
 
@@ -19,7 +19,7 @@ case $format in
     ;;
 esac
 
-# points and milliseconds of one shape and library, by the names of the columns.
+# Prints points and milliseconds of a shape and library, by the names of the columns.
 series() {
   awk -F, -v shape="$1:" -v library="$2" '
     NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }

@@ -5,8 +5,8 @@
 #
 # MACHINE names the files, as in hull_build_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
 # default. SUITEs are build, snapshot, stream, cost and extremes; all by default, which takes some
-# minutes. Needs what docker/packages.txt lists under [build], [test] and [bench]. Nothing else
-# should run on the machine meanwhile.
+# minutes. Requires the packages in docker/packages.txt under [build], [test] and [bench], and an
+# otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -23,7 +23,7 @@ cmake --build --preset release --target hull_benchmark extreme_benchmark
 for suite in "${suites[@]}"; do
   out=$results/hull_${suite}_$machine.csv
   case $suite in
-    # In turn with their peers, against drifts of the machine's speed.
+    # Alternates with peers, so that machine drift affects all alike.
     build | snapshot | stream | cost)
       "$programs/hull_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
         --benchmark_enable_random_interleaving=true

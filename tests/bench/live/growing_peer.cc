@@ -28,7 +28,7 @@ class BulletHull : public GrowingPeer {
     shape_.setMargin(0);
   }
 
-  // The box is not brought up to date, as neither GJK looks at it.
+  // Does not update the box, which neither GJK uses.
   void Add(const Vector& point) override { shape_.addPoint(ToBullet(point), false); }
 
   void UpdateBox() override { shape_.recalcLocalAabb(); }

@@ -9,20 +9,20 @@
 
 namespace hulld::bench {
 
-// Bullet's hull of points, to which more are added: it keeps all of them and scans them.
+// Bullet's hull of a growing set of points: it keeps and scans all of them.
 class GrowingPeer {
  public:
   virtual ~GrowingPeer() = default;
   virtual void Add(const Vector& point) = 0;
-  // Brings its bounding box up to date, which no question needs.
+  // Updates its bounding box, which no query needs.
   virtual void UpdateBox() = 0;
-  // Whether it collides with another, at the pose X_AB of that: by btGjkEpaSolver2, and by
+  // Returns true if it collides with another hull at pose X_AB: by btGjkEpaSolver2, and by
   // btGjkPairDetector.
   virtual bool CollidesBySolver(const GrowingPeer& other, const Pose& X_AB) const = 0;
   virtual bool CollidesByDetector(const GrowingPeer& other, const Pose& X_AB) const = 0;
 };
 
-// Null where Bullet is not installed.
+// Returns null if Bullet is not installed.
 std::unique_ptr<GrowingPeer> MakeGrowingPeer(std::span<const Vector> points);
 
 }  // namespace hulld::bench

@@ -1,16 +1,15 @@
-// What a step of a growing hull costs: some points are added, then some questions are asked, of
-// hulld and of Bullet.
+// Cost of a step of a growing hull, of hulld and of Bullet: some points are added, then some
+// queries run.
 //
 //   live_benchmark [MOST_VERTICES [SECONDS]]
 //
-// with_box_us: the median of a step that also keeps the bounding box up to date; hulld's does so
-// anyway, Bullet's by addPoint's default. One row of CSV per workload, number of vertices and
-// library. Both take the same points and the same questions, in turn, step by step; a turn of
-// Bullet that would take all the time is left out of most steps. hulld prepares what questions paid
-// for on a thread of its own, as the server does. Bullet takes a point into its list of points and
-// builds nothing; of its two GJKs the faster one counts. The probe is a hull of 64 vertices near
-// contact: its distance from touching, if the hull were a sphere, is up to a tenth of the radius on
-// either side.
+// with_box_us: the median of a step that also updates the bounding box; hulld always does, Bullet
+// by addPoint's default. One row of CSV per workload, number of vertices, and library. Both process
+// the same points and queries alternately, step by step; a Bullet turn that would take all the time
+// is omitted from most steps. hulld prepares in the background when queries have paid for it, as
+// the server does. Bullet appends a point to its list and builds nothing; the faster of its two
+// GJKs counts. The probe is a hull of 64 vertices near contact: its distance from touching, if the
+// hull were a sphere, is up to a tenth of the radius in either direction.
 
 #include <algorithm>
 #include <atomic>
@@ -45,7 +44,7 @@ struct Workload {
   int points;
   int questions;
   bool inside = false;
-  // Each step begins with the points alone, as when a hull was read from disk.
+  // Each step begins with the points alone, like a hull read from disk.
   bool cold = false;
 };
 constexpr Workload kWorkloads[] = {
@@ -64,7 +63,7 @@ double Microseconds(Clock::duration time) {
   return std::chrono::duration<double, std::micro>(time).count();
 }
 
-// The quantile of values, which are reordered.
+// Returns the quantile of values, which are reordered.
 double Quantile(std::vector<double>& values, double quantile) {
   if (values.empty()) return 0;
   const auto at = values.begin() + static_cast<ptrdiff_t>(quantile * (values.size() - 1));
@@ -144,7 +143,7 @@ class Run {
     HullBuilder start;
     HULLD_CHECK(start.Add(points).ok());
     const auto begin = Clock::now();
-    // The hull stays about as large as it was: it starts anew when it has grown by a half.
+    // The hull keeps its approximate size: it restarts after it has grown by a half.
     const int most_steps = std::max(1, vertices_ / 2 / std::max(1, workload_.points));
     do {
       if (workload_.cold) {
@@ -199,7 +198,7 @@ class Run {
     Pose pose;
     pose.q = random_.Rotation();
     pose.t = OnSphere(1 + kProbeRadius + random_.Between(-0.1, 0.1));
-    // To take in the points is a part of the peer's step.
+    // Adding the points is a part of the peer's step.
     const std::unique_ptr<GrowingPeer> peer = MakeGrowingPeer({});
     const int peer_colliding = peer == nullptr ? 0 : StepPeer(*peer, points, {pose});
     const auto start = Clock::now();

@@ -1,10 +1,10 @@
 #!/bin/bash
-# Draws query_live_MACHINE.csv of tests/bench/results/ as query_live_MACHINE.svg, with gnuplot: the
-# time of a step of a growing hull, one point and one question, against its size.
+# Plots query_live_MACHINE.csv of tests/bench/results/ as query_live_MACHINE.svg, with gnuplot: the
+# time of a step of a growing hull, one point and one query, against its size.
 #
 #   bash tests/bench/live/plot_live.sh [MACHINE] [png]
 #
-# With `png`, draws a PNG beside it instead, to look at.
+# With `png`, writes a PNG for viewing instead, in the same folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../results"
 
@@ -19,7 +19,7 @@ case $format in
     ;;
 esac
 
-# Vertices and microseconds of one library: its rows of one workload, and a column.
+# Prints vertices and microseconds of a library: a column of its rows of a workload.
 series() {
   sed -n 's/^"1 point, 1 question",/"1",/p' "$rows" |
     awk -F, -v library="$1" -v column="$2" '$2 == library { print $3, $column }'

@@ -13,7 +13,7 @@ constexpr uint32_t kText = 25;
 constexpr uint64_t kMostFollowed = 1 << 17;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
 
-// As those of hulld's sessions (server/store/postgres).
+// Same as in hulld's sessions (server/store/postgres).
 constexpr char kPrepare[] = R"(
   SET search_path = '';
   SET enable_seqscan = off;
@@ -66,7 +66,7 @@ std::string BigEndian(uint64_t number, int bytes) {
 
 std::string Bigint(uint64_t number) { return BigEndian(number, 8); }
 
-// An array of one element, in PostgreSQL's binary format.
+// Returns a single-element array, in PostgreSQL's binary format.
 std::string Array(uint32_t type, std::string_view element) {
   std::string text;
   for (const uint32_t field : {1U, 0U, type, 1U, 1U, static_cast<uint32_t>(element.size())}) {
@@ -141,7 +141,7 @@ void LibpqFloor::Ask(const std::vector<Statement>& statements) {
     }
     const std::vector<int> formats(values.size(), kBinary);
     const int count = static_cast<int>(values.size());
-    // Those without parameters are no prepared ones, as in hulld.
+    // Statements without parameters are not prepared, as in hulld.
     const bool is_text =
         std::string_view(statement.name) == "BEGIN" || std::string_view(statement.name) == "COMMIT";
     const int sent = is_text ? PQsendQueryParams(connection, statement.name, 0, nullptr, nullptr,

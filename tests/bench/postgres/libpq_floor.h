@@ -10,18 +10,18 @@
 
 namespace hulld::bench {
 
-// What libpq and PostgreSQL alone take for what hulld asks of them: the same prepared statements
-// with parameters of the same bytes, in the same pipelines, one after the other.
+// The cost of libpq and PostgreSQL alone for hulld's requests: the same prepared statements with
+// parameters of the same bytes, in the same pipelines, in sequence.
 class LibpqFloor {
  public:
-  // conninfo: a database in which a hulld kept `hull_id`, whose rows it repeats, and which no hulld
-  // has open. shared: that hulld was one of many (--postgres-servers many). Ends the program,
-  // saying why, when anything fails.
+  // conninfo: a database where a hulld stored `hull_id`. It repeats the rows of that hull; no hulld
+  // may have the database open. shared: that hulld was one of many (--postgres-servers many). Ends
+  // the program with a message on any failure.
   LibpqFloor(const std::string& conninfo, const std::string& hull_id, bool shared);
 
-  // Commits what a chunk of one point changes. Cost: one round trip, or two where it is shared.
+  // Commits the changes of a single-point chunk. Cost: one round trip, or two if shared.
   void Commit();
-  // The read index: what others committed. Requires that it is shared. Cost: one round trip.
+  // Read index: fetches the commits of peer servers. Requires: shared. Cost: one round trip.
   void Follow();
 
  private:
@@ -50,8 +50,8 @@ class LibpqFloor {
   std::string delta_;
 };
 
-// Runs one statement as a role that may make databases, and returns the first column of its first
-// row, or nothing.
+// Runs one statement as a role that may create databases. Returns the first column of its first
+// row, or empty.
 std::string AskDatabase(const std::string& conninfo, const std::string& statement);
 
 }  // namespace hulld::bench

@@ -1,20 +1,20 @@
-// hulld over PostgreSQL beside hulld over RocksDB, beside libpq alone and beside gRPC alone: in
-// alternation, in one run, so that a drift of the machine's speed reaches all of them.
+// hulld over PostgreSQL compared with hulld over RocksDB, libpq alone, and gRPC alone. They
+// alternate within one run, so that machine drift affects all of them.
 //
 //   postgres_benchmark SUITE --database CONNINFO --folder FOLDER [--out FILE.csv] [--seconds S]
 //                      [--clients N] [--hulls N] [--from N] [--hulld PROGRAM]
 //
-//   commit     chunks of one point, one after the other
+//   commit     single-point chunks, in sequence
 //   questions  CheckCollision, LINEARIZABLE and BOUNDED, by N clients
-//   bounded    the same, BOUNDED alone, in short turns: processor time, beside a second RocksDB,
-//              which tells how far two servers differ that are the same
+//   bounded    as questions, BOUNDED only, in short turns: processor time, with a second RocksDB
+//              server that shows the difference between two identical servers
 //   ingest     points of a ball into one hull
 //   fill       makes hulls FROM to N of 64 vertices in the database "bench_start"; prints the rate
-//   start      starts five times over what fill made
-//   cold       questions about pairs of it that are not in memory
+//   start      starts five times over the hulls of fill
+//   cold       queries about pairs of them that are not in memory
 //
-// CONNINFO: of a role that may make databases, of a server that trusts it. FOLDER: where RocksDB
-// keeps its hulls, and what servers read. `cpu_us`: processor time of the server for one request;
+// CONNINFO: of a role that may create databases, on a server that trusts it. FOLDER: for RocksDB's
+// hulls and the files that servers read. `cpu_us`: processor time of the server per request;
 // `database_cpu_us`: that of all processes of PostgreSQL, in steps of 10 ms.
 
 #include <functional>

@@ -25,7 +25,7 @@
 namespace hulld::bench {
 namespace {
 
-// One client: its connection, and the questions that it asks in turn.
+// One client: its connection, and the queries that it cycles through.
 struct Asker {
   std::unique_ptr<v1::CollisionService::Stub> stub;
   std::vector<v1::CheckCollisionRequest> requests;
@@ -77,10 +77,10 @@ Askers MakeAskers(const Arguments& arguments, const ChildServer& server, bool bo
   return askers;
 }
 
-// Microseconds.
+// Returns microseconds.
 double Ask(Asker& asker, const v1::CheckCollisionRequest& request) {
   grpc::ClientContext context;
-  // Many connect at once.
+  // Many connect concurrently.
   context.set_wait_for_ready(true);
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
   v1::CheckCollisionResponse response;
@@ -89,7 +89,7 @@ double Ask(Asker& asker, const v1::CheckCollisionRequest& request) {
   return 1e6 * Since(start);
 }
 
-// Runs `ask` of each asker on a thread of its own; what all of them return.
+// Runs `ask` for each asker on a separate thread; returns all results.
 std::vector<double> OnThreads(size_t askers,
                               const std::function<std::vector<double>(size_t)>& ask) {
   std::vector<std::vector<double>> taken(askers);
@@ -103,7 +103,7 @@ std::vector<double> OnThreads(size_t askers,
   return all;
 }
 
-// All askers at once, for a while.
+// Runs all askers concurrently, for a while.
 std::vector<double> AskAll(Askers& askers, double seconds) {
   const Clock::time_point begin = Clock::now();
   return OnThreads(askers.size(), [&](size_t i) {
@@ -116,7 +116,7 @@ std::vector<double> AskAll(Askers& askers, double seconds) {
   });
 }
 
-// Askers that have asked for a while already; they ask for this many seconds in each round.
+// Askers are warmed up; each round takes this many seconds.
 Subject MakeSubject(const Arguments& arguments, const std::string& name, const ChildServer& server,
                     bool bounded, double seconds) {
   const auto askers = std::make_shared<Askers>(MakeAskers(arguments, server, bounded));
@@ -132,7 +132,7 @@ void MeasureQuestions(const Arguments& arguments) {
   std::vector<std::unique_ptr<ChildServer>> servers;
   std::vector<Subject> subjects;
   std::map<std::string, std::string> peer_of;
-  for (const std::string kind : {"rocksdb", "one", "many", "shard", "gRPC alone"}) {
+  for (const std::string kind : {"rocksdb", "one", "many", "gRPC alone"}) {
     const bool is_floor = kind == "gRPC alone";
     servers.push_back(is_floor ? stores.StartFloor() : stores.StartEmpty(kind));
     const ChildServer& server = *servers.back();
@@ -167,7 +167,7 @@ void MeasureBounded(const Arguments& arguments) {
   std::vector<std::unique_ptr<ChildServer>> servers;
   std::vector<Subject> subjects;
   std::map<std::string, std::string> peer_of;
-  for (const std::string name : {"rocksdb", "rocksdb again", "one", "many", "shard"}) {
+  for (const std::string name : {"rocksdb", "rocksdb again", "one", "many"}) {
     servers.push_back(name == "rocksdb again" ? stores.StartEmpty("rocksdb", "bench_again")
                                               : stores.StartEmpty(name));
     MakeQuestionHulls(*servers.back());
@@ -187,7 +187,7 @@ void MeasureCold(const Arguments& arguments) {
   std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
   const std::unique_ptr<ChildServer> server = stores.Start("many", kStartDatabase);
   Askers askers = MakeAskers(arguments, *server, true);
-  // Each asker takes pairs of its own; none comes twice.
+  // Each asker has its own pairs; none is repeated.
   const auto ask = [&](size_t i) {
     const Clock::time_point begin = Clock::now();
     Asker& asker = askers[i];

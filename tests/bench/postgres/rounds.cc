@@ -34,7 +34,7 @@ void RunOnce(Subject& subject) {
   if (subject.server != nullptr) {
     subject.cpu_us.push_back(1e6 * (subject.server->ProcessorSeconds() - used) / count);
   }
-  // Less than nothing where a process of PostgreSQL ended meanwhile.
+  // Negative if a process of PostgreSQL ended during the run.
   const double used_there = DatabaseSeconds() - database;
   if (used_there >= 0) subject.database_cpu_us.push_back(1e6 * used_there / count);
   subject.rate.push_back(count / passed);
@@ -44,7 +44,7 @@ void RunOnce(Subject& subject) {
   subject.p99.push_back(Percentile(taken, 0.99));
 }
 
-// Median of the ratios within each round.
+// Returns the median of the ratios within each round.
 double MedianRatio(const std::vector<double>& values, const std::vector<double>& peers) {
   std::vector<double> ratios;
   for (size_t i = 0; i < std::min(values.size(), peers.size()); ++i) {
@@ -87,7 +87,7 @@ double DatabaseSeconds() {
     if (stat.find("(postgres)") == std::string::npos) continue;
     std::istringstream fields(stat.substr(stat.rfind(')') + 1));
     std::vector<std::string> field{std::istream_iterator<std::string>(fields), {}};
-    // From state, the third, on: utime, stime and those of children that were waited for.
+    // Counting from the third field, state: utime, stime, and the times of waited-for children.
     for (const int i : {11, 12, 13, 14}) ticks += std::atof(field[i].c_str());
   }
   return ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
@@ -107,7 +107,7 @@ void RunRounds(std::vector<Subject>& subjects, double seconds) {
   const Clock::time_point start = Clock::now();
   for (size_t round = 0; Since(start) < seconds; ++round) {
     for (size_t i = 0; i < subjects.size(); ++i) {
-      // Not always after the same one.
+      // Alternates the order.
       RunOnce(subjects[round % 2 == 0 ? i : subjects.size() - 1 - i]);
     }
   }

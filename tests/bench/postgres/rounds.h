@@ -11,31 +11,31 @@
 #include "tests/bench/postgres/suites.h"
 #include "tests/bench/service/child_server.h"
 
-// Measuring several programs in turn, and the rows that tell of it.
+// Alternating measurement of several programs, and its output rows.
 namespace hulld::bench {
 
 using Clock = std::chrono::steady_clock;
 
-// Ends the program, saying why.
+// Ends the program with a message.
 [[noreturn]] void Fail(const std::string& what);
 
-// Seconds.
+// Returns seconds.
 double Since(Clock::time_point start);
-// 0 of nothing.
+// 0 for empty input.
 double Median(std::vector<double> values);
 double Mean(const std::vector<double>& values);
 
-// Processor time of all programs called postgres, those that have ended included, in seconds; in
+// Returns the processor time of all programs named postgres, including ended ones, in seconds; in
 // steps of 10 ms.
 double DatabaseSeconds();
 
-// What is measured in turn: by name, with the server whose processor time counts, if any.
+// A measured subject: its name, and the server with the processor time to report, if any.
 struct Subject {
   std::string name;
   const ChildServer* server = nullptr;
-  // Takes a while; the microseconds of each request.
+  // Runs for a while; returns the microseconds of each request.
   std::function<std::vector<double>()> run;
-  // One of each round.
+  // One value per round.
   std::vector<double> p50 = {}, p99 = {}, rate = {}, cpu_us = {}, database_cpu_us = {};
   std::vector<double> all = {};
 };
@@ -43,30 +43,30 @@ struct Subject {
 // Runs `once` this many times; returns the microseconds of each.
 std::vector<double> Timed(int times, const std::function<void()>& once);
 
-// Rounds in which each is run once, until this time has passed.
+// Runs rounds, with one run of each subject, until this time has passed.
 void RunRounds(std::vector<Subject>& subjects, double seconds);
 
-// Rows of a CSV on the standard output, or in a file if a path is given. Each line ends with the
-// load, the compiler and the CPU.
+// Rows of a CSV on standard output, or in a file if a path is given. Each line ends with the load,
+// the compiler, and the CPU.
 class Rows {
  public:
-  // kAppend: after what the file holds, whose header stays.
+  // kAppend: appends to the file and keeps its header.
   enum class Mode { kWrite, kAppend };
 
-  // header: names the columns before those. Ends the program where the file cannot be written.
+  // header: names the preceding columns. Ends the program if the file is not writable.
   Rows(const std::string& path, const char* header, Mode mode = Mode::kWrite);
   Rows(const Rows&) = delete;
   Rows& operator=(const Rows&) = delete;
   ~Rows();
 
-  // Without the columns that each line ends with.
+  // Excludes the columns that each line ends with.
   void Add(const std::string& row);
 
  private:
   std::FILE* out_ = stdout;
 };
 
-// A row for each subject. peer_of: the one that a subject is compared with.
+// Writes a row for each subject. peer_of: the subject to compare with.
 void Report(const Arguments& arguments, std::vector<Subject>& subjects,
             const std::map<std::string, std::string>& peer_of);
 

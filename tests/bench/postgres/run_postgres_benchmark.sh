@@ -1,20 +1,20 @@
 #!/bin/bash
-# Measures hulld over PostgreSQL, beside RocksDB, libpq alone and gRPC alone, and keeps the rows in
-# tests/bench/results/postgres/.
+# Measures hulld over PostgreSQL, compared with RocksDB, libpq alone, and gRPC alone, and keeps the
+# rows in tests/bench/results/postgres/.
 #
 #   bash tests/bench/postgres/run_postgres_benchmark.sh [MACHINE] [SUITE...]
 #
-# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill makes as
-# many hulls as HULLS says, 1000000 by default, in pieces of SECONDS_EACH; start and cold ask what
-# it made last, also in an earlier run: "start cold" alone measures another program over the same.
+# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill makes
+# HULLS hulls, 1000000 by default, in parts of SECONDS_EACH; start and cold use its last result,
+# also of an earlier run: "start cold" alone measures another program over the same hulls.
 #
-# Starts a PostgreSQL of its own in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
-# synchronous_commit on, and ends it; what is there is used again. As root it runs as the user
-# postgres. MACHINE names the files, as in commit_MACHINE.csv; epyc_gcc12 by default. HULLD: a program
-# to measure in the place of the one that is built here. UNDER: a command that each measurement is run
-# under, such as one that waits for quiet. SECONDS_EACH (60) for each suite. Needs what
-# docker/packages.txt lists under [build], [bench] and [test]. Client, servers and database share the
-# machine.
+# Starts a PostgreSQL in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
+# synchronous_commit on, and stops it; existing data is reused. Under root it runs as the user
+# postgres. MACHINE names the files, as in commit_MACHINE.csv; epyc_gcc12 by default. HULLD: a
+# program to measure instead of the one built here. UNDER: a command that wraps each measurement,
+# such as one that waits for an idle machine. SECONDS_EACH (60) for each suite. Requires the
+# packages in docker/packages.txt under [build], [bench] and [test]. Client, servers and database
+# share the machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -25,7 +25,7 @@ suites=("$@")
 folder=${FOLDER:-/tmp/hulld-bench-postgres}
 results=tests/bench/results/postgres
 hulls=${HULLS:-1000000}
-# Threads that wait leave the core to those that work, also where other programs run.
+# Waiting threads yield the core to working ones, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 if [[ -z ${BENCHMARK:-} ]]; then
@@ -40,7 +40,7 @@ mkdir -p "$folder"
 chmod 755 "$folder"
 ((EUID != 0)) || chown postgres "$folder"
 if [[ ! -e $folder/data/PG_VERSION ]]; then
-  # Nobody else reaches the socket.
+  # No other user can reach the socket.
   as_server "$programs/initdb" -D "$folder/data" -U postgres --auth=trust --locale=C --encoding=UTF8 >/dev/null
 fi
 as_server "$programs/pg_ctl" -D "$folder/data" -w -l "$folder/log" start >/dev/null -o "-k $folder \

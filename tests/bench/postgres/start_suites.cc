@@ -24,7 +24,7 @@ namespace hulld::bench {
 std::string StartHull(int i) { return "start/" + std::to_string(i); }
 
 void Fill(const Arguments& arguments) {
-  // So that the store commits many hulls at once.
+  // Many, so that the store commits many hulls together.
   constexpr int kWriters = 64;
   const Stores stores(arguments);
   if (arguments.from == 0) stores.Make(kStartDatabase);

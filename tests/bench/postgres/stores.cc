@@ -42,14 +42,7 @@ std::unique_ptr<ChildServer> Stores::Start(const std::string& kind, const std::s
   const std::string conninfo = arguments_.folder + "/" + name + ".conninfo";
   std::ofstream(conninfo) << Conninfo(name) << "\n";
   chmod(conninfo.c_str(), 0600);
-  add({"--store", "postgres", "--postgres-servers", kind == "one" ? "one" : "many"});
-  if (kind == "shard") {
-    const std::string shards = arguments_.folder + "/" + name + ".shards";
-    std::ofstream(shards) << "0-1023 " << conninfo << "\n";
-    add({"--postgres-shards", shards});
-  } else {
-    add({"--postgres-conninfo-file", conninfo});
-  }
+  add({"--store", "postgres", "--postgres-servers", kind, "--postgres-conninfo-file", conninfo});
   return std::make_unique<ChildServer>(command);
 }
 

@@ -10,32 +10,31 @@
 
 namespace hulld::bench {
 
-// Where chunks of one point go.
+// The hull that receives single-point chunks.
 constexpr char kGrowingHull[] = "commit/hull";
 
-// The databases of this run, and how hulld is started over them.
+// The databases of this run, and the start of hulld over them.
 class Stores {
  public:
-  // arguments: outlives this.
+  // arguments: must outlive this.
   explicit Stores(const Arguments& arguments);
 
   std::string Conninfo(const std::string& database) const;
-  // An empty one.
+  // Creates an empty database.
   void Make(const std::string& database) const;
 
-  // kind: rocksdb, one, many or shard; the last is many, in a file of one shard. name: the name of
-  // the database or directory.
+  // kind: rocksdb, one or many. name: the name of the database or directory.
   std::unique_ptr<ChildServer> Start(const std::string& kind, const std::string& name) const;
-  // The same, over nothing.
+  // As Start, over an empty store.
   std::unique_ptr<ChildServer> StartEmpty(const std::string& kind, const std::string& name) const;
   std::unique_ptr<ChildServer> StartEmpty(const std::string& kind) const {
     return StartEmpty(kind, "bench_" + kind);
   }
-  // gRPC alone.
+  // Starts gRPC alone.
   std::unique_ptr<ChildServer> StartFloor() const;
 
-  // libpq alone, repeating what a hulld of this kind left in a database that is made for it: a
-  // hull with a writer of chunks of one point.
+  // Returns libpq alone, over a new database that a hulld of this kind filled with a hull with a
+  // writer of single-point chunks.
   std::unique_ptr<LibpqFloor> MakeLibpqFloor(const std::string& kind,
                                              const std::string& database) const;
 

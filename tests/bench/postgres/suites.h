@@ -5,7 +5,7 @@
 
 namespace hulld::bench {
 
-// What the command line says (postgres_benchmark.cc).
+// Command-line arguments (postgres_benchmark.cc).
 struct Arguments {
   std::string database;
   std::string folder;
@@ -19,7 +19,7 @@ struct Arguments {
 
 // Vertices of each hull.
 constexpr int kVertices = 64;
-// What Fill makes, and the suites after it use.
+// The database that Fill makes and later suites use.
 constexpr char kStartDatabase[] = "bench_start";
 std::string StartHull(int i);
 
@@ -27,7 +27,7 @@ std::string StartHull(int i);
 void MeasureCommits(const Arguments& arguments);
 void MeasureIngest(const Arguments& arguments);
 
-// Questions (question_suites.cc).
+// Queries (question_suites.cc).
 void MeasureQuestions(const Arguments& arguments);
 void MeasureBounded(const Arguments& arguments);
 void MeasureCold(const Arguments& arguments);

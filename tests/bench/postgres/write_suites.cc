@@ -21,7 +21,7 @@
 namespace hulld::bench {
 namespace {
 
-// Points in a ball of radius 1, in chunks of about 1 MiB.
+// Returns points in a ball of radius 1, in chunks of about 1 MiB.
 std::vector<v1::AppendPointsRequest> MakeBall(int points) {
   constexpr int kPointsPerChunk = (1 << 20) / 24;
   std::mt19937_64 random(1);
@@ -38,7 +38,7 @@ std::vector<v1::AppendPointsRequest> MakeBall(int points) {
   return chunks;
 }
 
-// Sends into a hull of its own, which does not exist before.
+// Sends the chunks into a new hull.
 void SendAll(v1::HullService::Stub& stub, const std::string& hull_id,
              const std::vector<v1::AppendPointsRequest>& chunks) {
   grpc::ClientContext context;
@@ -86,10 +86,9 @@ void MeasureCommits(const Arguments& arguments) {
     add("libpq as " + kind, nullptr, [floor = floors.back().get()] { floor->Commit(); });
     add_server(kind, stores.StartEmpty(kind));
   }
-  add_server("shard", stores.StartEmpty("shard"));
   add_server("rocksdb", stores.StartEmpty("rocksdb"));
   add_server("gRPC alone", stores.StartFloor());
-  // Both floors, one after the other: what a commit over the network cannot go below.
+  // Both floors, in sequence: the minimum cost of a commit over the network.
   GrowingWriter* const network = writers.back().get();
   for (const std::string kind : {"one", "many"}) {
     LibpqFloor* const floor = floors[kind == "one" ? 0 : 1].get();
@@ -102,7 +101,6 @@ void MeasureCommits(const Arguments& arguments) {
   Report(arguments, subjects,
          {{"one", "libpq as one"},
           {"many", "libpq as many"},
-          {"shard", "many"},
           {"gRPC and libpq as one", "libpq as one"},
           {"gRPC and libpq as many", "libpq as many"}});
 }
@@ -113,14 +111,14 @@ void MeasureIngest(const Arguments& arguments) {
   const Stores stores(arguments);
   std::vector<std::unique_ptr<ChildServer>> servers;
   std::vector<Subject> subjects;
-  for (const std::string kind : {"rocksdb", "one", "many", "shard"}) {
+  for (const std::string kind : {"rocksdb", "one", "many"}) {
     servers.push_back(stores.StartEmpty(kind));
     const std::shared_ptr<v1::HullService::Stub> stub =
         v1::HullService::NewStub(ConnectAlone(servers.back()->address()));
     const auto run = [&chunks, stub, round = 0]() mutable {
       const Clock::time_point start = Clock::now();
       SendAll(*stub, "ingest/" + std::to_string(++round), chunks);
-      // For each point, in the place of each request.
+      // Reports time per point instead of per request.
       return std::vector<double>(1, 1e6 * Since(start) / kPoints);
     };
     subjects.push_back({.name = kind, .server = servers.back().get(), .run = run});

@@ -80,7 +80,7 @@ constexpr std::pair<Family, const char*> kFamilies[] = {
     {Family::kNeedles, "needles"},   {Family::kPlates, "plates"},
     {Family::kPolygons, "polygons"}, {Family::kNearlyParallel, "nearly parallel"}};
 
-// Two long boxes on edge, crossed, their edges an angle of 1e-12 to 1e-3 apart.
+// Two long crossed boxes, edge against edge, at an angle of 1e-12 to 1e-3.
 Pair NearlyParallel(Random& random) {
   const double angle = std::pow(10.0, -random.Between(3, 12));
   const Vector half(1, 0.1, 0.1);
@@ -116,7 +116,7 @@ Pair MakePair(Family family, Random& random) {
   if (family == Family::kNearlyParallel) return NearlyParallel(random);
   Pair pair = {Rotated(shape(), random.Rotation()), Rotated(shape(), random.Rotation()),
                random.UnitVector()};
-  // Polygons meet each other or solids; solids of a kind each other.
+  // Polygons meet polygons or solids; solids meet solids of the same kind.
   if (family == Family::kPolygons && random.Below(2) == 0) {
     pair.b = Rotated(Ellipsoid(random, 8), random.Rotation());
   }
@@ -135,7 +135,7 @@ class Maker {
  public:
   explicit Maker(size_t stride) : stride_(stride) {}
 
-  // Two hulls `gap` apart along the pair's direction from contact, relative to their size.
+  // Adds two hulls `gap` apart along the pair's direction from contact, relative to their size.
   void AddNearContact(const char* family, const Pair& pair, double gap, const Setting& setting,
                       Random& random) {
     const Vector offset = setting.offset * random.UnitVector();
@@ -167,8 +167,9 @@ class Maker {
     Add(X_WA, at(separated + gap * reach), std::string(family) + ", " + setting.name);
   }
 
-  // Boxes with corners on a lattice, moved so that they touch: facet to facet, edge to edge, corner
-  // to corner (features 1, 2 or 3 of the axes in contact), or a corner of a turned box to a facet.
+  // Adds boxes with corners on a lattice, moved so that they touch: facet to facet, edge to edge,
+  // corner to corner (features 1, 2 or 3 of the axes in contact), or a corner of a rotated box to a
+  // facet.
   void AddContact(Random& random) {
     const auto whole = [&](size_t most) { return static_cast<double>(1 + random.Below(most)); };
     const Vector half_a(whole(64), whole(64), whole(64));
@@ -183,7 +184,7 @@ class Maker {
       move[axis] = std::floor(random.Between(-reach, reach));
     }
     const double size = std::exp2(std::floor(random.Between(-20, 20)));
-    // Turned alike: permuted axes keep every coordinate a double.
+    // Equal rotations: permuted axes keep every coordinate a double.
     const size_t turn = random.Below(3);
     const auto turned = [&](const Vector& p) {
       return Vector(size * Vector(p[turn], p[(turn + 1) % 3], p[(turn + 2) % 3]));

@@ -10,22 +10,22 @@
 
 namespace hulld::bench {
 
-// Questions that are hard to answer rightly, 4640 of them. Small hulls, 4 to 32 vertices:
-// ellipsoids, boxes, prisms, needles, plates, polygons, boxes whose edges are nearly parallel; at
-// contact as near as doubles come, and from 1e-3 down to 1e-15 of their size apart or deep; at
-// sizes of 1e-6, 1 and 1e6, and at 1e6 times their size from the origin. Those of the kind
-// "contact" touch exactly: a vertex, edge or facet meets another.
+// 4640 difficult queries on small hulls of 4 to 32 vertices: ellipsoids, boxes, prisms, needles,
+// plates, polygons, and boxes with nearly parallel edges; at contact as near as doubles allow, and
+// from 1e-3 down to 1e-15 of their size apart or deep; at sizes of 1e-6, 1 and 1e6, and at 1e6
+// times their size from the origin. Queries of the kind "contact" touch exactly: a vertex, edge or
+// facet meets another.
 //
-// Every library receives the same geometry: rotations are rounded into the points, and a pose is a
-// translation, exact as it stands.
+// Every library receives the same geometry: rotations are rounded into the points, and a pose is an
+// exact translation.
 struct AccuracySuite {
   std::deque<Hull> hulls;
   std::vector<QuerySet::Query> queries;
-  // Parallel to queries: what each is about.
+  // Parallel to queries: the kind of each.
   std::vector<std::string> kinds;
 };
 
-// Fixed seeds: the same suite each time. `stride`: every stride-th question alone.
+// Fixed seeds: the same suite each time. `stride`: only every stride-th query.
 AccuracySuite MakeAccuracySuite(size_t stride = 1);
 
 }  // namespace hulld::bench

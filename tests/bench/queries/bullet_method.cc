@@ -8,7 +8,7 @@ namespace {
 
 btVector3 ToBullet(const Vector& v) { return {v.x(), v.y(), v.z()}; }
 
-// Built for double precision, without margin: as exact as Bullet gets.
+// Built for double precision, without margin: Bullet's most exact configuration.
 struct Bullet {
   using Shape = btConvexHullShape;
   struct Placed {
@@ -31,7 +31,8 @@ struct Bullet {
     return {&shape, btTransform(basis, ToBullet(X_WA.t))};
   }
 
-  // Its GJK alone; what it fails to separate counts as colliding, as in Bullet's own detector.
+  // Uses its GJK alone; hulls that it fails to separate count as colliding, as in Bullet's own
+  // detector.
   Verdict Ask(const Placed& a, const Placed& b) {
     btGjkEpaSolver2::sResults results;
     const bool apart = btGjkEpaSolver2::Distance(a.shape, a.X, b.shape, b.X,

@@ -8,8 +8,8 @@
 
 namespace hulld::bench {
 
-// What hulls do over the reals, by tests/oracle, which shares no code with core. Cost: about a
-// millisecond for 8 vertices, much more for hundreds.
+// Returns the relation over the reals, by tests/oracle, which shares no code with core. Cost: about
+// a millisecond for 8 vertices, much more for hundreds.
 inline oracle::Relation OracleRelation(const std::deque<Hull>& hulls,
                                        const QuerySet::Query& query) {
   const auto points = [](const Hull& hull) {

@@ -7,7 +7,7 @@
 namespace hulld::bench {
 namespace {
 
-// Solver is asked directly: that spares the dispatch of fcl::collide and its bounding boxes.
+// Calls Solver directly, without the dispatch of fcl::collide and its bounding boxes.
 template <typename Solver>
 struct Fcl {
   using Shape = std::shared_ptr<fcl::Convexd>;

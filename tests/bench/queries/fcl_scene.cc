@@ -40,7 +40,7 @@ size_t FclScene::CountCollisions(const std::vector<Pose>& poses) {
     data_->objects[i]->setTransform(ToFcl(poses[i]));
     data_->objects[i]->computeAABB();
   }
-  // Every object moved: to build the tree anew is faster than to mend it (manager.update()).
+  // Every object moved: rebuilding the tree is faster than updating it (manager.update()).
   std::vector<fcl::CollisionObjectd*> objects;
   for (const auto& object : data_->objects) objects.push_back(object.get());
   data_->manager.clear();

@@ -11,14 +11,14 @@
 
 namespace hulld::bench {
 
-// A scene kept by FCL's dynamic tree of bounding boxes. Needs FCL: HULLD_HAVE_FCL.
+// A scene in FCL's dynamic tree of bounding boxes. Needs FCL: HULLD_HAVE_FCL.
 class FclScene {
  public:
   // Object i is hull hull_of[i].
   FclScene(const std::deque<Hull>& hulls, const std::vector<size_t>& hull_of);
   ~FclScene();
 
-  // Moves every object and counts the pairs that collide. Requires one pose for each.
+  // Moves every object and counts the colliding pairs. Requires: one pose per object.
   size_t CountCollisions(const std::vector<Pose>& poses);
 
  private:

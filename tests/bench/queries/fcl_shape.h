@@ -22,7 +22,7 @@ inline std::shared_ptr<fcl::Convexd> ToFcl(const Hull& hull) {
     faces->insert(faces->end(), facet.begin(), facet.end());
     ++count;
     if (hull.dimension() < 3) {
-      // The other side, so that the surface is closed.
+      // The reverse side, so that the surface is closed.
       faces->push_back(static_cast<int>(facet.size()));
       faces->insert(faces->end(), facet.rbegin(), facet.rend());
       ++count;

@@ -15,7 +15,7 @@ struct Libccd {
     Eigen::Matrix3d R;
     Vector t;
     Vector center;
-    // Where the last support point of the query was.
+    // Last support point of the query.
     mutable uint32_t last = Shape::kNowhere;
   };
 
@@ -42,7 +42,7 @@ struct Libccd {
     ccd.center1 = Center;
     ccd.center2 = Center;
     ccd.max_iterations = 500;
-    // Tighter than the defaults of 1e-4, with which MPR answers some fifty more questions of the
+    // Tighter than the default of 1e-4, with which MPR answers some fifty more queries of the
     // accuracy suite wrongly.
     ccd.mpr_tolerance = 1e-14;
     ccd.epa_tolerance = 1e-10;
@@ -56,7 +56,7 @@ struct Libccd {
     return {&shape, R, X_WA.t, R * shape.center() + X_WA.t, Shape::kNowhere};
   }
 
-  // Each question stands alone.
+  // Each query is independent.
   static void Forget(const Placed& a, const Placed& b) { a.last = b.last = Shape::kNowhere; }
 
   Verdict Ask(const Placed& a, const Placed& b) {

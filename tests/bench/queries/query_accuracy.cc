@@ -1,4 +1,4 @@
-// Counts wrong answers on the accuracy suite (accuracy_suite.h), by library and kind of question,
+// Counts wrong answers on the accuracy suite (accuracy_suite.h), by library and kind of query,
 // against the exact oracle of the tests, as CSV on standard output:
 //
 //   query_accuracy > accuracy.csv

@@ -1,24 +1,23 @@
-// Collision queries against FCL, libccd, Bullet and the textbook's SAT, on the same questions, in
+// Collision queries against FCL, libccd, Bullet, and the textbook's SAT, on the same queries, in
 // one process:
 //
 //   query_benchmark --benchmark_enable_random_interleaving=true --benchmark_repetitions=5
 //       --benchmark_filter='^relation/' --benchmark_out=FILE.csv
 //
-// writes medians (CsvReporter). An iteration answers a block of distinct questions that know
-// nothing of each other. Columns: `questions` in the block; `ns` per question (processor time, real
-// time where several threads work); `wrong`, how many verdicts differ from hulld's exact relation,
-// which the tests hold against an independent oracle. `wrong` is left out of the regime "touch",
-// where a pose means another question to a library that rounds its rotation. Suites:
+// writes medians (CsvReporter). An iteration answers a block of distinct, independent queries.
+// Columns: `questions` in the block; `ns` per query (processor time, real time if several threads
+// work); `wrong`, the number of verdicts that differ from hulld's exact relation, which the tests
+// check against an independent oracle. `wrong` is omitted in the regime "touch", where a library
+// that rounds its rotation receives a different query. Suites:
 //
 //   relation  hulls at their poses -> colliding or not; "from poses": poses converted to the
 //             method's own types each time
-//   contact   depth, normal and witness points of hulls that overlap; `none`: no depth was found
-//   distance  distance and witness points of hulls apart
-//   motion    the same pairs again and again, moved a little each time, with and without a cache
-//   batch     all questions at once on 1 or 2 threads; `ns` is real time, `cpu_ns` the processor
-//   time
-//             of all threads together
-//   scene     all pairs that collide among many hulls (scene_benchmark.h)
+//   contact   depth, normal, and witness points of overlapping hulls; `none`: no depth was found
+//   distance  distance and witness points of separated hulls
+//   motion    the same pairs repeatedly, with a small motion each time, with and without a cache
+//   batch     all queries in one call on 1 or 2 threads; `ns` is real time, `cpu_ns` the processor
+//             time of all threads together
+//   scene     all colliding pairs among many hulls (scene_benchmark.h)
 
 #include <benchmark/benchmark.h>
 #include <time.h>
@@ -41,14 +40,14 @@ namespace hulld::bench {
 namespace {
 
 constexpr size_t kQuestions = 128;
-// Enough relations that a branch predictor does not know the block by heart: with 128 questions
-// again and again it does, and most methods seem to take two thirds of the time.
+// Enough relations that a branch predictor cannot learn the block: it learns 128 repeated queries,
+// which reduces the apparent time of most methods to two thirds.
 constexpr size_t kRelations = 4096;
 // Fewer for large hulls: their support points take most of the time, and some peers take
 // milliseconds.
 constexpr size_t kRelationsOfLarge = 256;
 
-// Questions, made when the first benchmark asks for them, and their exact answers.
+// Queries, made when the first benchmark needs them, and their exact answers.
 class Workload {
  public:
   Workload(std::string set, Regime regime, size_t count)
@@ -141,8 +140,8 @@ void FindRelations(benchmark::State& state, Subject& subject) {
   ReportWrong(state, *subject.workload, verdicts);
 }
 
-// `none`: how many questions the method found no value for. `largest_error` of those found, in the
-// sets' length unit; hulls are about 1 in size, ur5's about 0.1.
+// `none`: the number of queries without a value from the method. `largest_error` of the values
+// found, in the sets' length unit; hulls are about 1 in size, ur5's about 0.1.
 void ReportValues(benchmark::State& state, Workload& workload,
                   const std::vector<std::optional<double>>& values) {
   ReportTime(state, values.size());
@@ -172,8 +171,8 @@ void Measure(benchmark::State& state, Subject& subject) {
   ReportValues(state, *subject.workload, values);
 }
 
-// Frames of a motion: each turns B by about a milliradian and moves it by about a thousandth of its
-// radius. The motion goes to and fro, so that it can last as long as the benchmark.
+// Frames of a motion: each rotates B by about a milliradian and moves it by about a thousandth of
+// its radius. The motion oscillates, so that it can last as long as the benchmark.
 std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set) {
   constexpr int kFrames = 32;
   constexpr double kStep = 1e-3;
@@ -223,7 +222,7 @@ double ProcessSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// All questions many times over in one call, as a scene of placements and pairs.
+// Answers all queries many times over in one call, as a scene of placements and pairs.
 void AnswerBatch(benchmark::State& state, Workload& workload, int threads) {
   constexpr size_t kCopies = 64;
   const QuerySet& set = workload.questions();
@@ -268,7 +267,7 @@ void AddRow(const std::string& name, void (*function)(benchmark::State&, Subject
       ->MinTime(0.01);
 }
 
-// The textbook grows with the cube of the size: left out where a block would take minutes.
+// The textbook grows with the cube of the size: omitted if a block would take minutes.
 bool TextbookTakesTooLong(const std::string& set, Regime regime) {
   if (regime == Regime::kFar) return set == "sphere:10000";
   if (regime == Regime::kClose) return set == "sphere:10000" || set == "sphere:512";
@@ -307,7 +306,7 @@ void RegisterMeasures(const std::string& set, Regime regime,
 
 void RegisterSequences(const std::string& set, Regime regime,
                        const std::shared_ptr<Workload>& workload) {
-  // A motion leaves contact at once.
+  // A motion leaves contact immediately.
   const bool at_contact =
       regime == Regime::kTouch || regime == Regime::kContact || regime == Regime::kGraze;
   for (const bool warm : {true, false}) {

@@ -21,37 +21,36 @@ enum class Verdict : uint8_t {
   kOpen,       // neither was claimed
 };
 
-// One way to ask whether placed hulls collide: hulld, a peer library, or a method that can be
-// wrong. Everything that does not depend on a question is converted to the method's own types
-// before: hulls when they are given, poses when they are placed.
+// A way to decide if placed hulls collide: hulld, a peer library, or an uncertified method.
+// Everything independent of a query is converted to the method's own types beforehand: hulls in
+// Prepare, poses when they are placed.
 class QueryMethod {
  public:
   virtual ~QueryMethod() = default;
 
   virtual const std::string& name() const = 0;
-  // Sets the questions and converts them. Both must outlive their use.
+  // Sets the queries and converts them. Both must outlive their use.
   virtual void Prepare(const std::deque<Hull>& hulls,
                        const std::vector<QuerySet::Query>& queries) = 0;
-  // Answers as many questions as there are verdicts, beginning with question `first`, from placed
-  // hulls.
+  // Answers one query per verdict, starting with query `first`, from placed hulls.
   virtual void Answer(size_t first, std::span<Verdict> verdicts) = 0;
-  // The same from poses, whose conversion is part of the work.
+  // As Answer, from poses; their conversion is part of the work.
   virtual void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) = 0;
-  // Whether MeasureDepths can be asked.
+  // True if MeasureDepths is supported.
   virtual bool knows_depth() const = 0;
-  // The penetration depth for each question, without a value where the method finds none (as where
-  // it finds the hulls apart), together with what the method's usual contact query finds: normal
-  // and witness points.
+  // Measures the penetration depth for each query; no value if the method finds none (as when it
+  // finds the hulls apart). Includes the results of the method's usual contact query: normal and
+  // witness points.
   virtual void MeasureDepths(size_t first, std::span<std::optional<double>> depths) = 0;
   virtual bool knows_distance() const = 0;
-  // The same for the distance of hulls apart.
+  // As MeasureDepths, for the distance of separated hulls.
   virtual void MeasureDistances(size_t first, std::span<std::optional<double>> distances) = 0;
 };
 
 // A method from a library with
 //   Shape, Placed: a hull, and a hull at a pose, in its own types;
 //   std::unique_ptr<Shape> MakeShape(const Hull&); Placed Place(const Shape&, const Pose&);
-//   Verdict Ask(const Placed&, const Placed&); and where it has them
+//   Verdict Ask(const Placed&, const Placed&); and, if supported,
 //   std::optional<double> Depth(const Placed&, const Placed&), and Distance likewise.
 template <typename Library>
 class MethodOf final : public QueryMethod {
@@ -122,30 +121,30 @@ class MethodOf final : public QueryMethod {
   std::vector<Placed> b_;
 };
 
-// The signed separation of hulls that are not empty, as well as a double holds it: hulld's, asked
-// for an error of 1e-15 of the hulls' sizes, far below its default and that of other methods.
+// Returns the signed separation of non-empty hulls to the precision of a double: hulld's, with an
+// error of 1e-15 of the hulls' sizes, far below its default and that of other methods.
 double BestSeparation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB);
 
-// hulld itself.
+// Returns hulld itself.
 std::unique_ptr<QueryMethod> MakeHulld();
-// The same with QueryOptions::tolerance.
+// Returns hulld with QueryOptions::tolerance.
 std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name);
-// hulld, exactly, on hulls simplified from inside to within max_error: never finds a collision too
-// many.
+// Returns hulld, exact, on hulls simplified from inside to within max_error: never reports a false
+// collision.
 std::unique_ptr<QueryMethod> MakeHulldSimplified(double max_error, std::string name);
 
-// The separating axis test as coursework has it: all points into the world, then facet normals and
-// cross products of edges, every point projected on each, early exit, no certificate.
-// `perturbation` moves each coordinate by a random part of itself of up to that size, a common cure
-// for degenerate input.
+// The separating axis test as taught in courses: transforms all points into the world, then
+// projects every point on facet normals and cross products of edges; early exit, no certificate.
+// `perturbation` moves each coordinate by a random part of itself of up to that size, a common
+// workaround for degenerate input.
 std::unique_ptr<QueryMethod> MakeTextbookInDouble(double perturbation = 0);
 
 // GJK to the sign, without any bound or certificate.
 std::unique_ptr<QueryMethod> MakePlainGjkInDouble();
 std::unique_ptr<QueryMethod> MakePlainGjkInFloat();
 
-// The peers that were there when this was built, each in the modes that its users choose: FCL
-// (libccd's solver and its own), libccd (MPR and GJK), Bullet (double precision, margin 0).
+// Returns the peers available at build time, each in the modes that its users choose: FCL (libccd's
+// solver and its own), libccd (MPR and GJK), Bullet (double precision, margin 0).
 std::vector<std::unique_ptr<QueryMethod>> MakePeers();
 
 }  // namespace hulld::bench

@@ -16,7 +16,8 @@ namespace hulld::bench {
 namespace {
 
 constexpr size_t kHullsPerSet = 32;
-// Sets of hulls with more vertices than kLargeHull hold fewer, as their copies fill the memory.
+// Sets of hulls with more than kLargeHull vertices contain fewer hulls, as their copies fill the
+// memory.
 constexpr size_t kLargeHullsPerSet = 8;
 constexpr size_t kLargeHull = 5000;
 
@@ -33,7 +34,7 @@ std::vector<Vector> OnEllipsoid(Random& random, size_t count) {
   return points;
 }
 
-// The corners of the triangles of a binary STL file.
+// Returns the corners of the triangles of a binary STL file.
 std::vector<Vector> ReadStl(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
@@ -48,7 +49,7 @@ std::vector<Vector> ReadStl(const std::filesystem::path& path) {
   return points;
 }
 
-// To the nearest multiples of 2^-40: sums and differences of a few of them are doubles.
+// Rounds to the nearest multiples of 2^-40: sums and differences of a few of them are doubles.
 Vector Snapped(const Vector& p) { return (p * 0x1p40).array().round() * 0x1p-40; }
 
 Hull Snapped(const Hull& hull) {
@@ -57,8 +58,8 @@ Hull Snapped(const Hull& hull) {
   return BuildHull(points);
 }
 
-// One of the rotations of a cube that turn about a diagonal or not at all: they permute the axes,
-// and their matrices are exact.
+// Returns the identity or a rotation of a cube about a diagonal: they permute the axes, and their
+// matrices are exact.
 std::array<double, 4> AxisPermutation(Random& random) {
   if (random.Below(4) == 0) return {1, 0, 0, 0};
   const auto sign = [&] { return random.Below(2) == 0 ? 1.0 : -1.0; };
@@ -79,12 +80,12 @@ void AddHulls(const std::string& name, Random& random, QuerySet& set) {
   for (size_t i = 0; i < hulls; ++i) set.hulls.push_back(BuildHull(OnEllipsoid(random, count)));
 }
 
-// A multiple of 1/64: as the lengths of a model, of few bits.
+// Returns a multiple of 1/64: few bits, like the lengths of a model.
 double Length(Random& random, double low, double high) {
   return std::round(random.Between(low, high) * 64) / 64;
 }
 
-// A block of a length, a width and a height, its base on z = 0.
+// Returns a block with random length, width, and height, its base on z = 0.
 std::vector<Vector> Block(Random& random) {
   const Vector half(Length(random, 0.25, 1), Length(random, 0.25, 1), 0);
   const double height = Length(random, 0.5, 2);
@@ -96,7 +97,7 @@ std::vector<Vector> Block(Random& random) {
   return points;
 }
 
-// A part: a flat base on z = 0 with a quarter of the points, and a rounded body above it.
+// Returns a part: a flat base on z = 0 with a quarter of the points, and a rounded body above it.
 std::vector<Vector> Part(Random& random, size_t count) {
   constexpr double kGrid = 4096;
   std::vector<Vector> points;
@@ -113,7 +114,7 @@ std::vector<Vector> Part(Random& random, size_t count) {
   return points;
 }
 
-// Base on base, moved along it; B is A's kind of hull upside down. No rotation.
+// Places base on base, shifted along it; B is A's kind of hull upside down. No rotation.
 void AddMatings(const std::string& name, Random& random, size_t count, QuerySet& set) {
   const auto base_up = [](std::vector<Vector> points) {
     for (Vector& p : points) p.z() = -p.z();
@@ -138,9 +139,9 @@ void AddMatings(const std::string& name, Random& random, size_t count, QuerySet&
   }
 }
 
-// The pose of B at which its farthest vertex against `direction` is A's farthest along it: they
-// touch there, the plane across `direction` between them. Requires snapped hulls and exact
-// rotations.
+// Returns the pose of B at which its farthest vertex against `direction` coincides with A's
+// farthest along it: they touch there, separated by the plane across `direction`. Requires: snapped
+// hulls and exact rotations.
 Pose TouchVertices(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
                    const Vector& direction) {
   const Eigen::Matrix3d R_WA = PlacedHull::Make(a, X_WA)->R_WH();
@@ -153,7 +154,7 @@ Pose TouchVertices(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pos
   return X_WB;
 }
 
-// B moved from A's centre along `direction` so far that the pair is in the regime.
+// Moves B from A's center along `direction` until the pair is in the regime.
 Pose Place(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
            const Vector& direction, Regime regime, Random& random) {
   const PlacedHull placed_a = *PlacedHull::Make(a, X_WA);

@@ -10,22 +10,22 @@
 
 namespace hulld::bench {
 
-// How far apart the hulls of a query are, relative to the sum of their radii.
+// Distance of the hulls of a query, relative to the sum of their radii.
 enum class Regime {
-  kFar,      // spheres round the hulls are 0.5 to 2 apart
-  kClose,    // 1 to 5 % apart along the line of centres
+  kFar,      // bounding spheres are 0.5 to 2 apart
+  kClose,    // 1 to 5 % apart along the line of centers
   kGap,      // 1e-6 apart
-  kTouch,    // as near to contact as doubles come
+  kTouch,    // as near to contact as doubles allow
   kContact,  // exactly touching, vertex to vertex
   kGraze,    // 1e-6 deep
-  kDeep,     // half of the way from contact to coinciding centres
+  kDeep,     // halfway from contact to coinciding centers
 };
 inline constexpr Regime kRegimes[] = {Regime::kFar,   Regime::kClose,   Regime::kGap,
                                       Regime::kTouch, Regime::kContact, Regime::kGraze,
                                       Regime::kDeep};
 const char* Name(Regime regime);
 
-// Distinct questions on distinct hulls.
+// Distinct queries on distinct hulls.
 struct QuerySet {
   std::string name;
   std::deque<Hull> hulls;
@@ -42,15 +42,15 @@ struct QuerySet {
   std::vector<PlacedHull> b;
 };
 
-// Hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and 1.5), or
-// "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries when it is
-// not there). "mating:V" has kContact alone: face on face without a rotation, as boxes are stacked
-// and parts assembled; blocks of 8 vertices, or parts of about V. Poses are random. Fixed seeds:
-// the same name and regime give the same questions.
+// Returns hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and
+// 1.5), or "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries
+// if missing). "mating:V" has kContact only: face on face without a rotation, like stacked boxes
+// and assembled parts; blocks of 8 vertices, or parts of about V. Poses are random. Fixed seeds:
+// the same name and regime give the same queries.
 //
 // In kContact coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
-// that every library receives the same geometry. Elsewhere a rotation matrix is rounded by those
-// that need one; but for kTouch that is far below the distance to contact.
+// that every library receives the same geometry. Elsewhere libraries that need a rotation matrix
+// round it; except for kTouch, the error is far below the distance to contact.
 QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count);
 
 }  // namespace hulld::bench

@@ -4,10 +4,9 @@
 #   bash tests/bench/queries/run_query_benchmark.sh [MACHINE] [SUITE...]
 #
 # MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. SUITEs are relation, contact, distance, motion, batch, scene, live, accuracy and trade; all by
-# default. REPETITIONS (5) of which the median counts. HULLD_DATA: the folder of meshes. Needs what
-# docker/packages.txt lists under [build], [test] and [bench]. Nothing else should run on the
-# machine meanwhile.
+# default. SUITEs are relation, contact, distance, motion, batch, scene, live, accuracy and trade;
+# all by default. REPETITIONS (5): the median counts. HULLD_DATA: the folder of meshes. Requires the
+# packages in docker/packages.txt under [build], [test] and [bench], and an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -17,7 +16,7 @@ suites=("$@")
 ((${#suites[@]})) || suites=(relation contact distance motion batch scene live accuracy trade)
 results=tests/bench/results
 programs=build/release/bin
-# Threads that wait leave the core to those that work, also where other programs run.
+# Waiting threads yield the core to working ones, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON -DHULLD_BENCH_NATIVE=ON >/dev/null
@@ -26,7 +25,7 @@ cmake --build --preset release --target query_benchmark live_benchmark query_acc
 for suite in "${suites[@]}"; do
   out=$results/query_${suite}_$machine.csv
   case $suite in
-    # In turn with their peers, against drifts of the machine's speed.
+    # Alternates with peers, so that machine drift affects all alike.
     relation | contact | distance | motion | batch | scene)
       "$programs/query_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
         --benchmark_repetitions="${REPETITIONS:-5}" --benchmark_enable_random_interleaving=true \
@@ -38,7 +37,7 @@ for suite in "${suites[@]}"; do
       "$programs/live_benchmark" "${VERTICES:-1000000}" "${SECONDS_EACH:-3}" >"$out"
       bash tests/bench/live/plot_live.sh "$machine"
       ;;
-    # Counts, the same on every machine.
+    # Counts, equal on every machine.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
     trade)
       "$programs/hulld-bench" trade --questions 4800 --csv "$out" --plot "$results/query_trade_$machine.svg"

@@ -21,7 +21,7 @@ class SceneWorkload {
  public:
   SceneWorkload(std::string set, size_t count) : set_(std::move(set)), count_(count) {}
 
-  // False when the set has no data.
+  // Returns false if the set has no data.
   bool Make() {
     if (!made_) {
       made_ = true;

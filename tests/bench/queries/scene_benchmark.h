@@ -3,10 +3,10 @@
 
 namespace hulld::bench {
 
-// Rows scene/N of SET/METHOD: N hulls of the set at random poses in a cube, so dense that each
-// meets a few; all move, then all colliding pairs are found. The methods are hulld and FCL's
-// dynamic tree of bounding boxes. `pairs` is how many were found, `wrong` how far that is from
-// hulld's number, and `ns` the time of the whole scene.
+// Registers rows scene/N of SET/METHOD: N hulls of the set at random poses in a cube, so dense that
+// each meets a few; all move, then all colliding pairs are found. The methods are hulld and FCL's
+// dynamic tree of bounding boxes. `pairs`: the number found; `wrong`: its difference from hulld's
+// number; `ns`: the time of the whole scene.
 void RegisterScenes();
 
 }  // namespace hulld::bench

@@ -1,4 +1,4 @@
-// Methods that can be wrong, for comparison.
+// Uncertified methods, for comparison.
 
 #include <array>
 #include <cmath>
@@ -119,8 +119,8 @@ struct TextbookInDouble {
   }
 };
 
-// Where the support points of the plain GJK come from: the same look-up that hulld uses, without
-// the proof that it found the farthest.
+// Source of support points for the plain GJK: hulld's lookup, without the proof that it found the
+// farthest.
 class LookedUp {
  public:
   using Scalar = double;
@@ -140,8 +140,8 @@ class InFloat : public ClimbingHull<float> {
   using ClimbingHull<float>::ClimbingHull;
 };
 
-// GJK to the sign: a simplex of A - B is moved towards the origin until a support plane misses it
-// or four points surround it. Source: van den Bergen 2003, Collision Detection in Interactive 3D
+// GJK to the sign: a simplex of A - B moves towards the origin until a support plane misses it or
+// four points surround it. Source: van den Bergen 2003, Collision Detection in Interactive 3D
 // Environments; the case analysis is that of Muratori 2006.
 template <typename Support>
 struct PlainGjk {
@@ -159,7 +159,7 @@ struct PlainGjk {
     return {&shape, RotationOf(X_WA).cast<Scalar>(), X_WA.t};
   }
 
-  // In the order of age, the newest last.
+  // In order of age, newest last.
   struct Simplex {
     std::array<Vector3, 4> points;
     int count = 0;
@@ -188,12 +188,12 @@ struct PlainGjk {
       if (Surrounds(simplex, n)) return Verdict::kColliding;
       if (n.squaredNorm() == 0) return Verdict::kColliding;
     }
-    // It turned in circles near the boundary: a guess.
+    // It cycled near the boundary: a guess.
     return Verdict::kColliding;
   }
 
-  // Whether four points surround the origin. If not, drops what the origin is not near and turns n
-  // towards it.
+  // Returns true if four points surround the origin. Otherwise drops the points irrelevant to the
+  // origin and turns n towards it.
   static bool Surrounds(Simplex& simplex, Vector3& n) {
     switch (simplex.count) {
       case 1:

@@ -20,7 +20,7 @@ void MakeBallHull(v1::HullService::Stub& stub, const std::string& hull_id, int p
   v1::AppendPointsRequest open;
   open.mutable_open()->set_hull_id(hull_id);
   open.mutable_open()->set_create_if_absent(true);
-  // Chunks within what a server takes by default.
+  // Chunks within a server's default limit.
   constexpr int kPointsPerChunk = 100'000;
   const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
   v1::AppendPointsResponse reply;

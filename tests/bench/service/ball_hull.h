@@ -9,10 +9,10 @@
 
 namespace hulld::bench {
 
-// Ends the program, saying so, when a call failed.
+// Ends the program with a message if a call failed.
 void Require(const grpc::Status& status, const char* what);
 
-// Creates a hull of points on a sphere round the origin, spread evenly (Fibonacci).
+// Creates a hull of evenly spread points on a sphere around the origin (Fibonacci).
 void MakeBallHull(v1::HullService::Stub& stub, const std::string& hull_id, int points,
                   double radius);
 

@@ -1,14 +1,14 @@
-// How much longer batches, scenes and steps of streams take beside other busy programs, and single
-// pairs beside those and beside batches.
+// Slowdown of batches, scenes, and steps of streams next to busy programs, and of single pairs next
+// to busy programs and to batches.
 //
 //   busy_benchmark [HULLD [ROUNDS [FLAG OF hulld...]]]
 //
-// Starts a hulld of its own. The busy programs are processes of ordinary priority that compute
-// without end, one for each core. The machine's fair share explains a ratio of 2; what is more is
-// the server's. One row of CSV per kind of work and load. The loads take turns, ROUNDS (5) times,
-// so that drifts of the machine's speed meet all of them; percentiles are of the calls of all
-// rounds, and ratios are to the load "alone". A call that takes 20 s is given up and counts as
-// that. Run it by run_busy_benchmark.sh.
+// Starts its own hulld. The busy programs are processes of ordinary priority that compute
+// endlessly, one for each core. Fair scheduling explains a ratio of 2; anything more is due to the
+// server. One row of CSV per kind of work and load. The loads alternate, ROUNDS (5) times, so that
+// machine drift affects all of them; percentiles are of the calls of all rounds, and ratios are to
+// the load "alone". A call that takes 20 s is abandoned and counts as that. Run it by
+// run_busy_benchmark.sh.
 
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -44,12 +44,12 @@ constexpr std::chrono::seconds kMostPerCall(20);
 // For one kind of work in one round.
 constexpr std::chrono::seconds kMostPerTurn(2);
 
-// A process that computes until this goes.
+// A process that computes until this is destroyed.
 class BusyProgram {
  public:
   BusyProgram() : pid_(fork()) {
     if (pid_ != 0) return;
-    // Ends with its parent, however that ends.
+    // Ends with its parent in any case.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (volatile uint64_t sum = 0;;) sum = sum + 1;
   }
@@ -75,7 +75,7 @@ v1::Placement PlaceBall(std::mt19937_64& random, double size) {
   return placement;
 }
 
-// Half of the pairs near each other, so that the ladder has something to climb.
+// Half of the pairs are near each other, so that they reach several rungs.
 v1::BatchCheckCollisionsRequest MakeBatch(int pairs) {
   constexpr int kPlacements = 1000;
   std::mt19937_64 random(3);
@@ -87,7 +87,7 @@ v1::BatchCheckCollisionsRequest MakeBatch(int pairs) {
   return request;
 }
 
-// Some 40 000 pairs whose boxes meet.
+// Some 40 000 pairs with intersecting boxes.
 v1::FindCollisionsRequest MakeScene() {
   constexpr int kPlacements = 4000;
   std::mt19937_64 random(5);
@@ -97,14 +97,14 @@ v1::FindCollisionsRequest MakeScene() {
 }
 
 std::unique_ptr<v1::CollisionService::Stub> Connect(const std::string& address) {
-  grpc::ChannelArguments own;  // a connection of its own
+  grpc::ChannelArguments own;  // a separate connection
   own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   own.SetMaxReceiveMessageSize(-1);
   return v1::CollisionService::NewStub(
       grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), own));
 }
 
-// Ends the program unless the call went well or was given up.
+// Ends the program unless the call succeeded or was abandoned.
 void RequireOrGivenUp(const grpc::Status& status, const char* what) {
   if (status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) Require(status, what);
 }
@@ -139,7 +139,7 @@ void RunSingle(v1::CollisionService::Stub& stub, int i) {
   Require(stub.CheckCollision(&context, request, &response), "CheckCollision");
 }
 
-// One StreamCollisions call of all pairs of some placements, all of which each step moves.
+// One StreamCollisions call of all pairs of some placements; each step moves all of them.
 class PoseStream {
  public:
   explicit PoseStream(v1::CollisionService::Stub& stub)
@@ -190,7 +190,7 @@ class PoseStream {
   v1::StreamCollisionsRequest step_;
 };
 
-// Sends batches until this goes.
+// Sends batches until destroyed.
 class BatchClient {
  public:
   BatchClient(const std::string& address, const v1::BatchCheckCollisionsRequest& request)
@@ -232,7 +232,7 @@ void Measure(const std::string& address, const v1::BatchCheckCollisionsRequest& 
   for (unsigned i = 0; i < cores; ++i) programs.push_back(std::make_unique<BusyProgram>());
   std::unique_ptr<BatchClient> batches;
   if (row->load.batches) batches = std::make_unique<BatchClient>(address, batch);
-  row->call(0);  // what the load changes has come to rest
+  row->call(0);  // the effects of the load change have settled
   const auto start = Clock::now();
   for (int i = 1; i <= row->calls_per_turn && Clock::now() - start < kMostPerTurn; ++i) {
     const auto sent = Clock::now();

@@ -19,7 +19,7 @@ ChildServer::ChildServer(std::vector<std::string> command) {
   if (pipe(ends) != 0) std::abort();
   pid_ = fork();
   if (pid_ == 0) {
-    // Ends with its parent, however that ends.
+    // Ends with its parent in any case.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     dup2(ends[1], STDERR_FILENO);
     close(ends[0]);
@@ -44,7 +44,7 @@ ChildServer::ChildServer(std::vector<std::string> command) {
     std::fprintf(stderr, "%s does not listen\n", command[0].c_str());
     std::abort();
   }
-  // It may say more: nobody reads it, and its log takes that well.
+  // Later output is not read, which its log tolerates.
   fclose(errors);
 }
 

@@ -8,11 +8,11 @@
 
 namespace hulld::bench {
 
-// A server in a process of its own, which says "listening on ADDRESS" on its standard error. Killed
-// with this.
+// A server in a child process that prints "listening on ADDRESS" on its standard error. Killed on
+// destruction.
 class ChildServer {
  public:
-  // Aborts, saying why, when the program does not come to listen.
+  // Aborts with a message if the program does not start listening.
   explicit ChildServer(std::vector<std::string> command);
   ChildServer(const ChildServer&) = delete;
   ChildServer& operator=(const ChildServer&) = delete;
@@ -20,8 +20,7 @@ class ChildServer {
 
   const std::string& address() const { return address_; }
   pid_t pid() const { return pid_; }
-  // Processor time of all its threads so far, in seconds; ResidentMebibytes: what it holds in
-  // memory.
+  // Processor time of all its threads so far, in seconds; and its resident memory.
   double ProcessorSeconds() const;
   double ResidentMebibytes() const;
 

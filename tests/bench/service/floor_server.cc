@@ -1,5 +1,5 @@
-// A server that does nothing: hulld's services, transport and sizes of messages, but what it
-// answers was decided beforehand. What it takes is the floor of what a call to hulld can take.
+// A no-op server: hulld's services, transport, and message sizes, with precomputed answers. Its
+// cost is the minimum of a call to hulld.
 //
 //   floor_server ADDRESS
 //
@@ -64,7 +64,7 @@ void FillColumns(int count, v1::AnswerColumns* columns) {
   columns->mutable_rungs()->Resize(count, kRung);
 }
 
-// Sends messages that are there from the start.
+// Sends prebuilt messages.
 template <typename Response>
 class Replies : public grpc::ServerWriteReactor<Response> {
  public:

@@ -36,7 +36,7 @@ GrowingWriter::~GrowingWriter() {
 
 void GrowingWriter::Send() {
   constexpr int kDirections = 16;
-  // Counts the chunks of all writers, so that one after another may grow the same hull.
+  // Counts the chunks of all writers, so that successive writers may grow the same hull.
   static std::atomic<int> count = 0;
   const int i = count++;
   const double angle = 2 * std::numbers::pi * (i % kDirections) / kDirections;

@@ -12,13 +12,13 @@
 
 namespace hulld::bench {
 
-// A connection that is shared with nobody.
+// Returns a connection that is not shared.
 std::shared_ptr<grpc::Channel> ConnectAlone(const std::string& address);
 
-// One stream of chunks of one point, into a hull that is there. Each point lies a little farther
-// out than the one in the same direction before, which it takes into the hull, so that the number
-// of vertices stays about what it was. Requires a hull within a radius of 1.1 about the origin.
-// Ends the program when a call fails or a point was not outside.
+// One stream of single-point chunks, into an existing hull. Each point lies slightly farther out
+// than the previous one in its direction, which it covers, so that the number of vertices stays
+// approximately constant. Requires: a hull within a radius of 1.1 about the origin. Ends the
+// program if a call fails or a point was not outside.
 class GrowingWriter {
  public:
   GrowingWriter(const std::shared_ptr<grpc::Channel>& channel, const std::string& hull_id,
@@ -28,7 +28,7 @@ class GrowingWriter {
   ~GrowingWriter();
 
   void Send();
-  // Waits for an acknowledgement, which may stand for several chunks.
+  // Waits for an ack, which may cover several chunks.
   void Receive();
   void SendAndReceive() {
     Send();
@@ -46,7 +46,7 @@ class GrowingWriter {
   uint64_t received_ = 0;
 };
 
-// The value below which a share p of the values lies. Requires sorted values, not none.
+// Returns the value below which a share p of the values lies. Requires: sorted, non-empty values.
 double Percentile(const std::vector<double>& sorted, double p);
 
 }  // namespace hulld::bench

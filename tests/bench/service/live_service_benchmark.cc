@@ -1,16 +1,17 @@
-// What a question about a growing hull costs over the wire, beside one about the same hull at rest.
+// Cost of a query about a growing hull over the wire, compared with one about the same hull at
+// rest.
 //
 //   live_service_benchmark [HULLD [VERTICES...]]
 //
-// For each number of vertices (64 to 1000000, in tens from 1000 on, where none is given): starts a
-// hulld of its own on a durable store and asks single questions about a hull of that many vertices
-// and a probe near it: at rest; right after each acknowledged chunk of one outside point; about
-// another hull then, which tells what the append costs any call that follows it; while another
-// connection streams such chunks at full rate; about another hull meanwhile, which tells what the
-// machine's load alone costs; and as the first question after a restart. One row of CSV per case:
-// the questions' percentiles, their ratios to those at rest, and the writer's rate, which the row
-// "writer alone" has without any reader. The cases take turns, so that drifts of the machine's
-// speed meet all of them.
+// For each number of vertices (by default 64 to 1000000, in powers of ten from 1000 on): starts its
+// own hulld on a durable store and runs single queries about a hull of that many vertices and a
+// probe near it: at rest; directly after each acknowledged chunk with an outside point; about
+// another hull at that time, which shows the cost of the append to any following call; while
+// another connection streams such chunks at full rate; about another hull during that, which shows
+// the cost of the machine's load alone; and as the first query after a restart. One row of CSV per
+// case: the queries' percentiles, their ratios to the case at rest, and the writer's rate, which
+// the row "writer alone" has without any reader. The cases alternate, so that machine drift affects
+// all of them.
 
 #include <grpcpp/grpcpp.h>
 
@@ -46,10 +47,10 @@ constexpr int kRounds = 5;
 constexpr int kRestarts = 5;
 constexpr int kCallsPerTurn = 400;
 constexpr std::chrono::seconds kMostPerTurn(2);
-// Chunks on their way, as a client has that does not wait for each.
+// Chunks in flight, as of a client that does not wait for each.
 constexpr uint64_t kWindow = 32;
 
-// A writer at full rate, until this goes.
+// A writer at full rate, until destroyed.
 class StreamingWriter {
  public:
   StreamingWriter(const std::string& address, const std::string& writer_id)
@@ -78,7 +79,7 @@ double Microseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
 }
 
-// The time of one question, in microseconds.
+// Returns the time of a query, in microseconds.
 double Ask(v1::CollisionService::Stub& stub, const char* hull_id, int i) {
   v1::CheckCollisionRequest request;
   request.mutable_a()->set_hull_id(hull_id);
@@ -101,7 +102,7 @@ struct Row {
   double seconds = 0;
 };
 
-// `before` is called before each question, and not timed.
+// `before` is called before each query, and not timed.
 void MeasureTurn(v1::CollisionService::Stub& stub, const char* hull_id,
                  const std::function<void()>& before, Row* row) {
   const auto start = Clock::now();
@@ -158,7 +159,8 @@ void Measure(const std::string& program, int vertices) {
     const auto nothing = [] {};
     const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(500)); };
     const auto stub = v1::CollisionService::NewStub(ConnectAlone(server.address()));
-    for (int i = 0; i < 1000; ++i) Ask(*stub, kHull, i);  // warm up, and all is prepared that pays
+    // warm up, until all worthwhile preparation is done
+    for (int i = 0; i < 1000; ++i) Ask(*stub, kHull, i);
     for (int round = 0; round < kRounds; ++round) {
       const std::string number = std::to_string(round);
       MeasureTurn(*stub, kHull, nothing, &rest);
@@ -179,7 +181,7 @@ void Measure(const std::string& program, int vertices) {
   for (int i = 0; i < kRestarts; ++i) {
     const ChildServer server(command);
     const auto channel = ConnectAlone(server.address());
-    // Somebody else's question, which opens the connection.
+    // A query about other hulls, which opens the connection.
     grpc::ClientContext context;
     context.set_wait_for_ready(true);
     v1::ListHullsResponse page;

@@ -1,22 +1,24 @@
-// Work with many growing hulls, with hulls that were just read from disk, and with the frames of a
-// depth camera, over the wire.
+// Workloads over the wire with many growing hulls, with hulls just read from disk, and with the
+// frames of a depth camera.
 //
 //   live_workload_benchmark [HULLD [SCALE [WORK]]]
 //
-// Starts a hulld of its own for each, on a durable store. One row of CSV per case; ratios are to
-// the first case of the same work, but for the camera. SCALE, 1 by default: how much of each is
-// done. WORK: one of these alone.
+// Starts its own hulld for each, on a durable store. One row of CSV per case; ratios are to the
+// first case of the same work, except for the camera. SCALE, 1 by default: the amount of each.
+// WORK: only this one.
 //
-//   scene       FindCollisions over 1000 hulls of 64 vertices: at rest, right after one of them got
-//               a point that was acknowledged, and right after each of them did.
-//   stream      StreamCollisions that resolves its hulls anew at every step, 1024 pairs of 32 hulls
-//               of 1000 vertices and a probe, and one pair of a hull of 100000: at rest and right
-//               after a point was acknowledged.
-//   camera      One ReplaceHull per frame of 848 x 480 depths in single precision, of which the
-//               client drops what is not a number, then a question about the hull: the time of
-//               both, and of the question alone.
-//   cold scene  FindCollisions over 10000 hulls of 64 vertices: when all are in memory, and as the
-//               first call after a restart, when each has to be read.
+//   scene       FindCollisions over 1000 hulls of 64 vertices: at rest, directly after one of them
+//               received an acknowledged point, and directly after each of them did.
+//   stream      StreamCollisions that resolves its hulls again at every step, 1024 pairs of 32
+//   hulls
+//               of 1000 vertices and a probe, and one pair of a hull of 100000: at rest and
+//               directly after a point was acknowledged.
+//   camera      One ReplaceHull per frame of 848 x 480 depths in single precision, from which the
+//               client drops NaNs, then a query about the hull: the time of both, and of the query
+//               alone.
+//   cold scene  FindCollisions over 10000 hulls of 64 vertices: with all in memory, and as the
+//   first
+//               call after a restart, when each has to be read.
 
 #include <grpcpp/grpcpp.h>
 
@@ -54,14 +56,14 @@ double Microseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
 }
 
-// Runs `work` and returns how long it took, in microseconds.
+// Runs `work` and returns its time in microseconds.
 double Timed(const std::function<void()>& work) {
   const auto start = Clock::now();
   work();
   return Microseconds(Clock::now() - start);
 }
 
-// A directory for a store, which goes with this, and the command of a server on it.
+// A temporary directory for a store, deleted with this, and the command of a server on it.
 class Store {
  public:
   explicit Store(const std::string& program)
@@ -102,7 +104,8 @@ void Print(Row row, Row first) {
 
 std::string HullId(int i) { return "live/" + std::to_string(i); }
 
-// Creates hulls 0 to count - 1 on some connections at once, so that they share the disk's waits.
+// Creates hulls 0 to count - 1 on several concurrent connections, so that they share the disk's
+// waits.
 void MakeHulls(const std::string& address, int count, int vertices) {
   constexpr int kConnections = 8;
   std::vector<std::jthread> threads;
@@ -116,7 +119,7 @@ void MakeHulls(const std::string& address, int count, int vertices) {
   }
 }
 
-// Each hull in a place of its own on a lattice, near enough to those beside it that boxes overlap.
+// Each hull has its own place on a lattice, so close to its neighbors that boxes overlap.
 v1::FindCollisionsRequest SceneOf(int count) {
   constexpr double kApart = 2.3;
   const int side = static_cast<int>(std::ceil(std::cbrt(count)));
@@ -178,7 +181,7 @@ void MeasureScene(const std::string& program, double scale) {
   for (const Row& row : {rest, one, each}) Print(row, rest);
 }
 
-// A stream of questions that moves one placement at each step.
+// A stream that moves one placement at each step.
 class Follower {
  public:
   Follower(const std::string& address, int hulls, int pairs)
@@ -259,8 +262,8 @@ void MeasureStream(const std::string& program, double scale, const char* work, i
   for (const Row& row : {rest, after}) Print(row, rest);
 }
 
-// A table with a ball on it before a wall, as a camera sees them that looks along z: for each pixel
-// the depth, with noise, and not a number where the camera has none.
+// A table with a ball in front of a wall, seen by a camera that looks along z: the depth of each
+// pixel, with noise, or NaN if the camera has none.
 class Camera {
  public:
   Camera() {
@@ -313,7 +316,7 @@ class Camera {
       }
       is_open = writer->Write(request);
     }
-    // An empty block says that nothing is missing.
+    // An empty block marks the end.
     request.mutable_points()->Clear();
     if (is_open) writer->Write(request);
     writer->WritesDone();
@@ -327,7 +330,7 @@ class Camera {
   static constexpr float kFocal = 430;
   static constexpr float kMissing = 0.06f;
 
-  // How far along z the ray through (x, y, 1) meets a ball of radius 0.3.
+  // Returns the depth along z at which the ray through (x, y, 1) meets a ball of radius 0.3.
   static std::optional<float> DepthOfBall(float x, float y, float ball_x) {
     constexpr float kZ = 1.5f;
     constexpr float kRadius = 0.3f;
@@ -391,7 +394,7 @@ void MeasureColdScene(const std::string& program, double scale) {
   for (int i = 0; i < kRestarts; ++i) {
     const ChildServer server(store.command());
     const auto channel = ConnectAlone(server.address());
-    // Somebody else's question, which opens the connection.
+    // A query about other hulls, which opens the connection.
     grpc::ClientContext context;
     context.set_wait_for_ready(true);
     v1::ListHullsRequest list;
@@ -401,7 +404,7 @@ void MeasureColdScene(const std::string& program, double scale) {
     const auto stub = v1::CollisionService::NewStub(channel);
     const auto find = [&] { FindAll(*stub, request); };
     cold.times.push_back(Timed(find));
-    for (int k = 0; k < kCalls; ++k) find();  // until all is prepared that pays
+    for (int k = 0; k < kCalls; ++k) find();  // until all worthwhile preparation is done
     for (int k = 0; k < kCalls; ++k) warm.times.push_back(Timed(find));
   }
   for (const Row& row : {warm, cold}) Print(row, warm);

@@ -1,11 +1,11 @@
-// How long a single pair takes while the server is busy with batches: a client of a running hulld.
+// Time of a single pair while the server is busy with batches: a client of a running hulld.
 //
 //   overload_benchmark ADDRESS [ROUNDS] [CALLS]
 //
-// One row of CSV per phase: "idle", and "batches" with N clients that send batches one after the
-// other. The phases take turns, ROUNDS (5) times with CALLS (2000) calls of CheckCollision each, so
-// that drifts of the machine's speed meet all of them; percentiles are of the calls of all rounds,
-// and ratios are to "idle". Run it by run_overload_benchmark.sh.
+// One row of CSV per phase: "idle", and "batches" with N clients that send batches in sequence. The
+// phases alternate, ROUNDS (5) times with CALLS (2000) calls of CheckCollision each, so that
+// machine drift affects all of them; percentiles are of the calls of all rounds, and ratios are to
+// "idle". Run it by run_overload_benchmark.sh.
 
 #include <grpcpp/grpcpp.h>
 
@@ -34,7 +34,7 @@ constexpr int kVertices = 256;
 constexpr int kPlacements = 1000;
 constexpr int kPairsPerBatch = 200'000;
 
-// Half of the pairs near each other, so that the ladder has something to climb.
+// Half of the pairs are near each other, so that they reach several rungs.
 v1::BatchCheckCollisionsRequest MakeBatch() {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> coordinate(-3, 3);
@@ -53,13 +53,13 @@ v1::BatchCheckCollisionsRequest MakeBatch() {
   return request;
 }
 
-// Sends batches until this goes.
+// Sends batches until destroyed.
 class BatchClient {
  public:
   BatchClient(const std::string& address, const v1::BatchCheckCollisionsRequest& request,
               std::atomic<uint64_t>* pairs)
       : thread_([this, address, &request, pairs] {
-          grpc::ChannelArguments own;  // a connection of its own
+          grpc::ChannelArguments own;  // a separate connection
           own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
           own.SetMaxReceiveMessageSize(-1);
           const auto stub = v1::CollisionService::NewStub(

@@ -1,16 +1,16 @@
-// hulld over the wire, with its store in memory and for points also on disk, against a server that
-// does nothing with messages of the same sizes (the floor), and against core in this process: in
+// hulld over the wire, with its store in memory and for points also on disk, compared with a no-op
+// server with messages of the same sizes (the floor), and with core in this process: in
 // alternation, in one run.
 //
 //   remote_benchmark [--out FILE.csv] [--suite NAME]... [--filter TEXT] [--rounds N] [--seconds S]
 //                    [--transport tcp|unix] [--hulld PROGRAM] [--data FOLDER]
 //                    [--hulld-flag=FLAG]... [--beside PROGRAM]
 //
-// Columns: what the workload counts a second; the time of one call; `of_floor`: per_second as a
+// Columns: the workload's units per second; the time of a call; `of_floor`: per_second as a
 // multiple of the floor's, `p50_of_floor`: p50 as a multiple of the floor's, `of_in_process`:
-// per_second as a multiple of core's. Each is the median over rounds; ratios are of neighbours in
-// one round. `server_cpu_us`: the server's processor time for one of the unit, which other programs
-// disturb less than they do the clock; `cpu_of_floor`: as a multiple of the floor's.
+// per_second as a multiple of core's. Each is the median over rounds; ratios are between neighbors
+// in one round. `server_cpu_us`: the server's processor time per unit, which other programs affect
+// less than the clock; `cpu_of_floor`: as a multiple of the floor's.
 
 #include <unistd.h>
 
@@ -47,7 +47,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// One server's rounds of one workload.
+// One server's rounds of a workload.
 struct Rounds {
   std::vector<Sample> samples;
 };
@@ -58,7 +58,7 @@ double MedianOf(const Rounds& rounds, double Sample::*field) {
   return Median(values);
 }
 
-// 0 where there is no peer.
+// Returns 0 without a peer.
 double MedianRatio(const Rounds& rounds, const Rounds* peer, double Sample::*field) {
   std::vector<double> ratios;
   for (size_t i = 0; peer != nullptr && i < peer->samples.size(); ++i) {
@@ -155,7 +155,7 @@ void Run(const RemoteWorkload& workload, const std::vector<RemoteSubject*>& subj
   }
 }
 
-// The servers of one transport, and the files that they leave behind.
+// The servers of a transport, and their files.
 struct Servers {
   Servers(const std::string& transport, const Arguments& arguments)
       : folder(std::filesystem::path(arguments.data) /
@@ -192,7 +192,7 @@ struct Servers {
   std::filesystem::path folder;
   std::optional<RemoteSubject> floor;
   std::optional<RemoteSubject> hulld;
-  // Another one to compare it with.
+  // Another hulld to compare with.
   std::optional<RemoteSubject> beside;
   // Keeps everything on disk.
   std::optional<RemoteSubject> durable;
@@ -201,7 +201,7 @@ struct Servers {
 std::vector<RemoteWorkload> MakeWorkloads(const Arguments& arguments) {
   std::vector<RemoteWorkload> workloads;
   const auto add = [&](const std::string& suite, const auto& make) {
-    // Making some takes longer than measuring others.
+    // Making some workloads takes longer than measuring the rest.
     if (!arguments.suites.empty() && std::find(arguments.suites.begin(), arguments.suites.end(),
                                                suite) == arguments.suites.end()) {
       return;
@@ -246,7 +246,7 @@ int Main(int argc, char** argv) {
     for (const RemoteWorkload& workload : workloads) {
       std::vector<RemoteSubject*> subjects = {&*servers.floor, &*servers.hulld};
       if (servers.beside.has_value()) subjects.push_back(&*servers.beside);
-      // What is only read is in memory either way.
+      // Data that is only read is in memory in both cases.
       if (workload.unit == "points") subjects.push_back(&*servers.durable);
       Run(workload, subjects, arguments.rounds, report);
     }

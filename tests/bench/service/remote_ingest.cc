@@ -17,7 +17,7 @@ struct Cloud {
   std::vector<v1::PointBlock> chunks;
 };
 
-// A ball in chunks of about 1 MiB, as the client sends files.
+// Returns a ball in chunks of about 1 MiB, as the client sends files.
 std::shared_ptr<Cloud> MakeBall(size_t count, bool in_floats) {
   constexpr size_t kChunkBytes = 1 << 20;
   const size_t chunk_points = kChunkBytes / 3 / (in_floats ? sizeof(float) : sizeof(double));

@@ -1,4 +1,4 @@
-// Workloads of single pairs, batches, streams and scenes.
+// Workloads of single pairs, batches, streams, and scenes.
 
 #include <algorithm>
 #include <chrono>
@@ -44,14 +44,14 @@ void FillPlacement(size_t hull, const Pose& pose, v1::Placement* message) {
   FillPose(pose, message->mutable_pose());
 }
 
-// To an update or to packed placements.
+// Adds a pose to an update or to packed placements.
 template <typename Poses>
 void AddPose(const Pose& pose, Poses* message) {
   for (const double number : pose.q) message->add_poses(number);
   for (int k = 0; k < 3; ++k) message->add_poses(pose.t[k]);
 }
 
-// How placements are written down.
+// Encoding of placements.
 enum class Form { kList, kPacked };
 
 template <typename Request>
@@ -73,7 +73,7 @@ Sample Summarize(std::vector<double> call_us, double seconds, double per_call) {
   return {per_call * static_cast<double>(call_us.size()) / seconds, at(0.5), at(0.99)};
 }
 
-// Calls `call` again and again on `clients` threads, which it is told apart by.
+// Calls `call` repeatedly on `clients` threads, with the number of the thread.
 Sample Repeat(int clients, double seconds, double per_call,
               const std::function<void(int client, size_t i)>& call) {
   std::vector<std::vector<double>> call_us(clients);
@@ -105,7 +105,7 @@ const QuerySet& Ur5Questions(Regime regime, size_t count) {
   return found->second;
 }
 
-// Hulls, and where they are.
+// Hulls and their poses.
 struct Placements {
   std::vector<const QueryHull*> hulls;
   std::vector<Pose> poses;
@@ -116,8 +116,8 @@ struct Placements {
   }
 };
 
-// Places all anew, as a program does whose hulls moved, by all threads. Requires as many in
-// `placed`, whose memory is used again.
+// Places all hulls again, like a program with moving hulls, by all threads. Requires: `placed` has
+// the same size; its memory is reused.
 void PlaceAll(const Placements& placements, std::vector<PlacedHull>& placed) {
 #pragma omp parallel for schedule(static) num_threads(kThreads)
   for (size_t i = 0; i < placed.size(); ++i) {
@@ -135,7 +135,7 @@ struct Batch {
   v1::BatchCheckCollisionsRequest request;
 };
 
-// `distinct` questions of a regime, each as often as makes `count` pairs.
+// Makes `count` pairs by repeating `distinct` queries of a regime.
 std::shared_ptr<Batch> MakeBatch(Regime regime, size_t distinct, size_t count,
                                  Form form = Form::kList) {
   const QuerySet& set = Ur5Questions(regime, distinct);
@@ -188,11 +188,11 @@ Sample PlaceAndAnswerBatch(const Batch& batch, double seconds) {
   });
 }
 
-// `count` links of arms at random poses, one stream that moves them all at each step.
+// `count` links of arms at random poses, and one stream that moves them all at each step.
 struct Motion {
   v1::CollisionStreamOpen open;
   std::vector<v1::CollisionStreamUpdate> frames;
-  // The same for core: the first placement of each pair, the hull of the second, and its poses.
+  // Data for core: the first placement of each pair, the hull of the second, and its poses.
   std::vector<PlacedHull> first;
   std::vector<const QueryHull*> second;
   std::vector<std::vector<Pose>> poses;
@@ -242,7 +242,7 @@ Sample FollowMotion(RemoteSubject& subject, const Motion& motion, double seconds
   return sample;
 }
 
-// As core does it: each pair with what the last question left of it.
+// Follows the motion with core: each pair uses the cache of its last query.
 Sample FollowMotionInProcess(const Motion& motion, double seconds) {
   const auto count = static_cast<int64_t>(motion.first.size());
   std::vector<PairCache> caches(motion.first.size());
@@ -352,7 +352,7 @@ std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds) {
         name, "pairs",
         [=](RemoteSubject& subject) { return AnswerBatch(subject, *batch, seconds); },
         [=] { return AnswerBatchInProcess(*batch, seconds); }};
-    // Each pair has placements of its own.
+    // Each pair has its own placements.
     if (batch->pairs.size() * 2 == batch->placed.size()) {
       workload.run_placing = [=] { return PlaceAndAnswerBatch(*batch, seconds); };
     }

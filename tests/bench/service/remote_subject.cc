@@ -27,7 +27,7 @@ RemoteSubject::RemoteSubject(std::string name, std::string transport,
       client_(OptionsFor(server_.address())) {}
 
 double RemoteSubject::ProcessorSeconds() const {
-  // Nanoseconds by thread; those of the process as a whole come in steps of 10 ms.
+  // Nanoseconds by thread; the times of the whole process come in steps of 10 ms.
   double seconds = 0;
   const std::string tasks = "/proc/" + std::to_string(server_.pid()) + "/task";
   for (const auto& task : std::filesystem::directory_iterator(tasks)) {

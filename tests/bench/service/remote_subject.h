@@ -14,7 +14,7 @@
 
 namespace hulld::bench {
 
-// A server under measurement, over one transport.
+// A measured server, over one transport.
 class RemoteSubject {
  public:
   // name: "hulld" or "floor". transport: "tcp" or "unix". command: the program and its arguments.
@@ -23,11 +23,11 @@ class RemoteSubject {
   const std::string& name() const { return name_; }
   const std::string& transport() const { return transport_; }
   bool is_floor() const { return name_ == "floor"; }
-  // What the running threads of its process have used so far, in seconds of processor time.
+  // Returns the processor time of the running threads of its process so far, in seconds.
   double ProcessorSeconds() const;
 
   const Client& client() const { return client_; }
-  // The stub of connection i, each of which is a connection of its own.
+  // Returns stub i; each has a separate connection.
   v1::CollisionService::Stub& stub(size_t i);
 
  private:
@@ -38,39 +38,39 @@ class RemoteSubject {
   std::vector<std::unique_ptr<v1::CollisionService::Stub>> stubs_;
 };
 
-// What one round of a workload saw.
+// Result of a round of a workload.
 struct Sample {
   // In the workload's unit: calls, pairs, points, updates.
   double per_second = 0;
-  // The time of one call; 0: not measured.
+  // The time of a call; 0: not measured.
   double p50_us = 0;
   double p99_us = 0;
-  // The server's processor time per unit, filled in by the code that runs the workload.
+  // The server's processor time per unit, set by the code that runs the workload.
   double server_cpu_us = 0;
 };
 
 struct RemoteWorkload {
-  // As in "check 8 clients".
+  // For example "check 8 clients".
   std::string name;
   std::string unit;
   // Measures one round.
   std::function<Sample(RemoteSubject&)> run;
-  // The same work by core in this process; may be empty.
+  // Does the same work by core in this process; may be empty.
   std::function<Sample()> run_in_process = nullptr;
-  // The same with hulls that are placed each time, at the poses that the request holds; empty where
-  // run_in_process does that, or nothing needs to be placed anew.
+  // As run_in_process, with hulls placed each time at the poses of the request; empty if
+  // run_in_process does that, or nothing needs placing.
   std::function<Sample()> run_placing = nullptr;
 };
 
-// The workloads; hulls are created on hulld when first needed. `seconds`: how long one round takes,
-// for those that can take any time.
+// Return the workloads; hulls are created on hulld when first needed. `seconds`: the duration of a
+// round, for workloads of variable duration.
 std::vector<RemoteWorkload> MakeCheckWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeStreamWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeSceneWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeIngestWorkloads();
 
-// The UR5's hulls under "ur5/0", "ur5/1" ..., unless they are there.
+// Creates the UR5's hulls as "ur5/0", "ur5/1" ..., unless they exist.
 void PutUr5(RemoteSubject& subject);
 std::string Ur5Id(size_t hull);
 

@@ -1,12 +1,12 @@
 #!/bin/bash
-# Measures batches, scenes, steps of streams and single pairs alone and beside other busy programs,
-# and keeps the rows in tests/bench/results/.
+# Measures batches, scenes, steps of streams, and single pairs alone and next to busy programs, and
+# keeps the rows in tests/bench/results/.
 #
 #   bash tests/bench/service/run_busy_benchmark.sh [MACHINE] [FLAG OF hulld...]
 #
-# MACHINE names the file, as in server_busy_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default.
-# ROUNDS (5). HULLD: another program to measure. Starts a hulld of its own on a free port of
-# 127.0.0.1. Nothing else should run on the machine meanwhile.
+# MACHINE names the file, as in server_busy_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
+# default. ROUNDS (5). HULLD: another program to measure. Starts its own hulld on a free port of
+# 127.0.0.1. Requires an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 

@@ -1,13 +1,14 @@
 #!/bin/bash
-# Measures questions about a growing hull over the wire, beside those about a hull at rest; then
-# scenes and streams of growing hulls, a depth camera, and scenes of hulls that are read from disk.
+# Measures queries about a growing hull over the wire, compared with queries about a hull at rest;
+# then scenes and streams of growing hulls, a depth camera, and scenes of hulls read from disk.
 # Keeps the rows in tests/bench/results/. Takes a few minutes.
 #
 #   bash tests/bench/service/run_live_service_benchmark.sh [MACHINE] [VERTICES...]
 #
-# MACHINE names the files, as in server_live_MACHINE.csv and server_live_work_MACHINE.csv: a CPU and a
-# compiler; epyc_gcc12 by default. VERTICES: 64 1000 10000 100000 1000000 by default. HULLD: another program to measure. Starts a
-# hulld of its own, on a durable store. Nothing else should run on the machine meanwhile.
+# MACHINE names the files, as in server_live_MACHINE.csv and server_live_work_MACHINE.csv: a CPU and
+# a compiler; epyc_gcc12 by default. VERTICES: 64 1000 10000 100000 1000000 by default. HULLD:
+# another program to measure. Starts its own hulld, on a durable store. Requires an otherwise idle
+# machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 

@@ -4,8 +4,7 @@
 #   bash tests/bench/service/run_overload_benchmark.sh [MACHINE]
 #
 # MACHINE names the file, as in server_overload_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. Starts a hulld of its own on a free port of 127.0.0.1. Nothing else should run on the
-# machine meanwhile.
+# default. Starts its own hulld on a free port of 127.0.0.1. Requires an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 

@@ -1,14 +1,14 @@
 #!/bin/bash
-# Measures hulld over the wire, beside a server that does nothing and beside core in one process,
-# and keeps the rows in tests/bench/results/.
+# Measures hulld over the wire, compared with a no-op server and with core in one process, and keeps
+# the rows in tests/bench/results/.
 #
 #   bash tests/bench/service/run_remote_benchmark.sh [MACHINE] [FLAG OF hulld...]
 #
-# TMPDIR: a folder on the disk that the durable store is to be measured on.
-# MACHINE names the file, as in remote_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default.
-# ROUNDS (9) of which the median counts, of SECONDS_EACH (1) seconds each. HULLD_DATA: the folder with the links
-# of the UR5. Needs what docker/packages.txt lists under [build] and [bench]. Nothing else should
-# run on the machine meanwhile: client and server share its cores.
+# TMPDIR: a folder on the disk to measure the durable store on. MACHINE names the file, as in
+# remote_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default. ROUNDS (9), of which the median
+# counts, of SECONDS_EACH (1) seconds each. HULLD_DATA: the folder with the links of the UR5.
+# Requires the packages in docker/packages.txt under [build] and [bench], and an otherwise idle
+# machine: client and server share its cores.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -16,7 +16,7 @@ machine=${1:-epyc_gcc12}
 shift || true
 flags=()
 for flag in "$@"; do flags+=("--hulld-flag=$flag"); done
-# Threads that wait leave the core to those that work, also where other programs run.
+# Waiting threads yield the core to working ones, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null

@@ -1,12 +1,12 @@
 #!/bin/bash
-# Measures how soon watches hear of changes, and what a store that changes all the time gives them;
-# keeps the rows in tests/bench/results/.
+# Measures the latency of watch events, and the event rate of a constantly changing store; keeps the
+# rows in tests/bench/results/.
 #
 #   bash tests/bench/service/run_watch_benchmark.sh [MACHINE]
 #
 # MACHINE names the file, as in server_watch_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. HULLD: another program to measure. Starts a hulld of its own, whose store is memory.
-# Nothing else should run on the machine meanwhile.
+# default. HULLD: another program to measure. Starts its own hulld with an in-memory store. Requires
+# an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 

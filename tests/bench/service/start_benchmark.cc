@@ -1,12 +1,12 @@
-// How long hulld takes to start on a durable store, and what it then holds in memory.
+// Startup time of hulld on a durable store, and its memory afterwards.
 //
 //   start_benchmark [--points N] [HULLS...]
 //
-// For each number of hulls (0, 1000, 10000 and 100000 where none is given): fills a store in a
-// directory of its own, each hull from N (64) points on a sphere, kills the server, and starts it
-// five times. One row of CSV per number: medians of the time until it listens and until the first
-// answer about two hulls, from the start of the process, and its resident memory then. The files
-// are in the page cache: this is a restart of the program, not of the machine.
+// For each number of hulls (by default 0, 1000, 10000 and 100000): fills a store in a temporary
+// directory, each hull from N (64) points on a sphere, kills the server, and starts it five times.
+// One row of CSV per number: medians of the time from the start of the process until it listens and
+// until the first answer about two hulls, and its resident memory then. The files are in the page
+// cache: this is a restart of the program, not of the machine.
 
 #include <grpcpp/grpcpp.h>
 
@@ -32,7 +32,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kStarts = 5;
-// Many, so that the store commits many hulls at once.
+// Many, so that the store commits many hulls together.
 constexpr int kWriters = 64;
 
 std::string IdOf(int hull) { return "start/" + std::to_string(hull); }
@@ -52,7 +52,7 @@ void Fill(const std::string& address, int hulls, int points) {
   for (std::thread& writer : writers) writer.join();
 }
 
-// Asks about the first hull and the last one.
+// Queries the first hull and the last one.
 void Check(const std::string& address, int hulls) {
   const auto stub = v1::CollisionService::NewStub(
       grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));

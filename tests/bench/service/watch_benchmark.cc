@@ -1,16 +1,16 @@
-// How soon after a change watches hear of it, and what a store that changes all the time gives.
+// Latency of watch events, and the event rate of a constantly changing store.
 //
 //   watch_benchmark [PROGRAM]
 //
-// Starts a hulld of its own, whose store is memory. Rows of CSV, times in microseconds:
+// Starts its own hulld with an in-memory store. Rows of CSV, times in microseconds:
 //
-//   floor              a round trip of StreamCollisions with one pair: what any message takes
+//   floor              a round trip of StreamCollisions with one pair: the cost of any message
 //   one watcher        from an acknowledged append, as its writer reads it, to the event, as the
-//                      watcher reads it; 0 where the event comes first
-//   1000 watchers      the same, of all of 1000 that watch one hull
-//   flood              kFloodHulls hulls that change as fast as their writers can, beside a watcher
-//                      that reads and one that does not: changes and events in a second, and how
-//                      much the server's resident memory grew meanwhile
+//                      watcher reads it; 0 if the event comes first
+//   1000 watchers      likewise, for all of 1000 that watch one hull
+//   flood              kFloodHulls hulls that change as fast as their writers can, with a watcher
+//                      that reads and one that does not: changes and events per second, and the
+//                      growth of the server's resident memory
 
 #include <grpcpp/grpcpp.h>
 
@@ -62,7 +62,7 @@ void Print(const char* name, std::vector<double> times) {
   std::fflush(stdout);
 }
 
-// Appends to a hull that is a segment and stays one: each point changes it, at the same cost.
+// Appends to a hull that stays a segment: each point changes it, at the same cost.
 class Writer {
  public:
   Writer(const std::string& address, const std::string& hull_id)
@@ -91,7 +91,7 @@ class Writer {
     }
     stream_->Write(chunk);
   }
-  // The revision after what was acknowledged.
+  // Returns the revision after the acknowledged change.
   uint64_t Receive() {
     v1::AppendPointsResponse response;
     stream_->Read(&response);
@@ -110,7 +110,7 @@ class Writer {
   uint64_t received_ = 0;
 };
 
-// What came to watches by when.
+// Arrival times of events by watch.
 class Board {
  public:
   void Note(int watcher, uint64_t revision) {
@@ -141,7 +141,7 @@ class Board {
   std::vector<Clock::time_point> times_;
 };
 
-// A watch of one hull, read by gRPC's threads.
+// A watch of a hull, read by gRPC's threads.
 class Watcher : public grpc::ClientReadReactor<v1::WatchHullsResponse> {
  public:
   Watcher(v1::HullService::Stub& stub, const std::string& hull_id, int number, Board& board)

@@ -9,11 +9,11 @@
 
 namespace hulld::bench {
 
-// The hull of the points of a file, in any format that hullctl reads. INVALID_ARGUMENT names the
-// file and the place.
+// Returns the hull of the points of a file, in any format that hullctl reads. INVALID_ARGUMENT
+// names the file and the position.
 absl::StatusOr<Hull> HullOfFile(const std::string& path);
 
-// A hull that a running server keeps. Errors are the server's.
+// Returns a hull of a running server. Errors are the server's.
 absl::StatusOr<Hull> HullOfServer(const std::string& server, const std::string& hull_id);
 
 }  // namespace hulld::bench

@@ -1,5 +1,4 @@
-// hulld-bench: measures, on one's own hulls, what each way to ask costs and what its answers are
-// worth.
+// hulld-bench: measures the cost and the accuracy of each query method, on the user's own hulls.
 
 #include <CLI/CLI.hpp>
 #include <fstream>
@@ -52,7 +51,8 @@ void AddTradeOptions(CLI::App& command, TradeArguments& arguments) {
   command.add_option("--plot", arguments.plot, "Write a plot to this file, as SVG");
 }
 
-// The hulls that the user names, or our own if there are none. False after an error was told.
+// Collects the hulls that the user names, or built-in ones if none. Returns false after reporting
+// an error.
 bool CollectHulls([[maybe_unused]] const TradeArguments& arguments, std::vector<Hull>& hulls) {
 #ifdef HULLD_HAVE_CLIENT
   const auto take = [&](absl::StatusOr<Hull> hull) {

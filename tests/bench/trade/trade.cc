@@ -28,7 +28,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// One method on one range of questions: its answers, and how long they take.
+// One method on one range of queries: its answers, and their time.
 template <typename Value>
 class Measurement {
  public:
@@ -41,8 +41,8 @@ class Measurement {
   bool too_slow() const { return too_slow_; }
   double nanoseconds() const { return 1e9 * Median(seconds_) / static_cast<double>(range_.count); }
 
-  // Question by question, so that it can be given up. Then once more, to see how long it takes:
-  // some methods make what they need when they are first asked.
+  // Query by query, so that it can be abandoned. Then runs again for the time: some methods prepare
+  // data on the first query.
   void RunFirst(double max_seconds) {
     const double start = ThreadSeconds();
     for (size_t i = 0; i < range_.count && !too_slow_; ++i) {
@@ -114,7 +114,7 @@ std::optional<TradeDepths> Summarize(const std::optional<DepthMeasurement>& meas
       ++depths.none;
     }
   }
-  // It tells no depth at all.
+  // It finds no depth at all.
   if (errors.empty()) return std::nullopt;
   depths.median_error = Median(errors);
   depths.largest_error = *std::max_element(errors.begin(), errors.end());
@@ -129,7 +129,7 @@ std::vector<Verdict> ExactVerdicts(const TradeQuestions& questions) {
   return verdicts;
 }
 
-// None where hulls are apart.
+// nullopt if the hulls are apart.
 std::vector<std::optional<double>> BestDepths(const TradeQuestions& questions) {
   std::vector<std::optional<double>> depths;
   for (size_t i = 0; i < questions.depth.count; ++i) {

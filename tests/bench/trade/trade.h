@@ -13,7 +13,7 @@
 
 namespace hulld::bench {
 
-// Methods that are variations of one, by a parameter.
+// Families of methods that vary by a parameter.
 enum class TradeFamily { kHulld, kTolerance, kSimplified, kTextbook, kPlainGjk, kPeer };
 
 struct TradeMethod {
@@ -21,12 +21,13 @@ struct TradeMethod {
   std::unique_ptr<QueryMethod> method;
 };
 
-// All that this program knows. Lengths (tolerances, errors) are `size` times what the names say.
+// Returns all methods known to this program. Lengths (tolerances, errors) are `size` times the
+// factor in the name.
 std::vector<TradeMethod> MakeTradeMethods(double size);
 
-// How a method answered one range of questions. Absent where it would have taken too long.
+// Answers of a method on one range of queries. Absent if it would have taken too long.
 struct TradeAnswers {
-  double nanoseconds = 0;  // per question, median of the rounds, processor time
+  double nanoseconds = 0;  // per query, median of the rounds, processor time
   size_t questions = 0;
   size_t wrong = 0;
   size_t open = 0;
@@ -35,7 +36,7 @@ struct TradeDepths {
   double nanoseconds = 0;
   size_t questions = 0;
   size_t none = 0;  // no depth was found, though the hulls overlap
-  // Errors of the depths that were found, relative to TradeQuestions::size.
+  // Errors of the depths found, relative to TradeQuestions::size.
   double median_error = 0;
   double largest_error = 0;
 };
@@ -49,21 +50,20 @@ struct TradeRow {
 
 struct TradeSettings {
   int rounds = 5;
-  // A method whose first round would take longer than this on one range is left out there.
+  // A method is omitted from a range if its first round would take longer than this.
   double max_seconds = 10;
 };
 
 struct Trade {
   std::vector<TradeRow> rows;
-  // What is counted as right is hulld's exact relation. `checked` questions were also asked of the
-  // tests' oracle, where it is built in and can answer in reasonable time; it differed `differing`
-  // times.
+  // hulld's exact relation is the reference. `checked` queries also ran against the tests' oracle,
+  // if built in and fast enough; it differed `differing` times.
   size_t questions = 0;
   size_t checked = 0;
   size_t differing = 0;
 };
 
-// Asks every method every question, the methods in turn in each round.
+// Runs every query with every method, alternating the methods in each round.
 Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& methods,
                    const TradeSettings& settings);
 

@@ -1,6 +1,5 @@
-// Three panels side by side, a legend below. Horizontal: time per question, logarithmic. Vertical:
-// what is wrong, logarithmic, with a band at the bottom for nothing at all, in which marks that
-// would cover each other are stacked.
+// Three panels in a row, a legend below. Horizontal: time per query, logarithmic. Vertical: errors,
+// logarithmic, with a band at the bottom for zero, which stacks overlapping marks.
 
 #include <algorithm>
 #include <cmath>
@@ -76,7 +75,7 @@ void Line(std::ostream& out, double x1, double y1, double x2, double y2, const c
       << "\" y2=\"" << Number(y2) << "\" stroke=\"" << color << "\"/>\n";
 }
 
-// "10" and its exponent, raised.
+// Returns "10" and its exponent, raised.
 std::string PowerOfTen(int exponent) {
   return "10<tspan dy=\"-5\" font-size=\"9\">" + std::to_string(exponent) + "</tspan>";
 }
@@ -91,7 +90,7 @@ struct Mark {
   TradeFamily family;
   double nanoseconds;
   double wrong;  // 0: in the band
-  bool hollow;   // leaves questions open
+  bool hollow;   // leaves queries open
 };
 
 struct Panel {
@@ -115,7 +114,7 @@ class PanelDrawing {
       most = std::max(most, mark.nanoseconds);
     }
     if (panel.marks.empty()) least = most = 100;
-    // Room for the marks beside the frame.
+    // Margin for the marks next to the frame.
     constexpr double kRoom = 1.25;
     low_ = static_cast<int>(std::floor(std::log10(least / kRoom)));
     high_ = std::max(low_ + 1, static_cast<int>(std::ceil(std::log10(most * kRoom))));
@@ -172,7 +171,7 @@ class PanelDrawing {
          "text-anchor=\"middle\"");
   }
 
-  // Where the mark is drawn: at its place, or as near as it is free.
+  // Returns the position of the mark: its place, or the nearest free one.
   std::pair<double, double> PlaceOf(const Mark& mark) {
     const double x = X(mark.nanoseconds);
     const bool in_band = mark.wrong == 0;
@@ -184,7 +183,7 @@ class PanelDrawing {
         return std::hypot(other.first - x, other.second - y) < 2 * kMarkRadius - 1;
       });
       if (free) break;
-      // Upwards in the band; elsewhere to and fro, so that it stays near.
+      // Upwards in the band; elsewhere alternating, so that it stays near.
       const double offset = in_band ? step : (step + 1) / 2 * (step % 2 == 1 ? -1 : 1);
       y = start + (in_band ? -4.0 : 3.0) * offset;
     }
@@ -291,7 +290,7 @@ void WriteTradePlot(const Trade& trade, std::ostream& out) {
       DepthPanel(trade)};
   double left = kLeft;
   for (const Panel& panel : panels) {
-    // Without depths there are but two.
+    // Without depths only two panels remain.
     if (panel.marks.empty()) continue;
     PanelDrawing(panel, left, out).Draw();
     left += kPanelStep;

@@ -33,7 +33,7 @@ struct Level {
   // Relative distance to contact, uniform between the two; negative: deep.
   double least;
   double most;
-  // Instead: this part of the way from contact to coinciding centres.
+  // If set, used instead: this fraction of the way from contact to coinciding centers.
   double inwards = 0;
   // Counted from the nearest translation that collides, not from the nearest that separates.
   bool from_collision = false;
@@ -48,7 +48,7 @@ static_assert(std::size(kOrdinary) + std::size(kNearContact) == TradeQuestions::
 constexpr size_t kFirstDepthLevel = 3;
 constexpr size_t kDepthLevels = 3;
 
-// B's translation for a pair at the level.
+// Returns B's translation for a pair at the level.
 Vector Place(const QueryHull& a, const Vector& t_WA, const QueryHull& b, const Level& level,
              Random& random) {
   const Vector direction = random.UnitVector();

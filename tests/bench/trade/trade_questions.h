@@ -10,8 +10,8 @@
 
 namespace hulld::bench {
 
-// Questions about pairs of given hulls, level by level, equally many each. A distance to contact is
-// along a random direction and relative to the sum of the pair's radii.
+// Queries about pairs of given hulls, with equally many per level. A distance to contact is along a
+// random direction and relative to the sum of the pair's radii.
 //
 //   ordinary:      far, close (1 to 5 %), 1e-3 apart, half-way deep, 1e-3 deep
 //   near contact:  1e-6 deep and apart, likewise 1e-9, 1e-12, 1e-15, and as little as doubles allow
@@ -19,7 +19,7 @@ namespace hulld::bench {
 //
 // Half of the pairs are at the origin, where translations are finest, half some 100 radii from it,
 // as in a scene. Every method receives the same geometry: random rotations are rounded into the
-// points, and a pose is a translation, exact as it stands.
+// points, and a pose is an exact translation.
 struct TradeQuestions {
   static constexpr size_t kLevels = 15;
 
@@ -32,14 +32,14 @@ struct TradeQuestions {
   Range ordinary;
   Range near_contact;
   Range depth;
-  // The mean radius of the hulls: what "relative" means where there is no pair.
+  // Mean radius of the hulls: the unit of relative values without a pair.
   double size;
 };
 
-// Requires hulls that are not empty, at least one. Fixed seeds.
+// Requires: at least one hull, none empty. Fixed seeds.
 TradeQuestions MakeTradeQuestions(const std::vector<Hull>& hulls, size_t per_level);
 
-// What is asked about when the user has no hulls: ellipsoids of 64 points, boxes, and prisms of 12
+// Returns the hulls used if the user has none: ellipsoids of 64 points, boxes, and prisms of 12
 // sides.
 std::vector<Hull> MakeOwnHulls();
 

@@ -1,12 +1,11 @@
 #!/bin/bash
-# Measures how long the viewer's page takes to show large scenes, and to draw a frame of them, with
-# software rendering; keeps the rows beside itself.
+# Measures the time of the viewer's page to show large scenes, and to draw a frame of them, with
+# software rendering; keeps the rows in its own folder.
 #
 #   bash tests/bench/viewer/run_viewer_benchmark.sh [MACHINE]
 #
 # MACHINE names the file, as in viewer_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default.
-# Needs chromium, chromium-driver and python3-selenium. Nothing else should run on the machine
-# meanwhile.
+# Requires chromium, chromium-driver and python3-selenium, and an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 

@@ -1,4 +1,4 @@
-"""Measures the viewer's page: how long it takes to show a scene, and how long a frame takes.
+"""Measures the viewer's page: the time to show a scene, and the time of a frame.
 
     /usr/bin/python3 viewer_benchmark.py BIN_DIRECTORY
 
@@ -19,8 +19,7 @@ viewing.skip_unless_browser()
 WIDTH, HEIGHT = 1440, 900
 FRAMES = 10
 
-# The milliseconds of each frame while the camera goes around. Reading a pixel waits for the
-# picture.
+# Milliseconds of each frame while the camera orbits. Reading a pixel waits for the picture.
 MEASURE = """
 const [frames, done] = arguments;
 const {stage} = hulldViewer;
@@ -41,7 +40,7 @@ step();
 
 
 def measure(hulld, name, *arguments):
-    """One row: the time from opening the page to its first picture, and of later ones."""
+    """Returns one row: the time from opening the page to its first picture, and of later ones."""
     viewer = hulld.view(*arguments)
     browser = viewing.Browser(WIDTH, HEIGHT)
     try:

@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace hulld {
-namespace {
+namespace retry_test {
 
 using std::chrono::milliseconds;
 using testing::ElementsAre;
@@ -34,6 +34,19 @@ TEST(Retry, UnavailableIsTriedAgainWithDoublingWaitsUpToACap) {
   EXPECT_THAT(
       waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400), milliseconds(800),
                          milliseconds(1600), milliseconds(2000), milliseconds(2000)));
+}
+
+TEST(Retry, OnlyTheDeadlineBoundsAttemptsByDefault) {
+  Deadline now;
+  RetryPolicy policy;
+  policy.now = [&now] { return now; };
+  policy.wait = [&now](milliseconds wait) { now += wait; };
+  int attempts = 0;
+  const absl::Status status = CallWithRetries(policy, now + std::chrono::minutes(1), [&] {
+    return ++attempts < 30 ? absl::UnavailableError("down") : absl::OkStatus();
+  });
+  EXPECT_TRUE(status.ok()) << status;
+  EXPECT_EQ(attempts, 30);
 }
 
 TEST(Retry, EndsWithTheFirstOtherAnswer) {
@@ -88,9 +101,9 @@ TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
   const Deadline deadline = now + milliseconds(800);
   EXPECT_TRUE(absl::IsUnavailable(
       CallWithRetries(policy, deadline, [] { return absl::UnavailableError(""); })));
-  // The third would end at the deadline or later, once 700 ms have passed.
+  // The third would end at or after the deadline, 700 ms in.
   EXPECT_THAT(waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400)));
-  // Calls are ended by the time of day, which gRPC asks for: at the same moment.
+  // Call deadlines use the wall clock, as gRPC requires: they denote the same time.
   const auto before = std::chrono::system_clock::now();
   const auto moment = policy.ForCall(now + std::chrono::hours(1)) - std::chrono::hours(1);
   const auto after = std::chrono::system_clock::now();
@@ -115,5 +128,5 @@ TEST(Retry, OneAttemptMeansNone) {
   EXPECT_THAT(waits, IsEmpty());
 }
 
-}  // namespace
+}  // namespace retry_test
 }  // namespace hulld

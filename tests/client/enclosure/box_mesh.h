@@ -12,8 +12,8 @@ namespace hulld {
 
 using Corner3 = std::array<double, 3>;
 
-// The faces of a box whose corner c has the upper coordinate of an axis where that bit of c is set;
-// counter-clockwise seen from outside.
+// Faces of a box: bit k of corner c selects the upper coordinate of axis k. Counter-clockwise seen
+// from outside.
 inline constexpr std::array<std::array<uint32_t, 4>, 6> kBoxFaces = {
     {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
 
@@ -27,7 +27,7 @@ inline std::array<Corner3, 8> BoxCorners(const Corner3& low, const Corner3& high
   return corners;
 }
 
-// As the server would send the hull of its corners. Flat where an edge is 0 along z.
+// As the server sends the hull of its corners. Flat if an edge is 0 along z.
 inline HullMesh BoxHull(const Corner3& low, const Corner3& high) {
   HullMesh mesh;
   const bool flat = low[2] == high[2];

@@ -11,7 +11,7 @@
 #include "tests/client/enclosure/box_mesh.h"
 
 namespace hulld {
-namespace {
+namespace coverage_test {
 
 PlacedHull Placed(HullMesh mesh, const RigidPose& X_WH) {
   return {std::make_shared<const HullMesh>(std::move(mesh)), X_WH};
@@ -48,7 +48,7 @@ TEST(Coverage, OneHullTellsHowFarTheMeshSticksOut) {
   EXPECT_EQ(coverage.uncovered[0].point, (Corner3{4, 5, 1}));
 }
 
-// Neither half holds the triangles that cross the cut.
+// Neither half contains the triangles that cross the cut.
 TEST(Coverage, TwoHalvesEncloseTheWhole) {
   const TriangleMesh whole = BoxMesh({0, 0, 0}, {2, 1, 1});
   const Coverage coverage =
@@ -57,7 +57,7 @@ TEST(Coverage, TwoHalvesEncloseTheWhole) {
   EXPECT_GT(coverage.clipped, 0u);
 }
 
-// A box that is turned by a third about the diagonal (1, 1, 1), and moved, takes its axes with it.
+// A box rotated by a third turn about the diagonal (1, 1, 1), and moved, takes its axes with it.
 TEST(Coverage, APieceStandsAtItsPose) {
   const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
   EXPECT_TRUE(Cover({turned}, BoxMesh({10, 0, 0}, {13, 1, 2})).uncovered.empty());
@@ -66,13 +66,13 @@ TEST(Coverage, APieceStandsAtItsPose) {
   EXPECT_DOUBLE_EQ(coverage.distance, 0.5);
 }
 
-// The quaternion (2, 0, 0, 1) takes (x, y) to (3x - 4y, 4x + 3y) / 5, so that the points (3s, 4s)
-// lie on an edge of the box, although a rotation rounded to doubles would move it off them. What is
+// The quaternion (2, 0, 0, 1) maps (x, y) to (3x - 4y, 4x + 3y) / 5, so that the points (3s, 4s)
+// lie on an edge of the box, although a rotation rounded to doubles would move the edge. A point
 // off by the smallest step is outside.
 TEST(Coverage, APoseIsNotRounded) {
   const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {5, 1, 1}), {2, 0, 0, 1, 0, 0, 0});
   for (const double s : {0.1, 0.3, 0x1.123456789abcdp-3}) {
-    // Rounded to few digits, so that three times and four times it are not rounded.
+    // Rounded to few digits, so that its multiples by three and four are exact.
     const double t = std::ldexp(std::round(std::ldexp(s, 40)), -40);
     const Corner3 on = {3 * t, 4 * t, 0.5};
     EXPECT_TRUE(Cover({turned}, Triangle(on, on, on)).uncovered.empty());
@@ -81,13 +81,13 @@ TEST(Coverage, APoseIsNotRounded) {
   }
 }
 
-// Two halves of a box, turned and moved together, still meet without a gap; pulled apart by the
+// Two halves of a box, rotated and moved together, still meet without a gap; separated by the
 // smallest step, they do not.
 TEST(Coverage, PiecesThatMeetTurned) {
   const auto half = [](double from, double to, double shift) {
     return Placed(BoxHull({from, 0, 0}, {to, 1, 1}), {0.3, 0.5, -0.7, 0.11, 1 + shift, 2, 3});
   };
-  // A triangle inside of both, as nearly as doubles allow, that crosses the cut.
+  // A triangle inside both, as closely as doubles allow, that crosses the cut.
   const auto at = [](double x, double y, double z) {
     const RigidPose X = Compose({0.3, 0.5, -0.7, 0.11, 1, 2, 3}, {1, 0, 0, 0, x, y, z});
     return Corner3{X[4], X[5], X[6]};
@@ -100,7 +100,7 @@ TEST(Coverage, PiecesThatMeetTurned) {
             1u);
 }
 
-// A gap of one unit in the last place is a gap.
+// A gap of a unit in the last place is a gap.
 TEST(Coverage, TheNarrowestGapIsSeen) {
   const double start = std::nextafter(0.7, 1);
   const Coverage coverage =
@@ -118,7 +118,7 @@ TEST(Coverage, FlatPiecesCoverWhatLiesInThem) {
   EXPECT_TRUE(Cover({left, right}, mesh).uncovered.empty());
   EXPECT_EQ(Cover({left}, mesh).uncovered.size(), 1u);
   EXPECT_DOUBLE_EQ(Cover({left}, mesh).uncovered[0].area, 0.5);
-  // Beside their plane they cover nothing but the line where they cross it.
+  // Outside their plane they cover only the line of intersection.
   EXPECT_EQ(Cover({left, right}, Triangle({0, 0, 1}, {1, 0, 1}, {0, 0, 2})).uncovered.size(), 1u);
 }
 
@@ -139,7 +139,7 @@ TEST(Coverage, NoPieceCoversNothing) {
   EXPECT_EQ(Cover({empty}, Triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0})).uncovered.size(), 1u);
 }
 
-// The area of a triangle within a unit cell, by clipping in floating point.
+// Returns the area of a triangle within a unit cell, by clipping in floating point.
 double AreaInCell(const std::array<std::array<double, 2>, 3>& triangle, double x, double y) {
   std::vector<std::array<double, 2>> polygon(triangle.begin(), triangle.end());
   const std::array<std::array<double, 3>, 4> sides = {
@@ -168,13 +168,13 @@ double AreaInCell(const std::array<std::array<double, 2>, 3>& triangle, double x
   return std::abs(twice) / 2;
 }
 
-// Boxes that stand over cells of a grid, and triangles on the grid: what is not covered is counted
-// cell by cell.
+// Boxes over cells of a grid, and triangles on the grid: the uncovered area is counted cell by
+// cell.
 TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
   constexpr int kSide = 6;
   constexpr uint64_t kSeed = 1201;
   std::mt19937_64 generator(kSeed);
-  // From `least` to `most`; the same everywhere, unlike the standard's distributions.
+  // From `least` to `most`; equal on every platform, unlike the standard's distributions.
   const auto between = [&generator](int least, int most) {
     return least + static_cast<int>(generator() % static_cast<uint64_t>(most - least + 1));
   };
@@ -249,5 +249,5 @@ TEST(IsHullOf, TellsHullsApart) {
   EXPECT_FALSE(*IsHullOf(segment, {0, 0, 0, 3, 3, 3, 1, 1, 1.5}));
 }
 
-}  // namespace
+}  // namespace coverage_test
 }  // namespace hulld

@@ -7,7 +7,7 @@
 #include "tests/client/enclosure/box_mesh.h"
 
 namespace hulld {
-namespace {
+namespace mesh_volume_test {
 
 TEST(MeshVolume, ABoxFillsItsHull) {
   EXPECT_EQ(VolumeRatio(BoxHull({0, 0, 0}, {0.1, 0.2, 0.3}), BoxMesh({0, 0, 0}, {0.1, 0.2, 0.3})),
@@ -25,7 +25,7 @@ TEST(MeshVolume, DirectionDoesNotMatter) {
   EXPECT_EQ(VolumeRatio(BoxHull({0, 0, 0}, {2, 1, 1}), mesh), 2);
 }
 
-// Files such as STL give each triangle corners of its own.
+// Formats such as STL give each triangle its own corners.
 TEST(MeshVolume, VerticesAtOnePlaceAreOne) {
   const TriangleMesh box = BoxMesh({0, 0, 0}, {1, 1, 1});
   TriangleMesh soup;
@@ -43,7 +43,7 @@ TEST(MeshVolume, WhatIsOpenHasNone) {
   mesh.triangles.pop_back();
   EXPECT_FALSE(IsClosed(mesh));
   EXPECT_EQ(VolumeRatio(BoxHull({0, 0, 0}, {1, 1, 1}), mesh), std::nullopt);
-  // One triangle the wrong way round.
+  // One triangle with the wrong orientation.
   mesh = BoxMesh({0, 0, 0}, {1, 1, 1});
   std::swap(mesh.triangles[0][0], mesh.triangles[0][1]);
   EXPECT_FALSE(IsClosed(mesh));
@@ -54,5 +54,5 @@ TEST(MeshVolume, WhatIsOpenHasNone) {
   EXPECT_EQ(VolumeRatio(BoxHull({0, 0, 0}, {1, 1, 1}), sheet), std::nullopt);
 }
 
-}  // namespace
+}  // namespace mesh_volume_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// The packed forms of PLY and PCD.
+// The binary forms of PLY and PCD.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,12 +10,12 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace binary_formats_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Packs scalars one after another in either byte order.
+// Appends scalars in either byte order.
 class Packer {
  public:
   explicit Packer(bool big_endian = false) : big_endian_(big_endian) {}
@@ -91,7 +91,7 @@ TEST(PlyFile, BinaryReadsEveryTypeAndSkipsListsAndOtherElements) {
 }
 
 TEST(PlyFile, BinaryAfterACrLfHeader) {
-  // The first byte of the body is LF: it must not be taken for a line end.
+  // The first byte of the body is LF: it must not be parsed as a line end.
   std::string head = PlyHead("binary_little_endian", kFloatVertices);
   for (size_t at = 0; (at = head.find('\n', at)) != std::string::npos; at += 2) {
     head.replace(at, 1, "\r\n");
@@ -171,5 +171,5 @@ TEST(PcdFile, BinaryOrganizedCloudsLoseTheirHolesWhenAskedTo) {
   EXPECT_THAT(ReadText(text, PointFormat::kPcd, options).xyz(), ElementsAre(1, 2, 3));
 }
 
-}  // namespace
+}  // namespace binary_formats_test
 }  // namespace hulld

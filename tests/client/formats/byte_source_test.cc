@@ -10,7 +10,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace byte_source_test {
 
 std::vector<std::string> Lines(const std::string& content) {
   const TempFile file("lines", content);
@@ -52,7 +52,7 @@ TEST(ByteSource, RefusesUtf16WithAdvice) {
 }
 
 TEST(ByteSource, LinesMayCrossTheBuffer) {
-  // Around the buffer's size, every split of CR LF between two fillings comes up.
+  // Around the buffer's size, every split of CR LF between two reads occurs.
   for (size_t length = (256 << 10) - 4; length < (256 << 10) + 4; ++length) {
     const std::string first(length, 'a');
     EXPECT_EQ(Lines(first + "\r\nb\r\nc"), (Strings{first, "b", "c"})) << length;
@@ -115,5 +115,5 @@ TEST(ByteSource, OpeningSaysWhatIsWrong) {
             absl::StatusCode::kInvalidArgument);
 }
 
-}  // namespace
+}  // namespace byte_source_test
 }  // namespace hulld

@@ -1,5 +1,5 @@
-// Files that are truncated, lie about their sizes, or are noise: each ends in an error or in
-// points, in little memory and time, and under sanitizers without a finding.
+// Truncated files, false sizes, and noise: each yields an error or points, with little memory and
+// time, and no sanitizer finding.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -9,7 +9,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace hostile_files_test {
 
 using testing::HasSubstr;
 
@@ -91,7 +91,7 @@ TEST(HostileFiles, NoiseIsReadOrRefusedByEveryReader) {
   }
 }
 
-// The largest amount of memory that this process has held, in bytes.
+// Returns the peak memory of this process in bytes.
 long PeakMemory() {
   rusage usage;
   getrusage(RUSAGE_SELF, &usage);
@@ -160,8 +160,8 @@ TEST(HostileFiles, ARowOfManyGigabytesIsRefused) {
                        "DATA binary\nxx",
                        PointFormat::kPcd)
                   .error(),
-              HasSubstr("no POINTS"));
+              HasSubstr("WIDTH times HEIGHT is beyond 2^64"));
 }
 
-}  // namespace
+}  // namespace hostile_files_test
 }  // namespace hulld

@@ -6,7 +6,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace mesh_file_test {
 
 using testing::DoubleNear;
 using testing::ElementsAre;
@@ -28,10 +28,27 @@ TEST(MeshFile, ObjPolygonsBecomeFans) {
 }
 
 TEST(MeshFile, ObjCornersMustNameVertices) {
-  for (const char* corner : {"0", "4", "-4", "x", "99999999999999999999", "-9223372036854775808"}) {
+  for (const char* corner : {"0", "-4", "x", "99999999999999999999", "-9223372036854775808"}) {
     const TempFile file("a.obj", std::string("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 ") + corner + "\n");
     EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr(":4: \"")) << corner;
   }
+}
+
+TEST(MeshFile, ObjFacesMayPrecedeTheirVertices) {
+  const TempFile file("a.obj",
+                      "# C:\\a\\\nf 1 2 \\\n3 # c\nv 0 0 0 1\nv 1 0 0 .5 .5 .5\nv 1 \\ \n 1 0\r\n");
+  const auto mesh = ReadMesh(file.path());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->triangles, ElementsAre(ElementsAre(0, 1, 2)));
+  EXPECT_EQ(mesh->vertices[2][1], 1);
+  const auto parts = ReadParts(file.path(), SplitBy::kName);
+  ASSERT_TRUE(parts.ok()) << parts.status();
+  EXPECT_EQ(parts->size(), 1u);
+  const TempFile missing("b.obj", "f 1 2 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\n");
+  EXPECT_THAT(Error(ReadMesh(missing.path())),
+              HasSubstr(":1: a face names vertex 4, but the file holds 3"));
+  const TempFile cut("c.obj", "v 0 0 0\nv 1 0 0\\");
+  EXPECT_THAT(Error(ReadMesh(cut.path())), HasSubstr("is it complete?"));
 }
 
 TEST(MeshFile, ObjFacesMustHaveCorners) {
@@ -70,7 +87,7 @@ TEST(MeshFile, FormatsWithoutFacesAreRefusedWithAdvice) {
   EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr("convert it to obj, off, stl, gltf or dae"));
 }
 
-// A triangle in centimetres with Z up, which its node moves by 1 m.
+// A triangle in centimeters with Z up; its node moves it by 1 m.
 constexpr char kCollada[] = R"(<?xml version="1.0" encoding="utf-8"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
   <asset><unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
@@ -112,5 +129,5 @@ TEST(MeshFile, ColladaComesInMetresWithItsAxesAsTheyAre) {
   EXPECT_EQ((*parts)[0].name, "plate");
 }
 
-}  // namespace
+}  // namespace mesh_file_test
 }  // namespace hulld

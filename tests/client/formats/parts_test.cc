@@ -6,7 +6,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace parts_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -33,7 +33,7 @@ TEST(MeshParts, ObjectsAndGroupsAreParts) {
 }
 
 TEST(MeshParts, ComponentsHangTogetherAtCoordinates) {
-  // The third triangle has vertices of its own where the first has some.
+  // The third triangle has separate copies of the first one's vertices.
   const TempFile file("a.obj",
                       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 1 0 0\nv 2 0 0\n"
                       "v 1 1 0\nf 1 2 3\nf 4 5 6\nf 7 8 9\n");
@@ -64,5 +64,5 @@ TEST(MeshParts, AFileWithoutTrianglesIsRefused) {
   EXPECT_FALSE(ReadParts(points.path(), SplitBy::kName).ok());
 }
 
-}  // namespace
+}  // namespace parts_test
 }  // namespace hulld

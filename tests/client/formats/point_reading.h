@@ -14,7 +14,7 @@
 
 namespace hulld {
 
-// A file that lives as long as the object.
+// A temporary file, deleted with the object.
 class TempFile {
  public:
   TempFile(const std::string& name, const std::string& content) {
@@ -73,7 +73,7 @@ inline PointsRead ReadText(const std::string& content, PointFormat format,
                            ReadOptions options = {}) {
   const TempFile file("points", content);
   PointsRead result = ReadFile(file.path(), format, options);
-  // Errors name the file; tests compare what follows.
+  // Errors name the file; tests compare the rest.
   std::string error = result.error();
   if (const size_t at = error.find(file.path()); at != std::string::npos) {
     error.replace(at, file.path().size(), "FILE");

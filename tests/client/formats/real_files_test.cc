@@ -1,6 +1,5 @@
-// Files that others made: the models of Debian's package assimp-testmodels, and the scans that
-// HULLD_DATA names (default: shared/data beside the project). Skipped with a word where they are
-// not installed.
+// Third-party files: the models of Debian's package assimp-testmodels, and the scans in HULLD_DATA
+// (default: shared/data next to the project). Skipped with a message if not installed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +12,7 @@
 #include "tests/source_tree.h"
 
 namespace hulld {
-namespace {
+namespace real_files_test {
 
 namespace fs = std::filesystem;
 
@@ -29,7 +28,7 @@ PointsRead ReadPath(const fs::path& path) {
   return ReadFile(path.string(), *PointFormatOfPath(path.string()));
 }
 
-// The points of the lines that start with "v ", by means that share nothing with the reader.
+// Returns the points of the lines that start with "v ", by code independent of the reader.
 std::vector<double> ObjPointsByStream(const fs::path& path) {
   std::ifstream file(path);
   std::vector<double> xyz;
@@ -91,7 +90,7 @@ TEST(RealFiles, PlyModelsOfAssimp) {
   const PointsRead binary = ReadPath(Models() / "PLY/cube_binary.ply");
   EXPECT_EQ(binary.counts.points, 8u);
   EXPECT_TRUE(binary.all_float());
-  // Bytes are missing from the middle of it, so that noise is read before it ends early.
+  // Bytes are missing from its middle, so that noise is read before it ends early.
   ReadOptions options;
   options.skip_nonfinite = true;
   const PointsRead cut =
@@ -99,7 +98,7 @@ TEST(RealFiles, PlyModelsOfAssimp) {
   EXPECT_THAT(cut.error(), HasSubstr("within the element vertex"));
 }
 
-// Every face is three corners, none joined, none lost; text and binary hold the same spider.
+// Every face is three corners, none joined, none lost; text and binary contain the same spider.
 TEST(RealFiles, StlModelsOfAssimp) {
   SKIP_WITHOUT(Models());
   const PointsRead binary = ReadPath(Models() / "STL/Spider_binary.stl");
@@ -113,7 +112,7 @@ TEST(RealFiles, StlModelsOfAssimp) {
   EXPECT_EQ(ReadPath(Models() / "STL/triangle_with_two_solids.stl").counts.points, 6u);
 }
 
-// The box of the file is 1 wide in its own frame; its node turns it by a quarter about x.
+// The box of the file is 1 wide in its own frame; its node rotates it by a quarter turn about x.
 TEST(RealFiles, GltfNodesMoveTheirMeshes) {
   SKIP_WITHOUT(Models());
   const fs::path path = Models() / "glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb";
@@ -176,5 +175,5 @@ TEST(RealFiles, Scans) {
   EXPECT_EQ(links, 7);
 }
 
-}  // namespace
+}  // namespace real_files_test
 }  // namespace hulld

@@ -7,7 +7,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace text_formats_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -34,8 +34,8 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
             "FILE:1: a point needs 3 coordinates, here are 2");
 }
 
-// After malformed.obj, malformed2.obj and empty.obj of assimp-testmodels, which were read as if
-// nothing were wrong with them.
+// Modeled on malformed.obj, malformed2.obj, and empty.obj of assimp-testmodels, which were formerly
+// accepted.
 TEST(ObjFile, FacesOfABrokenFileAreErrors) {
   const std::string vertices = "v 1 2 3\nv 4 5 6\n";
   EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
@@ -60,6 +60,39 @@ TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
 TEST(XyzFile, SkipsCommentsAndBlankLines) {
   EXPECT_THAT(ReadText("# x y z\n\n  1 2 3 # end\r\n\t\n4\t5\t6", PointFormat::kXyz).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST(XyzFile, NumbersMayBeSeparatedByCommasOrSemicolons) {
+  for (const char* text :
+       {"1,2,3\n4,5,6\n", "1, 2, 3\n4 , 5\t,6\n", "1;2;3;255;0\n4; 5; 6\n",
+        "1,2,3,255,0,0\n4,5,6,\n", "1 2 3\n4,5,6 # a, b\n", "1 2 3 a,b\n4 5 6 c;d\n"}) {
+    const PointsRead read = ReadText(text, PointFormat::kXyz);
+    EXPECT_TRUE(read.status.ok()) << read.status << "\n" << text;
+    EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, 5, 6)) << text;
+  }
+}
+
+TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
+  const auto error = [](const char* text) { return ReadText(text, PointFormat::kXyz).error(); };
+  EXPECT_THAT(error("1,5 2,5 3,5\n"),
+              HasSubstr("FILE:1: \"1,5 2,5 3,5\" has white space and \",\" between its numbers"));
+  EXPECT_THAT(error("1 2 3\n1,2,3 255 0 0\n"), HasSubstr("FILE:2:"));
+  EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("the decimal mark is a point"));
+  EXPECT_THAT(error("x,y,z\n1,2,3\n"),
+              HasSubstr("\"x\" is not a number; --format csv reads tables with a header"));
+  EXPECT_THAT(error("1,,3\n"), HasSubstr("\"\" is not a number"));
+  EXPECT_EQ(error("1,2\n"), "FILE:1: a point needs 3 coordinates, here are 2");
+}
+
+TEST(SkipZero, DropsAndCountsPointsAtExactlyZero) {
+  ReadOptions options;
+  options.skip_zero = true;
+  const PointsRead read =
+      ReadText("0 0 0\n1 0 0\n-0 0.0 0e5\n0 0 5e-324\n", PointFormat::kXyz, options);
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 0, 0, 0, 0, 0x1p-1074));
+  EXPECT_EQ(read.counts.zeros, 2u);
+  EXPECT_EQ(read.counts.points, 2u);
+  EXPECT_THAT(ReadText("0 0 0\n", PointFormat::kXyz).xyz(), ElementsAre(0, 0, 0));
 }
 
 TEST(XyzFile, ANumberTooLargeIsAnErrorEvenWhenNonFinitePointsAreSkipped) {
@@ -152,11 +185,16 @@ TEST(OffFile, ReadsTheVerticesItDeclares) {
       ReadText("OFF # head\n# note\n2 1 0\n\n1 2 3\n4 5 6\n3 0 1 1\n", PointFormat::kOff).xyz(),
       ElementsAre(1, 2, 3, 4, 5, 6));
   EXPECT_THAT(ReadText("OFF 1 0 0\n1 2 3\n", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
-  // After OFF/invalid.off of assimp-testmodels.
+  // Modeled on OFF/invalid.off of assimp-testmodels.
   EXPECT_THAT(ReadText("OFF\n1 4\n1 2 3\n", PointFormat::kOff).error(),
               HasSubstr("after 0 of 4 faces; is it complete?"));
   EXPECT_THAT(ReadText("STCNOFF\n1 0 0\n1 2 3 9 9 9 0 0 0 1 5 5\n", PointFormat::kOff).xyz(),
               ElementsAre(1, 2, 3));
+}
+
+TEST(OffFile, FacesWithoutVerticesAreAnError) {
+  EXPECT_EQ(ReadText("OFF\n0 1 0\n3 0 1 2\n", PointFormat::kOff).error(),
+            "FILE:2: the file declares 1 faces, but no vertex");
 }
 
 TEST(OffFile, RefusesWhatItDoesNotKnow) {
@@ -178,14 +216,15 @@ TEST(PlyFile, AsciiKeepsWhatTheTextSays) {
       std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n3 0 1 1\n",
       PointFormat::kPly);
   EXPECT_TRUE(read.status.ok()) << read.status;
-  // 0.1 stands in a float property, but it is text: the nearest double is taken.
+  // 0.1 in a float property, but as text: the nearest double is used.
   EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, 5, 0.1));
   EXPECT_FALSE(read.all_float());
 }
 
 TEST(PlyFile, AsciiErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText(std::string(kAsciiPly) + "3 8 9\n", PointFormat::kPly).error(),
-            "FILE:17: the list has 2 items of 3");
+            "FILE: ends at byte 311 within the element extra, after 2 of 3 items of a list; is it "
+            "complete?");
   EXPECT_THAT(ReadText(std::string(kAsciiPly) + "0 1\n0 1\n", PointFormat::kPly).error(),
               HasSubstr("within the element vertex"));
   EXPECT_EQ(ReadText("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
@@ -196,6 +235,53 @@ TEST(PlyFile, AsciiErrorsNameFileAndLine) {
   EXPECT_THAT(ReadText("ply\nformat binary_middle_endian 1.0\n", PointFormat::kPly).error(),
               HasSubstr("FILE:2: format \"binary_middle_endian\" is unknown"));
   EXPECT_THAT(ReadText("plx\n", PointFormat::kPly).error(), HasSubstr("FILE:1: a PLY file starts"));
+}
+
+// RealSense Viewer writes a vertex and its color on two lines; other writers use one.
+TEST(PlyFile, AsciiValuesMayStandOnAnyLines) {
+  const std::string head =
+      "ply\r\nformat ascii 1.0\r\nelement vertex 2\r\nproperty float x\r\nproperty float y\r\n"
+      "property float z\r\nproperty uchar red\r\nproperty uchar green\r\nelement face 1\r\n"
+      "property list uchar int vertex_indices\r\nend_header\r\n";
+  for (const char* body :
+       {"1 2 3\r\n10 20\r\n4 5 6\r\n30 40\r\n3 0\r\n1 0\r\n", "1 2 3 10 20 4 5 6 30 40 3 0 1 0",
+        "1\n2\n3\n10\n20\n4\n5\n6\n30\n40\n3\n0\n1\n0\n",
+        "comment begin\n1 2 3 10 20\n\ncomment 9 9\n4 5 6 30 40\n3 0 1 0\ncomment end\n"}) {
+    const PointsRead read = ReadText(head + body, PointFormat::kPly);
+    EXPECT_TRUE(read.status.ok()) << read.status << "\n" << body;
+    EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, 5, 6)) << body;
+  }
+}
+
+// A surplus or missing value shifts all later ones: the points read are then wrong.
+TEST(PlyFile, AsciiFilesThatDoNotFitTheirHeaderAreErrors) {
+  const auto error = [](const std::string& counts, const std::string& body) {
+    return ReadText("ply\nformat ascii 1.0\n" + counts +
+                        "property float x\nproperty float y\nproperty float z\nend_header\n" + body,
+                    PointFormat::kPly)
+        .error();
+  };
+  EXPECT_THAT(error("element vertex 2\n", "1 2 3 255\n4 5 6 255\n"),
+              HasSubstr("FILE:9: \"6\" is beyond the last value that the header declares"));
+  EXPECT_THAT(error("element vertex 2\n", "1 2\n4 5 6\n"),
+              HasSubstr("within the element vertex; is it complete?"));
+  EXPECT_THAT(error("element vertex 1\n", "1 2 3\n4 5 6\n"), HasSubstr("FILE:9: \"4\" is beyond"));
+  EXPECT_THAT(error("element vertex 1\n", "1 2 x\n"), HasSubstr("FILE:8: \"x\" is not a number"));
+  EXPECT_THAT(error("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
+                    "element face 1\n",
+                    "1 2 3\n"),
+              HasSubstr("declares 1 elements \"face\", but no vertex"));
+  EXPECT_THAT(error("element vertex 1\nproperty float x\nelement vertex 1\n", "1 1 2 3\n"),
+              HasSubstr("declares the element vertex twice"));
+  EXPECT_EQ(error("element vertex 0\n", ""), "");
+}
+
+TEST(PlyFile, FilesCutWithinTheirFacesAreErrors) {
+  const std::string head =
+      std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n";
+  EXPECT_THAT(ReadText(head, PointFormat::kPly).error(), HasSubstr("within the element face"));
+  EXPECT_THAT(ReadText(head + "3 0 1", PointFormat::kPly).error(),
+              HasSubstr("within the element face, after 2 of 3 items of a list"));
 }
 
 constexpr char kPcdHead[] =
@@ -223,12 +309,6 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
       "FILE:5: FIELDS must name x, y and z");
 }
 
-TEST(PcdFile, CompressedDataIsRefusedWithAdvice) {
-  EXPECT_THAT(
-      ReadText(std::string(kPcdHead) + "DATA binary_compressed\nxx", PointFormat::kPcd).error(),
-      HasSubstr("pcl_convert_pcd_ascii_binary"));
-}
-
 TEST(Formats, AreKnownByExtensionInAnyCase) {
   EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
   EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
@@ -245,5 +325,5 @@ TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {
   }
 }
 
-}  // namespace
+}  // namespace text_formats_test
 }  // namespace hulld

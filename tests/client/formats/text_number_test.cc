@@ -8,7 +8,7 @@
 #include <random>
 
 namespace hulld {
-namespace {
+namespace text_number_test {
 
 double Parsed(std::string_view text) {
   double value = -12345;
@@ -27,7 +27,7 @@ TEST(TextNumber, IsTheNearestDouble) {
   EXPECT_EQ(Parsed("4.9406564584124654e-324"), 0x1p-1074);
   EXPECT_EQ(Parsed("1.7976931348623157e308"), 0x1.fffffffffffffp1023);
   EXPECT_EQ(Parsed("2.2250738585072011e-308"), 0x0.fffffffffffffp-1022);
-  // Half way between two doubles: ties go to even, and one digit far behind decides otherwise.
+  // Halfway between two doubles: ties go to even, and a digit far behind decides otherwise.
   EXPECT_EQ(Parsed("9007199254740993"), 9007199254740992.0);
   EXPECT_EQ(Parsed("9007199254740993.0000000000000000000000000000000000000001"),
             9007199254740994.0);
@@ -52,7 +52,7 @@ TEST(TextNumber, TooSmallForADoubleIsZero) {
   EXPECT_EQ(Parsed("0." + std::string(500, '0') + "1"), 0.0);
   EXPECT_EQ(Parsed("1e-99999999999999999999999999"), 0.0);
   EXPECT_EQ(Parsed("12345e-9223372036854775807"), 0.0);
-  // Half of the smallest denormal goes to even, that is 0; anything above it up.
+  // Half of the smallest denormal rounds to even, which is 0; anything above it rounds up.
   EXPECT_EQ(Parsed("2.4703282292062327e-324"), 0.0);
   EXPECT_EQ(Parsed("2.4703282292062328e-324"), 0x1p-1074);
 }
@@ -105,5 +105,5 @@ TEST(TextNumber, QuotesForeignTextSafely) {
   EXPECT_EQ(Quoted(std::string(1000, 'a')), "\"" + std::string(40, 'a') + "...\"");
 }
 
-}  // namespace
+}  // namespace text_number_test
 }  // namespace hulld

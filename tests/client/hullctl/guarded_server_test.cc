@@ -1,5 +1,5 @@
-// The library and hullctl against a server that wants TLS and tokens: what works, and what hullctl
-// says to a user who got it wrong.
+// The library and hullctl against a server that requires TLS and tokens: successful use, and
+// hullctl's messages for mistakes.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {
-namespace {
+namespace guarded_server_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -57,7 +57,7 @@ class GuardedServer : public server::ServerTest {
     return path;
   }
 
-  // The line for the server's file; the token itself is in the file `name`.
+  // Returns the line for the server's file, and writes the token to the file `name`.
   std::string NewToken(const std::string& name, const std::string& role,
                        const std::string& prefix) {
     std::vector<std::string> arguments = {
@@ -74,7 +74,7 @@ class GuardedServer : public server::ServerTest {
     return token.ok() ? *token : "";
   }
 
-  // hullctl against the server, over TLS as `token`.
+  // Runs hullctl against the server, over TLS as `token`.
   Ran As(const std::string& token, std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", server_->address(), "--ca-cert", authorities_,
                                        "--token-file", directory_ + "/" + token});
@@ -156,7 +156,7 @@ TEST_F(GuardedServer, AContextHoldsAllThatAServerWants) {
   // Its token stays with its server.
   const Ran elsewhere = RunTool({"context", "show", "--server", "127.0.0.1:1"});
   EXPECT_EQ(elsewhere.out, "server  127.0.0.1:1  (--server)\n");
-  // A variable goes before it, an option before that.
+  // A variable overrides it; an option overrides both.
   setenv("HULLD_TOKEN", "hunter2", 1);
   EXPECT_EQ(RunTool({"list"}).code, 1);
   EXPECT_EQ(RunTool({"list", "--token-file", directory_ + "/view"}).code, 0);
@@ -254,5 +254,5 @@ TEST(HullctlToken, NewTokensAreRandomAndNeverOverwriteAFile) {
   std::remove(path.c_str());
 }
 
-}  // namespace
+}  // namespace guarded_server_test
 }  // namespace hulld

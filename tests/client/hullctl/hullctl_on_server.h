@@ -18,7 +18,7 @@ namespace hulld {
 // Hides the contexts of the user who runs the tests.
 inline void UseNoContexts() { setenv("XDG_CONFIG_HOME", "/nonexistent", 1); }
 
-// What a run of hullctl ended with and printed.
+// Exit code and output of a run of hullctl.
 struct Ran {
   int code = -1;
   std::string out;
@@ -36,8 +36,8 @@ inline Ran RunTool(const std::vector<std::string>& arguments) {
   return ran;
 }
 
-// Each line of the output as a message of the contract. An unknown member, as a JSON of hullctl's
-// own would have, is a failure.
+// Parses each line of the output as an API message. Unknown members, which hullctl-specific JSON
+// would have, fail the test.
 template <typename Message>
 std::vector<Message> MessagesIn(const std::string& out) {
   std::vector<Message> messages;
@@ -49,7 +49,7 @@ std::vector<Message> MessagesIn(const std::string& out) {
   return messages;
 }
 
-// hullctl within the test, against a server within the test.
+// hullctl and a server, both within the test.
 class HullctlOnServer : public server::ServerTest {
  protected:
   Ran Ask(std::vector<std::string> arguments) {

@@ -1,4 +1,4 @@
-// hullctl's commands against the real server: what they say is what the server decided.
+// hullctl's commands against the real server: their output matches the server's answers.
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
@@ -19,7 +19,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace hullctl_server_test {
 
 using ::google::protobuf::Struct;
 using ::testing::AllOf;
@@ -27,13 +27,13 @@ using ::testing::HasSubstr;
 
 class HullctlQuestions : public HullctlOnServer {
  protected:
-  // A recorded answer, as `check --record` writes it.
+  // Returns a recorded answer, as written by `check --record`.
   static std::string Recorded(const v1::CheckCollisionRequest& request,
                               const v1::CheckCollisionResponse& response) {
     return "{\"request\":" + MessageJson(request) + ",\"response\":" + MessageJson(response) + "}";
   }
 
-  // Two cubes that share a face, with a certificate of that.
+  // Two cubes that share a face, with a certificate.
   std::pair<v1::CheckCollisionRequest, v1::CheckCollisionResponse> TouchingCubes() {
     v1::CheckCollisionRequest request;
     *request.mutable_a() = server::PlacementOf("cube");
@@ -117,7 +117,7 @@ TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
   }
 }
 
-// Hulls of every dimension on a lattice, turned by quaternions whose squares are 1, 2, 3 and 5.
+// Hulls of every dimension on a lattice, rotated by quaternions with squared norms 1, 2, 3, and 5.
 std::string LatticeScene(uint32_t seed, int placements) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> steps(-3, 3);
@@ -160,7 +160,7 @@ TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
       total += counts[relation];
     }
     EXPECT_EQ(total, 90 * 89 / 2);
-    // The same as messages of the contract.
+    // Given as API messages, the answers are equal.
     const Ran json = AskJson({"batch", file.path(), "--verify", method});
     ASSERT_EQ(json.code, 0) << json.err;
     uint64_t next = 0;
@@ -394,7 +394,7 @@ TEST_F(HullctlQuestions, LoadShowsErrorsByCode) {
                              HasSubstr("malformed")));
 }
 
-// The signal comes once hulls of the load are there; the load itself would last for minutes.
+// The signal is sent after hulls of the load exist; the load itself would take minutes.
 TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   std::thread interrupter([this] {
     v1::ListHullsRequest request;
@@ -430,5 +430,5 @@ TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
   EXPECT_EQ(Ask({"bench"}).code, 2);
 }
 
-}  // namespace
+}  // namespace hullctl_server_test
 }  // namespace hulld

@@ -13,7 +13,7 @@
 #include "tests/client/hullctl/xml_check.h"
 
 namespace hulld {
-namespace {
+namespace hullctl_test {
 
 using google::protobuf::Struct;
 using testing::AllOf;
@@ -21,7 +21,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// The output as JSON; an empty object, and a failure, when it is none.
+// Returns the output as JSON; if malformed, fails the test and returns an empty object.
 Struct Json(const Ran& ran) {
   Struct json;
   const auto status = google::protobuf::util::JsonStringToMessage(ran.out, &json);
@@ -59,7 +59,7 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   const Ran missing = Ask({"get", "x"});
   EXPECT_EQ(missing.code, 1);
   EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
-  const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1", "--timeout", "10s"});
+  const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1"});
   EXPECT_EQ(unreachable.code, 3);
   EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1: start it "
                                           "with 'hulld', or name another with --server"));
@@ -72,7 +72,7 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   const Ran draining = Ask({"create", "x"});
   EXPECT_EQ(draining.code, 3);
   EXPECT_THAT(draining.err, HasSubstr("is not available: draining; try again later"));
-  // Words do not tell an error of gRPC from one of hulld.
+  // The message text does not distinguish errors of gRPC from errors of hulld.
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "cannot connect the disk",
                                            v1::ERROR_REASON_STORE_UNAVAILABLE)});
   EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("is not available: cannot connect the disk"));
@@ -221,6 +221,19 @@ TEST_F(HullctlTest, AppendCountsSkippedPoints) {
   EXPECT_THAT(fake_.hull("b").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
+TEST_F(HullctlTest, AppendAndReplaceCountPointsAtZero) {
+  const TempFile file("a.xyz", "0 0 0\n1 2 3\n0 0 0\nnan 0 0\n4 5 6\n");
+  Ran ran = Ask({"append", "a", "--create", "--skip-zero", "--skip-nonfinite", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("skipped    1 points that are not finite\n"
+                                 "skipped    2 points at (0, 0, 0)\n"));
+  EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
+  ran = Ask({"append", "b", "--create", "--skip-zero", "--skip-nonfinite", file.path(), "--output",
+             "name"});
+  EXPECT_EQ(ran.out, "b\n");
+  EXPECT_THAT(ran.err, HasSubstr("hullctl: 2 points at (0, 0, 0) were left out\n"));
+}
+
 TEST_F(HullctlTest, AnErrorInAFileLeavesTheChunksBeforeIt) {
   const TempFile file("a.csv", "1,2,3\n4,5,6\n7,abc,9\n");
   const Ran ran = Ask({"append", "a", "--create", "--chunk-points", "1", file.path()});
@@ -351,7 +364,7 @@ TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
   ASSERT_EQ(requests.size(), 2u);
   EXPECT_EQ(requests[0].pairs_size() + requests[1].pairs_size(), 2 * 125250);
   EXPECT_LT(requests[1].placements_size(), 501);
-  // The contract's messages name placements by their place in the file and count pairs on.
+  // API messages identify placements by index in the file, with consecutive pair numbers.
   uint64_t next = 0;
   for (const auto& part :
        MessagesIn<v1::BatchCheckCollisionsResponse>(AskJson({"batch", file.path()}).out)) {
@@ -569,11 +582,11 @@ TEST_F(HullctlTest, ColoursAreForTerminalsUnlessAskedFor) {
   EXPECT_THAT(Ask({"check", "a", "b", "--color", "always"}).out, HasSubstr(kPainted));
   EXPECT_THAT(AskJson({"check", "a", "b", "--color", "always"}).out,
               testing::Not(HasSubstr("\x1b")));
-  // A column is as wide as what is seen.
+  // Column widths count visible characters only.
   fake_.PutHull("long-name", {});
   const Ran list = Ask({"list", "--color", "always"});
   EXPECT_THAT(list.out, HasSubstr("\x1b[1mHULL\x1b[0m       \x1b[1mDIMENSION"));
 }
 
-}  // namespace
+}  // namespace hullctl_test
 }  // namespace hulld

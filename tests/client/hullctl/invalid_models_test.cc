@@ -1,6 +1,6 @@
-// The invalid files of Debian's package assimp-testmodels: each ends in an error that names the
-// file and says what is wrong, from the reader and from `hullctl append`. Skipped with a word where
-// the package is not installed.
+// The invalid files of Debian's package assimp-testmodels: the reader and `hullctl append` refuse
+// each with an error that names the file and the fault. Skipped with a message if the package is
+// not installed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {
-namespace {
+namespace invalid_models_test {
 
 namespace fs = std::filesystem;
 
@@ -25,7 +25,7 @@ using testing::Not;
 
 constexpr char kModels[] = "/usr/share/assimp/models";
 
-// What its folder holds, and the broken ones among the others.
+// Returns the files of its folder of invalid models, and the broken ones in other folders.
 std::vector<fs::path> InvalidModels() {
   const fs::path models = kModels;
   std::vector<fs::path> paths = {
@@ -36,10 +36,12 @@ std::vector<fs::path> InvalidModels() {
       models / "PLY/pond.0.ply",
       models / "glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb",
       models / "glTF2/MissingBin/BoxTextured.gltf",
+      // The other files of this folder have invalid materials, which are not read.
+      models / "glTF2/wrongTypes/badArray.gltf",
   };
-  for (const char* folder : {"invalid", "glTF2/wrongTypes"}) {
+  for (const char* folder : {"invalid"}) {
     for (const auto& entry : fs::directory_iterator(models / folder)) {
-      // Beside glTF files lie the bytes that they name.
+      // glTF files are accompanied by their data files.
       const bool is_model =
           entry.path().extension() != ".bin" && entry.path().extension() != ".png";
       if (entry.is_regular_file() && is_model) paths.push_back(entry.path());
@@ -89,11 +91,11 @@ TEST_F(InvalidModel, IsRefusedByAppend) {
     if (PointFormatOfPath(path.string()).ok()) {
       EXPECT_THAT(err.str(), Not(HasSubstr("no known format")));
     } else {
-      // Says which formats are taken.
+      // Lists the accepted formats.
       EXPECT_THAT(err.str(), HasSubstr("obj, off, ply, xyz, csv, pcd, stl, gltf, glb, dae"));
     }
   }
 }
 
-}  // namespace
+}  // namespace invalid_models_test
 }  // namespace hulld

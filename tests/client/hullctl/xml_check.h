@@ -6,9 +6,9 @@
 
 namespace hulld {
 
-// Empty when `text` is one well-formed XML element, perhaps after a declaration; otherwise what is
-// wrong. Knows what the pictures use: elements, attributes in double quotes, text with the
-// predefined entities.
+// Returns empty if `text` is one well-formed XML element, optionally after a declaration; otherwise
+// the fault. Supports the subset used by the pictures: elements, attributes in double quotes, text
+// with the predefined entities.
 inline std::string XmlProblem(const std::string& text) {
   std::vector<std::string> open;
   size_t at = 0;

@@ -1,11 +1,11 @@
 #!/bin/bash
-# Generates, compiles and runs the example in Go of client/LANGUAGES.md against a server of its own.
+# Generates, compiles, and runs the Go example of client/LANGUAGES.md against its own server.
 #
 #   run_go.sh PROGRAMS WORK
 #
-# PROGRAMS: the directory of hulld. WORK: a directory for its files, made anew. All comes from
-# Debian's packages, which are listed below; half a gigabyte, so docker/packages.txt leaves them out.
-# Exit code 77: one of them is missing.
+# PROGRAMS: the directory of hulld. WORK: a directory for its files, which is recreated. Everything
+# comes from Debian's packages, listed below; they take half a gigabyte, so docker/packages.txt
+# omits them. Exit code 77: a package is missing.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

@@ -1,11 +1,11 @@
 #!/bin/bash
-# Runs the example in JavaScript of client/LANGUAGES.md against a server of its own.
+# Runs the JavaScript example of client/LANGUAGES.md against its own server.
 #
 #   run_javascript.sh PROGRAMS WORK
 #
-# PROGRAMS: the directory of hulld. WORK: a directory for its files, made anew. Debian has no
-# @grpc/grpc-js. Where HULLD_NODE_MODULES names a node_modules that holds it and @grpc/proto-loader,
-# that is used; nothing is fetched here. Exit code 77: they are not there.
+# PROGRAMS: the directory of hulld. WORK: a directory for its files, which is recreated. Debian has
+# no @grpc/grpc-js. If HULLD_NODE_MODULES names a node_modules with it and @grpc/proto-loader, the
+# test uses that; nothing is downloaded. Exit code 77: they are missing.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

@@ -1,4 +1,4 @@
-"""What the tests share: one server for all, clients of both kinds, the larger meshes."""
+"""Shared fixtures: one server for all tests, clients of both kinds, the larger meshes."""
 
 from __future__ import annotations
 

@@ -37,8 +37,8 @@ def refuse(
 
 
 class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusServiceServicer):
-    """Each call takes the next of `script`, a function of the context, before it is answered; the
-    appended points are kept per chunk, so that each is there once."""
+    """Each call takes the next of `script`, a function of the context, before it is answered.
+    Appended points are kept per chunk, so that a repeated chunk is recognized."""
 
     def __init__(self) -> None:
         self.script: list[Callable[[Any], None]] = []

@@ -3,7 +3,7 @@
 #
 #   run_tests.sh PROGRAMS WORK [PYTEST_ARGUMENT...]
 #
-# PROGRAMS: the directory of hulld and hullctl. WORK: where the environment is made anew. The Python
+# PROGRAMS: the directory of hulld and hullctl. WORK: the directory of the environment, which is replaced. The Python
 # is Debian's, with Debian's packages; nothing is fetched. Exit code 77: one of them is missing.
 set -euo pipefail
 

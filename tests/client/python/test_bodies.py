@@ -92,7 +92,7 @@ def test_errors_have_reasons(either: Any, name: str, cube: str) -> None:
     with pytest.raises(hulld.AlreadyExistsError) as taken:
         either.put_body(cube, [f"{name}/nail"])
     assert taken.value.reason == "HULL_EXISTS"
-    with pytest.raises(hulld.InvalidArgumentError):
+    with pytest.raises(ValueError, match="pieces is empty"):
         either.put_body(body, [])
     made = either.put_body(body, [f"{name}/nail"], if_revision=0)
     with pytest.raises(hulld.AbortedError) as moved:

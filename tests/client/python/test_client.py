@@ -14,6 +14,7 @@ import pytest
 
 import hulld
 from conftest import CUBE
+from hulld.calls.requests import update_stream
 from hulld.v1 import hull_pb2, hull_pb2_grpc
 
 
@@ -44,7 +45,7 @@ def test_both_clients_have_one_surface() -> None:
         (hulld.HullWatch, hulld.AsyncHullWatch),
         (hulld.CollisionWatch, hulld.AsyncCollisionWatch),
     ):
-        # What a constructor does, an asynchronous one cannot: `open` is extra.
+        # Only asynchronous streams have `open`: a constructor cannot wait.
         found = surface(other)
         found.pop("open", None)
         assert found == surface(sync)
@@ -259,7 +260,7 @@ def test_a_simpler_hull_says_how_far_off_it_is(
     assert outside.error <= 0.2 and len(outside.vertices) < 500
     with pytest.raises(ValueError, match="side"):
         either.get_hull_mesh(name, max_vertices=40)
-    with pytest.raises(hulld.InvalidArgumentError):
+    with pytest.raises(ValueError, match="max_vertices or max_error"):
         either.get_hull_mesh(name, side="inside")
 
 
@@ -376,12 +377,12 @@ def test_a_batch_of_many_messages_comes_in_order(
 
 def test_a_pair_without_an_answer_says_why(either: Any, name: str) -> None:
     put(either, name)
-    batch = either.check_collisions([name, "no/such", (name, (0, 0, 0, 0, 0, 0, 0))])
-    assert batch.answers.relations.tolist() == [0, 0, 0]
-    missing, malformed = batch.problem(0), batch.problem(1)
+    batch = either.check_collisions([name, "no/such", name])
+    assert batch.answers.relations.tolist() == [0, 3, 0]
+    missing = batch.problem(0)
     assert missing.code == "NOT_FOUND" and missing.reason == "HULL_NOT_FOUND"
-    assert malformed.code == "INVALID_ARGUMENT"
-    assert batch.problem(2) is not None and "no/such" not in batch.hulls
+    assert batch.problem(1) is None and batch.problem(2) is not None
+    assert "no/such" not in batch.hulls
     fine = either.check_collisions([name, name])
     assert fine.problem(0) is None
 
@@ -445,14 +446,14 @@ def test_a_stream_answers_what_moved(either: Any, name: str) -> None:
         steps = [step.answers.relations[0] for step in stream.follow(moves)]
         assert steps == [1, 3]
         either.replace_hull(name, CUBE / 4)
-        # The same poses, other hulls.
+        # Equal poses, different hulls.
         assert stream.update([1], [(0.5, 0, 0)]).answers.relations[0] == 3
         assert stream.refresh().answers.relations[0] == 1
         with pytest.raises(ValueError, match=r"placements\[0\] is 3; there are 3"):
             stream.update([3], [(0, 0, 0)])
         with pytest.raises(ValueError, match="2 poses for 1"):
             stream.update([0], np.zeros((2, 3)))
-        # What was refused here ended nothing.
+        # The refused update did not end the stream.
         assert stream.update([1], [(0, 0, 0)]).answers.relations[0] == 3
     with pytest.raises(hulld.FailedPreconditionError, match="closed"):
         stream.update([1], [(0, 0, 0)])
@@ -465,7 +466,8 @@ def test_a_stream_that_the_server_ends_tells_why(either: Any, name: str) -> None
         assert stream.update([1], [(1.0, 0, 0)]).answers.relations.tolist() == [2]
         for _ in range(2):
             with pytest.raises(hulld.InvalidArgumentError) as caught:
-                stream.update([0, 0], np.zeros((2, 3)))
+                # The client itself would refuse to send this.
+                stream._ask(update_stream(np.zeros(2, np.uint32), np.ones((2, 7)), False))
             assert caught.value.reason == "INVALID_REQUEST"
 
 
@@ -496,11 +498,6 @@ def test_a_watch_tells_what_is_there_and_what_comes(either: Any, name: str) -> N
         assert [(e.hull.hull_id, e.kind.name) for e in changes.events] == [(f"{name}/a", "PRESENT")]
         np.testing.assert_array_equal(changes.events[0].box, [[0, 0, 0], [1, 1, 1]])
         assert not changes.anew
-
-
-def test_a_watch_that_is_refused_says_why(either: Any) -> None:
-    with pytest.raises(hulld.InvalidArgumentError):
-        next(iter(either.watch_hulls("", hull_id="not//well")))
 
 
 def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) -> None:
@@ -563,7 +560,7 @@ def test_a_watch_of_collisions_outlives_its_server(
     watch.update([3, 7], [(15, 0, 0), (70, 0, 0)])
     watch.update([1], [(0.5, 0, 0)])
     with run() as server:
-        # What is as it was, the pair (4, 5), is not told again.
+        # The unchanged pair (4, 5) is not reported again.
         assert events_of(4) == {(0, 1): "ENTER", (2, 3): "EXIT", (6, 7): "FAR"}
         client.delete_hull(name)
         assert set(events_of(4).values()) == {"LOST"}
@@ -633,3 +630,50 @@ def test_a_backup_that_fails_leaves_no_file(either: Any, tmp_path: pathlib.Path)
         either.save_backup(tmp_path / "store.backup")
     assert caught.value.reason == "STORE_IN_MEMORY"
     assert list(tmp_path.iterdir()) == []
+
+
+# --- Rows, and short texts ---
+
+
+def test_answers_are_read_row_by_row(either: Any, name: str) -> None:
+    put(either, name)
+    scene = [name, (name, (1, 0, 0)), (name, (3, 0, 0)), "no/such"]
+    batch = either.check_collisions(scene, separation=True, witness=True, clearance=0.5)
+    assert len(batch) == len(batch.answers) == 6
+    first = batch[0]
+    assert first.pair == (0, 1) and first.relation is hulld.Relation.TOUCHING and first.colliding
+    assert first.separation == hulld.Separation(0.0, 0.0) and first.within_clearance is True
+    assert first.witness is not None and first.witness.point_a.shape == (3,)
+    assert batch[1].separation is not None and batch[1].within_clearance is False
+    lost = batch[-1]
+    assert lost.pair == (2, 3) and lost.relation is hulld.Relation.UNSPECIFIED
+    assert lost.problem is not None and lost.problem.code == "NOT_FOUND"
+    assert lost.separation is None and lost.within_clearance is None
+    assert [row.pair for row in batch] == [tuple(pair) for pair in batch.pairs.tolist()]
+    assert [row.relation for row in batch.answers] == batch.answers.relations.tolist()
+    for row in (6, -7):
+        with pytest.raises(IndexError):
+            batch[row]
+    with pytest.raises(TypeError, match="neither true nor false"):
+        bool(batch[0])
+    with pytest.raises(TypeError, match="neither true nor false"):
+        bool(batch)
+
+
+def test_texts_are_short(either: Any, name: str) -> None:
+    put(either, name)
+    wanted = {"separation": True, "witness": True, "axis": True, "certificate": True}
+    answer = either.check_collision(name, (name, (2, 0, 0)), **wanted)
+    assert repr(answer).startswith(f"Collision({name}@{answer.hull_a.revision}, {name}@")
+    assert "SEPARATED" in repr(answer) and "separation=0.99" in repr(answer)
+    assert len(repr(answer)) < 200 + 2 * len(name)
+    batch = either.check_collisions(hulld.Placements(name, np.zeros((20, 3))), **wanted)
+    assert repr(batch) == "Batch(190 pairs: 190 OVERLAPPING)"
+    assert repr(batch.answers) == "Answers(190 pairs: 190 OVERLAPPING)"
+    assert repr(batch[0]).startswith("AnswerRow(pair=(0, 1), OVERLAPPING")
+    assert len(repr(batch[0])) < 200
+    scene = either.find_collisions([name, (name, (3, 0, 0))])
+    assert repr(scene) == "Scene(0 pairs)"
+    mesh, hull = either.get_hull_mesh(name), either.get_hull(name)
+    assert repr(mesh) == f"HullMesh({name}@{mesh.info.revision}, 8 vertices, 6 facets)"
+    assert repr(hull) == f"Hull({name}@{hull.info.revision}, dimension 3, 8 vertices)"

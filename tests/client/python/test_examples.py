@@ -1,4 +1,4 @@
-"""The examples run by themselves, and say what is known of them."""
+"""The examples run, and print known results."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_ur5_hits_itself(tmp_path: pathlib.Path, data: pathlib.Path) -> None:
     )
     assert "upper_arm_link: 3528 points, " in said
     assert re.search(r"^[1-9][0-9]* of 100 poses collide; 11 pairs asked about$", said, re.M)
-    # Joined links, and those that the SRDF excludes, are not asked about.
+    # Joined links, and links that the SRDF excludes, are left out.
     assert "base_link - shoulder_link" not in said and "wrist_1_link - wrist_2_link" not in said
 
 

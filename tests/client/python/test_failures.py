@@ -1,4 +1,4 @@
-"""What fails is tried again where that is safe, and told where it is not."""
+"""Retries of calls that are safe to repeat, and errors of other calls."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import pytest
 
 import hulld
 from fake_hulld import FakeHulld, refuse
+from hulld.calls.reported_pairs import WatchedPlacements
 from hulld.calls.requests import SceneFilter, watch_hulls
-from hulld.calls.told_pairs import WatchedPlacements
 from hulld.errors import from_status
 from hulld.retry import may_retry
 from hulld.v1 import hull_pb2
 
-QUICK = hulld.RetryPolicy(initial_backoff=0.001, max_backoff=0.002)
+QUICK = hulld.RetryPolicy(max_attempts=4, initial_backoff=0.001, max_backoff=0.002)
 
 
 @pytest.fixture
@@ -137,7 +137,7 @@ def test_calls_go_round_and_to_those_that_are_left(connect: Any, fake: FakeHulld
     assert len(fake.calls) - before[0] == 20
 
 
-def test_a_mesh_that_breaks_off_is_read_anew(caller: Any, fake: FakeHulld) -> None:
+def test_a_mesh_that_breaks_off_is_read_again(caller: Any, fake: FakeHulld) -> None:
     fake.script = [lambda context: None, unavailable]
     assert caller.get_hull_mesh("a").vertices.tolist() == [[0, 0, 0], [1, 1, 1]]
     assert len(fake.calls) == 2
@@ -182,7 +182,7 @@ def test_a_lost_connection_applies_each_chunk_once(caller: Any, fake: FakeHulld)
     assert sorted(lost) == [3, 5, 8, 12]
     assert fake.chunks == {sequence: 10 for sequence in range(1, 21)}
     assert done.points_acknowledged == 200 and done.chunks == 20
-    # What was sent behind a lost chunk may be taken, too, before the stream ends.
+    # Chunks sent behind a lost one may be applied, too, before the stream ends.
     assert done.reconnects == len(fake.calls) - 1 > 0
     assert done.counts.received + 10 * done.chunks_recovered == 200
 
@@ -292,8 +292,15 @@ def test_a_watch_goes_on_where_it_was(caller: Any, fake: FakeHulld) -> None:
     assert fake.calls[:3] == ["WatchHulls after 0", "WatchHulls after 10", "WatchHulls after 20"]
 
 
+def test_a_watch_that_is_refused_says_why(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [full]
+    with pytest.raises(hulld.ResourceExhaustedError, match="too many hulls"):
+        next(iter(caller.watch_hulls()))
+    assert len(fake.calls) == 1
+
+
 class LostAfterAnHour(grpc.RpcError):
-    """How a quiet watch ends."""
+    """The end of a quiet watch."""
 
     def code(self) -> grpc.StatusCode:
         return grpc.StatusCode.UNAVAILABLE
@@ -307,12 +314,13 @@ class LostAfterAnHour(grpc.RpcError):
 
 def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
-    passing = types.SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: None)
-    monkeypatch.setattr("hulld.watches.time", passing)
+    passing = types.SimpleNamespace(monotonic=lambda: clock[0])
+    monkeypatch.setattr("hulld.calls.attempts.time", passing)
+    monkeypatch.setattr("hulld.watches.sleep", lambda seconds: None)
     revisions = iter((10, 20, 30))
 
     class Quiet:
-        """Tells one message, and an hour later that the connection is lost."""
+        """Sends one message, and loses the connection an hour later."""
 
         def __init__(self, call: Any) -> None:
             self.told = False
@@ -340,7 +348,7 @@ def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:
     cancelled = threading.Event()
 
     class Garbled:
-        """Goes on telling what is no message, until it is cancelled."""
+        """Sends malformed messages until it is cancelled."""
 
         def __init__(self, requests: Any, metadata: Any) -> None:
             pass

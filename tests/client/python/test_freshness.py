@@ -1,4 +1,4 @@
-"""How fresh answers must be: on one server every answer is, and what a request says of it is read."""
+"""Freshness of reads: its encoding, and its effect on one server."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 from conftest import CUBE
 
 import hulld
-from hulld.answers import hulls
 from hulld.calls import requests
 from hulld.calls.freshness import FIELD
 from hulld.calls.wanted import Wanted
@@ -42,24 +41,6 @@ def test_it_is_what_protobuf_reads() -> None:
     opening = requests.open_stream(placements, all_pairs(2), Wanted(), 0.0, True, BOTH)
     opened = collision_pb2.StreamCollisionsRequest.FromString(opening).open
     assert opened.freshness == BOTH.message() and opened.only_changes
-
-
-def test_headers_of_several_stores_are_carried_along() -> None:
-    message = hull_pb2.WatchHullsResponse()
-    message.header.shards.add(store_id="a", revision=3)
-    message.header.shards.add(store_id="b", revision=5)
-    event = message.events.add(store_id="b")
-    event.hull.hull_id = "h"
-    told = hulls.decode_changes(message.SerializeToString())
-    assert told.header.shards == (("a", 3), ("b", 5))
-    assert told.events[0].store_id == "b"
-    freshness = hulld.Freshness(at_least=told.header).message()
-    assert list(freshness.at_least) == list(message.header.shards)
-    assert freshness.at_least_revision == 0
-    call = requests.watch_hulls("", None, False, told.header)
-    request = hull_pb2.WatchHullsRequest.FromString(call.request)
-    assert list(request.after) == list(message.header.shards)
-    assert request.after_revision == 0
 
 
 @pytest.mark.parametrize("bound", [-1.0, float("nan"), float("inf")])

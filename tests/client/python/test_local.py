@@ -1,4 +1,4 @@
-"""hulld.local(): a server that is there for the script, and gone with it."""
+"""hulld.local(): a server for the life of a script."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_the_server_ends_with_a_script_that_is_killed() -> None:
             with pytest.raises(hulld.UnavailableError):
                 while True:
                     next(watch)
-    # Removed a moment later, by what kept the server.
+    # The process that watches the server removes it a moment later.
     while pathlib.Path(address.removeprefix("unix:")).parent.exists():
         time.sleep(0.01)
 

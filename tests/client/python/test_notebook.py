@@ -1,4 +1,4 @@
-"""What a notebook shows: the viewer's page, or a table that says why there is none."""
+"""Notebook cells: the viewer's page, or a table with the reason for its absence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's code runs, in its order, and prints what the page says."""
+"""The code of the page runs, in its order, and prints the page's output."""
 
 from __future__ import annotations
 

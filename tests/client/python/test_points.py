@@ -1,4 +1,4 @@
-"""What counts as points, and what an array of them may not hold."""
+"""Arrays that are points, and arrays that are refused."""
 
 from __future__ import annotations
 

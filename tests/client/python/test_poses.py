@@ -1,4 +1,4 @@
-"""Poses: which forms are taken, what a matrix must be, and what becomes of it."""
+"""Poses: accepted forms, conversion of matrices, and refusals."""
 
 from __future__ import annotations
 

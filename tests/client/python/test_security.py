@@ -1,4 +1,4 @@
-"""TLS and tokens, against the real server; and what a client does not send."""
+"""TLS and tokens, against the real server, and refusals of the client itself."""
 
 from __future__ import annotations
 

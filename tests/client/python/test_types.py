@@ -1,4 +1,4 @@
-"""mypy --strict accepts the package, its examples, and what a user writes; and sees mistakes."""
+"""mypy --strict accepts the package, its examples, and correct user code, and finds mistakes."""
 
 from __future__ import annotations
 

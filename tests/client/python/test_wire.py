@@ -1,4 +1,4 @@
-"""The hand-written wire format says what protobuf's says, both ways, to the last bit."""
+"""The wire format equals protobuf's, in both directions, to the last bit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hulld.wire.fields import encode_varints
 STEPS = sorted(
     {max(0, min((1 << bits) + d, 2**32 - 1)) for bits in range(33) for d in (-1, 0, 1)}
 )
-# Doubles whose bits a conversion would lose: signed zeros, subnormals, the largest.
+# Doubles that a conversion would change: signed zeros, subnormals, the largest.
 HARD = [0.0, -0.0, 5e-324, -2.2e-308, 1.7976931348623157e308, 0.1, 1 / 3, np.pi]
 
 

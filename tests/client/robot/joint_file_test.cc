@@ -8,14 +8,14 @@
 #include "tests/client/robot/urdf_text.h"
 
 namespace hulld {
-namespace {
+namespace joint_file_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
 
 class JointFile : public testing::Test {
  protected:
-  // All waypoints of a table, or what is wrong with it.
+  // Returns all waypoints of a table, or its error.
   std::string Read(const std::string& text) {
     const TempFile file("joints.csv", text);
     const auto source = ByteSource::Open(file.path());
@@ -44,6 +44,33 @@ TEST_F(JointFile, ColumnsGoToTheirJoints) {
   }
 }
 
+TEST(LooseJointFile, PosesAndPlanarValuesHaveColumns) {
+  const auto robot = ParseUrdf(
+      "<robot name='r'><link name='w'/><link name='a'/><link name='b'/><joint name='f' "
+      "type='floating'><parent link='w'/><child link='a'/></joint><joint name='p' type='planar'>"
+      "<parent link='w'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>",
+      "r.urdf");
+  ASSERT_TRUE(robot.ok()) << robot.status();
+  const auto read = [&](const std::string& text, std::vector<double>* values) {
+    const TempFile file("joints.csv", text);
+    const auto source = ByteSource::Open(file.path());
+    auto reader = WaypointReader::Open(source->get(), *robot);
+    return reader.ok() ? reader->Next(values).status().ToString() : reader.status().ToString();
+  };
+  std::vector<double> values;
+  EXPECT_EQ(read("p/theta,f/rot_w,f/rot_x,f/rot_y,f/rot_z,f/trans_y\n0.5,1,2,3,4,5\n", &values),
+            "OK");
+  EXPECT_THAT(values, ElementsAre(0, 5, 0, 2, 3, 4, 1, 0, 0, 0.5));
+  EXPECT_EQ(read("p/x\n7\n", &values), "OK");
+  EXPECT_THAT(values, ElementsAre(0, 0, 0, 0, 0, 0, 1, 7, 0, 0));
+  EXPECT_THAT(read("f\n1\n", &values),
+              HasSubstr(":1: \"f\" has several values; its columns are f/trans_x, f/trans_y"));
+  EXPECT_THAT(read("f/rot_z\n1\n", &values),
+              HasSubstr(":1: the header has 1 of the 4 columns f/rot_x"));
+  EXPECT_THAT(read("f/rot_w,f/rot_x,f/rot_y,f/rot_z\n0,0,0,0\n", &values),
+              HasSubstr(":2: the quaternion of f is 0 0 0 0"));
+}
+
 TEST_F(JointFile, ErrorsNameTheLine) {
   EXPECT_THAT(Read("shoulder,elbo\n"), HasSubstr("joints.csv:1: \"elbo\" is no joint"));
   EXPECT_THAT(Read("follow\n1\n"), HasSubstr(":1: \"follow\" follows shoulder; leave it out"));
@@ -56,5 +83,5 @@ TEST_F(JointFile, ErrorsNameTheLine) {
   EXPECT_THAT(Read(""), HasSubstr("no header that names joints"));
 }
 
-}  // namespace
+}  // namespace joint_file_test
 }  // namespace hulld

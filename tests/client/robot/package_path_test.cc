@@ -7,7 +7,7 @@
 #include <fstream>
 
 namespace hulld {
-namespace {
+namespace package_path_test {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -79,5 +79,5 @@ TEST_F(PackagePath, RefusalSaysWhereItWasLookedFor) {
   EXPECT_THAT(Resolve("package://tool"), HasSubstr("names no file of a package"));
 }
 
-}  // namespace
+}  // namespace package_path_test
 }  // namespace hulld

@@ -9,7 +9,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace shape_hull_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -22,7 +22,7 @@ CollisionShape Round(ShapeKind kind, double radius, double length) {
   return shape;
 }
 
-// The farthest that the points reach along a direction.
+// Returns the support of the points along a direction.
 double Support(const ShapeHull& hull, double x, double y, double z) {
   double most = -HUGE_VAL;
   for (size_t i = 0; i < hull.xyz.size(); i += 3) {
@@ -31,7 +31,7 @@ double Support(const ShapeHull& hull, double x, double y, double z) {
   return most;
 }
 
-// A convex set holds another when it reaches at least as far in each direction.
+// A convex set contains another if its support is at least as large in each direction.
 void ExpectEncloses(const CollisionShape& shape) {
   const ShapeHull hull = PrimitiveHull(shape);
   double most = 0;
@@ -75,16 +75,21 @@ TEST(ShapeHull, RoundShapesAreEnclosedWithinTheirExcess) {
 TEST(ShapeHull, MeshIsScaled) {
   const TempFile file("a.obj", "v 1 2 3\nv 4 5 6\n");
   CollisionShape mesh;
-  mesh.scale = {1, -2, 0.5};
+  const auto scale = [](const char* text) { return *LengthScale::FromText(text); };
+  mesh.scale = {scale("1"), scale("-2"), scale("0.5")};
   const auto hull = MeshHull(mesh, file.path());
   ASSERT_TRUE(hull.ok()) << hull.status();
   EXPECT_THAT(hull->xyz, ElementsAre(1, -4, 1.5, 4, -10, 3));
-  mesh.scale = {1e308, 1, 1};
+  // Millimeters are divided by 1000, not multiplied by the double 0.001.
+  mesh.scale = {scale("0.001"), scale("0.0254"), scale("0.001")};
+  const TempFile fine("c.obj", "v 7 3 0.1\n");
+  EXPECT_THAT(MeshHull(mesh, fine.path())->xyz, ElementsAre(0.007, 0.0762, 0.0001));
+  mesh.scale = {scale("1e308"), scale("1"), scale("1")};
   EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("beyond the largest"));
   const TempFile empty("b.obj", "# nothing\n");
   EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("holds no vertex"));
   EXPECT_THAT(MeshHull(mesh, "a.3mf").status().ToString(), HasSubstr("convert it"));
 }
 
-}  // namespace
+}  // namespace shape_hull_test
 }  // namespace hulld

@@ -9,7 +9,7 @@
 #include "tests/client/robot/urdf_text.h"
 
 namespace hulld {
-namespace {
+namespace srdf_file_test {
 
 using testing::HasSubstr;
 
@@ -44,14 +44,26 @@ TEST_F(SrdfFile, ErrorsNameLineAndLink) {
               HasSubstr("arm.srdf:2: <disable_collisions> lacks link2"));
 }
 
-// The tool hangs on a bare flange, so its neighbour is the finger.
+// The tool is attached to a bare flange, so its neighbor is the finger.
 TEST_F(SrdfFile, NeighboursAreFoundThroughBareLinks) {
   const std::set<LinkPair> expected = {Pair("base", "upper"), Pair("upper", "lower"),
                                        Pair("lower", "finger"), Pair("finger", "tool")};
   EXPECT_EQ(AdjacentPairs(robot_), expected);
 }
 
-// All that hang from one bare root are neighbours; branches of a link with shapes are not.
+// A floating joint lets its links move into each other, so none of them is omitted.
+TEST(AdjacentPairs, LooseJointsConnectNothing) {
+  for (const char* type : {"floating", "planar"}) {
+    std::string urdf = kArmUrdf;
+    urdf.replace(urdf.find("type=\"continuous\""), 17, "type=\"" + std::string(type) + "\"");
+    const Robot robot = *ParseUrdf(urdf, "arm.urdf");
+    EXPECT_FALSE(AdjacentPairs(robot).contains(
+        MakeLinkPair(robot.FindLink("upper"), robot.FindLink("lower"))));
+    EXPECT_EQ(AdjacentPairs(robot).size(), 3u);
+  }
+}
+
+// All links attached to a bare root are neighbors; branches of a link with shapes are not.
 TEST(AdjacentPairs, BranchesOfABareRootAreNeighbours) {
   const auto robot = [](const char* root) {
     const std::string shape = "<collision><geometry><sphere radius=\"1\"/></geometry></collision>";
@@ -78,5 +90,5 @@ TEST_F(SrdfFile, WhatIsWrittenReadsBack) {
   EXPECT_THAT(out.str(), HasSubstr("reason=\"Never\""));
 }
 
-}  // namespace
+}  // namespace srdf_file_test
 }  // namespace hulld

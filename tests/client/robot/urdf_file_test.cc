@@ -9,7 +9,7 @@
 #include "tests/client/robot/urdf_text.h"
 
 namespace hulld {
-namespace {
+namespace urdf_file_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -20,7 +20,7 @@ std::string ErrorOf(const std::string& urdf) {
   return std::string(robot.status().message().data(), robot.status().message().size());
 }
 
-// The arm with one thing changed.
+// Returns the arm's URDF with one replacement.
 std::string Changed(const std::string& from, const std::string& to) {
   std::string urdf = kArmUrdf;
   const size_t at = urdf.find(from);
@@ -53,7 +53,52 @@ TEST(UrdfFile, LinksJointsAndShapesAreRead) {
   // The finger's limits lack effort and velocity, which collisions do not need.
   const RobotJoint& slide = robot->joints[static_cast<size_t>(robot->FindJoint("slide"))];
   EXPECT_EQ(*slide.limits, (std::array<double, 2>{0.5, 1}));
-  EXPECT_EQ(robot->FreeJoints().size(), 3u);
+  EXPECT_EQ(robot->Variables().size(), 3u);
+}
+
+TEST(UrdfFile, JointsThatMimicNeedNoLimit) {
+  const std::string limit = "<limit lower=\"-9\" upper=\"9\"/>";
+  for (const char* type : {"revolute", "prismatic"}) {
+    std::string urdf = Changed(limit, "");
+    urdf.replace(urdf.find("name=\"follow\" type=\"revolute\"") + 20, 8, type);
+    const auto robot = ParseUrdf(urdf, "arm.urdf");
+    ASSERT_TRUE(robot.ok()) << robot.status();
+    const RobotJoint& follow = robot->joints[static_cast<size_t>(robot->FindJoint("follow"))];
+    EXPECT_EQ(follow.mimics, robot->FindJoint("shoulder"));
+    EXPECT_FALSE(follow.limits.has_value());
+    // It exceeds limits of 0 without a warning.
+    const auto values = AllJointValues(*robot, std::vector<double>{1.5, 0, 0.75});
+    EXPECT_TRUE(LimitProblems(*robot, values).empty());
+  }
+  EXPECT_THAT(ErrorOf(Changed("<limit lower=\"-2\" upper=\"2\" effort=\"1\" velocity=\"1\"/>", "")),
+              HasSubstr("joint \"shoulder\" lacks <limit"));
+}
+
+TEST(UrdfFile, PlanarAndFloatingJointsHaveSeveralVariables) {
+  std::string urdf =
+      Changed("name=\"elbow\" type=\"continuous\"", "name=\"elbow\" type=\"floating\"");
+  urdf.replace(urdf.find("name=\"slide\" type=\"prismatic\""), 29,
+               "name=\"slide\" type=\"planar\"");
+  const auto robot = ParseUrdf(urdf, "arm.urdf");
+  ASSERT_TRUE(robot.ok()) << robot.status();
+  std::vector<std::string> names;
+  for (const JointVariable& variable : robot->Variables()) names.push_back(variable.name);
+  EXPECT_THAT(names,
+              testing::ElementsAre("shoulder", "elbow/trans_x", "elbow/trans_y", "elbow/trans_z",
+                                   "elbow/rot_x", "elbow/rot_y", "elbow/rot_z", "elbow/rot_w",
+                                   "slide/x", "slide/y", "slide/theta"));
+  EXPECT_THAT(RestValues(*robot), testing::ElementsAre(0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0));
+}
+
+TEST(UrdfFile, ScalesOfMeshesAreExact) {
+  const auto robot = ParseUrdf(
+      Changed("<box size=\"2 2 1\"/>", "<mesh filename=\"a.stl\" scale=\"0.001 0.0254 -1\"/>"),
+      "arm.urdf");
+  ASSERT_TRUE(robot.ok()) << robot.status();
+  const auto& scale = robot->links[0].shapes[0].scale;
+  EXPECT_EQ(scale[0].Apply(7), 0.007);
+  EXPECT_EQ(scale[1].Apply(3), 0.0762);
+  EXPECT_EQ(scale[2].Apply(3), -3);
 }
 
 TEST(UrdfFile, ErrorsNameLineAndElement) {
@@ -72,8 +117,13 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:12: link \"base\" is there already, in line 3"},
       {{"<child link=\"upper\"/>", "<child link=\"uper\"/>"},
        "arm.urdf:8: joint \"shoulder\" has a child that there is not: \"uper\""},
-      {{"type=\"revolute\"", "type=\"planar\""},
-       "arm.urdf:7: joint \"shoulder\" has type \"planar\""},
+      {{"type=\"revolute\"", "type=\"screw\""},
+       "arm.urdf:7: joint \"shoulder\" has type \"screw\""},
+      {{"<origin xyz=\"0 0 2\"/><axis xyz=\"0 0 3\"/>\n    <limit lower=\"0.5\" upper=\"1\"/>",
+        "<x/>"},
+       "joint \"slide\" lacks <limit"},
+      {{"<box size=\"2 2 1\"/>", "<mesh filename=\"a.stl\" scale=\"1 0 1\"/>"},
+       "arm.urdf:5: <mesh> scale must not be 0"},
       {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\""}, "arm.urdf:9: <axis> xyz must not be 0 0 0"},
       {{"lower=\"-2\"", "lower=\"nan\""}, "arm.urdf:10: <limit> lower: \"nan\" is not a finite"},
       {{"mimic joint=\"shoulder\"", "mimic joint=\"follow\""}, "mimics itself in the end"},
@@ -99,10 +149,24 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
   EXPECT_THAT(ErrorOf(deep), HasSubstr("nested deeper"));
 }
 
+TEST(UrdfFile, JointsOfSeveralValuesAreNotMimicked) {
+  EXPECT_THAT(ErrorOf(Changed("name=\"shoulder\" type=\"revolute\"",
+                              "name=\"shoulder\" type=\"floating\"")),
+              HasSubstr("joint \"shoulder\" is floating; joints that mimic have one value each"));
+  EXPECT_THAT(
+      ErrorOf(Changed("name=\"follow\" type=\"revolute\"", "name=\"follow\" type=\"planar\"")),
+      HasSubstr("joint \"follow\" is planar"));
+  EXPECT_THAT(
+      ErrorOf(Changed("type=\"prismatic\">\n    <parent link=\"lower\"/><child link=\"finger\"/>\n"
+                      "    <origin xyz=\"0 0 2\"/><axis xyz=\"0 0 3\"/>",
+                      "type=\"planar\"><parent link=\"lower\"/><child link=\"finger\"/>")),
+      HasSubstr("joint \"slide\" lacks <axis xyz=\"0 0 1\"/>, the normal of its plane"));
+}
+
 TEST(UrdfFile, SecondRootIsNamed) {
   EXPECT_THAT(ErrorOf("<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\"/>\n</robot>"),
               HasSubstr("arm.urdf:3: link \"b\" hangs on no joint, like \"a\""));
 }
 
-}  // namespace
+}  // namespace urdf_file_test
 }  // namespace hulld

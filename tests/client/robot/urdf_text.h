@@ -5,8 +5,8 @@
 
 namespace hulld {
 
-// An arm of a base, an upper and a lower part and a finger that follows; a tool hangs on a bare
-// flange. Every kind of joint and shape but the mesh is on it.
+// An arm with a base, an upper and a lower part, and a finger that mimics a joint; a tool is
+// attached to a bare flange. It has every kind of joint and shape except the mesh.
 inline constexpr char kArmUrdf[] = R"(<?xml version="1.0"?>
 <robot name="arm">
   <link name="base">

@@ -12,7 +12,7 @@
 #include "tests/oracle/brute_force_relation.h"
 
 namespace hulld {
-namespace {
+namespace certificate_check_test {
 
 using ::testing::HasSubstr;
 
@@ -138,7 +138,7 @@ TEST(CertificateCheck, IntegersOfAnyLengthAreDirections) {
   ExpectInvalid(kSeparated, Integers(std::string(100'001, '1'), "0", "0"), a, b, "decimal integer");
 }
 
-// q = (2, 1, 0, 0) turns (0, 0, 5) into (0, -4, 3) exactly, though |q|^2 = 5.
+// q = (2, 1, 0, 0) rotates (0, 0, 5) to (0, -4, 3) exactly, though |q|^2 = 5.
 TEST(CertificateCheck, RotationsAreExact) {
   const Hull a = Turned(At({0, 0, 5}, 1, 2, 3), 2, 1, 0, 0);
   const v1::Certificate same = Direction(0.5, 7, -1, {{0, 0}});
@@ -148,7 +148,7 @@ TEST(CertificateCheck, RotationsAreExact) {
   ExpectInvalid(kTouching, same, a, At({1, -2, std::nextafter(6.0, 9.0)}), "max n.A > min n.B");
   const Hull twice = Turned(At({0, 0, 5}), 0, 0, 0, 0);
   ExpectInvalid(kTouching, same, twice, a, "rotation is zero");
-  // An axis that is no double: the third part of a full turn about the diagonal.
+  // A rotation that is no double: a third of a full turn about the diagonal.
   const Hull turned = Turned(At({1, 2, 3}), 1, 1, 1, 1);
   ExpectValid(kTouching, same, turned, At({3, 1, 2}));
   ExpectInvalid(kTouching, same, turned, At({2, 3, 1}), "");
@@ -179,7 +179,7 @@ TEST(CertificateCheck, TouchingInEveryDimension) {
   ExpectValid(kTouching, Direction(0, 0, -1, {{0, 0}, {1, 1}}), along_x, along_y);
   ExpectInvalid(kTouching, Direction(0, 0, 1, {{0, 0}, {1, 0}}), along_x, along_y,
                 "0 is not in the hull");
-  // A point inside a triangle, on its edge, and beside it.
+  // A point inside a triangle, on its edge, and outside it.
   const Hull triangle = At({-1, -1, 0, 3, -1, 0, -1, 3, 0});
   const v1::Certificate corners = Direction(0, 0, 1, {{0, 0}, {1, 0}, {2, 0}});
   ExpectValid(kTouching, corners, triangle, At({0, 0, 0}));
@@ -264,7 +264,7 @@ TEST(CertificateCheck, TheWholeRangeOfDoublesIsExact) {
               At({huge, 0, 0}, huge));
 }
 
-// Certificates made at random: whatever is accepted must be true, by an oracle of its own.
+// Random certificates: every accepted one must be true, by a separate oracle.
 TEST(CertificateCheck, AcceptsNothingThatIsFalse) {
   constexpr uint32_t kSeed = 20;
   std::mt19937 random(kSeed);
@@ -314,5 +314,5 @@ TEST(CertificateCheck, AcceptsNothingThatIsFalse) {
   EXPECT_GT(accepted[kOverlapping], kScenes / 200);
 }
 
-}  // namespace
+}  // namespace certificate_check_test
 }  // namespace hulld

@@ -11,7 +11,7 @@
 #include <vector>
 
 namespace hulld {
-namespace {
+namespace piece_check_test {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -45,7 +45,7 @@ std::vector<double> Cube() {
   return xyz;
 }
 
-// A body that owns what its pieces refer to.
+// A body that owns the data of its pieces.
 struct Body {
   explicit Body(v1::Pose at = {}) : pose(std::move(at)) {}
 
@@ -85,7 +85,7 @@ v1::PieceCertificate Proof(uint32_t a, uint32_t b, v1::Relation relation, double
   return of;
 }
 
-// Why the certificates do not prove the relation; empty where they do.
+// Returns the reason why the certificates do not prove the relation, or empty.
 std::string Fault(v1::Relation relation, const std::vector<v1::PieceCertificate>& proofs,
                   const Body& a, const Body& b) {
   const PieceCertificates certificates(proofs.begin(), proofs.end());
@@ -93,8 +93,8 @@ std::string Fault(v1::Relation relation, const std::vector<v1::PieceCertificate>
       CheckPieceCertificates(relation, certificates, a.pieces(), b.pieces()).message());
 }
 
-// Three cubes in a row along x, 2 apart, and two above them: piece 0 of B touches piece 1 of A, and
-// piece 1 of B is beside piece 2 of A within its box, turned.
+// Three cubes in a row along x, 2 apart, and two above them: piece 0 of B touches piece 1 of A;
+// piece 1 of B, rotated, is separate from piece 2 of A but within its box.
 class Touching : public testing::Test {
  protected:
   Touching() {
@@ -102,7 +102,7 @@ class Touching : public testing::Test {
     b_.Add(Cube(), At(2, 1, 0)).Add(Diamond(), At(0, 0, 0));
   }
 
-  // Its box along the axes meets that of piece 2 of A; it does not.
+  // Its axis-aligned box meets that of piece 2 of A; the piece itself does not.
   static std::vector<double> Diamond() { return {5.9, 0.5, 0, 4.9, 1.5, 0, 5.9, 1.5, 1}; }
 
   static v1::PieceCertificate Contact() { return Proof(1, 0, kTouching, 0, 1, 0, {{6, 4}}); }
@@ -114,7 +114,7 @@ class Touching : public testing::Test {
 
 TEST_F(Touching, IsProvenByTheContactAndByEveryPairThatBoxesDoNotSettle) {
   EXPECT_THAT(Fault(kTouching, {Contact(), Beside()}, a_, b_), IsEmpty());
-  // In any order, and with more than is needed.
+  // In any order, and with superfluous ones.
   EXPECT_THAT(Fault(kTouching, {Beside(), Proof(0, 1, kSeparated, 1, 0, 0), Contact()}, a_, b_),
               IsEmpty());
 }
@@ -131,7 +131,7 @@ TEST_F(Touching, AWrongPieceIsNamed) {
   other.set_piece_b(0);
   EXPECT_THAT(Fault(kTouching, {Contact(), other}, a_, b_),
               HasSubstr("pieces 2 of A and 0 of B: the direction does not separate"));
-  // Which is true of that pair, and leaves the other one out.
+  // Correct for that pair, but another pair lacks a certificate.
   EXPECT_THAT(Fault(kTouching, {Contact(), Proof(2, 0, kSeparated, -1, 0, 0)}, a_, b_),
               HasSubstr("pieces 2 of A and 1 of B have no certificate"));
   other.set_piece_b(2);
@@ -160,7 +160,7 @@ TEST_F(Touching, AMovedVertexIsNoticed) {
               HasSubstr("pieces 1 of A and 0 of B"));
   b_.hulls[0][13] = 0;
   EXPECT_THAT(Fault(kTouching, {Contact(), Beside()}, a_, b_), IsEmpty());
-  // Out of its box, into that of a pair that boxes settled.
+  // Out of its box, into that of a pair decided by boxes.
   a_.hulls[0][12] = 2.5;
   EXPECT_THAT(Fault(kTouching, {Contact(), Beside()}, a_, b_),
               HasSubstr("pieces 0 of A and 0 of B have no certificate"));
@@ -181,7 +181,7 @@ TEST_F(Touching, AnotherRelationIsRefused) {
   unknown.set_relation(v1::RELATION_UNSPECIFIED);
   EXPECT_THAT(Fault(kTouching, {unknown, Beside()}, a_, b_),
               HasSubstr("pieces 1 of A and 0 of B: RELATION_UNSPECIFIED has no certificate"));
-  // What is apart touches nobody.
+  // Separated pieces do not touch.
   b_.pose = At(0, 0x1p-52, 0);
   EXPECT_THAT(Fault(kTouching, {Proof(1, 0, kSeparated, 0, 1, 0), Beside()}, a_, b_),
               HasSubstr("no certificate shows two pieces that are RELATION_TOUCHING"));
@@ -201,12 +201,12 @@ TEST_F(Touching, OneOverlapIsEnough) {
               HasSubstr("pieces 1 of A and 0 of B: 0 is not inside"));
 }
 
-// Boxes settle by the last bit, and not where rounding says so: a third of a turn about the
-// diagonal of the body, then of the piece, at scales that no double holds.
+// Boxes decide exactly, to the last bit: a third of a turn about the diagonal of the body, then of
+// the piece, at scales that no double represents.
 TEST(PieceCheck, BoxesAreExact) {
   for (const double scale : {1.0, 0x1p-1060, 0x1p1000}) {
     const auto point = [scale](double x) { return std::vector<double>{x * scale, 0, 0}; };
-    // (x, 0, 0) is turned to (0, x, 0), and then to (0, 0, x).
+    // (x, 0, 0) is rotated to (0, x, 0), and then to (0, 0, x).
     Body a(Turned(At(0, 0, 0), 3, 3, 3, 3));
     a.Add(point(5), Turned(At(0, 0, 0), 1, 1, 1, 1));
     for (const double z : {4.0, 5.0, 6.0}) {
@@ -268,5 +268,5 @@ TEST(PieceCheck, PosesMustBeFinite) {
   EXPECT_THAT(Fault(kSeparated, {}, a, b), HasSubstr("piece 0 of B: a rotation is zero"));
 }
 
-}  // namespace
+}  // namespace piece_check_test
 }  // namespace hulld

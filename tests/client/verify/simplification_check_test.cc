@@ -16,7 +16,7 @@
 #include "tests/oracle/brute_force_hausdorff.h"
 
 namespace hulld {
-namespace {
+namespace simplification_check_test {
 
 using ::testing::HasSubstr;
 
@@ -40,7 +40,7 @@ v1::Simplification Asked(v1::SimplificationSide side, uint64_t max_vertices, dou
   return asked;
 }
 
-// As the server would send it.
+// Returns the mesh as the server would send it.
 HullMesh MeshOf(const Hull& hull) {
   HullMesh mesh;
   for (const Vector& v : hull.vertices()) mesh.xyz.insert(mesh.xyz.end(), v.begin(), v.end());
@@ -70,7 +70,7 @@ void ExpectInvalid(const v1::Simplification& asked, const HullMesh& hull,
   EXPECT_THAT(std::string(status.message()), HasSubstr(why));
 }
 
-// Four corners of the cube of side 2; the others are 2 / sqrt(3) away.
+// Four corners of the cube of side 2; the other corners are 2 / sqrt(3) away.
 HullMesh TetrahedronInCube() {
   HullMesh mesh;
   mesh.xyz = {0, 0, 0, 2, 2, 0, 2, 0, 2, 0, 2, 2};
@@ -115,7 +115,7 @@ TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
   ExpectInvalid(Asked(kInside, 0, 1.25), cube, simple,
                 "the error is 1.5; at most 1.25 was asked for");
   ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
-  // With both the nearest that the server finds will do.
+  // With both limits, the nearest that the server finds is accepted.
   ExpectValid(Asked(kInside, 4, 1.25), cube, simple);
   ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "tells no error");
   ExpectInvalid(Asked(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()), "is no distance");
@@ -137,14 +137,14 @@ TEST(SimplificationCheck, SurvivesMeshesThatMakeNoSense) {
   HullMesh infinite = Claiming(9, TetrahedronInCube());
   infinite.xyz[2] = INFINITY;
   ExpectInvalid(inside, cube, infinite, "not finite");
-  // Without its facets it cannot be shown, and must not be believed.
+  // Without its facets it cannot be proven, and must be rejected.
   HullMesh bare = Claiming(0.5, TetrahedronInCube());
   bare.facet_sizes.clear();
   bare.facet_indices.clear();
   EXPECT_FALSE(CheckSimplification(inside, cube, bare).ok());
 }
 
-// The server's own simplifications of clouds of every size, place and dimension.
+// The server's own simplifications of clouds of every size, position, and dimension.
 TEST(SimplificationCheck, AgreesWithWhatTheServerMakes) {
   Random random(TestSeed(91));
   std::vector<std::vector<Vector>> clouds = {
@@ -178,7 +178,7 @@ TEST(SimplificationCheck, AgreesWithWhatTheServerMakes) {
   }
 }
 
-// Claims that are true or nearly so, against brute force.
+// True and nearly true claims, against brute force.
 TEST(SimplificationCheck, AgreesWithTheOracle) {
   Random random(TestSeed(92));
   int valid = 0;
@@ -191,7 +191,7 @@ TEST(SimplificationCheck, AgreesWithTheOracle) {
     const SimplifyTarget target = {size_t{is_inside ? 5u : 8u}, 0, {}};
     const auto simple = is_inside ? SimplifyInside(hull, target) : SimplifyOutside(hull, target);
     ASSERT_TRUE(simple.ok()) << simple.status();
-    // The simplification itself, and one of which a vertex was pulled a little.
+    // The simplification itself, and a copy with a slightly moved vertex.
     std::vector<Vector> pulled(simple->hull.vertices().begin(), simple->hull.vertices().end());
     pulled[0] *= 1 + 0x1p-40 * random.Between(-1, 1);
     const double error = simple->error;
@@ -239,5 +239,5 @@ TEST(SimplificationCheck, LooksThroughManyVertices) {
   ExpectInvalid(asked_outside, mesh, around, "is not in the simplification");
 }
 
-}  // namespace
+}  // namespace simplification_check_test
 }  // namespace hulld

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld {
-namespace {
+namespace check_test {
 
 TEST(Check, PassesWhereTheConditionHolds) {
   int evaluations = 0;
@@ -28,5 +28,5 @@ TEST(CheckDeathTest, DebugChecksAreOnWithoutNdebug) {
 }
 #endif
 
-}  // namespace
+}  // namespace check_test
 }  // namespace hulld

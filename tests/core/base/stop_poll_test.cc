@@ -5,7 +5,7 @@
 #include <functional>
 
 namespace hulld {
-namespace {
+namespace stop_poll_test {
 
 TEST(StopPoll, AsksAtTheFirstStepAndThenOnceInSoManySteps) {
   int polls = 0;
@@ -57,5 +57,5 @@ TEST(StopPoll, NeverStopsWithoutAQuestion) {
   EXPECT_FALSE(never.Poll());
 }
 
-}  // namespace
+}  // namespace stop_poll_test
 }  // namespace hulld

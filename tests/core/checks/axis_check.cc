@@ -23,7 +23,7 @@ struct Scene {
   oracle::WorldPoints world;
 };
 
-// Where A reaches farthest along n and B least far.
+// Maximum of A along n and minimum of B.
 struct Support {
   Integer gap;  // min n.B - max n.A
   std::vector<uint32_t> argmax_a;
@@ -61,7 +61,7 @@ size_t LargestBit(const IntegerVector& v) {
   return bit;
 }
 
-// v / |v|, within a few units in the last place. Requires v != 0.
+// Returns v / |v|, within a few units in the last place. Requires: v != 0.
 Vector ToUnit(const IntegerVector& v) {
   const size_t bit = LargestBit(v);
   Vector result;
@@ -77,7 +77,7 @@ Vector ToUnit(const IntegerVector& v) {
   return result / result.norm();
 }
 
-// The direction is the correct rounding of n / |n| up to this, in each coordinate. Observed errors
+// The direction is n / |n| correctly rounded up to this, in each coordinate. **Observed**: errors
 // of one normalization in doubles stay below 4e-16.
 constexpr double kDirectionTolerance = 1e-15;
 
@@ -85,7 +85,7 @@ bool Agrees(const IntegerVector& n, const Vector& direction) {
   return !oracle::IsZero(n) && (ToUnit(n) - direction).cwiseAbs().maxCoeff() <= kDirectionTolerance;
 }
 
-// The facet normals of a hull, each both ways: an axis is a line.
+// Returns the facet normals of a hull and their negatives: an axis is a line.
 std::vector<IntegerVector> FacetNormals(const Hull& hull, const std::vector<IntegerVector>& world) {
   std::vector<IntegerVector> result;
   for (size_t i = 0; i < hull.facet_count(); ++i) {
@@ -98,8 +98,8 @@ std::vector<IntegerVector> FacetNormals(const Hull& hull, const std::vector<Inte
   return result;
 }
 
-// The edges that the direction is perpendicular to within its rounding: others cannot be factors of
-// a cross product that agrees with it.
+// Returns the edges perpendicular to the direction within its rounding. No other edge can be a
+// factor of a matching cross product.
 std::vector<IntegerVector> EdgesAcross(const Hull& hull, const std::vector<IntegerVector>& world,
                                        const Vector& direction) {
   std::vector<IntegerVector> result;
@@ -124,7 +124,7 @@ std::vector<IntegerVector> EdgeCrossProducts(const Scene& scene, const Vector& d
   return result;
 }
 
-// What is wrong with exact direction n; empty when it separates at just the features given.
+// Returns the fault of an exact direction n; empty if it separates at exactly the given features.
 std::string ExactFault(const Scene& scene, const IntegerVector& n, Relation relation,
                        const SeparatingAxis& axis) {
   const Support support = SupportAlong(scene, n);
@@ -135,8 +135,8 @@ std::string ExactFault(const Scene& scene, const IntegerVector& n, Relation rela
   return "";
 }
 
-// The same for a direction known only up to its rounding: a gap, and features that are extreme,
-// within that rounding times the size of the scene.
+// As ExactFault, for a direction known up to rounding: checks the gap, and that the features are
+// extreme, within that rounding times the size of the scene.
 std::string RoundedFault(const Scene& scene, const SeparatingAxis& axis) {
   const oracle::Point rounded = {axis.direction.x(), axis.direction.y(), axis.direction.z()};
   const std::vector<Integer> integers = oracle::ToIntegers(rounded);
@@ -164,7 +164,7 @@ std::string RoundedFault(const Scene& scene, const SeparatingAxis& axis) {
   return "";
 }
 
-// The facet with just these vertices, if there is one.
+// Returns the facet with exactly these vertices, if any.
 std::optional<uint32_t> FacetOf(const Hull& hull, const std::vector<uint32_t>& vertices) {
   for (size_t i = 0; i < hull.facet_count(); ++i) {
     std::vector<uint32_t> polygon(hull.facet(i).begin(), hull.facet(i).end());
@@ -187,7 +187,8 @@ std::string FeatureFault(const Feature& feature, const Hull& hull) {
   return "";
 }
 
-// The exact directions that the kind of the axis allows; none when the kind does not tell.
+// Returns the exact directions that the axis's kind allows; empty if the kind does not determine
+// them.
 std::vector<IntegerVector> Candidates(const Scene& scene, const SeparatingAxis& axis) {
   switch (axis.kind) {
     case AxisKind::kFacetA:

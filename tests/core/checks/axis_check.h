@@ -7,11 +7,11 @@
 
 namespace hulld {
 
-// Whether the axis of an answer is what collision.h promises, in exact arithmetic that shares
-// nothing with core: there is one iff the hulls do not overlap and neither is empty; its direction
-// is of unit length; its kind names directions (facet normals, cross products of edges) of which
-// one agrees with the direction, separates the hulls (strictly when SEPARATED) and is extreme at
-// exactly the features given. GENERAL and FLAT axes are checked to the rounding of the direction.
+// True if an answer's axis satisfies collision.h, in exact arithmetic independent of core. It
+// exists iff the hulls do not overlap and neither is empty. Its direction has unit length. One of
+// the directions that its kind names (facet normals, cross products of edges) agrees with it,
+// separates the hulls (strictly if SEPARATED), and is extreme at exactly the given features.
+// GENERAL and FLAT axes are checked to the rounding of the direction.
 testing::AssertionResult AxisIsValid(const Hull& a, const Pose& X_WA, const Hull& b,
                                      const Pose& X_WB, const Answer& answer);
 

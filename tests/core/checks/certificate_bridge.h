@@ -8,11 +8,11 @@
 
 namespace hulld {
 
-// The certificate as the oracle reads it; doubles at one power of two.
+// Converts a certificate for the oracle; doubles at one power of two.
 oracle::Certificate ToOracle(const Certificate& certificate);
 
-// Whether an answer has a certificate iff neither hull is empty, and the certificate proves the
-// relation, by the oracle's arithmetic.
+// True if an answer has a certificate iff neither hull is empty, and the certificate proves the
+// relation in the oracle's arithmetic.
 testing::AssertionResult CertificateIsValid(const Hull& a, const Pose& X_WA, const Hull& b,
                                             const Pose& X_WB, const Answer& answer);
 

@@ -80,7 +80,7 @@ Points PlaneWithRounding(int n) {
   return points;
 }
 
-// A tilted integer plane, exactly, and one point one unit in the last place above its middle.
+// An exact tilted integer plane, and a point one unit in the last place above its middle.
 Points PlaneAndOneUlp(int n) {
   const int side = static_cast<int>(std::sqrt(n));
   Points points;
@@ -103,8 +103,9 @@ Points BoxFacesWithinAnUlp(int n) {
   return points;
 }
 
-// n integer points on one sphere round the origin: exactly cospherical. The radius grows until
-// there are as many; its square stays 1 modulo 4, as 4^a (8b + 7) is no sum of three squares.
+// n integer points on a sphere around the origin: exactly cospherical. The radius grows until
+// enough points exist; its square stays 1 modulo 4, because 4^a (8b + 7) is no sum of three
+// squares.
 Points Cospherical(int n) {
   for (int64_t radius_squared = 4 * n + 1;; radius_squared = 2 * radius_squared - 1) {
     const auto r = static_cast<int64_t>(std::sqrt(static_cast<double>(radius_squared)));
@@ -145,7 +146,7 @@ Points Drum(int n) {
   return Concatenated(circle, Shifted(circle, Vector(0, 0, 1000)));
 }
 
-// Each coordinate of its own magnitude, 10^-exponent to 10^exponent.
+// Each coordinate with its own magnitude, 10^-exponent to 10^exponent.
 Points MixedMagnitudes(int n, double exponent) {
   Random random(kSeed);
   Points points;
@@ -159,7 +160,7 @@ Points MixedMagnitudes(int n, double exponent) {
   return points;
 }
 
-// Spheres of 64 points round one centre, each ten times as large as the one before, from 1e-150.
+// Concentric spheres of 64 points, each ten times as large as the previous, from 1e-150.
 Points NestedScales(int n) {
   Points points;
   for (int i = 0; i < n; i += 64) {
@@ -185,7 +186,7 @@ Points SortedAlongX(Points points) {
   return points;
 }
 
-// From both ends of x in turn.
+// Alternates between both ends of x.
 Points FromBothEnds(const Points& sorted) {
   Points points;
   for (size_t i = 0, j = sorted.size(); i < j;) {
@@ -212,7 +213,7 @@ Points PlaneFirst(int n) {
   return Concatenated(points, Ball(n - n / 2, 40));
 }
 
-// Each apex sees all sides of the cone of the one before: n^2 / 4 triangles in all.
+// Each apex sees all sides of the previous cone: n^2 / 4 triangles in all.
 Points CircleThenRisingApexes(int n) {
   Points points;
   for (int i = 0; i < n / 2; ++i) {
@@ -223,7 +224,7 @@ Points CircleThenRisingApexes(int n) {
   return points;
 }
 
-// Distinct points over and over, n in all.
+// Repeats distinct points, n in all.
 Points Repeated(const Points& distinct, int n) {
   Points points;
   for (int i = 0; i < n; ++i) points.push_back(distinct[static_cast<size_t>(i) % distinct.size()]);

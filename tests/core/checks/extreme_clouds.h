@@ -12,33 +12,34 @@
 
 namespace hulld {
 
-// The arithmetic without which a hull of about 1000 such points cannot be told.
+// The arithmetic required to decide a hull of about 1000 such points.
 enum class Arithmetic {
-  // Rounded arithmetic with a bound may do.
+  // Rounded arithmetic with an error bound may suffice.
   kAny,
-  // Some signs are beyond doubles: zero, or too small to tell.
+  // Doubles cannot decide some signs: zero or too small.
   kExact,
-  // Some coordinates are so far apart, or so near the ends of the range of doubles, that no
-  // rescaling by one power of two brings all of them into the range of expansions.
+  // Some coordinates are so far apart, or so near the limits of doubles, that no common power of
+  // two brings all of them into the range of expansions.
   kIntegers,
 };
 
-// One way in which a cloud of points is hard to build a hull of. The rows of the table of extremes
-// in tests/bench/README.md, and the parameters of the suite that checks them.
+// A cloud of points with a hull that is hard to build. A row of the table of extremes in
+// tests/bench/README.md, and a parameter of the tests that check it.
 struct Extreme {
   std::string name;
-  // About n points in an order that is part of the difficulty; the same on every call. n >= 16.
+  // Returns about n points in an order that contributes to the difficulty; equal on every call.
+  // Requires: n >= 16.
   std::function<std::vector<Vector>(int n)> make;
   Arithmetic needs = Arithmetic::kAny;
-  // How many triangles adding n points one by one in their order creates, where the order forces
-  // quadratically many; otherwise null.
+  // Number of triangles created by adding n points one by one in order, if the order forces a
+  // quadratic number; otherwise null.
   int64_t (*facets_one_by_one)(int n) = nullptr;
 };
 
 std::span<const Extreme> Extremes();
 void PrintTo(const Extreme& extreme, std::ostream* out);
 
-// A cloud without difficulty: `vertices` points on the unit sphere, n - vertices well inside, in
+// Returns an easy cloud: `vertices` points on the unit sphere, and n - vertices well inside, in
 // random order.
 std::vector<Vector> GenericCloud(int n, int vertices);
 

@@ -85,7 +85,7 @@ testing::AssertionResult SameBits(const Hull& actual, const Hull& expected) {
   }
   for (size_t i = 0; i < a.vertices.size(); ++i) {
     for (int k = 0; k < 3; ++k) {
-      // Bits, because -0 == 0.
+      // Compares bits, because -0 == 0.
       if (std::bit_cast<uint64_t>(a.vertices[i][k]) != std::bit_cast<uint64_t>(b.vertices[i][k])) {
         return testing::AssertionFailure() << "vertex " << i << " coordinate " << k << " differs";
       }

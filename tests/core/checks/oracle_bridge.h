@@ -14,28 +14,28 @@
 
 namespace hulld {
 
-// Between the types of core and those of the oracle.
+// Convert types of core to those of the oracle.
 std::vector<oracle::Point> ToOracle(std::span<const Vector> points);
 oracle::Placement ToOracle(const Pose& pose);
 oracle::ConvexHull ToOracle(const Hull& hull);
 Relation FromOracle(oracle::Relation relation);
 
-// The oracle's relation of two hulls.
+// Returns the oracle's relation of two hulls.
 Relation OracleRelation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB);
 
-// The hull of all points in one block; a failure of the test when refused.
+// Builds the hull of all points in one block; fails the test if refused.
 Hull BuildHull(std::span<const Vector> points);
 
-// Whether two snapshots hold the same bits.
+// True if two snapshots are bitwise equal.
 testing::AssertionResult SameBits(const Hull& actual, const Hull& expected);
 
-// Whether a snapshot equals the oracle's canonical hull, vertices, facets and edges in order.
+// True if a snapshot equals the oracle's canonical hull, with vertices, facets, and edges in order.
 testing::AssertionResult SameHull(const Hull& actual, const oracle::ConvexHull& expected);
 
 const char* Name(Relation relation);
 const char* Name(AxisKind kind);
 
-// All that a failing question needs to be asked again, in hexadecimal floating point.
+// Returns a failing query in hexadecimal floating point, sufficient to reproduce it.
 std::string Describe(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB);
 
 }  // namespace hulld

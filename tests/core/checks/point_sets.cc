@@ -28,7 +28,7 @@ std::vector<Vector> ReadObjVertices(const std::string& path) {
 }
 
 Vector RandomSmallVector(Random& random) {
-  // One after the other: the order of arguments is the compiler's choice.
+  // In separate statements: the evaluation order of arguments is unspecified.
   const int z = random.Between(-3, 3);
   const int y = random.Between(-3, 3);
   const int x = random.Between(-3, 3);

@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// What is wrong with a textbook report; empty when nothing is.
+// Returns the fault of a textbook report, or empty.
 std::string AnalysisFault(const Hull& a, const Hull& b, const Answer& answer) {
   if (!answer.analysis) return "no analysis";
   const Analysis& analysis = *answer.analysis;

@@ -9,28 +9,28 @@
 
 namespace hulld {
 
-// Asks core one question in all ways and counts which regimes the questions reached, so that a
-// sweep can assert that it reached them all.
+// Queries core in all ways and counts the regimes reached, so that a sweep can assert that it
+// reached all of them.
 class RelationCheck {
  public:
   enum Ways {
     kAllWays,
-    kSearchOnly,  // for hulls too large for the textbook's number of axes
+    kSearchOnly,  // for hulls with too many axes for the textbook
   };
 
-  // Whether core says `expected` for A and B and for B and A, by both methods, each with a valid
-  // axis and a consistent analysis, and the search with a certificate that proves it; and the
-  // search also when asked for nothing else.
+  // True if core returns `expected` for (A, B) and (B, A) by both methods, each with a valid axis
+  // and a consistent analysis, the search with a valid certificate, and also by a search for the
+  // relation alone.
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                Relation expected, Ways ways = kAllWays);
 
   int questions() const { return questions_; }
-  // How many questions had this relation.
+  // Returns the number of queries with this relation.
   int count(Relation relation) const { return relations_[static_cast<size_t>(relation)]; }
-  // How many answers of the default method came from this rung, or by an axis of this kind.
+  // Return the number of answers of the default method from this rung, or with this kind of axis.
   int count(Rung rung) const { return rungs_[static_cast<size_t>(rung)]; }
   int count(AxisKind kind) const { return kinds_[static_cast<size_t>(kind)]; }
-  // How many answers of the textbook method had an axis of this kind.
+  // Returns the number of textbook answers with this kind of axis.
   int textbook_count(AxisKind kind) const { return textbook_kinds_[static_cast<size_t>(kind)]; }
 
  private:

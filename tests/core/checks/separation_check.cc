@@ -10,9 +10,7 @@
 namespace hulld {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// A question in the oracle's types.
+// A query in the oracle's types.
 struct Question {
   std::vector<oracle::Point> a;
   oracle::Placement X_WA;
@@ -20,7 +18,7 @@ struct Question {
   oracle::Placement X_WB;
 };
 
-// Whether a world point is within `error` of the hull of the points.
+// Returns true if a world point is within `error` of the hull of the points.
 bool IsNear(const std::vector<oracle::Point>& points, const oracle::Placement& pose,
             const Vector& p_W, double error) {
   const std::vector<oracle::Point> point = {{p_W.x(), p_W.y(), p_W.z()}};
@@ -47,7 +45,7 @@ testing::AssertionResult WitnessIsValid(const Question& q, const Answer& answer)
   return testing::AssertionSuccess();
 }
 
-// Whether separation <= clearance, by the oracle.
+// Returns true if separation <= clearance, by the oracle.
 bool IsWithinClearance(Relation relation, const oracle::SquaredLength& length, double clearance) {
   if (relation == Relation::kTouching) return clearance >= 0;
   if (relation == Relation::kSeparated) {
@@ -106,7 +104,7 @@ testing::AssertionResult SeparationCheck::Ask(const Hull& a, const Pose& X_WA, c
       2e-12 * (a.max_abs_coordinate() + b.max_abs_coordinate() + std::abs(value)));
   if (!exact && !(bound <= goal)) return failure() << "bound " << bound << " misses the goal";
   if (const auto result = WitnessIsValid(q, *answer); !result) return failure() << result.message();
-  // The same hull twice, at the same pose: the question is its own mirror image.
+  // Equal hulls at equal poses: the query is its own mirror image.
   const bool symmetric = X_WA.q == X_WB.q && X_WA.t == X_WB.t && SameBits(a, b);
   const double ulp = std::nextafter(std::abs(value), kInfinity) - std::abs(value);
   for (const double clearance : {value, value + ulp, value - ulp, value + 3 * bound,

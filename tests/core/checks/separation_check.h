@@ -9,18 +9,18 @@
 
 namespace hulld {
 
-// Asks for separation, witness points and clearances, and checks them against brute force in exact
-// arithmetic that shares nothing with core. For hulls with at most about 50 differences.
+// Queries separation, witness points, and clearances, and checks them against brute force in exact
+// arithmetic independent of core. For hulls with at most about 50 differences.
 class SeparationCheck {
  public:
-  // Whether the answer to A and B keeps every promise of collision.h, and that to B and A mirrors
-  // it.
+  // True if the answer for (A, B) satisfies collision.h, and the answer for (B, A) mirrors it.
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                std::optional<double> max_error = std::nullopt);
 
   int questions() const { return questions_; }
   int count(Relation relation) const { return relations_[static_cast<int>(relation)]; }
-  // How many separations came with a bound that only exact arithmetic reaches, and with another.
+  // Number of separations with a bound that only exact arithmetic achieves, and with a larger
+  // bound.
   int exact_count() const { return exact_; }
   int float_count() const { return float_; }
 
@@ -31,7 +31,7 @@ class SeparationCheck {
   int float_ = 0;
 };
 
-// The options for everything that SeparationCheck asks.
+// Returns the options for everything that SeparationCheck queries.
 QueryOptions WantSeparation(std::optional<double> max_error = std::nullopt);
 
 }  // namespace hulld

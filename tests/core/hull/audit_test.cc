@@ -9,9 +9,9 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace audit_test {
 
-// The parts of a snapshot, to break one at a time.
+// The parts of a snapshot, to be broken individually.
 struct Parts {
   int dimension;
   std::vector<Vector> vertices;
@@ -53,7 +53,7 @@ void ExpectFound(const Parts& parts, const char* what) {
   EXPECT_EQ(status.code(), absl::StatusCode::kInternal) << what;
 }
 
-// What an audit of `hull` is when should_stop is first true at its poll number `last`; 0: never.
+// Returns the audit of `hull` if should_stop is first true at poll number `last`; 0: never.
 absl::Status AuditUntil(const Hull& hull, int last, int* polls) {
   *polls = 0;
   return AuditHull(hull, [last, polls] { return ++*polls == last; });
@@ -67,7 +67,7 @@ TEST(Audit, StopsWheneverItIsToldTo) {
   for (const Hull& hull : {solid, BuildHull(circle)}) {
     int polls = 0;
     EXPECT_TRUE(AuditUntil(hull, 0, &polls).ok());
-    // Every vertex and every corner of a facet is a step at least.
+    // Every vertex and every corner of a facet takes at least one step.
     size_t steps = hull.vertices().size();
     for (size_t f = 0; f < hull.facet_count(); ++f) steps += hull.facet(f).size();
     EXPECT_GE(static_cast<size_t>(polls), steps / 1024);
@@ -75,7 +75,7 @@ TEST(Audit, StopsWheneverItIsToldTo) {
     for (int last = 1; last <= all; last += 1 + all / 16) {
       const absl::Status status = AuditUntil(hull, last, &polls);
       EXPECT_EQ(status.code(), absl::StatusCode::kCancelled) << status;
-      // Told once, it does not ask again.
+      // After a stop it does not poll again.
       EXPECT_EQ(polls, last);
     }
   }
@@ -167,7 +167,8 @@ TEST(Audit, FindsDents) {
   ExpectFound(parts, "a dent");
 }
 
-// Locally convex everywhere, closed, and wound twice about its axis: only the global check sees it.
+// Locally convex everywhere, closed, and wound twice about its axis: only the global check detects
+// it.
 TEST(Audit, FindsAPyramidOverAPentagram) {
   Parts parts;
   parts.dimension = 3;
@@ -200,7 +201,7 @@ TEST(Audit, FindsAPyramidOverAPentagram) {
     parts.edges.push_back({std::min(rank[i], rank[j]), std::max(rank[i], rank[j])});
   };
   for (uint32_t i = 0; i < 5; ++i) {
-    const uint32_t j = (i + 2) % 5;  // the star goes round twice
+    const uint32_t j = (i + 2) % 5;  // the star winds around twice
     add(i, j, 5);
     add(j, i, 6);
     link(i, j);
@@ -277,5 +278,5 @@ TEST(AuditContainment, IsExactForFlatHulls) {
   EXPECT_FALSE(AuditContainment(BuildHull(point), off).ok());
 }
 
-}  // namespace
+}  // namespace audit_test
 }  // namespace hulld

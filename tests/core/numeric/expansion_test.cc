@@ -7,7 +7,7 @@
 #include <random>
 
 namespace hulld {
-namespace {
+namespace expansion_test {
 
 using Rational = boost::multiprecision::cpp_rational;
 
@@ -70,5 +70,5 @@ TEST(Expansion, ZeroHasNoComponents) {
   EXPECT_EQ((zero * Expansion<2>::DifferenceOf(3, 1)).size(), 0u);
 }
 
-}  // namespace
+}  // namespace expansion_test
 }  // namespace hulld

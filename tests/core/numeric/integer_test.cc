@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace hulld {
-namespace {
+namespace integer_test {
 
 TEST(Integer, LowestBitExponentReachesBothEndsOfTheDoubles) {
   EXPECT_EQ(LowestBitExponent(1.0), 0);
@@ -49,5 +49,5 @@ TEST(Integer, PerpendicularIsAcrossAndNotZero) {
   }
 }
 
-}  // namespace
+}  // namespace integer_test
 }  // namespace hulld

@@ -1,14 +1,14 @@
 #!/bin/bash
-# no_fusion_test.sh OBJDUMP LIBRARY...: fails where machine code multiplies and adds with one rounding,
-# on x86-64 or 64-bit ARM. Processors with and without such instructions would give other bits.
-# The compiler is told not to fuse; the intrinsics that Eigen's products use on ARM do so all the same.
+# no_fusion_test.sh OBJDUMP LIBRARY...: fails if machine code multiplies and adds with one rounding,
+# on x86-64 or 64-bit ARM. Processors with and without such instructions would give different bits.
+# The compiler is instructed not to fuse, but the intrinsics of Eigen's products on ARM still fuse.
 set -uo pipefail
 objdump=$1
 shift
 failed=0
 for library in "$@"; do
   code=$("$objdump" --disassemble --no-show-raw-insn --demangle "$library") || exit 2
-  # The name of a function stands before its code, the instruction between two tabs or after one.
+  # A function's name precedes its code; the instruction is between two tabs or after one.
   found=$(awk '
     /^[0-9a-f]+ </ { name = $0; ++functions }
     /\t(vfn?m(add|sub)|fml[as]|fn?m(add|sub))/ { print name }

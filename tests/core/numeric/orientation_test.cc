@@ -7,14 +7,16 @@
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace hulld {
-namespace {
+namespace orientation_test {
 
 using Rational = boost::multiprecision::cpp_rational;
 using Points = std::array<Vector, 4>;
 
-// By rationals, expanded along the last row: a formula unlike the one under test.
+// In rationals, expanded along the last row: a formula unlike the one under test.
 int RationalOrient3d(const Points& p) {
   Rational m[3][3];
   for (int i = 0; i < 3; ++i) {
@@ -29,7 +31,7 @@ int RationalOrient3d(const Points& p) {
 
 int Sign(const Points& p) { return Orient3d(p[0], p[1], p[2], p[3]); }
 
-// The sign is exact and obeys the laws of a determinant.
+// The sign is that of the determinant in rationals, in several orders of the points.
 void ExpectExact(const Points& p) {
   const int sign = RationalOrient3d(p);
   ASSERT_EQ(Sign(p), sign) << p[0].transpose() << " / " << p[1].transpose() << " / "
@@ -37,6 +39,76 @@ void ExpectExact(const Points& p) {
   ASSERT_EQ(Sign({p[1], p[0], p[2], p[3]}), -sign);
   ASSERT_EQ(Sign({p[0], p[1], p[3], p[2]}), -sign);
   ASSERT_EQ(Sign({p[1], p[2], p[0], p[3]}), sign);
+}
+
+// Points of a lattice, many of them coplanar, and points next to a plane at several scales, where
+// floating point cannot decide the sign. Doubles represent the sums with the offset exactly.
+struct LawCase {
+  Points points;
+  Vector offset;
+};
+
+std::vector<LawCase> LawCases() {
+  std::mt19937_64 random(17);
+  std::uniform_int_distribution<int> few(-2, 2);
+  std::uniform_int_distribution<int64_t> many(-(int64_t{1} << 50), int64_t{1} << 50);
+  std::vector<LawCase> cases;
+  for (int i = 0; i < 3000; ++i) {
+    const double scale = std::ldexp(1.0, std::array{-1000, 0, 900}[i % 3]);
+    LawCase added;
+    for (Vector& v : added.points) v = Vector(few(random), few(random), few(random));
+    if (i % 2 == 0) {
+      const auto large = [&] { return static_cast<double>(many(random)); };
+      for (int k = 0; k < 3; ++k) added.points[k] = Vector(large(), large(), large());
+      const Points& p = added.points;
+      // Integers below 2^51, as near to the plane of the other points as possible.
+      added.points[3] = (p[0] / 2 + p[1] / 4 + p[2] / 4).array().round();
+    }
+    const auto shift = [&] { return static_cast<double>(many(random)); };
+    added.offset = scale * Vector(shift(), shift(), shift());
+    for (Vector& v : added.points) v *= scale;
+    cases.push_back(added);
+  }
+  return cases;
+}
+
+TEST(Orient3d, Law1ExchangingTwoPointsNegatesTheSign) {
+  for (const LawCase& law_case : LawCases()) {
+    for (int i = 0; i < 4; ++i) {
+      for (int k = i + 1; k < 4; ++k) {
+        Points exchanged = law_case.points;
+        std::swap(exchanged[i], exchanged[k]);
+        ASSERT_EQ(Sign(exchanged), -Sign(law_case.points)) << i << " " << k;
+      }
+    }
+  }
+}
+
+TEST(Orient3d, Law2EvenPermutationsKeepTheSign) {
+  for (const LawCase& law_case : LawCases()) {
+    std::array<int, 4> order = {0, 1, 2, 3};
+    do {
+      int inversions = 0;
+      for (int i = 0; i < 4; ++i) {
+        for (int k = i + 1; k < 4; ++k) inversions += order[i] > order[k];
+      }
+      if (inversions % 2 != 0) continue;
+      Points permuted;
+      for (int i = 0; i < 4; ++i) permuted[i] = law_case.points[order[i]];
+      ASSERT_EQ(Sign(permuted), Sign(law_case.points));
+    } while (std::next_permutation(order.begin(), order.end()));
+  }
+}
+
+TEST(Orient3d, Law3RepresentableTranslationsKeepTheSign) {
+  int coplanar = 0;
+  for (const LawCase& law_case : LawCases()) {
+    Points moved = law_case.points;
+    for (Vector& v : moved) v += law_case.offset;
+    ASSERT_EQ(Sign(moved), Sign(law_case.points));
+    coplanar += Sign(moved) == 0;
+  }
+  EXPECT_GT(coplanar, 100);
 }
 
 TEST(Orient3d, PositiveOnTheSideOfTheNormal) {
@@ -71,11 +143,11 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
       for (int k = 0; k < 3; ++k) {
         p[k] = Vector(unit(random), unit(random), unit(random));
       }
-      // Anywhere, or rounded into the plane of the others and hence next to it.
+      // Anywhere, or rounded into the plane of the other points and hence next to it.
       const double s = unit(random);
       const double t = unit(random);
       p[3] = i % 3 == 0 ? Vector(s, t, unit(random)) : p[0] + s * (p[1] - p[0]) + t * (p[2] - p[0]);
-      // With like magnitudes along the axes, or with unlike ones, which take more bits.
+      // Similar magnitudes along the axes, or different ones, which take more bits.
       const int spread = i % 2 == 0 ? 0 : 12;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(v[k], scale - k * spread);
@@ -88,11 +160,11 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
   EXPECT_GT(after.nearest_filter - before.nearest_filter, 1000u);
   EXPECT_GT(after.fixed_point - before.fixed_point, 1000u);
   EXPECT_GT(after.expansion - before.expansion, 1000u);
-  // A common power of two takes no integers.
+  // A common power of two needs no integers.
   EXPECT_EQ(after.integer, before.integer);
 }
 
-// A power of two on each axis: past the spread of exponents that one power of two on all can undo.
+// A power of two on each axis: exponents spread beyond the reach of a common power of two.
 TEST(Orient3d, ExactWhereAxesAreFarApart) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -123,8 +195,8 @@ TEST(Orient3d, ExactWhereAxesAreFarApart) {
   }
 }
 
-// Two or three of the points close together, whichever they are, and the others far off: the
-// determinant is far below what differences from a far point err by. No exact arithmetic is needed.
+// Any two or three of the points are close together and the rest far away: the determinant is far
+// below the error of differences from a far point. No exact arithmetic is needed.
 TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -152,8 +224,8 @@ TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
   EXPECT_EQ(after.integer, before.integer);
 }
 
-// Rounding to zero what is far below the others does not lose a sign that is certain, nor makes
-// certain one that is not.
+// Rounding terms far below the rest to zero neither loses a certain sign nor makes an uncertain one
+// certain.
 TEST(Orient3d, MagnitudesFarApartTakeNoIntegersUnlessTheyCount) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> unit(-1, 1);
@@ -164,7 +236,7 @@ TEST(Orient3d, MagnitudesFarApartTakeNoIntegersUnlessTheyCount) {
     for (Vector& v : p) {
       for (int k = 0; k < 3; ++k) v[k] = std::ldexp(unit(random), exponent(random));
     }
-    // In the plane of the others.
+    // In the plane of the other points.
     if (i % 8 == 0) p[3] = p[0] + (p[1] - p[0]) / 2 + (p[2] - p[0]) / 4;
     ExpectExact(p);
   }
@@ -250,5 +322,5 @@ TEST(ProjectionOf, FindsAPlaneUnlessCollinear) {
   EXPECT_NE(Orient2d(a, b, c, plane), 0);
 }
 
-}  // namespace
+}  // namespace orientation_test
 }  // namespace hulld

@@ -1,5 +1,5 @@
-// Prints the bounds and the ranges of core/numeric as they are compiled, a name and a hexadecimal
-// double a line, for the proofs about them.
+// Prints the compiled bounds and ranges of core/numeric, one name and hexadecimal double per line,
+// for the proofs about them.
 
 #include <cstdio>
 

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 """Proves error bounds with Gappa.
 
-  prove_bounds.py prove CONSTANTS SCRIPT.g    proves the script, and sees its mutants refused
-  prove_bounds.py expand CONSTANTS SCRIPT.g   prints what Gappa reads
+  prove_bounds.py prove CONSTANTS SCRIPT.g    proves the script, and checks that its mutants fail
+  prove_bounds.py expand CONSTANTS SCRIPT.g   prints the script as Gappa reads it
   prove_bounds.py complete HEADER FOLDER      checks that each bound of the header has its proof: in
                                               a script of the folder, or by hand in its README.md
 
-CONSTANTS: a program that prints the C++ constants, a name and a hexadecimal double a line.
+CONSTANTS: a program that prints the C++ constants, one name and hexadecimal double per line.
 
-In a script a name k... stands for the C++ constant, so that what is proved is what is compiled.
+In a script a name k... stands for the C++ constant, so that the proof covers the compiled value.
 fl(EXPRESSION) rounds every +, - and * in it, by Gappa's operators for any relative error of at most
 2^-53. A line "# Refused: kName * 0.7" or "# Refused: kName - 1 step" is a mutant: with that
-constant instead Gappa must find no proof, so no script proves what is empty.
+constant instead Gappa must find no proof, so that no script proves a vacuous statement.
 """
 
 import ast
@@ -23,7 +23,7 @@ import sys
 
 CONSTANT = re.compile(r'\bk[A-Z]\w*')
 MUTANT = re.compile(r'# Refused: (k\w+) (?:\* ([0-9.]+)|= (0x[0-9a-f.p-]+)|- 1 step)$')
-# What Gappa says, and what it says only of a bound that it cannot show.
+# Output of Gappa that occurs only for a bound that it cannot prove.
 REFUSED = re.compile(
     r'^Error: (some properties were not satisfied|no contradiction was found)', re.MULTILINE)
 OPERATORS = {ast.Add: 'add_rel', ast.Sub: 'sub_rel', ast.Mult: 'mul_rel'}
@@ -59,7 +59,7 @@ def expand_rounding(text):
 
 
 def expand(text, constants):
-    """What Gappa reads."""
+    """Returns the script as Gappa reads it."""
     code = re.sub(r'#.*', '', text)
     unknown = set(CONSTANT.findall(code)) - set(constants)
     if unknown:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scripts that prove nothing, or not what the constants say, are not taken for proofs."""
+"""Scripts that prove nothing, or not the bounds of the constants, are rejected as proofs."""
 
 import contextlib
 import io
@@ -15,7 +15,7 @@ SOUND = '{ |d| <= kUnit -> |d + d| <= kTwice }\n# Refused: kTwice * 0.9\n'
 
 
 def outcome(text, unit=0.125, twice=0.25):
-    """None when the script counts as a proof, else what is said of it."""
+    """Returns None if the script counts as a proof, otherwise the error."""
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         script = pathlib.Path(folder, 'script.g')
         script.write_text(text)

@@ -1,4 +1,4 @@
-// Fixed widths against integers of any size, modulo the width.
+// Fixed-width integers against integers of any size, modulo the width.
 
 #include "core/numeric/wide_integer.h"
 
@@ -11,9 +11,9 @@
 #include "core/numeric/integer.h"
 
 namespace hulld {
-namespace {
+namespace wide_integer_test {
 
-// Words of all kinds, those at the ends of carries more often than others.
+// Words of all kinds, with carry boundaries more often than other words.
 template <int kWords>
 WideInteger<kWords> AnyInteger(std::mt19937_64& random) {
   WideInteger<kWords> value;
@@ -41,7 +41,7 @@ WideInteger<kWords> AnyInteger(std::mt19937_64& random) {
   return value;
 }
 
-// What a number wraps to in this many words.
+// Returns a number wrapped to this many words.
 Integer Wrapped(const Integer& value, int words) {
   const Integer range = Integer(1) << (64 * words);
   Integer rest = value % range;
@@ -175,11 +175,11 @@ TEST(WideInteger, IntegersConvertWhereTheyFit) {
       ASSERT_EQ(ToInteger(wide), a) << "seed " << seed;
     }
   }
-  // The least number of two words has no opposite there, and is left out.
+  // The least number of two words has no negation of that width, and is excluded.
   WideInteger<2> wide;
   EXPECT_FALSE(ToWide(Integer(-(Integer(1) << 127)), wide));
   EXPECT_TRUE(ToWide(Integer((Integer(1) << 127) - 1), wide));
 }
 
-}  // namespace
+}  // namespace wide_integer_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// The questions on which tests/bench counts the wrong answers of every library: none here.
+// The queries on which tests/bench counts the wrong answers of every library: none here.
 
 #include "tests/bench/queries/accuracy_suite.h"
 
@@ -10,7 +10,7 @@
 #include "tests/core/checks/oracle_bridge.h"
 
 namespace hulld {
-namespace {
+namespace accuracy_suite_test {
 
 TEST(AccuracySuite, EveryQuestionIsAnsweredExactly) {
 #ifdef HULLD_SANITIZED
@@ -37,7 +37,7 @@ TEST(AccuracySuite, EveryQuestionIsAnsweredExactly) {
     ++relations[expected];
     ++rungs[answer->rung];
   }
-  // The suite asks what it says: every relation, many of them beyond floating point.
+  // The suite has the intended mix: every relation, many beyond floating point.
   EXPECT_GT(relations[Relation::kSeparated], kQuestions / 3);
   EXPECT_GT(relations[Relation::kTouching], kQuestions / 20);
   EXPECT_GT(relations[Relation::kOverlapping], kQuestions / 3);
@@ -45,5 +45,5 @@ TEST(AccuracySuite, EveryQuestionIsAnsweredExactly) {
   EXPECT_GT(rungs[Rung::kExact], kQuestions / 10);
 }
 
-}  // namespace
+}  // namespace accuracy_suite_test
 }  // namespace hulld

@@ -11,7 +11,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace batch_test {
 
 // A crowd of hulls of all dimensions, some of them in exact contact.
 struct Crowd {
@@ -69,7 +69,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
     options.method = method;
     options.want_axis = true;
     options.want_analysis = true;
-    // The textbook on all pairs would be slow: every seventh will do.
+    // The textbook on all pairs would be slow: every seventh suffices.
     std::vector<PlacedPair> pairs;
     for (size_t i = 0; i < crowd.pairs.size(); i += method == Method::kTextbookSat ? 7 : 1) {
       pairs.push_back(crowd.pairs[i]);
@@ -140,7 +140,7 @@ TEST(Batch, PollsLessOftenThanItAnswersAndStopsForGood) {
     options.should_stop = [&] { return ++polls > 10; };
     const auto answers = CheckCollisions(crowd.placements, crowd.pairs, options, threads);
     EXPECT_EQ(answers.back().status().code(), absl::StatusCode::kCancelled);
-    // Polled again and again, but not for every pair of those that take no time.
+    // Polled repeatedly, but not for every trivial pair.
     EXPECT_LT(polls, 1000);
   }
 }
@@ -191,5 +191,5 @@ TEST(Batch, OnePairTooLargeForTheTextbookFailsAlone) {
   EXPECT_TRUE(answers[2].ok());
 }
 
-}  // namespace
+}  // namespace batch_test
 }  // namespace hulld

@@ -12,7 +12,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace certification_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kRounds = 300;
@@ -50,7 +50,7 @@ TEST(Certificate, EmptyHullsNeedNone) {
   EXPECT_FALSE(answer.certificate.has_value());
 }
 
-// Vertices of which none can be spared: the origin is on a line or in a plane of opposite ones.
+// Every vertex is needed: the origin is on a line or in a plane of opposite ones.
 TEST(Certificate, SomeOverlapsNeedFiveOrSixPairs) {
   const std::vector<Vector> bipyramid = {{0, 0, 3}, {0, 0, -3}, {2, 0, 0}, {-1, 1, 0}, {-1, -1, 0}};
   const std::vector<Vector> octahedron = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
@@ -109,7 +109,7 @@ struct Regimes {
 };
 
 // Small integer sets of every dimension in poses of small integers: half of them in contact. Their
-// poses' rotations make directions that doubles cannot hold.
+// poses' rotations give directions that doubles cannot represent.
 TEST(Certificate, SmallHullsOfEveryDimensionAreProven) {
   const uint64_t seed = TestSeed(701);
   Random random(seed);
@@ -138,7 +138,7 @@ TEST(Certificate, SmallHullsOfEveryDimensionAreProven) {
         << "seed " << seed << " round " << round << "\n"
         << Describe(a, X_WA, b, X_WB);
     regimes.Count(answer);
-    // The same hull twice, at the same pose: the question is its own mirror image.
+    // Equal hulls at equal poses: the query is its own mirror image.
     if (X_WA.q == X_WB.q && SameBits(a, b)) continue;
     ExpectMirrored(*answer.certificate,
                    *CheckCollision(b, X_WB, a, X_WA, WantCertificate()).value().certificate);
@@ -149,5 +149,5 @@ TEST(Certificate, SmallHullsOfEveryDimensionAreProven) {
   for (int size = 1; size <= 4; ++size) EXPECT_GT(regimes.pair_counts[size], 0) << size;
 }
 
-}  // namespace
+}  // namespace certification_test
 }  // namespace hulld

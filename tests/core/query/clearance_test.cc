@@ -9,7 +9,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace clearance_test {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -25,7 +25,7 @@ bool IsWithin(const Hull& a, const Hull& b, const Pose& X_WB, double clearance) 
   return CheckCollision(a, Pose(), b, X_WB, options).value().within_clearance.value();
 }
 
-// The clearance where the answer changes is `separation`, to the unit in the last place.
+// Expects that the answer changes at clearance `separation`, to the unit in the last place.
 void ExpectLeast(const Hull& a, const Hull& b, const Pose& X_WB, double separation) {
   EXPECT_TRUE(IsWithin(a, b, X_WB, separation)) << separation;
   EXPECT_FALSE(IsWithin(a, b, X_WB, std::nextafter(separation, -kInfinity))) << separation;
@@ -69,5 +69,5 @@ TEST(Clearance, ExtremeScalesAreDecidedToo) {
   ExpectLeast(point, point, At(0x1.8p1023, 0, 0), 0x1.8p1023);
 }
 
-}  // namespace
+}  // namespace clearance_test
 }  // namespace hulld

@@ -13,7 +13,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace collision_contract_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -46,7 +46,7 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
   EXPECT_TRUE(check.Ask(empty, Pose(), BuildHull(origin), At(1, 2, 3), Relation::kSeparated));
 }
 
-// Found beside each other: a single call said EXACT, a stream said BOUNDS.
+// Regression test: formerly, a single call returned EXACT and a stream BOUNDS.
 TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
   const Hull empty;
   const Hull cube = UnitCube();
@@ -165,7 +165,7 @@ TEST(Collision, TextbookNamesTheFacetThatSeparates) {
   EXPECT_THAT(answer.analysis->stage, testing::Optional(AxisKind::kFacetA));
 }
 
-// Where floating point cannot be used at all, what exact arithmetic tried counts.
+// Directions tried by exact arithmetic count even if floating point is unusable.
 TEST(Collision, CountsTheDirectionsOfExactSearches) {
   const Hull cube = BuildHull(Scaled(LatticeCube(2, 1), 0x1p1000));
   for (const double shift : {0.25, 1.0, 1.5}) {
@@ -208,7 +208,7 @@ TEST(Collision, TextbookRefusesMoreAxesThanAllowed) {
   }
   options.max_textbook_axes = 156;
   EXPECT_TRUE(CheckCollision(cube, Pose(), cube, At(0.5, 0, 0), options).ok());
-  // The limit is the textbook's alone.
+  // The limit applies to the textbook only.
   options.method = Method::kCertifiedSearch;
   options.max_textbook_axes = 0;
   EXPECT_TRUE(CheckCollision(cube, Pose(), cube, At(0.5, 0, 0), options).ok());
@@ -306,7 +306,7 @@ TEST(Collision, SwappingTheHullsMirrorsTheAnswerOfTheSearch) {
   EXPECT_GT(axes, 50);
 }
 
-// A cancelled textbook query on some 2000 x 2000 edges stops soon after it is told.
+// A cancelled textbook query on some 2000 x 2000 edges stops soon.
 TEST(Collision, CancellationEndsTheTextbook) {
   const Hull sphere = BuildHull(FibonacciSphere(600));
   for (int threads : {1, 4}) {
@@ -342,5 +342,5 @@ TEST(Collision, SumsBeyondTheRangeOfDoublesAreExact) {
       check.Ask(cube, At(largest, 0, 0), cube, At(largest, 1e300, 0), Relation::kOverlapping));
 }
 
-}  // namespace
+}  // namespace collision_contract_test
 }  // namespace hulld

@@ -11,7 +11,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace contact_matrix_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kStride = 7;
@@ -25,8 +25,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 using Quaternion = std::array<double, 4>;
 
-// A contact on the plane x = 0 that holds the origin: a point, edges or faces that meet it inside,
-// at an end, on an edge or at a corner.
+// Contacts in the plane x = 0 that contain the origin: a point, or edges or faces with the origin
+// inside, at an end, on an edge, or at a corner.
 std::vector<std::vector<Vector>> Contacts() {
   return {
       {{0, 0, 0}},
@@ -41,8 +41,8 @@ std::vector<std::vector<Vector>> Contacts() {
   };
 }
 
-// Each contact with nothing behind it, with an apex, and as the face of a prism: all in x <= 0, of
-// every dimension.
+// Each contact alone, with an apex behind it, and as the face of a prism: all in x <= 0, of every
+// dimension.
 std::vector<std::vector<Vector>> ShapesBehindThePlane() {
   std::vector<std::vector<Vector>> shapes;
   for (const std::vector<Vector>& contact : Contacts()) {
@@ -60,7 +60,7 @@ std::vector<Vector> Mirrored(std::vector<Vector> points) {
   return points;
 }
 
-// R(q)^T p / |q|^2, exact for integers where |q|^2 divides p.
+// R(q)^T p / |q|^2, exact for integers if |q|^2 divides p.
 Vector RotatedBack(const Quaternion& q, const Vector& p) {
   const auto [w, x, y, z] = q;
   const double norm = w * w + x * x + y * y + z * z;
@@ -72,15 +72,15 @@ Vector RotatedBack(const Quaternion& q, const Vector& p) {
   return rotated / norm;
 }
 
-// Integer quaternions whose squared norms divide kUnit, up to those of quarter and third turns,
-// which take integers to integers.
+// Integer quaternions with squared norms that divide kUnit, including quarter and third turns,
+// which map integers to integers.
 constexpr double kUnit = 315;
 constexpr Quaternion kRotations[] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 0, 1, 0},  {1, 0, 0, -1},
                                      {0, 1, 0, 0}, {1, 1, 1, 1}, {1, -1, 1, 1}, {2, 1, 0, 0},
                                      {0, 2, 1, 0}, {3, 1, 2, 1}, {1, 2, 2, 0},  {0, 1, 2, 2},
                                      {2, 1, 1, 1}, {4, 2, 1, 0}, {2, 0, 0, -1}};
 
-// A pair of hulls in contact across the plane x = 0 of some frame.
+// A pair of hulls in contact across the plane x = 0 of a frame.
 struct Contact {
   Hull a;
   Hull b;
@@ -88,24 +88,24 @@ struct Contact {
   Pose X_WB;
 };
 
-// Moves B by the smallest step of one coordinate of its translation, towards +direction.
+// Moves B by the smallest step of a coordinate of its translation, towards +direction.
 void Nudge(Contact& contact, int coordinate, int direction) {
   double& t = contact.X_WB.t[coordinate];
   t = std::nextafter(t, direction * kInfinity);
 }
 
-// Each hull under its own integer quaternion, so that the contact lies on x = const of the world.
+// Gives each hull its own integer quaternion, so that the contact lies on x = const of the world.
 // All numbers are integers times one power of two, so the contact is exact.
 Contact IntegerContact(Random& random, const std::vector<Vector>& a, const std::vector<Vector>& b) {
   const double scale = std::ldexp(1.0, std::array{-498, -20, 0, 20, 498}[random.Below(5)]);
   const Vector offset = random.Below(2) ? Vector(1e6, -3, 70000) : Vector(0, 0, 0);
   const auto place = [&](const std::vector<Vector>& shape, Pose* pose) {
     const Quaternion q = kRotations[random.Below(std::size(kRotations))];
-    // The hull's own frame may lie far off as well.
+    // The hull's own frame may be far away as well.
     const Vector centre = random.Below(3) == 0 ? Vector(315e4, -630, 945) : Vector(0, 0, 0);
     std::vector<Vector> local;
     for (const Vector& p : shape) local.push_back(RotatedBack(q, kUnit * p - centre) * scale);
-    // The same rotation for any multiple of q.
+    // Any multiple of q is the same rotation.
     const double factor = std::array{1.0, -2.0, 3.0, 0x1p-300, 0x1p400}[random.Below(5)];
     for (int i = 0; i < 4; ++i) pose->q[i] = q[i] * factor;
     pose->t = (offset + centre) * scale;
@@ -117,7 +117,7 @@ Contact IntegerContact(Random& random, const std::vector<Vector>& a, const std::
   return contact;
 }
 
-// Both hulls under the same pose of arbitrary doubles, at a decimal scale: the contact is exact in
+// Gives both hulls the same pose of arbitrary doubles, at a decimal scale: the contact is exact in
 // their common frame.
 Contact CommonPoseContact(Random& random, const std::vector<Vector>& a,
                           const std::vector<Vector>& b) {
@@ -132,7 +132,7 @@ Contact CommonPoseContact(Random& random, const std::vector<Vector>& a,
   return contact;
 }
 
-// The world direction of the frame's x axis, with the sign of each coordinate right where it is not
+// Returns the world direction of the frame's x axis; the sign of each coordinate is correct unless
 // close to zero.
 Vector NormalOf(const Pose& pose) {
   const auto [w, x, y, z] = pose.q;
@@ -159,7 +159,7 @@ TEST(ContactMatrix, IntegerPosesTouchExactlyAndOneStepDecides) {
     const Relation expected = OracleRelation(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB);
     ASSERT_TRUE(check.Ask(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
         << "seed " << seed << " pair " << i;
-    // A step along the contact: whatever the oracle says.
+    // A step along the contact: the oracle decides.
     Contact slide = contact;
     Nudge(slide, 1 + random.Below(2), random.Below(2) ? 1 : -1);
     ASSERT_TRUE(check.Ask(slide.a, slide.X_WA, slide.b, slide.X_WB,
@@ -202,9 +202,9 @@ TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
   EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 20);
 }
 
-// Coordinates that round: offset and scale inside the hulls themselves, unrotated and at quarter
-// turns, with one coordinate of B's contact moved by one unit in the last place. Expected answers
-// are the oracle's.
+// Rounded coordinates: offset and scale inside the hulls themselves, unrotated and at quarter
+// turns, with one coordinate of B's contact moved by one unit in the last place. The oracle gives
+// the expected answers.
 TEST(ContactMatrix, RoundedCoordinatesGetTheExactAnswer) {
   const uint64_t seed = TestSeed(403);
   Random random(seed);
@@ -234,7 +234,7 @@ TEST(ContactMatrix, RoundedCoordinatesGetTheExactAnswer) {
   EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 20);
 }
 
-// Needles and polygons that pierce each other by much or by a hair.
+// Needles and polygons that pierce each other deeply or minimally.
 TEST(ContactMatrix, PiercingIsOverlapping) {
   const std::vector<Vector> square_points = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   const std::vector<Vector> needle_points = {{0, 0, -1}, {0, 0, 1}};
@@ -273,7 +273,7 @@ TEST(ContactMatrix, PiercingIsOverlapping) {
   EXPECT_TRUE(check.Ask(square, Pose(), square, at(0, 0, 5e-324), Relation::kSeparated));
 }
 
-// Points, collinear segments and coplanar polygons among themselves: flat differences of every
+// Points, collinear segments, and coplanar polygons against each other: flat differences of every
 // dimension, in tilted frames.
 TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
   const uint64_t seed = TestSeed(404);
@@ -306,5 +306,5 @@ TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
   EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 8);
 }
 
-}  // namespace
+}  // namespace contact_matrix_test
 }  // namespace hulld

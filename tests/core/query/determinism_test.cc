@@ -1,4 +1,4 @@
-// Same question, same bits: on every SIMD path, asked either way round, and with a warm cache as
+// A query gives the same bits always: on every SIMD path, in either order, and with a warm cache as
 // far as core/README.md promises it (Exactness, determinism).
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace determinism_test {
 
 #ifdef HULLD_SANITIZED
 constexpr size_t kStride = 37;
@@ -23,7 +23,7 @@ constexpr size_t kStride = 37;
 constexpr size_t kStride = 5;
 #endif
 
-// Takes a SIMD path, and the former one back at the end.
+// Selects a SIMD path and restores the previous one on destruction.
 class OnPath {
  public:
   explicit OnPath(SimdPath path) : before_(CurrentSimdPath()) { EXPECT_TRUE(UseSimdPath(path)); }
@@ -44,7 +44,7 @@ QueryOptions Everything() {
   return options;
 }
 
-// What core/README.md says never varies at tolerance 0.
+// Compares the values that never vary at tolerance 0, according to core/README.md.
 void ExpectSameValues(const Answer& actual, const Answer& expected) {
   EXPECT_EQ(actual.relation, expected.relation);
   EXPECT_EQ(actual.separation->value, expected.separation->value);
@@ -157,7 +157,7 @@ TEST_F(Determinism, WarmCachesChangeNoValue) {
     const QueryHull b(suite_.hulls[query.hull_b]);
     const Answer cold = Ask(query);
     PairCache cache;
-    // Warm from nearby, from the question itself, and from what that left.
+    // Warmed by a nearby query, by the query itself, and by the result of both.
     Pose nearby = query.X_WB;
     nearby.t *= 1 + 1e-6;
     const PlacedHull placed_a = PlacedHull::Make(a, query.X_WA).value();
@@ -175,5 +175,5 @@ TEST_F(Determinism, WarmCachesChangeNoValue) {
   EXPECT_GT(cached, suite_.queries.size() / 4);
 }
 
-}  // namespace
+}  // namespace determinism_test
 }  // namespace hulld

@@ -1,6 +1,6 @@
-// The same bits on every path and every processor: hashes of snapshots, of answers and of what is
-// made of hulls otherwise, over questions from fixed seeds. Nothing here is computed by the
-// mathematical library, whose sines may differ in the last bit from one processor to the next.
+// Results are bitwise equal on every path and processor: hashes of snapshots, answers, and other
+// results of hulls, over queries from fixed seeds. Nothing here uses the math library: its sines
+// may differ in the last bit between processors.
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@
 #include "tests/core/query/body/own_body.h"
 
 namespace hulld {
-namespace {
+namespace digest_test {
 
 // FNV-1a over 64-bit words.
 class Digest {
@@ -54,7 +54,7 @@ class Digest {
   uint64_t hash_ = 0xcbf29ce484222325;
 };
 
-// Clouds of all dimensions, scales and kinds of degeneracy.
+// Clouds of all dimensions, scales, and kinds of degeneracy.
 std::vector<std::vector<Vector>> Clouds() {
   Random random(1723);
   std::vector<std::vector<Vector>> clouds;
@@ -69,7 +69,7 @@ std::vector<std::vector<Vector>> Clouds() {
   clouds.push_back(IntegerParaboloid(6));
   clouds.push_back(Scaled(RandomOnSphere(random, 50, 1), 0x1p-1060));
   clouds.push_back(Scaled(RandomOnSphere(random, 50, 1), 0x1p1000));
-  // Large enough for conflict lists, the direction map and its scans.
+  // Large enough for conflict lists, the direction map, and its scans.
   clouds.push_back(RandomInBall(random, 4000, 1));
   return clouds;
 }
@@ -144,7 +144,7 @@ QueryOptions Everything() {
   return options;
 }
 
-// By the name of what was computed.
+// By the name of the result.
 using Digests = std::map<std::string, Digest>;
 
 std::vector<Hull> DigestSnapshots(Digests& digests) {
@@ -168,7 +168,7 @@ void DigestAnswers(std::span<const Hull> hulls, Digest& digest) {
     AddAnswer(digest, answer);
     ++counts[static_cast<size_t>(answer.relation)];
   };
-  // Textbook questions about the last hull, the largest, take long.
+  // Textbook queries about the last hull, the largest, take long.
   const auto few = static_cast<int>(hulls.size()) - 1;
   for (int i = 0; i < 300; ++i) {
     const Hull& a = hulls[random.Below(few)];
@@ -189,9 +189,8 @@ void DigestAnswers(std::span<const Hull> hulls, Digest& digest) {
   }
 }
 
-// The relation alone, which bounds about centres may decide, with a cache that questions warm; and
-// what else there is to ask of hulls with thousands of vertices, whose lists of candidates are
-// scanned.
+// Queries of the relation alone, which center bounds may decide, with a cache that queries warm;
+// and all other queries on hulls with thousands of vertices, which scan candidate lists.
 void DigestLargeHulls(Digest& digest) {
   Random random(1725);
   std::deque<Hull> hulls;
@@ -234,7 +233,7 @@ void DigestLargeHulls(Digest& digest) {
   }
 }
 
-// What became of each block's points, and questions about hulls while they grow.
+// Digests the counts of each block's points, and queries about growing hulls.
 void DigestGrowth(Digest& digest) {
   Random random(1726);
   const Hull probe = BuildHull(RandomOnSphere(random, 60, 0.5));
@@ -277,8 +276,8 @@ void AddBodyAnswer(Digest& digest, const BodyAnswer& found) {
   }
 }
 
-// Lattices, rounded pieces anywhere, and grids of cubes, of which many are equally near: rounding
-// then tells which comes first.
+// Lattices, rounded pieces anywhere, and grids of cubes with many equally near pairs: rounding then
+// decides the first.
 void DigestBodies(Digest& digest) {
   Random random(1727);
   std::deque<OwnBody> bodies(6);
@@ -301,9 +300,9 @@ void DigestBodies(Digest& digest) {
     const size_t first = 2 * (i % 3);
     const Pose X_WA = first == 0 ? LatticePose(random) : RandomPose(random, 2);
     Pose X_WB = first == 0 ? LatticePose(random) : RandomPose(random, 2);
-    // The same turn, so that faces are parallel and distances equal.
+    // Equal rotations, so that faces are parallel and distances equal.
     if (first == 4 && i % 2 == 0) X_WB.q = X_WA.q;
-    // From deep in each other to apart.
+    // From deep overlap to separation.
     X_WB.t.x() += i % 10;
     const PlacedBody a = bodies[first].Placed(X_WA);
     const PlacedBody b = bodies[first + 1].Placed(X_WB);
@@ -411,5 +410,5 @@ INSTANTIATE_TEST_SUITE_P(Paths, DigestTest,
                            return "";
                          });
 
-}  // namespace
+}  // namespace digest_test
 }  // namespace hulld

@@ -1,5 +1,5 @@
-// The exact search in each width of integers: the same questions, the same answers, up to the
-// limits of each width.
+// The exact search in each width of integers: the same queries, the same answers, up to the limits
+// of each width.
 
 #include <gtest/gtest.h>
 
@@ -19,14 +19,14 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace exact_width_test {
 
 constexpr ExactWidth kWidths[] = {ExactWidth::k1Word, ExactWidth::k2Words, ExactWidth::k3Words,
                                   ExactWidth::k5Words, ExactWidth::kAny};
 constexpr int kMostBits[] = {55, 119, 183, 311, std::numeric_limits<int>::max()};
 constexpr size_t kWidthCount = std::size(kWidths);
 
-// Asks one question in all widths that hold it, from the start and from where floating point ended.
+// Runs a query in all widths that hold it, from the start and from the end of floating point.
 class WidthCheck {
  public:
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
@@ -63,7 +63,7 @@ class WidthCheck {
       const auto chosen = SearchExactly(pair, from, true, {});
       if (!chosen.ok()) return testing::AssertionFailure() << chosen.status();
       if (auto same = IsSame(*chosen, *wanted, *expected); !same) return same << " chosen";
-      // Without the axis all else is the same.
+      // Without the axis everything else is equal.
       auto bare = SearchExactly(pair, from, false, {});
       if (!bare.ok() || bare->axis.has_value()) return testing::AssertionFailure() << "bare";
       bare->axis = wanted->axis;
@@ -72,14 +72,14 @@ class WidthCheck {
     return testing::AssertionSuccess();
   }
 
-  // How many answers each width gave.
+  // Returns the number of answers of each width.
   int count(ExactWidth width) const {
     for (size_t i = 0; i < kWidthCount; ++i) {
       if (kWidths[i] == width) return counts_[i];
     }
     return 0;
   }
-  // The bits of the last question, where its frame is small.
+  // Returns the bits of the last query if its frame is small.
   std::optional<int> bits() const { return bits_; }
 
  private:
@@ -99,9 +99,10 @@ class WidthCheck {
     return testing::AssertionSuccess();
   }
 
-  // Whether the frame is that of the pair in integers of any size, and its bits hold what they say.
+  // True if the frame equals the pair's in integers of any size, and its bits are a valid bound.
   static testing::AssertionResult CheckBounds(const FloatPair& pair, const SmallFrame& frame) {
-    ExactPair exact(pair);
+    const std::function<bool()> never;
+    ExactPair exact(pair, never);
     if (exact.exponent() != frame.exponent) return testing::AssertionFailure() << "exponent";
     unsigned most = 0;
     for (uint32_t i = 0; i < exact.a().point_count(); ++i) {
@@ -135,8 +136,8 @@ Vector IntegerVectorOf(Random& random, int most) {
           static_cast<double>(random.Between(-most, most))};
 }
 
-// Integer boxes, tetrahedra and flat sets that touch, miss or overlap by chance, at scales from the
-// least double to near the largest.
+// Integer boxes, tetrahedra, and flat sets that touch, miss, or overlap by chance, at scales from
+// the least double to near the largest.
 TEST(ExactWidth, SmallIntegersAtEveryScale) {
   const uint64_t seed = TestSeed(601);
   Random random(seed);
@@ -181,13 +182,13 @@ TEST(ExactWidth, SmallIntegersAtEveryScale) {
     }
     ASSERT_TRUE(check.Ask(scaled(points_a), X_WA, scaled(points_b), X_WB, expected))
         << "seed " << seed << " round " << i;
-    // Turns by right angles and thirds cost no bits.
+    // Right-angle and third turns cost no bits.
     ASSERT_TRUE(check.bits().has_value() && *check.bits() <= 12) << *check.bits();
   }
   EXPECT_GT(check.count(ExactWidth::k1Word), 1500);
 }
 
-// Boxes whose corners take every number of bits up to beyond each width, corner to corner, and one
+// Boxes with corners of every number of bits up to beyond each width, corner to corner, and one
 // unit to either side: the largest products that a width must hold.
 TEST(ExactWidth, CornersUpToTheLimitOfEachWidth) {
   WidthCheck check;
@@ -221,7 +222,7 @@ TEST(ExactWidth, CornersUpToTheLimitOfEachWidth) {
   for (const ExactWidth width : kWidths) EXPECT_GT(check.count(width), 200);
 }
 
-// The widest hulls that each width takes: points with mantissas of ones at both ends of the range
+// The widest hulls that each width accepts: points with mantissas of ones at both ends of the range
 // of bits, so that cross and triple products come near their bounds.
 TEST(ExactWidth, WideHullsUpToTheLimitOfEachWidth) {
   const uint64_t seed = TestSeed(602);
@@ -230,7 +231,7 @@ TEST(ExactWidth, WideHullsUpToTheLimitOfEachWidth) {
   for (int i = 0; i < 3000; ++i) {
     const int top = random.Between(20, 122);
     const auto coordinate = [&] {
-      // As large as it gets, or one of the least units, or a sum of both where a double holds it.
+      // The maximum, a few least units, or their sum if a double can represent it.
       const double large = std::ldexp(1.0 - 0x1p-53, top) * (random.Below(2) ? 1 : -1);
       const double least = random.Between(-3, 3);
       const double large_or_integer = top <= 53 ? std::round(large) : large;
@@ -255,7 +256,7 @@ TEST(ExactWidth, WideHullsUpToTheLimitOfEachWidth) {
   for (const ExactWidth width : kWidths) EXPECT_GT(check.count(width), 300);
 }
 
-// Contacts under rotations by any doubles, the same for both or an apex on an apex.
+// Contacts under arbitrary rotations: the same for both hulls, or an apex on an apex.
 TEST(ExactWidth, RotationsByAnyDoubles) {
   const uint64_t seed = TestSeed(603);
   Random random(seed);
@@ -276,7 +277,7 @@ TEST(ExactWidth, RotationsByAnyDoubles) {
     };
     std::optional<Relation> expected = Relation::kTouching;
     if (random.Below(2)) {
-      // Turned by a little about its apex.
+      // Rotated slightly about its apex.
       for (double& q : X_WB.q) q += random.Real(-0.01, 0.01);
       expected = std::nullopt;
     }
@@ -325,7 +326,7 @@ TEST(ExactWidth, LargeHullsOnAGrid) {
   EXPECT_GT(check.count(ExactWidth::k1Word), 180);
 }
 
-// Multiples of a quaternion, and quarter and third turns by any multiple, are the same small
+// Multiples of a quaternion, and quarter and third turns by any multiple, reduce to the same small
 // rotation.
 TEST(ExactWidth, RotationsAreReduced) {
   const auto rotation = [](const std::array<double, 4>& q) {
@@ -341,7 +342,7 @@ TEST(ExactWidth, RotationsAreReduced) {
     EXPECT_TRUE(none.rows[0][0] == 1 && none.rows[1][1] == 1 && none.rows[0][1] == 0);
     EXPECT_TRUE(quarter.rows[0][0] == 0 && quarter.rows[0][1] == -1 && quarter.rows[1][0] == 1);
     const SmallRotation mixed = rotation({3 * scale, scale, 0, 0});
-    // 3 * 0.1 is rounded: then it is not.
+    // 3 * 0.1 rounds, so it is not a multiple.
     EXPECT_EQ(mixed.norm == 5, std::fmod(3 * scale, scale) == 0) << scale;
   }
   SmallRotation found;
@@ -350,5 +351,5 @@ TEST(ExactWidth, RotationsAreReduced) {
   EXPECT_FALSE(FindSmallRotation({1, 0x1p-60, 0, 0}, found));
 }
 
-}  // namespace
+}  // namespace exact_width_test
 }  // namespace hulld

@@ -10,7 +10,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace large_contact_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kSphereVertices = 400;
@@ -32,7 +32,7 @@ Pose At(const Vector& t) {
   return pose;
 }
 
-// Asks by the search and prints how long one answer took; the bench asserts speed, not this.
+// Queries by the search and prints the time of an answer; only the benchmark asserts speed.
 void ExpectRelation(const char* name, const Hull& a, const Pose& X_WA, const Hull& b,
                     const Pose& X_WB, Relation expected) {
   const auto start = std::chrono::steady_clock::now();
@@ -61,12 +61,12 @@ TEST(LargeContact, SpheresTouchAtAVertex) {
   }
 }
 
-// The lattice paraboloid and its reflection about the centre of one of its squares: face to face.
+// The lattice paraboloid and its reflection about the center of a square: face to face.
 TEST(LargeContact, IntegerHullsTouchFaceToFace) {
   const std::vector<Vector> bowl = IntegerParaboloid(kParaboloidRadius);
   const Hull a = BuildHull(bowl);
   ASSERT_EQ(a.vertices().size(), bowl.size());
-  // Twice the centre of the square on (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1).
+  // Twice the center of the square on (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1).
   const auto twice_centre = [](int i, int j) {
     return Vector(2 * i + 1, 2 * j + 1, i * i + j * j + (i + 1) * (i + 1) + (j + 1) * (j + 1));
   };
@@ -90,8 +90,7 @@ TEST(LargeContact, IntegerHullsTouchFaceToFace) {
   }
 }
 
-// Two discs of many vertices in one plane, sharing it as prisms' faces: thousands of coplanar
-// differences.
+// Two many-sided coplanar discs as faces of prisms: thousands of coplanar differences.
 TEST(LargeContact, PrismsOverManySidedPolygonsTouchFaceToFace) {
   std::vector<Vector> prism;
   for (const Vector& p : IntegerSphere(1105)) {
@@ -111,5 +110,54 @@ TEST(LargeContact, PrismsOverManySidedPolygonsTouchFaceToFace) {
   ExpectRelation("the same prism twice", a, pose, a, pose, Relation::kOverlapping);
 }
 
-}  // namespace
+// Polygons with many corners in one plane, all farthest along its normal. For any query, the scans
+// of these poll should_stop and end when it returns true.
+TEST(LargeContact, FlatQuestionsStopWheneverTheyAreToldTo) {
+  std::vector<Vector> corners;
+  for (int i = -10000; i <= 10000; ++i) corners.emplace_back(i, int64_t{i} * i, 0);
+  const Hull hull = BuildHull(corners);
+  const QueryHull query_hull(hull);
+  const PlacedHull a(query_hull, At({0, 0, 0}));
+  const PlacedHull b(query_hull, At({100, 20000, 0}));
+  for (int kind = 0; kind < 3; ++kind) {
+    QueryOptions options;
+    options.want_axis = kind == 0;
+    options.want_certificate = kind == 1;
+    options.want_witness = kind == 2;
+    int polls = 0;
+    options.should_stop = [&polls] { return ++polls < 0; };
+    const absl::StatusOr<Answer> answer = CheckCollision(a, b, options);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    EXPECT_EQ(answer->relation, Relation::kTouching);
+    if (kind == 0) {
+      EXPECT_GE(polls, 2 * 20000 / 1024);
+    }
+    const int all = polls;
+    for (int last = 1; last <= all; last += 1 + all / 16) {
+      polls = 0;
+      options.should_stop = [&polls, last] { return ++polls >= last; };
+      const absl::Status status = CheckCollision(a, b, options).status();
+      EXPECT_EQ(status.code(), absl::StatusCode::kCancelled)
+          << kind << " " << last << " " << status;
+    }
+  }
+}
+
+// The axis limit is checked before any vertex is multiplied out.
+TEST(LargeContact, TooManyFlatAxesAreRefusedBeforeAnyWork) {
+  std::vector<Vector> corners;
+  for (int i = -10000; i <= 10000; ++i) corners.emplace_back(i, int64_t{i} * i, 0);
+  const Hull polygon = BuildHull(corners);
+  const Hull point = BuildHull(std::vector<Vector>{Vector(0, 1, 0)});
+  QueryOptions options;
+  options.method = Method::kTextbookSat;
+  options.max_textbook_axes = 100;
+  int polls = 0;
+  options.should_stop = [&polls] { return ++polls < 0; };
+  const absl::Status status = CheckCollision(polygon, Pose(), point, Pose(), options).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted) << status;
+  EXPECT_EQ(polls, 0);
+}
+
+}  // namespace large_contact_test
 }  // namespace hulld

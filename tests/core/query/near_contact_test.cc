@@ -12,7 +12,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace near_contact_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kRounds = 30;
@@ -26,22 +26,23 @@ Relation Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
   return CheckCollision(a, X_WA, b, X_WB).value().relation;
 }
 
-// Moves B along a line from overlap to separation and narrows down where the relation changes, to
-// two translations that are a few units in the last place apart: the hardest generic questions, in
-// which no coordinate is special. The narrowing trusts core; the answers are then the oracle's.
+// Moves B along a line from overlap to separation and bisects the change of the relation, down to
+// two translations that are a few units in the last place apart: the hardest generic queries, in
+// which no coordinate is special. The bisection trusts core; the oracle then gives the expected
+// answers.
 class Narrowing {
  public:
   Narrowing(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB, const Vector& line)
       : a_(a), b_(b), X_WA_(X_WA), start_(X_WB), line_(line) {}
 
-  // B at this fraction of the line.
+  // Returns the pose of B at this fraction of the line.
   Pose At(double fraction) const {
     Pose pose = start_;
     pose.t += fraction * line_;
     return pose;
   }
 
-  // The last fraction, to 2^-53 of the line, at which the hulls still meet.
+  // Returns the last fraction, to 2^-53 of the line, at which the hulls still meet.
   double Run() const {
     double low = 0;
     double high = 1;
@@ -67,7 +68,7 @@ TEST(NearContact, GenericPairsOnTheBrinkMatchTheOracle) {
   for (int round = 0; round < kRounds; ++round) {
     const double scale = std::array{1e-6, 1.0, 1e6}[round % 3];
     const Vector offset = Vector::Constant(round % 2 ? 1e6 : 0);
-    // A hull's own frame may be far off, which costs the floating-point stage its accuracy.
+    // A hull's own frame may be far away, which reduces the floating-point stage's accuracy.
     const Vector local = Vector::Constant(round % 5 == 0 ? 1e5 * scale : 0);
     const auto hull = [&] {
       return BuildHull(Shifted(RandomInBall(random, random.Between(2, 12), scale), local));
@@ -88,7 +89,7 @@ TEST(NearContact, GenericPairsOnTheBrinkMatchTheOracle) {
     if (Ask(a, X_WA, b, X_WB) == Relation::kSeparated) continue;
     const Narrowing narrowing(a, X_WA, b, X_WB, line);
     const double brink = narrowing.Run();
-    // From the brink outwards and inwards, across the bounds of the floating-point stage.
+    // From the boundary outwards and inwards, across the bounds of the floating-point stage.
     for (double step : {0.0, 0x1p-53, 0x1p-52, 0x1p-48, 0x1p-44, 0x1p-40}) {
       for (double sign : {-1.0, 1.0}) {
         const Pose there = narrowing.At(brink + sign * step);
@@ -104,8 +105,8 @@ TEST(NearContact, GenericPairsOnTheBrinkMatchTheOracle) {
   EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
 }
 
-// Hulls that are tiny beside their distance from the origin of their frames, down to a few units in
-// the last place: all that counts is lost in the rounding of a rotation. Under a common pose the
+// Hulls that are tiny relative to their distance from the origin of their frames, down to a few
+// units in the last place: a rotation's rounding exceeds their size. Under a common pose the
 // relation is that of the integer sets about the origin.
 TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
   const uint64_t seed = TestSeed(903);
@@ -134,15 +135,15 @@ TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
   EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
 }
 
-// How many questions the next test asks: HULLD_NEAR_CONTACT_QUESTIONS in the environment, a million
-// by hand; few by default.
+// Returns the number of queries of the next test: HULLD_NEAR_CONTACT_QUESTIONS in the environment
+// (a million in manual runs); few by default.
 int QuestionsToAsk() {
   const char* given = std::getenv("HULLD_NEAR_CONTACT_QUESTIONS");
   return given != nullptr ? std::atoi(given) : kRounds;
 }
 
-// Lattice hulls of all dimensions side by side, some coordinates moved by an ulp, at poses of small
-// integers, scaled by anything: touching, missing and overlapping by nothing, by an ulp, or by a
+// Adjacent lattice hulls of all dimensions, some coordinates moved by an ulp, at poses of small
+// integers, with arbitrary scale: touching, missing, and overlapping by zero, by an ulp, or by a
 // rounding of the pose.
 TEST(NearContact, RandomQuestionsMatchTheOracle) {
   const uint64_t seed = TestSeed(904);
@@ -184,7 +185,7 @@ TEST(NearContact, RandomQuestionsMatchTheOracle) {
   EXPECT_GT(check.count(Rung::kExact), check.questions() / 10);
 }
 
-// The solids of the cube's symmetry, whole and flat, in units of four.
+// Solids with the cube's symmetry, whole and flat, in units of four.
 std::vector<Hull> SymmetricSolids() {
   std::vector<Vector> cube, octahedron, cuboctahedron, dodecahedron, truncated, square, segment;
   for (const Vector& p : LatticeCube(5, 1)) {
@@ -208,8 +209,8 @@ std::vector<Hull> SymmetricSolids() {
   return hulls;
 }
 
-// All integer translations of one octant: rays from centre to centre meet vertices, edges and
-// facets of the difference exactly, and no refinement may go round in circles.
+// All integer translations in an octant: rays from center to center meet vertices, edges, and
+// facets of the difference exactly, and no refinement may cycle.
 TEST(NearContact, SymmetricSolidsOnALatticeMatchTheOracle) {
   const uint64_t seed = TestSeed(902);
   Random random(seed);
@@ -237,8 +238,7 @@ TEST(NearContact, SymmetricSolidsOnALatticeMatchTheOracle) {
   }
 }
 
-// Shallow cones with many vertices: the supporting facets differ by little, and all signs are
-// small.
+// Shallow cones with many vertices: the supporting facets differ slightly, and all signs are small.
 TEST(NearContact, BluntConesTipToTipMatchTheirConstruction) {
   RelationCheck check;
   for (double height : {1.0, 1e-3, 1e-7, 1e-12}) {
@@ -266,5 +266,5 @@ TEST(NearContact, BluntConesTipToTipMatchTheirConstruction) {
   }
 }
 
-}  // namespace
+}  // namespace near_contact_test
 }  // namespace hulld

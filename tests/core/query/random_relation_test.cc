@@ -12,7 +12,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace random_relation_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kRounds = 2000;
@@ -52,8 +52,8 @@ Pose SmallPose(Random& random) {
   return pose;
 }
 
-// Moves B so that a vertex of B that is lowest in some direction lies on a highest one of A: under
-// a common pose they touch, where the shift is exact.
+// Moves B so that a vertex of B that is lowest in some direction lies on a highest vertex of A:
+// under a common pose they touch if the shift is exact.
 void MoveIntoContact(Random& random, const std::vector<Vector>& a, std::vector<Vector>& b) {
   if (a.empty() || b.empty()) return;
   const Vector direction(random.Between(-2, 2), random.Between(-2, 2), 0.5 + random.Below(2));
@@ -128,7 +128,7 @@ TEST(RandomRelation, ScalesAndQuaternionMultiplesChangeNothing) {
   }
 }
 
-// All but degenerate: rounded coordinates, and steps of one unit in the last place.
+// Nearly degenerate: rounded coordinates, and steps of a unit in the last place.
 TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
   const uint64_t seed = TestSeed(503);
   Random random(seed);
@@ -164,7 +164,7 @@ TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
   }
 }
 
-// Coordinates, translations and quaternions of wildly different magnitudes, to the ends of the
+// Coordinates, translations, and quaternions of widely different magnitudes, to the ends of the
 // range of doubles.
 TEST(RandomRelation, MixedMagnitudesMatchTheOracle) {
   const uint64_t seed = TestSeed(504);
@@ -229,5 +229,5 @@ TEST(RandomRelation, GenericHullsMatchTheOracle) {
   EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 10);
 }
 
-}  // namespace
+}  // namespace random_relation_test
 }  // namespace hulld

@@ -12,7 +12,7 @@
 #include "tests/core/checks/separation_check.h"
 
 namespace hulld {
-namespace {
+namespace separation_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kRounds = 240;
@@ -95,7 +95,7 @@ TEST(Separation, TheLeastDoubleKeepsItsSign) {
   const Hull point = BuildHull(std::vector<Vector>{{0, 0, 0}});
   const Answer near = Ask(point, Pose(), point, At(kLeast, 0, 0));
   EXPECT_EQ(near.separation->value, kLeast);
-  // Turned, it is a third of that along each axis; a length that no double holds.
+  // Rotated, it is a third of that along each axis; a length that no double represents.
   const Hull needle = BuildHull(std::vector<Vector>{{0, 0, 0}, {1, 1, 1}});
   Pose turned;
   turned.q = {1, 0.3, 0.2, 0.1};
@@ -110,7 +110,7 @@ std::vector<Vector> SmallSet(Random& random, int most) {
                          : RandomFlatPoints(random, random.Between(1, most), random.Below(4));
 }
 
-// Half of the pairs share a pose and a vertex: touching, or overlapping where B reaches into A.
+// Half of the pairs share a pose and a vertex: touching, or overlapping if B reaches into A.
 TEST(Separation, SmallHullsOfEveryDimensionMatchBruteForce) {
   const uint64_t seed = TestSeed(711);
   Random random(seed);
@@ -140,8 +140,8 @@ TEST(Separation, SmallHullsOfEveryDimensionMatchBruteForce) {
   EXPECT_GT(check.float_count(), kRounds / 20);
 }
 
-// Needles, plates and offsets in the poses and in the hulls' own frames, which only exact
-// arithmetic survives.
+// Needles, plates, and offsets in the poses and in the hulls' own frames, which only exact
+// arithmetic handles.
 TEST(Separation, NeedlesPlatesAndOffsetsMatchBruteForce) {
   const uint64_t seed = TestSeed(712);
   Random random(seed);
@@ -169,15 +169,15 @@ TEST(Separation, NeedlesPlatesAndOffsetsMatchBruteForce) {
   EXPECT_GT(check.float_count(), kRounds / 120);
 }
 
-// Whether two answers to one question can both be right.
+// True if two answers to one query can both be right.
 testing::AssertionResult Agree(const Separation& a, const Separation& b) {
   if (std::abs(a.value - b.value) <= a.bound + b.bound) return testing::AssertionSuccess();
   return testing::AssertionFailure()
          << a.value << " +- " << a.bound << ", " << b.value << " +- " << b.bound;
 }
 
-// Larger hulls than brute force can do: floating point against the exact walk, which the tests
-// above check.
+// Hulls too large for brute force: floating point against the exact walk, which the tests above
+// check.
 TEST(Separation, FloatingPointAgreesWithExactArithmeticOnLargerHulls) {
   const uint64_t seed = TestSeed(713);
   Random random(seed);
@@ -278,5 +278,5 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
   EXPECT_EQ(message([](QueryOptions& o) { o.max_error = kInfinity; }), "OK");
 }
 
-}  // namespace
+}  // namespace separation_test
 }  // namespace hulld

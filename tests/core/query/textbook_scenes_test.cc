@@ -12,7 +12,7 @@
 #include "tests/core/checks/relation_check.h"
 
 namespace hulld {
-namespace {
+namespace textbook_scenes_test {
 
 // The scenes of the coursework that this project grew from, with poses that make the answer known:
 // each hull is shifted so that one of its vertices is exactly the origin. The textbook runs on the
@@ -25,7 +25,7 @@ Pose At(const Vector& t) {
   return pose;
 }
 
-// The vertex of largest, or of least, x. Vertices are sorted by x first.
+// Return the vertex of largest or least x. Vertices are sorted by x first.
 const Vector& Rightmost(const Hull& hull) { return hull.vertices().back(); }
 const Vector& Leftmost(const Hull& hull) { return hull.vertices().front(); }
 
@@ -41,8 +41,9 @@ void Expect(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB, Re
 #endif
 }
 
-// Two hulls far apart, overlapping plainly and barely, and exactly at the boundary: A's rightmost
-// vertex and B's leftmost both at the origin, with A in x <= 0 and B in x >= 0.
+// Expects the relations of two hulls far apart, overlapping deeply and slightly, and exactly at the
+// boundary: A's rightmost vertex and B's leftmost both at the origin, with A in x <= 0 and B in x
+// >= 0.
 void ExpectScenes(const Hull& a, const Hull& b) {
   const Vector at_a = -Rightmost(a);
   const Vector at_b = -Leftmost(b);
@@ -53,17 +54,17 @@ void ExpectScenes(const Hull& a, const Hull& b) {
   apart.t.x() = std::nextafter(apart.t.x(), 2 * std::abs(apart.t.x()) + 1);
   Expect(a, At(at_a), b, apart, Relation::kSeparated, "one unit in the last place apart");
 
-  // Towards the other's centre, by about a tenth and by about 2^-40 of the size.
+  // Towards the other's center, by about a tenth and by about 2^-40 of the size.
   const auto centre = [](const Hull& hull) {
     Vector sum = Vector::Zero();
     for (const Vector& p : hull.vertices()) sum += p;
     return Vector(sum / static_cast<double>(hull.vertices().size()));
   };
-  // From B's centre to A's, each relative to the common origin: an inner direction of A - B.
+  // From B's center to A's, each relative to the common origin: an inner direction of A - B.
   const Vector inward = (centre(a) + at_a) - (centre(b) + at_b);
   Expect(a, At(at_a), b, At(at_b + 0.9 * inward), Relation::kOverlapping, "overlapping plainly");
   Expect(a, At(at_a), b, At(at_b + 0x1p-40 * inward), Relation::kOverlapping, "overlapping barely");
-  // The common pose changes nothing when it turns both by a quarter.
+  // A common quarter turn changes nothing.
   Pose turned_a = At(Vector(at_a.x(), -at_a.z(), at_a.y()));
   Pose turned_b = At(Vector(at_b.x(), -at_b.z(), at_b.y()));
   turned_a.q = turned_b.q = {1, 1, 0, 0};
@@ -108,7 +109,7 @@ TEST(TextbookScenes, TwoRandomBalls) {
   ExpectScenes(small, other);
 }
 
-// Each piece tests one block of axes when it has no time at all.
+// With no time budget, each part tests one block of axes.
 TEST(TextbookCheck, InPiecesGivesTheSameAnswerAndStopsBetweenThem) {
   Random random(TestSeed(941));
   const Hull a = BuildHull(RandomOnSphere(random, 60, 1));
@@ -143,7 +144,7 @@ TEST(TextbookCheck, InPiecesGivesTheSameAnswerAndStopsBetweenThem) {
       EXPECT_EQ(answer->analysis->axes_total, whole->analysis->axes_total);
       EXPECT_EQ(answer->analysis->axes_tested, whole->analysis->axes_tested);
       EXPECT_EQ(answer->analysis->axis_index, whole->analysis->axis_index);
-      // Nobody waits for it any more after the first piece.
+      // Abandoned after the first part.
       absl::StatusOr<TextbookCheck> stopped = TextbookCheck::Begin(placed_a, placed_b, options);
       ASSERT_TRUE(stopped.ok());
       if (*stopped->Advance(TextbookSearch::Clock::time_point::min())) continue;
@@ -154,5 +155,5 @@ TEST(TextbookCheck, InPiecesGivesTheSameAnswerAndStopsBetweenThem) {
   }
 }
 
-}  // namespace
+}  // namespace textbook_scenes_test
 }  // namespace hulld

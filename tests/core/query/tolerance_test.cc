@@ -8,7 +8,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace tolerance_test {
 
 Pose At(double x, double y, double z) {
   Pose pose;
@@ -22,14 +22,14 @@ Answer Ask(const Hull& a, const Hull& b, const Pose& X_WB, double tolerance) {
   return CheckCollision(a, Pose(), b, X_WB, options).value();
 }
 
-// A cube of side 1 beside one at distance `gap`, or overlapping it by -gap: |separation| = |gap|.
+// A cube of side 1 next to one at distance `gap`, or overlapping it by -gap: |separation| = |gap|.
 TEST(Tolerance, IsUsedOnlyWhereTheSeparationIsWithinIt) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   std::array<int, 4> seen = {};
   for (const double tolerance : {1e-3, 0.1, 0.25}) {
     for (const double gap :
          {-0.5, -0.3, -0.2, -0.05, -1e-4, -1e-17, 0.0, 1e-17, 1e-4, 0.05, 0.2, 0.3, 0.5}) {
-      // Exact: 1 + gap may round, and the distance is what it rounded to.
+      // Exact: 1 + gap may round, and the distance is the rounded value.
       const double offset = 1 + gap;
       const double separation = offset - 1;
       for (const Pose& X : {At(offset, 0, 0), At(0, -offset, 0), At(offset, 0.25, 0.125)}) {
@@ -50,7 +50,7 @@ TEST(Tolerance, IsUsedOnlyWhereTheSeparationIsWithinIt) {
   EXPECT_GT(seen[static_cast<size_t>(Relation::kWithinTolerance)], 10);
 }
 
-// Near contact the tolerance spares the exact rung, which touching contact otherwise needs.
+// Near contact the tolerance avoids the exact rung, which touching contact otherwise needs.
 TEST(Tolerance, SparesExactArithmeticInContact) {
   Random random(TestSeed(811));
   int spared = 0;
@@ -75,9 +75,9 @@ TEST(Tolerance, SparesExactArithmeticInContact) {
   EXPECT_GT(spared, 35);
 }
 
-// |separation| is at most the distance of any vertex pair, and where the hulls overlap at most
-// their reach along any direction: WITHIN_TOLERANCE must never contradict the exact relation of
-// hulls moved apart, or together, by a little more than the tolerance.
+// |separation| is at most the distance of any vertex pair and, if the hulls overlap, at most their
+// reach along any direction: WITHIN_TOLERANCE must never contradict the exact relation of hulls
+// moved apart, or together, by slightly more than the tolerance.
 TEST(Tolerance, IsNeverClaimedBeyondItself) {
   Random random(TestSeed(812));
   int within = 0;
@@ -91,7 +91,8 @@ TEST(Tolerance, IsNeverClaimedBeyondItself) {
     X.t = distance * u;
     if (Ask(a, b, X, tolerance).relation != Relation::kWithinTolerance) continue;
     ++within;
-    // B grown by a cube that holds the ball of radius `tolerance` (1 + 1e-9) touches or overlaps A.
+    // B grown by a cube that contains the ball of radius `tolerance` (1 + 1e-9) touches or overlaps
+    // A.
     std::vector<Vector> grown;
     const double r = tolerance * (1 + 1e-9);
     for (const Vector& v : b.vertices()) {
@@ -104,5 +105,5 @@ TEST(Tolerance, IsNeverClaimedBeyondItself) {
   EXPECT_GT(within, 100);
 }
 
-}  // namespace
+}  // namespace tolerance_test
 }  // namespace hulld

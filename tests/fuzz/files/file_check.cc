@@ -9,6 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
+#include <iterator>
+#include <utility>
 
 #include "client/formats/byte_source.h"
 #include "client/formats/mesh_file.h"
@@ -26,7 +29,7 @@ namespace {
 constexpr char kName[] = "the file";
 constexpr size_t kSmallBlock = 2;
 
-// The content as a file that is open at its start.
+// Returns a file descriptor with this content, positioned at its start.
 int OpenInMemory(std::string_view content) {
   const int file = memfd_create("fuzz", 0);
   if (file < 0) std::abort();
@@ -64,12 +67,20 @@ PointReader ReaderOf(FileKind kind) {
       return ReadCsv;
     case FileKind::kPcd:
       return ReadPcd;
+    case FileKind::kPts:
+      return ReadPts;
+    case FileKind::kLas:
+      return ReadLas;
+    case FileKind::kStl:
+      return ReadStl;
+    case FileKind::kGltf:
+      return ReadGltf;
     default:
       return nullptr;
   }
 }
 
-// All points of a file, as they were passed on.
+// All points read from a file.
 struct PointsRead {
   absl::Status status;
   ReadCounts counts;
@@ -111,6 +122,8 @@ PointsRead ReadPointsOf(PointReader reader, std::string_view content, const Read
 FileVerdict CheckPoints(PointReader reader, std::string_view content) {
   const PointsRead whole = ReadPointsOf(reader, content, {});
   if (!whole.finding.empty()) return {whole.finding, false};
+  const bool has_geometry = reader == ReadObj || reader == ReadStl || reader == ReadGltf;
+  if (whole.status.ok() && has_geometry && whole.xyz.empty()) return {"read as empty", false};
   ReadOptions options;
   options.points_per_block = kSmallBlock;
   const PointsRead pieces = ReadPointsOf(reader, content, options);
@@ -126,6 +139,17 @@ FileVerdict CheckPoints(PointReader reader, std::string_view content) {
     return {"points are skipped although all are finite", false};
   }
   return {"", whole.status.ok()};
+}
+
+template <absl::Status (*kReader)(ByteSource*, std::vector<MeshPart>*)>
+absl::Status MeshOfParts(ByteSource* source, TriangleMesh* mesh) {
+  std::vector<MeshPart> parts;
+  absl::Status status = kReader(source, &parts);
+  for (size_t i = 0; i < parts.size() && status.ok(); ++i) {
+    status = AddMesh(kName, parts[i].mesh, mesh);
+  }
+  if (status.ok() && mesh->vertices.empty()) return absl::InternalError("read as empty");
+  return status;
 }
 
 FileVerdict CheckMesh(absl::Status (*reader)(ByteSource*, TriangleMesh*),
@@ -166,7 +190,7 @@ FileVerdict CheckScene(std::string_view content) {
   return {pairs->size() % 2 == 0 ? "" : "half a pair", true};
 }
 
-// What reads back must be the same bits, NaN included.
+// The message must round-trip bit by bit, including NaN.
 std::string CheckRoundTrip(const google::protobuf::Message& message) {
   const std::string json = MessageJson(message);
   const std::unique_ptr<google::protobuf::Message> again(message.New());
@@ -185,7 +209,7 @@ FileVerdict CheckJson(std::string_view content, google::protobuf::Message* messa
   return {explained ? "" : "JSON refused without a word: " + parsed.ToString(), false};
 }
 
-// As `hullctl verify` reads it.
+// Reads an answer as `hullctl verify` does.
 FileVerdict CheckAnswer(std::string_view content) {
   const std::string json(content);
   v1::CheckCollisionRequest request;
@@ -216,8 +240,8 @@ FileVerdict CheckUrdf(std::string_view content) {
     const RobotJoint& joint = robot->joints[static_cast<size_t>(link.parent_joint)];
     if (joint.child != i || joint.parent >= i) return {"a child before its parent", false};
   }
-  // All that mimics comes to an end, and every link has a place.
-  const std::vector<double> values = AllJointValues(*robot, RestValues(*robot));
+  // Mimic chains end, and every link has a place.
+  const std::vector<JointValue> values = AllJointValues(*robot, RestValues(*robot));
   if (values.size() != robot->joints.size()) return {"a joint without a value", false};
   if (LinkPoses(*robot, kNoMotion, values).size() != robot->links.size()) {
     return {"a link without a place", false};
@@ -267,6 +291,10 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
       return CheckMesh(ReadObjMesh, content);
     case FileKind::kOffMesh:
       return CheckMesh(ReadOffMesh, content);
+    case FileKind::kStlMesh:
+      return CheckMesh(MeshOfParts<ReadStlParts>, content);
+    case FileKind::kGltfMesh:
+      return CheckMesh(MeshOfParts<ReadGltfParts>, content);
     case FileKind::kBatch:
     case FileKind::kYamlScene:
       return CheckScene(content);
@@ -288,6 +316,57 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
     }
   }
 }
+
+namespace {
+
+// Two compressed points; LZF stores incompressible data as a length and the bytes.
+std::string CompressedPcd() {
+  const std::string sizes = std::string("\x19\0\0\0\x18\0\0\0", 8);
+  return "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n"
+         "DATA binary_compressed\n" +
+         sizes + "\x17" + std::string(24, '\x3f');
+}
+
+const char* SmallStl() {
+  return "solid two words\nfacet normal 0 0 -nan(ind)\nouter loop\nvertex 0 0 1\nvertex 1 0 0\n"
+         "vertex 0 1 0\nendloop\nendfacet\nendsolid\nSOLID\nFACET\nOUTER LOOP\nVERTEX 1 2 3\n"
+         "VERTEX 4 5 6\nVERTEX 7 8 9\nENDLOOP\nENDFACET\nENDSOLID\n";
+}
+
+std::string SmallBinaryStl() {
+  return "solid" + std::string(75, ' ') + std::string("\2\0\0\0", 4) + std::string(100, '\x3f') +
+         "x";
+}
+
+const char* SmallGltf() {
+  return R"({"asset":{"version":"2.0"},"extensionsRequired":["KHR_mesh_quantization"],"scene":0,)"
+         R"("scenes":[{"nodes":[1]}],"nodes":[{"mesh":0,"rotation":[0,0,1,0]},{"children":[0],)"
+         R"("scale":[1,2,3],"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0},)"
+         R"("indices":1,"mode":5}]}],"buffers":[{"byteLength":36,"uri":"data:;base64,)"
+         R"(AAAAAAAAgD8AAABAAABAQAAAgEAAAKBAAADAQAAA4EAAAQIA"}],"bufferViews":[{"buffer":0,)"
+         R"("byteLength":36}],"accessors":[{"bufferView":0,"componentType":5122,"normalized":true,)"
+         R"("count":3,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":0,"byteOffset":33,)"
+         R"("componentType":5121},"values":{"bufferView":0,"byteOffset":2}}},{"bufferView":0,)"
+         R"("byteOffset":32,"componentType":5121,"count":3,"type":"SCALAR"}]})";
+}
+
+// LAS 1.2 with two points of format 0, scale 1 and offset 0.
+std::string SmallLas() {
+  std::string las(227, '\0');
+  const auto put = [&las](size_t at, const auto& value) {
+    std::memcpy(las.data() + at, &value, sizeof(value));
+  };
+  las.replace(0, 4, "LASF");
+  put(24, uint16_t{0x0201});
+  put(94, uint16_t{227});
+  put(96, uint32_t{227});
+  put(105, uint16_t{20});
+  put(107, uint32_t{2});
+  for (size_t axis = 0; axis < 3; ++axis) put(131 + 8 * axis, 1.0);
+  return las + std::string(40, '\x01');
+}
+
+}  // namespace
 
 std::vector<SeedFile> SeedFiles() {
   const std::string packed(48, '\x3f');
@@ -316,6 +395,16 @@ std::vector<SeedFile> SeedFiles() {
        "FIELDS x y z w\nSIZE 4 4 4 8\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n"
        "POINTS 2\nDATA binary\n" +
            packed},
+      {FileKind::kPcd, CompressedPcd()},
+      {FileKind::kXyz, "1,2,3\n4, 5, 6,7\n8;9;10\n"},
+      {FileKind::kPts, "2\n1 2 3 -9 255 0 0\n4 5 6\n1\n7 8 9\n"},
+      {FileKind::kLas, SmallLas()},
+      {FileKind::kStl, SmallStl()},
+      {FileKind::kStl, SmallBinaryStl()},
+      {FileKind::kStlMesh, SmallStl()},
+      {FileKind::kStlMesh, SmallBinaryStl()},
+      {FileKind::kGltf, SmallGltf()},
+      {FileKind::kGltfMesh, SmallGltf()},
       {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},
       {FileKind::kOffMesh, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n"},
       {FileKind::kBatch,
@@ -364,6 +453,76 @@ std::vector<SeedFile> SeedFiles() {
   };
 }
 
+namespace {
+
+// Returns the positions of all pieces of a kind: lines, runs of digits, or aligned words.
+std::vector<std::pair<size_t, size_t>> Pieces(const std::string& content, size_t kind) {
+  std::vector<std::pair<size_t, size_t>> pieces;
+  for (size_t at = 0; at < content.size();) {
+    size_t end = at + 1;
+    if (kind == 0) {
+      end = std::min(content.find('\n', at), content.size() - 1) + 1;
+    } else if (kind == 1) {
+      while (end < content.size() && (content[at] >= '0' && content[at] <= '9') &&
+             content[end] >= '0' && content[end] <= '9') {
+        ++end;
+      }
+    } else {
+      end = std::min(at + 4, content.size());
+    }
+    if (kind != 1 || (content[at] >= '0' && content[at] <= '9')) pieces.emplace_back(at, end - at);
+    at = end;
+  }
+  return pieces;
+}
+
+}  // namespace
+
+void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* content) {
+  static const auto* const kLimits =
+      new std::vector<std::string>{"0",          "1",          "2",
+                                   "3",          "255",        "65536",
+                                   "4294967295", "4294967296", "18446744073709551615",
+                                   "-1",         "1e999",      "1e-999",
+                                   "nan"};
+  constexpr uint32_t kWords[] = {0, 1, 2, 0xffffffff, 0x7fffffff, 0x80000000, 0x7f800000, 50, 84};
+  const size_t kind = next(3);
+  const auto pieces = Pieces(*content, kind);
+  if (pieces.empty()) return;
+  const auto [at, size] = pieces[next(pieces.size())];
+  const auto [other, other_size] = pieces[next(pieces.size())];
+  const std::string piece = content->substr(at, size);
+  switch (next(5)) {
+    case 0: {
+      std::string swapped = content->substr(other, other_size);
+      content->replace(std::max(at, other), at > other ? size : other_size,
+                       at > other ? swapped : piece);
+      if (at != other) {
+        content->replace(std::min(at, other), at > other ? other_size : size,
+                         at > other ? piece : swapped);
+      }
+      return;
+    }
+    case 1:
+      content->insert(other, piece);
+      return;
+    case 2:
+      content->erase(at, size);
+      return;
+    case 3:
+      content->resize(at);
+      return;
+    default:
+      if (kind == 1) {
+        content->replace(at, size, (*kLimits)[next(kLimits->size())]);
+      } else if (kind == 2 && size == 4) {
+        std::memcpy(content->data() + at, &kWords[next(std::size(kWords))], 4);
+      } else {
+        content->insert(at + size, piece);
+      }
+  }
+}
+
 const std::vector<std::string>& FileTokens() {
   static const auto* const tokens = new std::vector<std::string>{"nan",
                                                                  "-inf",
@@ -391,6 +550,8 @@ const std::vector<std::string>& FileTokens() {
                                                                  "format binary_big_endian 1.0\n",
                                                                  "DATA binary\n",
                                                                  "DATA binary_compressed\n",
+                                                                 "type=\"planar\"",
+                                                                 "type=\"floating\"",
                                                                  "POINTS 3\n",
                                                                  "COUNT 4000000000 1 1\n",
                                                                  "SIZE 8 8 8\n",

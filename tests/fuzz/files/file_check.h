@@ -2,14 +2,15 @@
 #define HULLD_TESTS_FUZZ_FILES_FILE_CHECK_H_
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace hulld::fuzz {
 
-// What hullctl reads by code of this project: points, meshes, batches,
-// scenes, robots, and messages as JSON.
+// Formats that hullctl reads with this project's code: points, meshes, batches, scenes, robots, and
+// messages as JSON.
 enum class FileKind {
   kObj,
   kOff,
@@ -17,8 +18,14 @@ enum class FileKind {
   kXyz,
   kCsv,
   kPcd,
+  kPts,
+  kLas,
+  kStl,
+  kGltf,
   kObjMesh,
   kOffMesh,
+  kStlMesh,
+  kGltfMesh,
   kBatch,
   kSceneJson,
   kAnswerJson,
@@ -31,24 +38,29 @@ enum class FileKind {
 inline constexpr size_t kFileKinds = static_cast<size_t>(FileKind::kJoints) + 1;
 
 struct FileVerdict {
-  // Empty when all is well.
+  // Empty if no fault was found.
   std::string finding;
-  // Whether the file was read to its end.
+  // True if the file was read to its end.
   bool read = false;
 };
 
-// Reads `content` as a file of that kind. It is read, or refused with INVALID_ARGUMENT that names
-// the file and says what is wrong. What is read is finite, indices are in range, counts agree with
-// what was passed on, and do not depend on the size of blocks or, where all is finite, on whether
-// other points would be skipped. JSON that was read reads back the same.
+// Reads `content` as a file of that kind. The reader must accept it, or refuse it with an
+// INVALID_ARGUMENT that names the file and the fault. Accepted data is finite, with indices in
+// range and counts equal to the number of items delivered. It does not depend on the block size or,
+// if all points are finite, on skipping non-finite ones. Accepted JSON round-trips.
 FileVerdict CheckFile(FileKind kind, std::string_view content);
 
-// A small file of each kind, and more than one where the kind has variants.
+// A small file of each kind, with variants if the kind has several.
 struct SeedFile {
   FileKind kind;
   std::string content;
 };
 std::vector<SeedFile> SeedFiles();
+
+// Changes the structure of `content` at places that `next` chooses (a number below its argument):
+// swaps, repeats or drops lines, numbers and blocks, puts limits in the place of numbers and of
+// binary words, counts up or down, or cuts the file.
+void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* content);
 
 // Words and numbers that these files are made of, right and wrong.
 const std::vector<std::string>& FileTokens();

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -9,14 +10,20 @@
 #include "tests/fuzz/files/file_check.h"
 
 namespace hulld::fuzz {
-namespace {
+namespace file_fuzz_test {
 
-// The fuzzer's target without the fuzzer: as many inputs on every run, from a fixed seed.
+// Runs the fuzz target without the fuzzer: a fixed number of inputs from a fixed seed.
 #ifdef HULLD_SANITIZED
 constexpr int kChangesPerSeed = 300;
 #else
 constexpr int kChangesPerSeed = 1500;
 #endif
+
+// HULLD_FUZZ_CHANGES sets another number, for long runs by hand.
+int ChangesPerSeed() {
+  const char* const text = std::getenv("HULLD_FUZZ_CHANGES");
+  return text == nullptr ? kChangesPerSeed : std::atoi(text);
+}
 
 size_t Place(Random& random, const std::string& content) {
   return static_cast<size_t>(random.Below(static_cast<int>(content.size()) + 1));
@@ -47,7 +54,7 @@ void Change(Random& random, std::string* content) {
 
 TEST(FileFuzz, SeedsAreRead) {
   for (const SeedFile& seed : SeedFiles()) {
-    // One seed holds a point that only --skip-nonfinite lets pass.
+    // One seed has a point that only --skip-nonfinite accepts.
     if (seed.content.find("nan nan") != std::string::npos) continue;
     const FileVerdict verdict = CheckFile(seed.kind, seed.content);
     EXPECT_EQ(verdict.finding, "") << seed.content;
@@ -58,12 +65,21 @@ TEST(FileFuzz, SeedsAreRead) {
 TEST(FileFuzz, ChangedFilesAreReadOrRefused) {
   const uint64_t seed = TestSeed(701);
   Random random(seed);
+  const auto next = [&random](size_t n) {
+    return static_cast<size_t>(random.Below(static_cast<int>(n)));
+  };
   std::array<int, kFileKinds> read = {};
   std::array<int, kFileKinds> refused = {};
   for (const SeedFile& file : SeedFiles()) {
-    for (int i = 0; i < kChangesPerSeed; ++i) {
+    for (int i = 0; i < ChangesPerSeed(); ++i) {
       std::string content = file.content;
-      for (int changes = random.Between(1, 4); changes > 0; --changes) Change(random, &content);
+      for (int changes = random.Between(1, 4); changes > 0; --changes) {
+        if (random.Below(2) == 0) {
+          Change(random, &content);
+        } else {
+          ChangeStructure(next, &content);
+        }
+      }
       const FileVerdict verdict = CheckFile(file.kind, content);
       ASSERT_EQ(verdict.finding, "")
           << "seed " << seed << " kind " << static_cast<int>(file.kind) << ":\n"
@@ -72,11 +88,11 @@ TEST(FileFuzz, ChangedFilesAreReadOrRefused) {
     }
   }
   for (size_t kind = 0; kind < kFileKinds; ++kind) {
-    // Few changes leave JSON what it was.
+    // Few mutations leave JSON unchanged.
     EXPECT_GT(read[kind], kChangesPerSeed / 300) << kind;
     EXPECT_GT(refused[kind], kChangesPerSeed / 5) << kind;
   }
 }
 
-}  // namespace
+}  // namespace file_fuzz_test
 }  // namespace hulld::fuzz

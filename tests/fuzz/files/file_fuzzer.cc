@@ -1,5 +1,5 @@
-// libFuzzer on the readers of files. The first byte of an input chooses the kind, the rest is the
-// file. It writes its own seeds:
+// libFuzzer on the file readers. The first byte of an input selects the kind, the rest is the file.
+// It writes its own seeds:
 //
 //   cmake --preset fuzz && cmake --build --preset fuzz --target file_fuzzer
 //   build/fuzz/bin/file_fuzzer --write_seeds=build/fuzz/files -runs=0
@@ -45,7 +45,7 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   return 0;
 }
 
-// Now and then a word of the formats goes in.
+// Sometimes inserts a token of the formats.
 extern "C" size_t LLVMFuzzerCustomMutator(uint8_t* data, size_t size, size_t max_size,
                                           unsigned seed) {
   const std::string& token = hulld::fuzz::FileTokens()[seed / 4 % hulld::fuzz::FileTokens().size()];

@@ -11,13 +11,12 @@
 namespace hulld::fuzz {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr size_t kKinds = 13;
 
-// What the magnitudes of one program are: about 1, about one power of two, or anything.
+// Magnitudes in one program: about 1, about one power of two, or any.
 enum class Magnitudes { kTame, kCommon, kAny };
 
-// The last is rare, and has few points: it takes integers of thousands of bits.
+// The last is rare and uses few points: it takes integers of thousands of bits.
 constexpr Magnitudes kChoices[] = {Magnitudes::kTame,   Magnitudes::kTame,   Magnitudes::kTame,
                                    Magnitudes::kTame,   Magnitudes::kCommon, Magnitudes::kCommon,
                                    Magnitudes::kCommon, Magnitudes::kAny};
@@ -81,7 +80,8 @@ class Decoder {
     const size_t n = cloud_.points.size();
     return n == 0 ? Vector::Zero().eval() : cloud_.points[n - 1 - back % n];
   }
-  // Every byte is read in a statement of its own: compilers differ in the order of operands.
+  // Each byte is read in a separate statement: compilers differ in the evaluation order of
+  // operands.
   Vector ScaledIntegers() {
     const double x = in_.SmallInteger();
     const double y = in_.SmallInteger();
@@ -106,7 +106,7 @@ class Decoder {
     x = std::nextafter(x, which & 4 ? kInfinity : -kInfinity);
     Add(p);
   }
-  // On the line through two points, but for rounding.
+  // Adds a point on the line through two points, up to rounding.
   void AddOnLine() {
     const Vector a = Earlier();
     const Vector b = Earlier();
@@ -156,7 +156,7 @@ class Decoder {
       Add(origin + scale * Vector(x, y, scatter.Between(-range, range)));
     }
   }
-  // All of them extreme, many coplanar in fours.
+  // All points are extreme, many coplanar in fours.
   void AddParaboloid() {
     Scatter scatter(in_.Byte());
     const int range = 1 + static_cast<int>(in_.Below(24));
@@ -180,7 +180,7 @@ class Decoder {
     const double factor = in_.SignedByte();
     return factor * Power();
   }
-  // A power of two in the range that this program has for all its magnitudes.
+  // Returns a power of two within the program's magnitudes.
   double Power() {
     if (magnitudes_ == Magnitudes::kAny) return in_.PowerOfTwo();
     return magnitudes_ == Magnitudes::kCommon ? common_power_ : 1;

@@ -10,19 +10,19 @@
 
 namespace hulld::fuzz {
 
-// A stream of points to build a hull of, and where to cut it into blocks.
+// A stream of points for a hull, and its division into blocks.
 struct FuzzCloud {
-  // May hold NaN and infinities.
+  // May contain NaN and infinities.
   std::vector<Vector> points;
-  // Sizes of consecutive blocks; they add up to the number of points.
+  // Sizes of consecutive blocks; they sum to the number of points.
   std::vector<size_t> block_sizes;
 };
 
-// Reads any bytes as a cloud of at most kMostPoints points. The bytes are a program: small
-// integers, raw doubles, repeated points, neighbours one unit in the last place off, points on the
-// lines and in the planes of earlier points (exactly or but for rounding), powers of two from the
-// subnormals to the largest doubles, runs, grids and scatters. So that what is rare among random
-// coordinates is common here. Deterministic.
+// Decodes any bytes into a cloud of at most kMostPoints points. The bytes are a program: small
+// integers, raw doubles, repeated points, neighbors one unit in the last place away, points on the
+// lines and in the planes of earlier points (exactly or up to rounding), powers of two from the
+// subnormals to the largest doubles, runs, grids, and scatters. So cases that are rare among random
+// coordinates are common here. Deterministic.
 FuzzCloud DecodeFuzzCloud(std::span<const uint8_t> bytes);
 
 inline constexpr size_t kMostPoints = 400;

@@ -23,7 +23,7 @@ std::vector<Vector> FiniteOf(std::span<const Vector> points) {
   return finite;
 }
 
-// Adds a block as a careful caller would; a finding, or nothing.
+// Adds the finite points of a block. Returns a finding, or empty.
 std::string AddBlock(HullBuilder& builder, std::span<const Vector> block, size_t& refused) {
   const std::vector<Vector> finite = FiniteOf(block);
   if (finite.size() != block.size()) {
@@ -42,7 +42,7 @@ std::string AddBlock(HullBuilder& builder, std::span<const Vector> block, size_t
   return {};
 }
 
-// All of the points, or where that would take long, as many as may be tested: evenly spread.
+// Returns all points, or an evenly spread sample if testing all would take long.
 std::vector<Vector> ContainmentSample(std::span<const Vector> points, size_t facets) {
   constexpr size_t kTests = 4000;
   const size_t stride = points.size() * facets / kTests + 1;

@@ -8,9 +8,9 @@
 
 namespace hulld::fuzz {
 
-// What was found and how hard it was tried.
+// Finding and coverage of a check.
 struct Verdict {
-  // Empty when all is well.
+  // Empty if no fault was found.
   std::string finding;
   int dimension = -1;
   size_t refused = 0;
@@ -18,11 +18,10 @@ struct Verdict {
   bool compared_with_brute_force = false;
 };
 
-// Builds the hull one point at a time, in blocks, and in one block from the last point to the
-// first; blocks that hold NaN or an infinity must be refused and change nothing, and are sent again
-// without these. All snapshots must have the same bits, pass the exact audit, hold the points (a
-// sample of them where they are many), and equal the oracle's hull where there are at most
-// kBruteForcePoints points.
+// Builds the hull point by point, in blocks, and in one block in reverse order. Blocks with NaN or
+// infinity must be refused without effect, and are sent again without these values. All snapshots
+// must be bitwise equal, pass the exact audit, contain the points (a sample if they are many), and
+// equal the oracle's hull for at most kBruteForcePoints points.
 Verdict CheckHullOf(const FuzzCloud& cloud);
 
 inline constexpr size_t kBruteForcePoints = 9;

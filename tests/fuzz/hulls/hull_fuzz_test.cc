@@ -10,9 +10,9 @@
 #include "tests/fuzz/hulls/hull_check.h"
 
 namespace hulld::fuzz {
-namespace {
+namespace hull_fuzz_test {
 
-// The fuzzer's target without the fuzzer: as many inputs on every run, from a fixed seed.
+// Runs the fuzz target without the fuzzer: a fixed number of inputs from a fixed seed.
 #ifdef HULLD_SANITIZED
 constexpr int kInputs = 150;
 #else
@@ -43,7 +43,7 @@ TEST(HullFuzz, RandomProgramsPassEveryCheck) {
     compared += verdict.compared_with_brute_force;
     large += verdict.vertices > 100;
   }
-  // The programs reach what they are for.
+  // The programs cover the intended cases.
   for (const int count : dimensions) EXPECT_GT(count, kInputs / 200);
   EXPECT_GT(refused, kInputs / 200);
   EXPECT_GT(compared, kInputs / 50);
@@ -66,5 +66,5 @@ TEST(HullFuzz, AnyBytesDecodeToBlocksThatCoverThePoints) {
   }
 }
 
-}  // namespace
+}  // namespace hull_fuzz_test
 }  // namespace hulld::fuzz

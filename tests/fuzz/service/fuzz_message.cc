@@ -78,7 +78,8 @@ class MessageFiller {
   }
 
  private:
-  // What is optional is there for one of four; what any request needs, nearly always.
+  // Optional fields are present with probability 1/4; fields that every request needs, nearly
+  // always.
   bool IsPresent(const FieldDescriptor& field) {
     const std::string& name = field.name();
     if (field.has_optional_keyword() || name == "tolerance" || name == "simplification") {
@@ -127,7 +128,7 @@ class MessageFiller {
   void FillRepeated(Message* message, const FieldDescriptor* field, int depth) {
     const Reflection& r = *message->GetReflection();
     const size_t count = Count(*field);
-    // Long lists take their numbers from one byte.
+    // Long lists expand one byte.
     Scatter scatter(in_.Byte());
     const bool scattered = count > 12;
     for (size_t i = 0; i < count; ++i) {
@@ -156,7 +157,7 @@ class MessageFiller {
     moved_ = count;
   }
 
-  // How long a list is; mostly such that the message is consistent.
+  // Returns the length of a list, mostly consistent with the message.
   size_t Count(const FieldDescriptor& field) {
     constexpr size_t kLengths[] = {0, 1, 1, 2, 2, 2, 3, 3, 4, 4, 5, 6, 8, 12, 20, 70};
     const std::string& name = field.name();
@@ -171,7 +172,7 @@ class MessageFiller {
     if (name == "groups") return in_.OneOf(3) ? placements_ + slip : 0;
     if (name == "ignored_group_pairs") return in_.OneOf(8) ? 2 + slip : 0;
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return std::min<size_t>(count, 12);
-    // An update names each placement once.
+    // An update names each placement at most one time.
     if (name == "placements") return std::min(count, in_.OneOf(16) ? count : size_t{1});
     return count;
   }
@@ -198,7 +199,7 @@ class MessageFiller {
     return in_.Raw();
   }
 
-  // Lengths that wishes name are not negative when tame.
+  // Tame lengths are not negative.
   double Length(const FieldDescriptor& field) {
     const std::string& name = field.name();
     const double number = Double();
@@ -245,7 +246,7 @@ class MessageFiller {
   std::string String(const FieldDescriptor& field) {
     const std::string& name = field.name();
     if (name == "hull_id") return FuzzHullId(in_);
-    // A hull can have the ID, too.
+    // The ID may also be a hull's.
     if (name == "body_id" && !in_.OneOf(8)) return in_.OneOf(2) ? "body/a" : "body/b";
     if (name == "body_id") return FuzzHullId(in_);
     if (name == "prefix") {
@@ -262,7 +263,7 @@ class MessageFiller {
     return kTexts[in_.Below(std::size(kTexts))];
   }
 
-  // A field that no version of the contract has.
+  // Adds a field unknown to every API version.
   void AddUnknown(UnknownFieldSet* fields, int depth) {
     const int number = 1000 + static_cast<int>(in_.Below(7));
     switch (in_.Below(4)) {
@@ -279,8 +280,8 @@ class MessageFiller {
 
   ByteReader& in_;
   const MessageHints hints_;
-  // Counts of the message that is being filled: the placements of its table, and those that an
-  // update moves.
+  // Counts of the current message: the placements in its table, and the placements that an update
+  // moves.
   size_t placements_;
   size_t moved_ = 0;
   const bool tame_;
@@ -295,7 +296,7 @@ void FillMessage(ByteReader& in, const MessageHints& hints, Message* message) {
 
 std::string FuzzHullId(ByteReader& in) {
   const std::vector<std::string>& ids = HullIds();
-  // Half of all are among the first four.
+  // Half are among the first four.
   return in.OneOf(2) ? ids[in.Below(4)] : ids[in.Below(ids.size())];
 }
 

@@ -11,27 +11,27 @@
 
 namespace hulld::fuzz {
 
-// What a client could know that makes its messages meaningful more often than chance does.
+// Client state that makes random messages meaningful more often.
 struct MessageHints {
-  // The last revision that the server named.
+  // Last revision named by the server.
   uint64_t revision = 0;
-  // The next sequence of the stream.
+  // Next sequence of the stream.
   uint64_t sequence = 1;
-  // How many placements the stream has.
+  // Number of placements of the stream.
   size_t placements = 0;
-  // The store, once a reply named it.
+  // The store, if a reply has named it.
   std::string store_id = {};
 };
 
 // Fills any message by reflection from bytes, field by field in the order of their numbers. Field
-// names are its grammar: IDs come from a small dictionary of valid, malformed and very long ones,
-// coordinates in threes, indices near the bounds of the placements that came before them, and now
-// and then something that does not fit. Most messages are tame, of small numbers; the others take
-// doubles from the subnormals to infinity and NaN. Enums may be unknown, and so may fields.
-// Strings are UTF-8. Deterministic.
+// names determine the values: IDs come from a small dictionary of valid, malformed, and very long
+// ones, coordinates in threes, indices near the bounds of the preceding placements, and sometimes
+// mismatched values. Most messages are tame, with small numbers; the rest use doubles from the
+// subnormals to infinity and NaN. Enums and fields may be unknown. Strings are UTF-8.
+// Deterministic.
 void FillMessage(ByteReader& in, const MessageHints& hints, google::protobuf::Message* message);
 
-// An ID of the dictionary.
+// Returns an ID of the dictionary.
 std::string FuzzHullId(ByteReader& in);
 
 }  // namespace hulld::fuzz

@@ -1,4 +1,4 @@
-// What the raw calls of service_program.cc found, as tests of their own.
+// Regression tests for findings of the raw calls in service_program.cc.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,12 +13,12 @@
 #include "tests/fuzz/service/raw_call.h"
 
 namespace hulld::fuzz {
-namespace {
+namespace malformed_message_test {
 
 using server::Rpc;
 using testing::HasSubstr;
 
-// A length that runs past the end.
+// A length beyond the end.
 constexpr char kCutShort[] = "\x0a\x7f";
 
 class MalformedMessage : public testing::Test {
@@ -43,7 +43,7 @@ class MalformedMessage : public testing::Test {
   std::shared_ptr<grpc::Channel> channel_;
 };
 
-// These streams ended OK, as if the client had said all.
+// Formerly, these streams ended OK, as if half-closed.
 TEST_F(MalformedMessage, FirstOfAStreamIsRefused) {
   for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions, Rpc::kWatchCollisions}) {
     const grpc::Status status = Send(rpc, {kCutShort});
@@ -52,7 +52,7 @@ TEST_F(MalformedMessage, FirstOfAStreamIsRefused) {
   }
 }
 
-// These ended UNIMPLEMENTED, as gRPC parsed them.
+// Formerly, these ended UNIMPLEMENTED, because gRPC parsed them.
 TEST_F(MalformedMessage, OfACallWithOneRequestIsRefused) {
   for (const Rpc rpc :
        {Rpc::kCreateHull, Rpc::kGetHull, Rpc::kGetHullMesh, Rpc::kListHulls, Rpc::kDeleteHull,
@@ -82,7 +82,7 @@ TEST_F(MalformedMessage, InAStreamIsRefusedAndWhatCameBeforeStands) {
   EXPECT_EQ(Send(Rpc::kStreamCollisions, {ask.SerializeAsString()}).error_code(), grpc::OK);
 }
 
-// An empty message is a message, and none at all is an end.
+// An empty message is a message; the absence of a message is an end.
 TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
   for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions, Rpc::kWatchCollisions}) {
     EXPECT_EQ(Send(rpc, {}).error_code(), grpc::OK) << server::RpcName(rpc);
@@ -90,7 +90,7 @@ TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
   }
 }
 
-// A thousandth of the bytes on the wire: 64 MiB were unpacked, and only then counted.
+// A thousandth of the size on the wire: formerly, 64 MiB were unpacked before they were counted.
 TEST_F(MalformedMessage, CompressedOnesAreNotUnpacked) {
   const auto stub = v1::HullService::NewStub(channel_);
   v1::CreateHullRequest request;
@@ -105,5 +105,5 @@ TEST_F(MalformedMessage, CompressedOnesAreNotUnpacked) {
   }
 }
 
-}  // namespace
+}  // namespace malformed_message_test
 }  // namespace hulld::fuzz

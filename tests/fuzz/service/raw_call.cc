@@ -16,7 +16,7 @@ using google::protobuf::MessageFactory;
 using google::protobuf::MethodDescriptor;
 using google::protobuf::ServiceDescriptor;
 
-// Looks in the services that the program is linked with.
+// Searches the services linked into the program.
 const MethodDescriptor* FindMethod(server::Rpc rpc) {
   for (const char* service :
        {"hulld.v1.HullService", "hulld.v1.BodyService", "hulld.v1.CollisionService",
@@ -42,7 +42,7 @@ std::string Noise(ByteReader& in) {
   return noise;
 }
 
-// Starts of groups without end.
+// Returns starts of groups without ends.
 std::string Nested(ByteReader& in) {
   return std::string(static_cast<size_t>(in.Byte()) * 4, '\x0b');
 }
@@ -74,7 +74,7 @@ std::string RawMessage(ByteReader& in, const MessageHints& hints, Message& messa
       // An ID that is not UTF-8: field 1 of most requests.
       return std::string("\x0a\x02\xc3\x28", 4);
     case 3:
-      // More than the server takes, now and then.
+      // Sometimes more than the server accepts.
       return std::string(in.OneOf(4) ? 70'000 : 500, static_cast<char>(in.Byte()));
     case 4:
       return {};
@@ -89,7 +89,7 @@ grpc::ByteBuffer ToBuffer(const std::string& bytes) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-// Waits for the operation that was just started.
+// Waits for the operation just started.
 bool Wait(grpc::CompletionQueue& queue) {
   void* tag = nullptr;
   bool ok = false;

@@ -13,23 +13,23 @@
 
 namespace hulld::fuzz {
 
-// A call whose messages are bytes.
+// A call with raw bytes as messages.
 struct RawCall {
   server::Rpc rpc = server::Rpc::kGetStatus;
   std::vector<std::string> messages;
-  // Whether the first message cannot be read.
+  // True if the first message is malformed.
   bool malformed = false;
 };
 
-// Noise, messages cut short or with bytes changed, strings that are not UTF-8, groups nested
-// deeper than protobuf reads, messages of more bytes than the server takes, or none at all.
+// Generates noise, truncated or altered messages, strings that are not UTF-8, groups nested deeper
+// than protobuf allows, messages that exceed the server's limit, or none at all.
 RawCall DecodeRawCall(ByteReader& in, const MessageHints& hints);
 
-// Whether such a call has no end of its own.
+// Returns true if such a call does not end by itself.
 bool LastsUntilCancelled(server::Rpc rpc);
 
-// Sends them, reads whatever comes, and returns how the call ended. One that has no end of its own
-// is cancelled after its first reply.
+// Sends the messages, reads all replies, and returns the final status. A call that does not end by
+// itself is cancelled after its first reply.
 grpc::Status MakeRawCall(grpc::GenericStub& stub, grpc::ClientContext& context,
                          const RawCall& call);
 

@@ -26,7 +26,7 @@ std::string CheckSeparation(v1::Relation relation, double value, double bound) {
   return {};
 }
 
-// What the relation already tells of the clearance.
+// Checks the clearance against the relation.
 std::string CheckClearance(v1::Relation relation, bool within) {
   const bool colliding = relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
   return colliding && !within ? "a colliding pair is not within its clearance" : "";
@@ -37,19 +37,19 @@ bool IsProblemCode(int code) {
          code == grpc::RESOURCE_EXHAUSTED;
 }
 
-// The number of placements of a request that has them in one of two forms.
+// Returns the number of placements of a request, in either form.
 template <typename Request>
 int PlacementCount(const Request& request) {
   return request.placements_size() + request.packed_placements().hulls_size();
 }
 
-// The entries of the table of hulls that answers it.
+// Returns the number of entries of its table of hulls.
 template <typename Request>
 int HullCount(const Request& request) {
   return request.placements_size() + request.packed_placements().hull_ids_size();
 }
 
-// The placements that have a problem.
+// Checks the placements reported as problems, and collects them.
 template <typename Problems>
 std::string CheckProblems(const Problems& problems, int placements, std::set<uint32_t>* found) {
   for (const v1::PlacementProblem& problem : problems) {
@@ -63,7 +63,7 @@ std::string CheckProblems(const Problems& problems, int placements, std::set<uin
 
 bool IsParallel(int size, bool wanted, int rows) { return size == (wanted ? rows : 0); }
 
-// Whether each column is as long as it must be.
+// Returns true if each column has its required length.
 bool AreParallel(const v1::Wanted& wanted, const v1::AnswerColumns& columns, int rows) {
   return IsParallel(columns.relations_size(), true, rows) &&
          IsParallel(columns.rungs_size(), true, rows) &&
@@ -77,7 +77,7 @@ bool AreParallel(const v1::Wanted& wanted, const v1::AnswerColumns& columns, int
          IsParallel(columns.within_clearance_size(), wanted.has_clearance(), rows);
 }
 
-// One row's numbers against its relation.
+// Checks the numbers of a row against its relation.
 std::string CheckRow(const v1::Wanted& wanted, double tolerance, const v1::AnswerColumns& columns,
                      int row) {
   const v1::Relation relation = columns.relations(row);
@@ -98,7 +98,8 @@ std::string CheckRow(const v1::Wanted& wanted, double tolerance, const v1::Answe
   return finding;
 }
 
-// The rows of one message. `has_problem(row)`: whether a placement of the row's pair has one.
+// Checks the rows of a message. `has_problem(row)`: true if a placement of the row's pair has a
+// problem.
 template <typename HasProblem>
 std::string CheckColumns(const v1::Wanted& wanted, double tolerance,
                          const v1::AnswerColumns& columns, int rows,
@@ -122,7 +123,7 @@ std::string CheckColumns(const v1::Wanted& wanted, double tolerance,
   return causes.empty() ? "" : "a problem names a row that the message does not have";
 }
 
-// Facets name vertices that there are.
+// Checks that facets name existing vertices.
 std::string CheckFacets(const v1::MeshFacets& facets, uint64_t vertices) {
   uint64_t corners = 0;
   for (const uint32_t size : facets.sizes()) {

@@ -17,8 +17,8 @@ inline bool IsCollision(v1::Relation relation) {
   return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
 }
 
-// What the contract says of replies that end OK, whatever was asked. Each function returns what is
-// wrong with a reply, or nothing.
+// Checks of OK replies against the API contract, for any request. Each function returns the fault
+// of a reply, or empty.
 
 std::string CheckHullInfo(const v1::HullInfo& hull);
 std::string CheckHull(const v1::GetHullRequest& request, const v1::GetHullResponse& response);
@@ -30,11 +30,11 @@ std::string CheckPair(const v1::CheckCollisionRequest& request,
 // Every pair is answered exactly once, in order.
 std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
                        std::span<const v1::BatchCheckCollisionsResponse> parts);
-// Pairs ascend, each at most once, and the totals count them.
+// Pairs ascend without repetition, and the totals count them.
 std::string CheckScene(const v1::FindCollisionsRequest& request,
                        std::span<const v1::FindCollisionsResponse> parts);
 
-// Whether a scene asks about these two. Scene: FindCollisionsRequest, or what watches one.
+// Returns true if a scene includes this pair. Scene: FindCollisionsRequest, or its watch.
 template <typename Scene>
 bool AsksAbout(const Scene& scene, int a, int b) {
   if (scene.has_movers() && static_cast<uint32_t>(a) >= scene.movers()) return false;
@@ -50,7 +50,7 @@ bool AsksAbout(const Scene& scene, int a, int b) {
   return true;
 }
 
-// Gives placements the poses of an update, as far as it names them.
+// Moves the placements named by an update to its poses.
 template <typename Update, typename Placements>
 void MovePlacements(const Update& update, Placements* placements) {
   for (int i = 0; i < update.placements_size(); ++i) {
@@ -71,21 +71,21 @@ void MovePlacements(const Update& update, Placements* placements) {
   }
 }
 
-// The relations of a batch, in the order of its pairs.
+// Returns the relations of a batch, in the order of its pairs.
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts);
 
 // Follows one ReplaceHull call.
 class ReplaceCheck {
  public:
-  // Every message, whether or not it could be sent.
+  // Records every message, sent successfully or not.
   void Sent(const v1::ReplaceHullRequest& request);
-  // What is wrong with a call that ended OK.
+  // Returns the fault of a call that ended OK.
   std::string EndedOk(const v1::ReplaceHullResponse& response) const;
 
   const std::string& hull_id() const { return hull_id_; }
-  // Whether the call may end OK: an opening, points, and an empty block at the end.
+  // True if the call may end OK: an opening, points, and a final empty block.
   bool is_whole() const { return well_formed_ && ends_; }
-  // Whether it may not, for want of that block alone.
+  // True if only that block is missing.
   bool is_cut_short() const { return well_formed_ && !ends_; }
 
  private:
@@ -99,15 +99,15 @@ class ReplaceCheck {
 // Follows one AppendPoints call.
 class AppendCheck {
  public:
-  // Points of chunks in the order in which they were sent.
+  // Records the points of chunks in sending order.
   void Sent(const v1::AppendPointsRequest& request);
   std::string Received(const v1::AppendPointsResponse& response);
-  // ok: how the call ended, after everything was read.
+  // ok: the final status, after everything was read.
   std::string Ended(bool ok) const;
 
   const v1::AppendOpened& opened() const { return opened_; }
   bool is_open() const { return open_; }
-  // The hull as the last reply told of it, but for its dimension; requires is_open().
+  // The hull in the last reply, except its dimension. Requires: is_open().
   const v1::HullInfo& hull() const { return hull_; }
 
  private:
@@ -124,7 +124,7 @@ class AppendCheck {
   uint64_t revision_ = 0;
 };
 
-// Follows one StreamCollisions call: what its client knows of the pairs.
+// Follows one StreamCollisions call and its client's knowledge of the pairs.
 class CollisionStreamCheck {
  public:
   explicit CollisionStreamCheck(const v1::CollisionStreamOpen& open);
@@ -133,8 +133,8 @@ class CollisionStreamCheck {
   void Sent(const v1::CollisionStreamUpdate& update);
   std::string Received(const v1::StreamCollisionsResponse& response);
 
-  // The question of a batch whose relations are those that the stream has told so far. Requires
-  // that every message was answered.
+  // Returns a batch with the relations that the stream has reported so far. Requires: every message
+  // was answered.
   v1::BatchCheckCollisionsRequest AsBatch() const;
   const std::vector<v1::Relation>& relations() const { return relations_; }
   bool has_tolerance() const { return open_.tolerance() != 0; }
@@ -143,7 +143,7 @@ class CollisionStreamCheck {
   v1::CollisionStreamOpen open_;
   std::vector<v1::Relation> relations_;
   uint64_t sent_ = 0;
-  // Where the answer that is being received stands.
+  // Position in the answer being received.
   uint64_t answering_ = 0;
   bool starts_ = true;
   uint32_t last_pair_ = 0;

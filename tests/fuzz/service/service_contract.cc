@@ -12,7 +12,7 @@ namespace {
 using server::Rpc;
 using Codes = std::set<grpc::StatusCode>;
 
-// Beside OK, and what any call can end with.
+// Returns the codes of a call besides OK and the codes of all calls.
 Codes CodesOf(Rpc rpc) {
   switch (rpc) {
     case Rpc::kCreateHull:
@@ -52,7 +52,7 @@ Codes CodesOf(Rpc rpc) {
   return {};
 }
 
-// Every error of hulld gives its reason. gRPC refuses messages that are too large by itself.
+// Checks that an error of hulld has its reason. gRPC itself refuses messages that are too large.
 std::string CheckReason(Rpc rpc, const grpc::Status& status) {
   if (ReasonOf(FromGrpcStatus(status)) != v1::ERROR_REASON_UNSPECIFIED) return {};
   if (status.error_details().empty() && status.error_code() == grpc::RESOURCE_EXHAUSTED) return {};
@@ -65,7 +65,7 @@ std::string CheckReason(Rpc rpc, const grpc::Status& status) {
 std::string CheckStatus(Rpc rpc, const CallManner& manner, const grpc::Status& status) {
   const grpc::StatusCode code = status.error_code();
   if (code == grpc::OK) return {};
-  // gRPC says these itself.
+  // Reported by gRPC itself.
   if (manner.hurried && code == grpc::DEADLINE_EXCEEDED) return {};
   if (manner.cancelled && code == grpc::CANCELLED) return {};
   Codes codes = CodesOf(rpc);

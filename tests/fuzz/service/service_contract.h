@@ -9,19 +9,19 @@
 
 namespace hulld::fuzz {
 
-// How a client treated its own call.
+// The client's treatment of a call.
 struct CallManner {
-  // Its deadline had passed, or nearly.
+  // Its deadline had passed or nearly passed.
   bool hurried = false;
   bool cancelled = false;
-  // It sent bytes that need not be a message.
+  // It sent raw bytes, possibly malformed.
   bool raw = false;
 };
 
-// What is wrong with how a call ended by the comments of the contract, or nothing.
+// Returns the violation of the API contract by the status of a call, or empty.
 std::string CheckStatus(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
 
-// "NOT_FOUND".
+// Returns the name of a code, e.g. "NOT_FOUND".
 std::string CodeName(grpc::StatusCode code);
 
 }  // namespace hulld::fuzz

@@ -19,12 +19,12 @@
 namespace hulld::fuzz {
 namespace {
 
-// Programs between two openings of a durable store.
+// Programs between reopenings of a durable store.
 constexpr int kProgramsPerOpening = 8;
-// Holds some of the hulls that programs make, so that the others come from the store.
+// Fits only some of the hulls of programs, so that the rest come from the store.
 constexpr uint64_t kSmallMemory = 64 << 10;
 
-// Small, so that programs of a hundred bytes reach them.
+// Small limits, so that programs of a hundred bytes reach them.
 server::Config SmallConfig() {
   server::Config config;
   config.threads = 2;
@@ -52,7 +52,7 @@ std::vector<double> CubeAt(double x) {
   return xyz;
 }
 
-// What programs find when they start.
+// Returns the hulls that exist when a program starts.
 std::vector<KnownHull> FirstHulls() {
   return {{"cube", CubeAt(0)},
           {"tetra", {0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 2}},
@@ -61,7 +61,7 @@ std::vector<KnownHull> FirstHulls() {
           {"cell-1/arm", {-1, -1, -1, 1, 1, 1}}};
 }
 
-// Those that no program can name.
+// Returns the hulls that no program can name.
 std::vector<KnownHull> Guards() { return {{"guard/a", CubeAt(0)}, {"guard/b", CubeAt(0)}}; }
 
 std::string Put(v1::HullService::Stub& hulls, const KnownHull& hull) {
@@ -88,7 +88,7 @@ std::string Put(v1::HullService::Stub& hulls, const KnownHull& hull) {
 }  // namespace
 
 ServiceFuzz::ServiceFuzz(const std::string& store) : store_(store) {
-  // What is logged is formatted, and goes nowhere.
+  // Log lines are formatted and discarded.
   auto logger =
       std::make_shared<spdlog::logger>("fuzz", std::make_shared<spdlog::sinks::null_sink_mt>());
   logger->set_level(spdlog::level::debug);
@@ -111,7 +111,7 @@ ServiceFuzz::~ServiceFuzz() {
 
 void ServiceFuzz::Start() {
   server::Config config = SmallConfig();
-  // A channel to another address than before shares nothing with it.
+  // A channel to a new address shares nothing with earlier channels.
   config.listen = absl::StrCat("unix:", directory_, "/socket-", ++opened_);
   config.store = store_;
   config.data_dir = data_dir_;
@@ -193,7 +193,7 @@ std::map<std::string, std::string> ServiceFuzz::Contents() {
 std::string ServiceFuzz::Reopen() {
   const std::map<std::string, std::string> before = Contents();
   std::string former;
-  // Every second time a backup takes the place of the store.
+  // Every second time a backup replaces the store.
   if (opened_ % 2 == 0) {
     const std::string file = absl::StrCat(directory_, "/backup-", opened_);
     BackupWriter writer(file);
@@ -212,7 +212,7 @@ std::string ServiceFuzz::Reopen() {
   Start();
   if (!former.empty()) {
     std::filesystem::remove_all(former);
-    // A store that was restored is another one.
+    // A restored store has another ID.
     store_id_.clear();
   }
   if (Contents() != before) return "a store is not what it was before it was opened again";
@@ -220,7 +220,7 @@ std::string ServiceFuzz::Reopen() {
   return {};
 }
 
-// Removes what the program before has left.
+// Removes everything left by the previous program.
 std::string ServiceFuzz::Prepare() {
   const std::map<std::string, v1::HullInfo> hulls = Hulls();
   if (hulls.empty()) return "hulls cannot be listed";

@@ -19,29 +19,26 @@
 
 namespace hulld::fuzz {
 
-// A server with small limits, in this process, behind a unix socket, and programs of calls that
-// are run on it.
+// An in-process server with small limits, behind a unix socket, that runs programs of calls.
 class ServiceFuzz {
  public:
-  // store: "memory" or "rocksdb", which is kept in a temporary directory. Aborts when no server can
-  // be started.
+  // store: "memory" or "rocksdb" in a temporary directory. Aborts if the server does not start.
   explicit ServiceFuzz(const std::string& store);
   ~ServiceFuzz();
 
-  // Reads the bytes as a program of calls, of every RPC and kind: unary, streams in either
-  // direction that are cancelled, half-closed early or never read, deadlines that have passed, and
-  // bytes that are no message. Runs it on the server with a few hulls as they are at first. What is
-  // wrong with any reply by the contract, or nothing: each call ends with a status that its
-  // contract lists, replies are consistent (reply_check.h), certificates prove what they are for,
-  // answers from a stream or a scene are those of a batch, those about a body follow from those
-  // about its pieces, hulls that the program cannot name stay
-  // as they were, the others are as acknowledged, and no call outlives the program. After some
-  // programs a durable store is opened again, itself or a backup of it: every hull, its mesh and
-  // its writer's sequence are then as before.
+  // Decodes the bytes into a program of calls, of every RPC and kind: unary, streams in either
+  // direction that are cancelled, half-closed early, or never read, expired deadlines, and
+  // malformed messages. Runs it on the server with a few initial hulls. Returns the first violation
+  // of the API contract, or empty. Checks: each call ends with a listed status, replies are
+  // consistent (reply_check.h), certificates prove their relations, answers of streams and scenes
+  // equal a batch's, answers about a body follow from its pieces, hulls that the program cannot
+  // name are unchanged, all hulls are as acknowledged, and no call outlives the program. After some
+  // programs a durable store, or a backup of it, is reopened: every hull, its mesh, and its
+  // writer's sequence are unchanged.
   std::string Run(std::span<const uint8_t> program);
 
-  // How often what was reached in all programs so far: "CreateHull OK", "CreateHull
-  // ALREADY_EXISTS", "--max-hulls" and so on.
+  // Coverage counts of all programs so far: "CreateHull OK", "CreateHull ALREADY_EXISTS",
+  // "--max-hulls", ...
   const std::map<std::string, int>& reached() const { return reached_; }
 
  private:
@@ -51,9 +48,9 @@ class ServiceFuzz {
   void Stop();
   std::string Prepare();
   std::string Reopen();
-  // All hulls, the guards too.
+  // Returns all hulls, including the guards.
   std::map<std::string, v1::HullInfo> Hulls();
-  // All that readers can see of them, in words of its own.
+  // Returns everything that readers can see of them, as text.
   std::map<std::string, std::string> Contents();
 
   const std::string store_;
@@ -70,7 +67,7 @@ class ServiceFuzz {
   std::unique_ptr<v1::MaintenanceService::Stub> maintenance_;
   std::unique_ptr<grpc::GenericStub> generic_;
   std::map<std::string, int> reached_;
-  // What every reply must carry, and the last revision seen.
+  // The store ID required in every reply, and the last revision seen.
   std::string store_id_;
   uint64_t revision_ = 0;
 };

@@ -11,9 +11,9 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld::fuzz {
-namespace {
+namespace service_fuzz_test {
 
-// The fuzzer's target without the fuzzer: as many programs on every run, from a fixed seed.
+// Runs the fuzz target without the fuzzer: a fixed number of programs from a fixed seed.
 constexpr int kPrograms = 1000;
 
 std::vector<uint8_t> RandomProgram(Random& random) {
@@ -22,7 +22,7 @@ std::vector<uint8_t> RandomProgram(Random& random) {
   return bytes;
 }
 
-// What was reached at least this many times.
+// A case that must be reached at least this many times.
 struct Goal {
   const char* what;
   int times;
@@ -126,7 +126,7 @@ TEST(ServiceFuzz, RandomProgramsOfCallsPassEveryCheck) {
   }
   std::map<std::string, int> reached_in_all = memory.reached();
   for (const auto& [what, times] : durable.reached()) reached_in_all[what] += times;
-  // The programs reach what they are for.
+  // The programs cover the intended cases.
   for (const Goal& goal : kGoals) {
     const auto reached = reached_in_all.find(goal.what);
     EXPECT_GE(reached == reached_in_all.end() ? 0 : reached->second, goal.times) << goal.what;
@@ -134,5 +134,5 @@ TEST(ServiceFuzz, RandomProgramsOfCallsPassEveryCheck) {
   for (const auto& [what, times] : reached_in_all) RecordProperty(what, times);
 }
 
-}  // namespace
+}  // namespace service_fuzz_test
 }  // namespace hulld::fuzz

@@ -1,4 +1,4 @@
-// libFuzzer on the gRPC surface:
+// libFuzzer on the gRPC API:
 //
 //   cmake --preset fuzz && cmake --build --preset fuzz --target service_fuzzer
 //   build/fuzz/bin/service_fuzzer -max_len=400 -max_total_time=1800 build/fuzz/service
@@ -13,7 +13,7 @@
 
 namespace {
 
-// The servers live as long as the process; they are never taken down.
+// The servers live until the process ends and are never shut down.
 hulld::fuzz::ServiceFuzz& Service(bool durable) {
   static auto* const memory = new hulld::fuzz::ServiceFuzz("memory");
   static auto* const rocksdb = new hulld::fuzz::ServiceFuzz("rocksdb");
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  // The first byte says on which store the rest is run.
+  // The first byte selects the store for the rest.
   const bool durable = size > 0 && data[0] % 4 == 0;
   const size_t start = size > 0 ? 1 : 0;
   const std::string finding = Service(durable).Run({data + start, size - start});

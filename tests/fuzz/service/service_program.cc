@@ -17,11 +17,11 @@ namespace {
 using server::Rpc;
 
 constexpr int kMostCalls = 24;
-// No call of a program takes long; one that does has hung.
+// Every call of a program is short; one that exceeds this has hung.
 constexpr std::chrono::seconds kPatience(60);
 constexpr int kMostComparedPlacements = 7;
 
-// A server stream with the context that it needs.
+// A server stream with its context.
 template <typename Response>
 struct OpenReader {
   ~OpenReader() { context.TryCancel(); }
@@ -135,7 +135,7 @@ bool ServiceProgram::Ended(Rpc rpc, const CallManner& manner, const grpc::Status
 
 void ServiceProgram::Settle() {
   idle_.clear();
-  // It would last.
+  // It would not end by itself.
   if (watch_ != nullptr) watch_->TryCancel();
   watch_ = nullptr;
   if (!service_.server_->WaitIdle(kPatience)) Note("a call outlives its client");
@@ -381,7 +381,7 @@ void ServiceProgram::AppendPoints() {
   Hurry(context, manner);
   const auto stream = service_.hulls_->AppendPoints(&context);
   const size_t messages = in_.Below(6);
-  // One at a time, or all at once; now and then everything stops in the middle.
+  // Chunk by chunk or pipelined; sometimes the stream is abandoned in the middle.
   const bool stepwise = in_.OneOf(2);
   const size_t cancel_at = in_.OneOf(12) ? in_.Below(4) : ~size_t{0};
   AppendCheck check;
@@ -410,7 +410,7 @@ void ServiceProgram::AppendPoints() {
   stream->WritesDone();
   while (stream->Read(&response)) receive();
   const bool ok = Ended(Rpc::kAppendPoints, manner, stream->Finish());
-  // What a refusal overtakes may stand without an acknowledgement.
+  // A change overtaken by a refusal may be committed without an ack.
   if (!ok && (check.is_open() || manner.hurried || manner.cancelled)) Doubt(hull_id);
   Note(check.Ended(ok));
   if (ok && check.is_open()) Reach("AppendPoints opened");
@@ -444,7 +444,7 @@ std::vector<double> ServiceProgram::VerticesOf(const std::string& hull_id) {
   return xyz;
 }
 
-// Asks the same two again for a proof of their relation.
+// Queries the same pair again for a proof of its relation.
 void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
                                         const v1::CheckCollisionResponse& answer) {
   v1::CheckCollisionRequest request;
@@ -455,7 +455,7 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   v1::CheckCollisionResponse response;
   const grpc::Status status = service_.collisions_->CheckCollision(&context, request, &response);
   if (!status.ok()) return Note("no certificate: " + status.error_message());
-  // A body that has the ID of a hull that went.
+  // A body has taken over the ID of a deleted hull.
   if (!response.piece_hulls().empty()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {

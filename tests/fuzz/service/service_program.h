@@ -24,27 +24,26 @@
 
 namespace hulld::fuzz {
 
-// What replies tell of a hull, whichever call they answer.
+// Returns the part of a hull's information that every reply contains.
 std::string Known(const v1::HullInfo& hull);
 
-// Whether a call can change a hull.
+// Returns true if a call can change a hull.
 bool ChangesHulls(server::Rpc rpc);
 
-// One run of one program: decodes and makes its calls, and checks what comes back.
+// One run of a program: decodes and makes its calls, and checks the replies.
 class ServiceProgram {
  public:
-  // hulls: all that there are, by ID.
+  // hulls: all existing ones, by ID.
   ServiceProgram(ServiceFuzz& service, std::map<std::string, v1::HullInfo> hulls,
                  std::span<const uint8_t> program)
       : service_(service), in_(program), hulls_(std::move(hulls)) {}
 
-  // The first finding, or nothing.
+  // Returns the first finding, or empty.
   std::string Run();
-  // Whether the hulls that no program can name are as they were, and the server answers.
+  // Checks that the server answers, and that the hulls that no program can name are unchanged.
   std::string CheckGuards();
-  // Whether the hulls that are there are those that the server acknowledged, of whose changes each
-  // was answered or refused: nothing is lost, and what was refused has changed nothing. Requires
-  // that no call runs.
+  // Checks that the existing hulls are those acknowledged, each with all acknowledged and no
+  // refused changes. Requires: no call is running.
   std::string CheckAcknowledged();
 
  private:
@@ -72,26 +71,26 @@ class ServiceProgram {
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0, service_.store_id_}; }
-  // Gives the call its deadline, rarely one that has passed.
+  // Sets the call's deadline, rarely one that has passed.
   void Hurry(grpc::ClientContext& context, CallManner& manner);
   void Note(std::string finding);
   void Reach(const std::string& what) { ++service_.reached_[what]; }
-  // How a call ended; true when OK.
+  // Checks the final status of a call. Returns true if OK.
   bool Ended(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
-  // A call that its client gives up may still change something: waits until all calls have ended.
+  // Waits until all calls have ended: an abandoned call may still change something.
   void Settle();
-  // Takes the header of a watch, whose revision is that of what was told.
+  // Checks the header of a watch; its revision is that of the reported events.
   void SeeStore(const v1::ResponseHeader& header);
   void SeeHeader(const v1::ResponseHeader& header);
   void SeeHull(const v1::HullInfo& hull);
-  // A hull that a reply tells of is the one that was acknowledged.
+  // Checks that a hull in a reply equals the acknowledged one.
   void SeeKnownHull(const v1::HullInfo& hull);
-  // A change of this hull was not acknowledged, and not refused for certain.
+  // Marks a hull with a change of unknown outcome.
   void Doubt(const std::string& hull_id) { doubtful_.insert(hull_id); }
-  // `if_revision` as a client has it that knows this hull, where it is to be the last one seen.
+  // Returns `if_revision`, replaced by the revision last seen if it stands for that.
   uint64_t RevisionToExpect(const std::string& hull_id, uint64_t if_revision) const;
 
-  // One unary call; true when it ended OK, its header checked.
+  // Makes a unary call. Returns true if it ended OK with a valid header.
   template <typename Stub, typename Request, typename Response>
   bool Call(server::Rpc rpc, Stub& stub,
             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
@@ -106,14 +105,14 @@ class ServiceProgram {
     if (ok) SeeHeader(response->header());
     return ok;
   }
-  // One server stream; `parts` holds all of it and true comes back when it was read to an OK end.
+  // Reads a server stream into `parts`. Returns true if it ended OK.
   template <typename Stub, typename Request, typename Response>
   bool ReadStream(server::Rpc rpc, Stub& stub,
                   std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(
                       grpc::ClientContext*, const Request&),
                   const Request& request, std::vector<Response>* parts);
 
-  // Careful calls, beside the program's own: they must end OK.
+  // Calls besides the program's own, which must end OK.
   std::vector<double> VerticesOf(const std::string& hull_id);
   void CheckCertificateOf(const v1::CheckCollisionRequest& asked,
                           const v1::CheckCollisionResponse& answer);
@@ -121,13 +120,14 @@ class ServiceProgram {
   void CompareSceneWithBatch(const v1::FindCollisionsRequest& request,
                              std::span<const v1::FindCollisionsResponse> parts);
 
-  // One that is there, mostly.
+  // Returns a hull ID, usually of an existing hull.
   std::string AnyHull();
-  // Whether a body's relation is the strongest of its pieces', and its certificates prove it.
+  // Checks that a body's relation is the strongest of its pieces', and that its certificates prove
+  // it.
   void CompareWithPieces(const v1::CheckCollisionRequest& request,
                          const v1::CheckCollisionResponse& response);
 
-  // One WatchHulls call; true when all was told that is to be.
+  // Makes a WatchHulls call. Returns true if it reported everything expected.
   bool WatchHullsOnce(const v1::WatchHullsRequest& request, bool then_change,
                       HullWatchCheck* check);
   std::vector<std::string> ChangedSince(const std::map<std::string, v1::HullInfo>& before) const;
@@ -138,7 +138,7 @@ class ServiceProgram {
   v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
   v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
-  // The same request in its other form, now and then.
+  // Sometimes returns the request in its other form.
   template <typename Request>
   std::optional<Request> MaybePacked(const Request& request) {
     if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
@@ -153,18 +153,18 @@ class ServiceProgram {
   ServiceFuzz& service_;
   ByteReader in_;
   std::string finding_;
-  // The revision of the hull that was last seen.
+  // Revision of the hull last seen.
   uint64_t revision_ = 0;
-  // What the server has acknowledged of each hull, and of which that is not all.
+  // Acknowledged state of each hull, and the hulls with changes of unknown outcome.
   std::map<std::string, v1::HullInfo> hulls_;
   std::set<std::string> doubtful_;
-  // Those of the bodies whose last change was acknowledged.
+  // Bodies with an acknowledged last change.
   std::map<std::string, v1::PutBodyRequest> bodies_;
-  // A change of any hull may have happened.
+  // True if any hull may have changed.
   bool all_doubtful_ = false;
-  // Streams that nobody reads; they end with the program.
+  // Streams that are never read; they end with the program.
   std::vector<std::shared_ptr<void>> idle_;
-  // A watch that lasts while other calls are made; null once it was given up.
+  // A watch that runs during other calls; null after it is abandoned.
   grpc::ClientContext* watch_ = nullptr;
 };
 

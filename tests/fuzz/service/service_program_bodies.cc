@@ -1,4 +1,4 @@
-// Bodies: what is put is what is there, and what is answered follows from the pieces.
+// Bodies: reads return the pieces put, and answers follow from the pieces.
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -12,15 +12,15 @@ namespace {
 
 using server::Rpc;
 
-// A batch of the service takes no more.
+// The limit of a batch.
 constexpr int kMostComparedPairs = 60;
 
-// The place of a relation among those of pieces.
+// Returns the rank of a relation among those of pieces.
 int Strength(v1::Relation relation) {
   return relation == v1::RELATION_OVERLAPPING ? 2 : relation == v1::RELATION_TOUCHING ? 1 : 0;
 }
 
-// A piece where it was put; no rotation and no translation count as those that do nothing.
+// Returns a piece with its pose as text; a missing rotation or translation equals the identity.
 std::string Text(const v1::Placement& piece) {
   const v1::Vector3& t = piece.pose().translation();
   return absl::StrCat(piece.hull_id(), " at ", t.x(), " ", t.y(), " ", t.z());
@@ -32,7 +32,7 @@ void ServiceProgram::PutBody() {
   v1::PutBodyRequest request;
   v1::PutBodyResponse response;
   FillMessage(in_, Hints(), &request);
-  // Mostly of a few hulls that are there, near each other, and without a condition.
+  // Usually a few existing hulls, close together, without a condition.
   if (!in_.OneOf(4)) {
     request.clear_if_revision();
     while (request.pieces_size() > 4) request.mutable_pieces()->RemoveLast();
@@ -43,7 +43,7 @@ void ServiceProgram::PutBody() {
   }
   if (!Call(Rpc::kPutBody, *service_.bodies_, &v1::BodyService::Stub::PutBody, request,
             &response)) {
-    // It may have happened all the same.
+    // The put may have taken effect anyway.
     bodies_.erase(request.body_id());
     return;
   }
@@ -120,8 +120,8 @@ void ServiceProgram::DeleteBody() {
   bodies_.erase(request.body_id());
 }
 
-// A body that stands where it was built, so that its pieces can be asked about at the same places:
-// against whatever, or against another such body.
+// Queries a body at the identity pose, so that its pieces can be queried at the same places:
+// against any placement, or another such body.
 void ServiceProgram::AskAboutBody() {
   if (bodies_.empty()) return;
   const auto any_body = [this] {
@@ -164,7 +164,7 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
   };
   const Pieces a = pieces_of(request.a());
   const Pieces b = pieces_of(request.b());
-  // A body that is not known, or that stands elsewhere, cannot be compared with its pieces.
+  // A body that is unknown or has another pose cannot be compared with its pieces.
   const bool is_elsewhere = bodies_.contains(request.b().hull_id()) && request.b().has_pose();
   const bool is_known =
       bodies_.contains(request.b().hull_id()) || hulls_.contains(request.b().hull_id());

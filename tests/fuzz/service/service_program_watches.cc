@@ -1,4 +1,4 @@
-// Watches, and what they tell while other calls change hulls and placements move.
+// Watches, and their events while other calls change hulls and placements move.
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -12,36 +12,26 @@ namespace {
 
 using server::Rpc;
 
-// A batch of the service takes no more.
+// The limit of a batch.
 constexpr int kMostComparedPairs = 60;
 
 }  // namespace
 
-// Watches until all is told, makes a change and sees it told, and resumes.
+// Watches until synced, makes a change, waits for its event, and resumes.
 void ServiceProgram::WatchHulls() {
   v1::WatchHullsRequest request;
   FillMessage(in_, Hints(), &request);
   const size_t kind = in_.Below(4);
-  // Mostly from the start, sometimes as after a break of the connection.
+  // Usually from the start, sometimes as after a broken connection.
   if (kind > 0) request.clear_after_revision();
-  if (kind > 0) request.clear_after();
   if (kind == 0) request.set_store_id(service_.store_id_);
   if (kind == 1) request.set_store_id("another");
   if (!request.hull_id().empty() && !in_.OneOf(4)) request.clear_prefix();
   HullWatchCheck check(request);
   if (!WatchHullsOnce(request, true, &check) || !finding_.empty()) return;
   if (check.header().revision() == 0) return;
-  // By either of the fields, which say the same of one store.
-  request.clear_after_revision();
-  request.clear_after();
-  if (in_.OneOf(2)) {
-    v1::ShardRevision* const after = request.add_after();
-    after->set_revision(check.header().revision());
-    after->set_store_id(check.header().store_id());
-  } else {
-    request.set_after_revision(check.header().revision());
-    request.set_store_id(check.header().store_id());
-  }
+  request.set_after_revision(check.header().revision());
+  request.set_store_id(check.header().store_id());
   HullWatchCheck resumed(request);
   if (!WatchHullsOnce(request, false, &resumed) || !finding_.empty()) return;
   Reach("WatchHulls resumed");
@@ -66,7 +56,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     return finding_.empty();
   };
   bool told = read_until([&] { return check->is_synced(); });
-  // A watch that was resumed tells what changed.
+  // A resumed watch reports the changes only.
   const bool tells_all = !Resumes(request) || check->is_anew();
   if (told && tells_all) CompareWatched(*check);
   if (told && then_change) {
@@ -79,7 +69,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     } else {
       AppendPoints();
     }
-    // Otherwise a call was given up, and this one with it.
+    // Otherwise a call was abandoned, and this one with it.
     manner.cancelled = std::exchange(watch_, nullptr) == nullptr;
     told = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
     for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {
@@ -96,7 +86,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     if (told && tells_all) CompareWatched(*check);
   }
   manner.cancelled = manner.cancelled || lasts;
-  // What has ended says why.
+  // A watch that has ended returns its status.
   if (lasts) context.TryCancel();
   while (reader->Read(&response)) {
   }
@@ -106,7 +96,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   return told;
 }
 
-// The hulls whose revision is another than `before`, and those that came or went.
+// Returns the hulls with a revision other than in `before`, created and deleted ones included.
 std::vector<std::string> ServiceProgram::ChangedSince(
     const std::map<std::string, v1::HullInfo>& before) const {
   std::vector<std::string> changed;
@@ -122,7 +112,7 @@ std::vector<std::string> ServiceProgram::ChangedSince(
   return changed;
 }
 
-// What a watch has told is what was acknowledged.
+// Checks that the watch's state equals the acknowledged state.
 void ServiceProgram::CompareWatched(const HullWatchCheck& check) {
   for (const auto& [hull_id, known] : hulls_) {
     const bool is_certain = doubtful_.count(hull_id) == 0 && !all_doubtful_;
@@ -131,7 +121,7 @@ void ServiceProgram::CompareWatched(const HullWatchCheck& check) {
     }
   }
   const uint64_t revision = revision_;
-  // Points that change no vertex are counted with the next event.
+  // Points that change no vertex are reported with the next event.
   for (const auto& [hull_id, told] : check.hulls()) {
     const auto known = hulls_.find(hull_id);
     const bool only_counted = known != hulls_.end() && known->second.revision() == told.revision();
@@ -147,7 +137,7 @@ v1::WatchCollisionsRequest ServiceProgram::NextWatchMessage(bool first, size_t p
     FillMessage(in_, hints, &request);
   } else if (first) {
     FillMessage(in_, hints, request.mutable_open());
-    // Pairs go with no groups.
+    // Pairs exclude groups.
     v1::CollisionWatchOpen* const open = request.mutable_open();
     if (in_.OneOf(3)) {
       open->clear_groups();

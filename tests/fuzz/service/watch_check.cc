@@ -10,7 +10,7 @@
 namespace hulld::fuzz {
 namespace {
 
-// The kind of event that leads from one state to another, as the contract has it.
+// Returns the kind of event for a transition, as specified by the contract.
 v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation after,
                               bool is_near) {
   if (after == v1::RELATION_UNSPECIFIED) return v1::COLLISION_EVENT_KIND_LOST;
@@ -30,9 +30,7 @@ bool IsThere(const v1::HullEvent& event) {
 
 }  // namespace
 
-bool Resumes(const v1::WatchHullsRequest& request) {
-  return request.after_revision() > 0 || !request.after().empty();
-}
+bool Resumes(const v1::WatchHullsRequest& request) { return request.after_revision() > 0; }
 
 bool HullWatchCheck::Watches(const std::string& hull_id) const {
   if (!request_.hull_id().empty()) return hull_id == request_.hull_id();
@@ -55,7 +53,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   uint64_t last_revision = 0;
   for (const v1::HullEvent& event : response.events()) {
     const v1::HullInfo& hull = event.hull();
-    // What went comes first, then what is there.
+    // Deleted hulls come first, then existing ones.
     const bool is_there = !is_synced_ && event.kind() != v1::HULL_EVENT_KIND_DELETED;
     if (is_there && hull.hull_id() <= last_id) return "events are not in the order of IDs";
     if (!is_there && (hull.revision() < last_revision || !last_id.empty())) {
@@ -68,7 +66,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
       return "a body without pieces, or a hull with some";
     }
     if (event.is_body()) {
-      // What was a hull is one no more.
+      // The ID is no longer a hull's.
       hulls_.erase(hull.hull_id());
       if (IsThere(event)) bodies_.insert(hull.hull_id());
       if (!IsThere(event)) bodies_.erase(hull.hull_id());
@@ -164,7 +162,7 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   State& state = told_[pair];
   const State before = state;
   state = {event.relation(), event.within_clearance()};
-  // A pair that is named twice is told of twice.
+  // A pair named twice is reported twice.
   const auto named = named_.find(pair);
   if (named != named_.end() && named->second > 1) return {};
   if (!told_now_.insert(pair).second) return "it is told of twice";

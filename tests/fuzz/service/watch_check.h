@@ -12,20 +12,20 @@
 
 namespace hulld::fuzz {
 
-// Whether it goes on behind what an earlier watch was told.
+// True if the watch resumes an earlier one.
 bool Resumes(const v1::WatchHullsRequest& request);
 
-// Follows one WatchHulls call: what its client knows of the hulls. Functions return what is wrong
-// with a message, or nothing.
+// Follows one WatchHulls call and its client's knowledge of the hulls. Functions return the fault
+// of a message, or empty.
 class HullWatchCheck {
  public:
   explicit HullWatchCheck(v1::WatchHullsRequest request) : request_(std::move(request)) {}
 
   std::string Received(const v1::WatchHullsResponse& response);
 
-  // Whether the watch tells of this hull.
+  // Returns true if the watch covers this hull.
   bool Watches(const std::string& hull_id) const;
-  // By ID. Complete once synced, unless the watch resumed another.
+  // By ID. Complete after synced, unless the watch resumed another.
   const std::map<std::string, v1::HullInfo>& hulls() const { return hulls_; }
   bool is_synced() const { return is_synced_; }
   bool is_anew() const { return is_anew_; }
@@ -36,28 +36,28 @@ class HullWatchCheck {
 
   const v1::WatchHullsRequest request_;
   std::map<std::string, v1::HullInfo> hulls_;
-  // Those that were told of.
+  // Bodies reported.
   std::set<std::string> bodies_;
   v1::ResponseHeader header_;
   bool is_synced_ = false;
   bool is_anew_ = false;
 };
 
-// Follows one WatchCollisions call: what its client knows of the pairs.
+// Follows one WatchCollisions call and its client's knowledge of the pairs.
 class CollisionWatchCheck {
  public:
-  // open: with placements that are not packed.
+  // open: its placements must not be packed.
   explicit CollisionWatchCheck(v1::CollisionWatchOpen open);
 
   // Messages are numbered from 0, the opening one.
   void Sent(const v1::CollisionWatchUpdate& update);
   std::string Received(const v1::WatchCollisionsResponse& response);
 
-  // Whether all that was sent has been told of.
+  // True if everything sent has been answered.
   bool is_settled() const { return is_synced_ && told_update_ == sent_; }
-  // What was told of pairs that touch or overlap, named by the lower index first.
+  // Returns the reported pairs that touch or overlap, lower index first.
   std::map<std::pair<uint32_t, uint32_t>, v1::Relation> Colliding() const;
-  // The question of a batch about all pairs that are watched, as they are by now.
+  // Returns a batch of all watched pairs in their current state.
   v1::BatchCheckCollisionsRequest AsBatch() const;
 
  private:
@@ -71,7 +71,7 @@ class CollisionWatchCheck {
   std::string TakeEvent(const v1::CollisionEvent& event);
 
   v1::CollisionWatchOpen open_;
-  // Where pairs are named: each, as often as it is named.
+  // For explicitly named pairs: their multiplicity.
   std::map<Pair, int> named_;
   std::map<Pair, State> told_;
   // Since the last `synced`.

@@ -1,5 +1,4 @@
-// A program of somebody else: appends a cube, asks a question, and verifies the certificate of the
-// answer.
+// A third-party program: appends a cube, queries it, and verifies the certificate of the answer.
 #include <cstdio>
 #include <string>
 

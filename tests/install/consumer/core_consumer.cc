@@ -1,4 +1,4 @@
-// A program that uses hulld::core alone: two unit cubes that share a face touch.
+// A program that uses hulld::core only: two unit cubes that share a face touch.
 #include <cstdio>
 #include <vector>
 

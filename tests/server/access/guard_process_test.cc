@@ -1,4 +1,4 @@
-// The program itself, with certificates and tokens: what it notices, and what it never writes.
+// The program itself, with certificates and tokens: reloading, and secrets in the log.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@
 #include "tests/server/harness/test_certificates.h"
 
 namespace hulld::server {
-namespace {
+namespace guard_process_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -154,5 +154,5 @@ TEST_F(GuardProcess, CheckConfigEndsWith0Or2AndNamesTheSetting) {
   expect({}, 2, "--tls-cert: the certificate of CN = old expired on ");
 }
 
-}  // namespace
+}  // namespace guard_process_test
 }  // namespace hulld::server

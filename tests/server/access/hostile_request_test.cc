@@ -1,4 +1,4 @@
-// What callers can make the program hold before it knows who they are, and after.
+// Memory that callers can make the program hold, before and after they are authenticated.
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -16,11 +16,12 @@
 
 #include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
+#include "server/settings/config.h"
 #include "tests/server/harness/hulld_process.h"
 #include "tests/server/harness/test_certificates.h"
 
 namespace hulld::server {
-namespace {
+namespace hostile_request_test {
 
 #ifdef HULLD_SANITIZED
 constexpr bool kKeepsWhatWasFreed = true;
@@ -113,9 +114,10 @@ TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
   using grpc::reflection::v1alpha::ServerReflection;
   using grpc::reflection::v1alpha::ServerReflectionRequest;
   using grpc::reflection::v1alpha::ServerReflectionResponse;
-  constexpr int kStreams = 200;
+  // Fewer than one connection may have.
+  constexpr int kStreams = 80;
   Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--log-format", "json",
-                 "--max-streams-per-client", std::to_string(kStreams)});
+                 "--max-anonymous-calls", std::to_string(kStreams * Limits::kAnonymousShare)});
   const auto stub = ServerReflection::NewStub(grpc::CreateChannel(
       AddressIn(hulld.ReadLineWith("listening on ")), grpc::InsecureChannelCredentials()));
   struct Stream {
@@ -148,5 +150,5 @@ TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
   for (const auto& stream : streams) stream->context.TryCancel();
 }
 
-}  // namespace
+}  // namespace hostile_request_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// A token that is taken back takes its open calls with it.
+// Open calls end when their token is revoked.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,9 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "client/calls/grpc_status.h"
 #include "tests/server/harness/captured_log.h"
@@ -15,7 +17,7 @@
 #include "tests/server/harness/test_tokens.h"
 
 namespace hulld::server {
-namespace {
+namespace revocation_test {
 
 using ::testing::HasSubstr;
 
@@ -151,7 +153,62 @@ TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-// The name stays; the token, or what it may do, is another.
+// The last token is removed with its line, with all content, with the file, or by a dangling link.
+TEST_F(Revocation, OfTheLastTokenRefusesEverything) {
+  const auto create = [this](const std::string& token) {
+    grpc::ClientContext context;
+    Be(context, token);
+    v1::CreateHullRequest request;
+    request.set_hull_id("after");
+    request.set_if_absent(true);
+    v1::CreateHullResponse response;
+    return hulls_->CreateHull(&context, request, &response);
+  };
+  const std::vector<std::function<void()>> ways = {
+      [this] { WriteSecret(path_, "# nobody\n"); },
+      [this] { WriteSecret(path_, ""); },
+      [this] { std::filesystem::remove(path_); },
+      [this] {
+        std::filesystem::remove(path_);
+        std::filesystem::create_symlink(path_ + ".gone", path_);
+      },
+  };
+  for (size_t way = 0; way < ways.size(); ++way) {
+    SCOPED_TRACE(way);
+    std::filesystem::remove(path_);
+    ReplaceTokens(kept_);
+    ASSERT_TRUE(create("kept secret").ok());
+    grpc::ClientContext context;
+    Be(context, "kept secret");
+    const auto watch = hulls_->WatchHulls(&context, {});
+    v1::WatchHullsResponse change;
+    ASSERT_TRUE(watch->Read(&change));
+    CapturedLog log;
+    ways[way]();
+    server_->ReloadFiles();
+    server_->ReloadFiles();
+    while (watch->Read(&change)) {
+    }
+    ExpectRevoked(watch->Finish());
+    ExpectRevoked(create("kept secret"));
+    ExpectRevoked(create("gone secret"));
+    EXPECT_THAT(log.text(), HasSubstr("error --tokens-file " + path_));
+    // Once.
+    EXPECT_EQ(log.text().find("every token is revoked"),
+              log.text().rfind("every token is revoked"));
+  }
+}
+
+// An unreadable file is no revocation.
+TEST_F(Revocation, DoesNotFollowFromAFileThatCannotBeRead) {
+  ReplaceTokens(kept_ + "half a li");
+  grpc::ClientContext context;
+  Be(context, "gone secret");
+  v1::GetStatusResponse response;
+  EXPECT_TRUE(status_->GetStatus(&context, {}, &response).ok());
+}
+
+// The name stays, but the token or its rights change.
 TEST_F(Revocation, CountsAsOneWhenTheTokenOrItsRightsChange) {
   const std::string narrower = TokenLine("gone", "read-only", "cell-1/", "gone secret");
   for (const std::string& line : {TokenLine("gone", "admin", "*", "next secret"), narrower}) {
@@ -168,5 +225,5 @@ TEST_F(Revocation, CountsAsOneWhenTheTokenOrItsRightsChange) {
   }
 }
 
-}  // namespace
+}  // namespace revocation_test
 }  // namespace hulld::server

@@ -18,7 +18,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace tls_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -43,7 +43,7 @@ class Tls : public ServerTest {
     return path;
   }
 
-  // How a call over a connection of its own ends.
+  // Returns the status of a call over a new connection.
   grpc::StatusCode Connect(std::shared_ptr<grpc::ChannelCredentials> credentials) {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -100,6 +100,32 @@ TEST_F(Tls, MutualTlsRefusesClientsWithoutACertificateOfTheAuthority) {
   EXPECT_EQ(Connect(Trusting(authority_, other_.Issue("client"))), grpc::StatusCode::OK);
   EXPECT_EQ(Connect(Trusting(authority_, authority_.Issue("client"))),
             grpc::StatusCode::UNAVAILABLE);
+}
+
+// As with the last token: the authority may have been revoked.
+TEST_F(Tls, WithoutAnAuthorityOfClientsNobodyConnects) {
+  config_.tls_client_ca = Write("clients.crt", authority_.certificate());
+  Restart(config_);
+  const TestIdentity client = authority_.Issue("client");
+  for (const bool is_removed : {false, true}) {
+    SCOPED_TRACE(is_removed);
+    ASSERT_EQ(Connect(Trusting(authority_, client)), grpc::StatusCode::OK);
+    if (is_removed) {
+      std::filesystem::remove(config_.tls_client_ca);
+    } else {
+      Write("clients.crt", "# nobody\n");
+    }
+    server_->ReloadFiles();
+    EXPECT_EQ(Connect(Trusting(authority_, client)), grpc::StatusCode::UNAVAILABLE);
+    EXPECT_EQ(Connect(Trusting(authority_)), grpc::StatusCode::UNAVAILABLE);
+    // A damaged file does not count as empty.
+    Write("clients.crt", authority_.certificate().substr(0, 200));
+    server_->ReloadFiles();
+    EXPECT_EQ(Connect(Trusting(authority_, client)), grpc::StatusCode::UNAVAILABLE);
+    Write("clients.crt", authority_.certificate());
+    server_->ReloadFiles();
+  }
+  EXPECT_EQ(Connect(Trusting(authority_, client)), grpc::StatusCode::OK);
 }
 
 TEST_F(Tls, NewConnectionsSeeExchangedCertificatesAndOldOnesStand) {
@@ -247,5 +273,5 @@ TEST_F(Tls, ADataDirectoryCanBeMadeWhereADirectoryIs) {
   EXPECT_THAT(std::string(CheckDataDir("/proc/new").message()), HasSubstr("cannot be written"));
 }
 
-}  // namespace
+}  // namespace tls_test
 }  // namespace hulld::server

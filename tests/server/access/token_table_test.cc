@@ -10,7 +10,7 @@
 #include "tests/server/harness/test_certificates.h"
 
 namespace hulld::server {
-namespace {
+namespace token_table_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -45,8 +45,6 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("ba7816bf"))) << text;
   };
   const std::string good = Line("a", "admin", "*", kAbc);
-  expect("", "it holds no token");
-  expect("# nothing\n", "it holds no token");
   expect(good + "b admin *\n", "line 2: it is not four words");
   expect("# x\n" + Line("b", "admin", "* more", kAbc), "line 2: it is not four words");
   expect(Line("-b", "admin", "*", kAbc), "line 1: the name");
@@ -72,9 +70,14 @@ TEST(TokenTable, AFileThatOthersCanUseIsRefused) {
     EXPECT_THAT(std::string(ReadTokensFile(path).status().message()),
                 HasSubstr("--tokens-file " + path + ": its permissions"));
   }
+  WriteSecret(path, "# nobody\n\n");
+  EXPECT_THAT(std::string(ReadTokensFile(path).status().message()),
+              HasSubstr("--tokens-file " + path + ": it holds no token"));
+  EXPECT_TRUE(RereadTokensFile(path)->empty());
   std::remove(path.c_str());
+  EXPECT_TRUE(RereadTokensFile(path)->empty());
   EXPECT_THAT(std::string(ReadTokensFile(path).status().message()), HasSubstr("No such file"));
 }
 
-}  // namespace
+}  // namespace token_table_test
 }  // namespace hulld::server

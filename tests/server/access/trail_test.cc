@@ -16,7 +16,7 @@
 #include "tests/server/harness/test_tokens.h"
 
 namespace hulld::server {
-namespace {
+namespace trail_test {
 
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
@@ -156,7 +156,7 @@ TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
     return ValueOf(context.GetServerTrailingMetadata(), "traceparent");
   };
   EXPECT_EQ(ask({kTraceparent}, "a"), kTraceparent);
-  // What is malformed, or given twice, is no trace.
+  // A malformed or repeated header is no trace.
   EXPECT_EQ(ask({"00-00000000000000000000000000000000-b7ad6b7169203331-01"}, "b"), "");
   EXPECT_EQ(ask({kTraceparent, kTraceparent}, "c"), "");
   EXPECT_EQ(ask({}, "d"), "");
@@ -168,5 +168,5 @@ TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
   EXPECT_THAT(log.text(), ContainsRegex("request_id=[^ ]+ token=robot peer=[^ ]+ hull=b "));
 }
 
-}  // namespace
+}  // namespace trail_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Certificates of bodies: what a single call answers, checked by client/verify alone.
+// Certificates of bodies: answers of single calls, checked by client/verify alone.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace body_certificates_test {
 
 using ::testing::HasSubstr;
 
@@ -27,7 +27,7 @@ class BodyCertificates : public BodyTest {
     return request;
   }
 
-  // The answer, which is checked.
+  // Returns the verified answer.
   v1::CheckCollisionResponse Prove(const v1::CheckCollisionRequest& request) const {
     const auto verified = CheckCollisionVerified(MakeClient(), request);
     EXPECT_TRUE(verified.ok()) << verified.status();
@@ -46,7 +46,7 @@ class BodyCertificates : public BodyTest {
     return verification.ok() ? *verification : Verification();
   }
 
-  // A row of unit cubes, 2 apart along x, and a row across it.
+  // Puts a row of unit cubes, 2 apart along x, and a row across it.
   void PutRows(int count) {
     Put("cube", Cube());
     std::vector<v1::Placement> pieces;
@@ -79,7 +79,7 @@ TEST_F(BodyCertificates, EveryRelationIsProven) {
   EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
   EXPECT_EQ(touching.piece_certificates_size(), 30);
 
-  // Turned as one, the boxes meet and the hulls do not.
+  // Under a common rotation, the boxes meet and the hulls do not.
   const auto apart =
       Prove(Question(Turned(PlacementOf("row")), Turned(PlacementOf("row", 0.8, 0.8, 0.8))));
   EXPECT_EQ(apart.relation(), v1::RELATION_SEPARATED);
@@ -146,7 +146,7 @@ TEST_F(BodyCertificates, WhatIsAlteredIsRefused) {
   *altered.add_piece_hulls() = proven.piece_hulls(0);
   altered.mutable_piece_hulls(0)->set_hull_id("other");
   EXPECT_THAT(refused(altered), HasSubstr("piece 0 of body row is hull cube"));
-  // A pose that the question did not have.
+  // A pose that the query did not have.
   v1::CheckCollisionRequest moved = request;
   moved.mutable_b()->mutable_pose()->mutable_translation()->set_y(1.5);
   EXPECT_EQ(Verify(moved, proven).verdict, Verdict::kInvalid);
@@ -184,7 +184,7 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
   EXPECT_EQ(ReasonOf(many.status()), v1::ERROR_REASON_PROOF_TOO_LARGE);
   EXPECT_THAT(MetadataOf(many.status(), "limit"), testing::Optional(std::string("8192")));
   EXPECT_THAT(std::string(many.status().message()), HasSubstr("more than 8192 pairs of pieces"));
-  // 8100 do, and fit.
+  // 8100 pairs touch, and fit.
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(81, PlacementOf("cube"))).ok());
   const auto fits =
       MakeClient().CheckCollision(Question(PlacementOf("heap"), PlacementOf("less", 1, 0, 0)));
@@ -193,12 +193,12 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
   EXPECT_LT(fits->ByteSizeLong(), size_t{4} << 20);
 }
 
-// Rows of a batch, a stream or a scene, checked as single answers are.
+// Rows of a batch, stream, or scene, checked like single answers.
 class BodyProofs : public BodyCertificates {
  protected:
-  // Whether every row is answered and proven. `placement_of`: by index among the call's; `pairs`:
-  // those of the rows. Hulls, pieces' too, are those of the whole call. Returns how many rows had
-  // certificates of pieces.
+  // Expects that every row is answered and proven. `placement_of`: index into the call's
+  // placements; `pairs`: the pairs of the rows. Hulls, including those of pieces, are the whole
+  // call's. Returns the number of rows with certificates of pieces.
   int ExpectProven(const std::vector<v1::Placement>& placements, const std::vector<uint32_t>& pairs,
                    const std::vector<v1::HullVersion>& hulls,
                    const std::vector<v1::HullVersion>& piece_hulls,
@@ -238,7 +238,7 @@ class BodyProofs : public BodyCertificates {
     return proofs;
   }
 
-  // Proofs name rows of their own message.
+  // Proofs refer to rows of their own message.
   template <typename Message>
   static void Append(const Message& part, Message* all) {
     const int rows = all->columns().relations_size();
@@ -258,7 +258,7 @@ class BodyProofs : public BodyCertificates {
   static std::vector<v1::HullVersion> PieceHullsOf(const Message& message) {
     return {message.piece_hulls().begin(), message.piece_hulls().end()};
   }
-  // Two rows, a row that is turned, and two cubes that are no bodies.
+  // Two rows, a rotated row, and two cubes that are not bodies.
   std::vector<v1::Placement> Cell() {
     PutRows(5);
     Put("probe", Cube());
@@ -292,7 +292,7 @@ TEST_F(BodyProofs, OfBatchesAreChecked) {
   // All but the pair of probes.
   EXPECT_EQ(ExpectProven(cell, pairs, HullsOf(all), PieceHullsOf(all), all.columns()), 9);
   EXPECT_TRUE(all.columns().certificates(0).pairs().empty());
-  // Nothing of it where no certificate is wanted.
+  // No proofs if no certificate is wanted.
   request.mutable_wanted()->set_certificate(false);
   v1::BatchCheckCollisionsResponse plain;
   ASSERT_TRUE(MakeClient()
@@ -334,7 +334,7 @@ TEST_F(BodyProofs, OfStreamsAreCheckedAfterEachUpdate) {
   ASSERT_TRUE(answer.ok()) << answer.status();
   EXPECT_EQ(ExpectProven(cell, pairs, HullsOf(*answer), PieceHullsOf(*answer), answer->columns()),
             3);
-  // Another piece, which the stream hears of when it refreshes.
+  // Another piece, which the stream sees when it refreshes.
   Put("other", Cube());
   ASSERT_TRUE(PutBody("row", {PlacementOf("other", 0.5, 0, 0), PlacementOf("cube", 9, 9, 9)}).ok());
   v1::CollisionStreamUpdate update;
@@ -354,7 +354,7 @@ TEST_F(BodyProofs, ARowThatIsTooLargeHasAProblemAndTheOthersAnswers) {
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(80, PlacementOf("cube"))).ok());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("heap");
-  // 10000 pairs touch, 8000 do, which take some bytes more where all six pairs are distinct.
+  // 10000 pairs touch; then 8000, which take slightly more bytes if all six pairs are distinct.
   *request.add_placements() = PlacementOf("heap", 1, 0, 0);
   *request.add_placements() = PlacementOf("less", 1, 0, 0);
   *request.add_placements() = PlacementOf("cube", 1, 0, 0);
@@ -390,5 +390,5 @@ TEST_F(BodyProofs, ARowThatIsTooLargeHasAProblemAndTheOthersAnswers) {
   EXPECT_EQ(problems.front(), v1::ERROR_REASON_PROOF_TOO_LARGE);
 }
 
-}  // namespace
+}  // namespace body_certificates_test
 }  // namespace hulld::server

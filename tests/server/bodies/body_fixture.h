@@ -39,7 +39,7 @@ class BodyTest : public ServerTest {
     return MakeClient().PutBody(request);
   }
 
-  // Two unit cubes, 4 apart along x, and the body of both.
+  // Puts two unit cubes, 4 apart along x, as one body.
   void PutPair(const std::string& body_id) {
     Put("cube", Cube());
     ASSERT_TRUE(PutBody(body_id, {PlacementOf("cube"), PlacementOf("cube", 5, 0, 0)}).ok());

@@ -1,4 +1,4 @@
-// Questions that name bodies: single calls, batches, streams and scenes.
+// Queries about bodies: single calls, batches, streams, and scenes.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace body_questions_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -17,7 +17,7 @@ using ::testing::Optional;
 
 class BodyQuestions : public BodyTest {
  protected:
-  // One answer of a batch, its messages put together.
+  // Returns the merged answer of a batch.
   absl::StatusOr<v1::BatchCheckCollisionsResponse> Batch(
       const v1::BatchCheckCollisionsRequest& request) {
     v1::BatchCheckCollisionsResponse all;
@@ -73,7 +73,7 @@ TEST_F(BodyQuestions, DetailsAreThoseOfTheNearestOrDeepestPair) {
   EXPECT_NEAR(deep->separation().value(), -0.75, deep->separation().bound() + 1e-12);
 }
 
-// Two cubes of one turned body share a face: only the exact product of the poses says so.
+// Two cubes of one rotated body share a face: only the exact product of the poses shows it.
 TEST_F(BodyQuestions, PosesComposeExactly) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.25, 0.2, 0.3)}).ok());
@@ -115,7 +115,7 @@ TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItIsThere) {
   ASSERT_TRUE(Delete("late").ok());
   EXPECT_EQ(ReasonOf(Ask(PlacementOf("b"), PlacementOf("cube")).status()),
             v1::ERROR_REASON_PIECE_NOT_FOUND);
-  // A body is no piece.
+  // A body cannot be a piece.
   ASSERT_TRUE(PutBody("late", {PlacementOf("cube")}).ok());
   EXPECT_THAT(std::string(Ask(PlacementOf("b"), PlacementOf("cube")).status().message()),
               HasSubstr("is a body, not a hull"));
@@ -178,7 +178,7 @@ TEST_F(BodyQuestions, BatchesTakeBoth) {
   ASSERT_TRUE(apart.ok()) << apart.status();
   EXPECT_NEAR(apart->columns().separations(0), 1.5, 1e-10);
   EXPECT_GE(apart->columns().pieces(0), 0);
-  // What is for hulls alone is a problem of the pair.
+  // Options for hulls alone are a problem of the pair.
   packed.clear_wanted();
   packed.set_method(v1::METHOD_TEXTBOOK_SAT);
   EXPECT_THAT(Batch(packed)->columns().pair_problems(0).message(),
@@ -211,7 +211,7 @@ TEST_F(BodyQuestions, ScenesTakeBoth) {
         return absl::OkStatus();
       });
   ASSERT_TRUE(status.ok()) << status;
-  // The turned body's second piece reaches down into the first cube.
+  // The rotated body's second piece reaches down into the first cube.
   EXPECT_THAT(all.pairs(), ElementsAre(0, 1, 0, 3));
   EXPECT_THAT(all.columns().pieces(), ElementsAre(1, -1, 0, 1));
   EXPECT_EQ(all.totals().overlapping(), 2u);
@@ -244,7 +244,7 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   take(stream->Update(update));
   EXPECT_THAT(relations, ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING));
   EXPECT_THAT(pieces, ElementsAre(-1, -1, 0, -1));
-  // The body is put anew, and then a hull of it goes; each is noticed when hulls are refreshed.
+  // The body is put again, then one of its hulls is deleted; a refresh shows each change.
   ASSERT_TRUE(PutBody("pair", {PlacementOf("cube", 30, 0, 0)}).ok());
   v1::CollisionStreamUpdate refresh;
   refresh.set_refresh_hulls(true);
@@ -278,5 +278,5 @@ TEST_F(BodyQuestions, ALongQuestionEndsAtItsDeadline) {
   TearDown();
 }
 
-}  // namespace
+}  // namespace body_questions_test
 }  // namespace hulld::server

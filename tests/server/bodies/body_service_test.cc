@@ -1,5 +1,4 @@
-// Bodies by ID: put, get, list, delete, the namespace that they share with hulls, and what
-// survives.
+// Bodies by ID: put, get, list, delete, the namespace that they share with hulls, and durability.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +13,7 @@
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace body_service_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -156,6 +155,26 @@ TEST_F(BodyCalls, ListsCountAndComeInPages) {
   EXPECT_EQ(client.GetStatus()->hull_count(), 1u);
 }
 
+TEST_F(BodyCalls, APageTokenBelongsToTheCallThatGaveIt) {
+  for (const char* id : {"a", "b"}) ASSERT_TRUE(PutBody(id, {PlacementOf("x")}).ok());
+  for (const char* id : {"c", "d"}) Create(id);
+  const Client client = MakeClient();
+  v1::ListBodiesRequest bodies;
+  v1::ListHullsRequest hulls;
+  bodies.set_page_size(1);
+  hulls.set_page_size(1);
+  const auto body_page = client.ListBodies(bodies);
+  const auto hull_page = client.ListHulls(hulls);
+  ASSERT_TRUE(body_page.ok() && hull_page.ok());
+  bodies.set_page_token(hull_page->next_page_token());
+  hulls.set_page_token(body_page->next_page_token());
+  for (const absl::Status& refused :
+       {client.ListBodies(bodies).status(), client.ListHulls(hulls).status()}) {
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument) << refused;
+    EXPECT_THAT(std::string(refused.message()), ::testing::HasSubstr("page_token belongs to"));
+  }
+}
+
 TEST_F(BodyCalls, BodiesCountAmongHulls) {
   Config config = TestConfig();
   config.limits.max_hulls = 2;
@@ -164,7 +183,7 @@ TEST_F(BodyCalls, BodiesCountAmongHulls) {
   ASSERT_TRUE(PutBody("b", {PlacementOf("h")}).ok());
   const auto third = PutBody("c", {PlacementOf("h")});
   EXPECT_THAT(TextOf(third.status()), HasSubstr("holds 1 hulls and 1 bodies; the limit is 2"));
-  // One that takes the place of another is not one more.
+  // A replacement does not add to the count.
   EXPECT_TRUE(PutBody("b", {PlacementOf("h"), PlacementOf("h")}).ok());
   EXPECT_TRUE(absl::IsResourceExhausted(MakeClient().CreateHull("d").status()));
 }
@@ -179,9 +198,9 @@ TEST_F(BodyCalls, BodiesCountAgainstTheMemoryLimit) {
   const auto second = PutBody("second", pieces);
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_THAT(TextOf(second.status()), HasSubstr("--memory-limit"));
-  // Nor is there room to ask about it: its pieces are there once more for each call.
+  // Memory does not suffice for queries either: each call copies the pieces.
   EXPECT_TRUE(absl::IsResourceExhausted(Ask(PlacementOf("first"), PlacementOf("cube")).status()));
-  // What was refused or deleted is counted no more.
+  // Refused or deleted bodies are no longer counted.
   ASSERT_TRUE(MakeClient().DeleteBody("first").ok());
   EXPECT_TRUE(PutBody("second", pieces).ok());
 }
@@ -241,7 +260,7 @@ TEST_F(DurableBodies, SurviveARestart) {
   EXPECT_EQ(MakeClient().ListAllBodies("")->bodies_size(), 1);
 }
 
-// A hulld that knows no bodies would give their IDs to hulls.
+// A hulld without body support would reuse their IDs for hulls.
 TEST_F(DurableBodies, TheFirstBodyRaisesTheFormatOfTheStore) {
   const auto format = [this] {
     TearDown();
@@ -287,5 +306,5 @@ TEST_F(DurableBodies, ADamagedBodyIsNamedAndCanBePutAnew) {
             client.GetBody("pair")->body().revision());
 }
 
-}  // namespace
+}  // namespace body_service_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Watches of bodies: as they come, change and go, and as what they collide with changes.
+// Watches of bodies: their creation, changes, deletion, and changing collisions.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
@@ -18,7 +18,7 @@
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace body_watch_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -61,7 +61,7 @@ class BodyWatches : public BodyTest {
     ASSERT_TRUE(appender.Append(1, xyz).has_value());
     ASSERT_TRUE(appender.Finish().ok());
   }
-  // The messages up to the next that tells something or is `synced`, as one.
+  // Returns all messages up to the next with events or `synced`, merged.
   static v1::WatchHullsResponse Told(HullWatch& watch) {
     while (true) {
       const auto message = watch.Next();
@@ -71,7 +71,7 @@ class BodyWatches : public BodyTest {
       }
     }
   }
-  // Rounds that tell nothing are marks.
+  // Rounds without events are marks.
   static v1::WatchCollisionsResponse Change(CollisionWatch& watch) {
     while (true) {
       v1::WatchCollisionsResponse round = Round(watch);
@@ -109,7 +109,7 @@ TEST_F(BodyWatches, WatchHullsTellsOfBodiesWhereTheyAreAskedFor) {
   EXPECT_THAT(Texts(anew), ElementsAre("CHANGED pair of 1"));
   EXPECT_EQ(anew.events(0).hull().revision(), put->body().revision());
   EXPECT_EQ(anew.events(0).hull().create_revision(), pair.create_revision());
-  // A piece grows: that is told of the hull.
+  // A piece grows: the event is about the hull.
   Grow("cube", {3, 0, 0});
   EXPECT_THAT(Texts(Told(*both)), ElementsAre("CHANGED cube"));
   EXPECT_THAT(Texts(Told(*hulls)), ElementsAre("CHANGED cube"));
@@ -118,7 +118,7 @@ TEST_F(BodyWatches, WatchHullsTellsOfBodiesWhereTheyAreAskedFor) {
   const v1::WatchHullsResponse gone = Told(*both);
   EXPECT_THAT(Texts(gone), ElementsAre("DELETED pair of 0"));
   EXPECT_EQ(gone.events(0).hull().revision(), deleted->header().revision());
-  // Its ID may be a hull's now.
+  // Its ID may now be a hull's.
   Put("pair", Cube());
   EXPECT_EQ(Texts(Told(*both)).front(), "CREATED pair");
   EXPECT_EQ(Texts(Told(*hulls)).front(), "CREATED pair");
@@ -176,7 +176,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   EXPECT_EQ(told.events(0).piece_a().hull().revision(), Get("cube").hull().revision());
   EXPECT_GE(told.header().revision(), Get("cube").hull().revision());
 
-  // Put anew, of a hull that was of no concern before.
+  // Put again, with a hull not previously followed.
   Put("block", Cube());
   const auto put = PutBody("pair", {PlacementOf("block", 30, 0, 0), PlacementOf("block", 2, 0, 0)});
   ASSERT_TRUE(put.ok());
@@ -185,7 +185,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   EXPECT_EQ(told.events(0).revision_a(), put->body().revision());
   ASSERT_EQ(told.piece_hulls_size(), 1);
   EXPECT_EQ(told.piece_hulls(0).hull_id(), "block");
-  // What is no piece any more is of no concern.
+  // Former pieces are no longer followed.
   Grow("cube", {9, 9, 9});
   Grow("block", {0.5, 0.5, 4});
   told = Change(*watch);
@@ -199,7 +199,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   ASSERT_EQ(told.placement_problems_size(), 1);
   EXPECT_EQ(told.placement_problems(0).reason(), v1::ERROR_REASON_PIECE_NOT_FOUND);
   EXPECT_THAT(told.placement_problems(0).message(), HasSubstr("hull \"block\" not found"));
-  // It comes back, and is noticed although the body lacked it.
+  // It is created again and noticed, although the body lacked it.
   Put("block", Cube());
   told = Change(*watch);
   while (told.events().empty()) told = Change(*watch);
@@ -208,7 +208,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   told = Change(*watch);
   EXPECT_THAT(Texts(told), ElementsAre("LOST 0 1 - -"));
   EXPECT_EQ(told.placement_problems(0).reason(), v1::ERROR_REASON_HULL_NOT_FOUND);
-  // The ID becomes a hull's, under which the watch goes on.
+  // The ID becomes a hull's, and the watch continues with it.
   Put("pair", {2.5, 0, 0, 3, 0, 0, 2.5, 1, 0, 2.5, 0, 1});
   told = Change(*watch);
   while (told.events().empty()) told = Change(*watch);
@@ -242,11 +242,11 @@ TEST_F(BodyWatches, ABodyIsWatchedBeforeItsHullsExist) {
   EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 0 -"));
 }
 
-// What a watch has told is at all times what a batch answers.
+// A watch's events agree with a batch at all times.
 TEST_F(BodyWatches, AgreeWithBatchesWhateverChanges) {
   Random random(7);
   const std::vector<std::string> hulls = {"h0", "h1", "h2"};
-  // Every change concerns the watch, which need not wait for marks: the last two stand far away.
+  // Every change affects the watch, which need not wait for marks: the last two stand far away.
   const std::vector<std::string> placed = {"b0", "b1", "h0", "b0", "h1", "h2"};
   const std::vector<double> places = {0, 1.5, 3, 6, 100, 200};
   v1::CollisionWatchOpen open;
@@ -333,5 +333,5 @@ TEST_F(BodyWatches, AgreeWithBatchesWhateverChanges) {
   EXPECT_GT(collisions, 30);
 }
 
-}  // namespace
+}  // namespace body_watch_test
 }  // namespace hulld::server

@@ -19,12 +19,12 @@ extern "C" size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
 namespace hulld::server {
-namespace {
+namespace backpressure_test {
 
 constexpr double kMebibyte = 1 << 20;
 
-// Memory that this process holds, client and server: what is resident, or what is allocated where a
-// sanitizer keeps what was freed, to find out who uses it.
+// Returns the memory of this process, client and server: resident, or allocated if a sanitizer
+// retains freed memory to detect its use.
 double BytesHeld() {
 #ifdef HULLD_SANITIZED
   return static_cast<double>(__sanitizer_get_current_allocated_bytes());
@@ -64,7 +64,7 @@ class Backpressure : public ServerTest {
   }
 };
 
-// A writer that never waits for an ack sends 300 MB; were chunks queued, they would stay.
+// A writer that never waits for an ack sends 300 MB; queued chunks would stay in memory.
 TEST_F(Backpressure, MemoryStaysFlatWhilePointsStreamIn) {
   constexpr int kChunks = 250;
   constexpr int kPointsPerChunk = 50'000;
@@ -89,8 +89,8 @@ TEST_F(Backpressure, MemoryStaysFlatWhilePointsStreamIn) {
   EXPECT_LT((most - before) / kMebibyte, 100) << "of " << kChunks * 1.2 << " MB sent";
 }
 
-// Both batches take turns, so the one that is read ends with the other far behind
-// if that is held back, and at the end as well if it is not.
+// Both batches take turns: when the one that is read ends, the other is far behind if it is
+// throttled, and at its end if not.
 TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   constexpr int kPairs = 500'000;
   Put("cube", Cube());
@@ -113,8 +113,8 @@ TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   EXPECT_FALSE(unread->Finish().ok());
 }
 
-// Every pair is found, with a certificate of some hundred bytes. The unread scene holds up no other
-// call, so it need not be ended, and is complete when the client reads on.
+// Every pair is found, with a certificate of some hundred bytes. The unread scene delays no other
+// call, so it need not be ended, and completes when the client resumes reading.
 TEST_F(Backpressure, ASceneThatNobodyReadsIsNotSearchedAhead) {
   constexpr int kPlacements = 600;
   constexpr double kPairs = kPlacements * (kPlacements - 1) / 2.0;
@@ -171,5 +171,5 @@ TEST_F(Backpressure, AStepOfAStreamThatNobodyReadsIsNotComputedAhead) {
   EXPECT_TRUE(read->Finish().ok());
 }
 
-}  // namespace
+}  // namespace backpressure_test
 }  // namespace hulld::server

@@ -1,5 +1,5 @@
-// The reasons of errors, as the client library reads them: what a program can tell apart without
-// reading text.
+// Error reasons as parsed by the client library: distinctions that a program can make without
+// parsing text.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace error_reason_test {
 
 using Metadata = std::map<std::string, std::string>;
 
@@ -96,7 +96,7 @@ TEST_F(ErrorReasons, LimitsNameTheirFlagAndTheirNumber) {
   config.limits.max_calls = 1;
   Restart(config);
   Create("first");
-  // A call gives its place back after its reply has gone out.
+  // A call releases its slot after its reply is sent.
   ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
   Expect(MakeClient().CreateHull("second").status(), absl::StatusCode::kResourceExhausted,
          v1::ERROR_REASON_LIMIT_EXCEEDED, {{"flag", "max-hulls"}, {"limit", "1"}});
@@ -188,5 +188,5 @@ TEST(ErrorInfo, PermissionsSayWhatIsMissing) {
   EXPECT_EQ(MetadataOf(outside, "prefix"), "cell/");
 }
 
-}  // namespace
+}  // namespace error_reason_test
 }  // namespace hulld::server

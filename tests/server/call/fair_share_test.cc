@@ -1,4 +1,4 @@
-// How clients share a server: what one may have at a time, and what is kept for single calls.
+// Sharing of a server among clients: the quota of each, and the capacity reserved for single calls.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,13 +14,13 @@
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
-namespace {
+namespace fair_share_test {
 
 using ::testing::HasSubstr;
 
 class FairShare : public testing::Test {
  protected:
-  // The limit that keeps a call out; empty when it is let in, and then it runs on.
+  // Returns the limit that refuses a call; empty if admitted, and then it keeps running.
   std::string Refusal(Rpc rpc, const std::string& client) {
     absl::StatusOr<Admission::Ticket> ticket = admission_->Admit({.rpc = rpc, .client = client});
     if (!ticket.ok()) {
@@ -46,7 +46,7 @@ TEST_F(FairShare, NoClientFillsTheServer) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(Refusal(Rpc::kGetHull, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kGetHull, "token:a"), "max-calls-per-client");
   EXPECT_EQ(Refusal(Rpc::kGetHull, "token:b"), "");
-  // What tells the operator how the server is.
+  // Calls that show the operator the server's state.
   EXPECT_EQ(Refusal(Rpc::kGetStatus, "token:a"), "");
   tickets_.pop_front();
   tickets_.pop_front();
@@ -73,7 +73,7 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   EXPECT_THAT(last_message_, HasSubstr("the last 2 are kept for single calls"));
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "max-calls-per-client");
-  // The same holds for the whole server.
+  // The limit of the whole server works alike.
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "max-calls");
   EXPECT_THAT(last_message_, HasSubstr("the last 3 are kept for single calls"));
@@ -85,6 +85,7 @@ TEST_F(FairShare, ACallWaitsForItsOwnPoolAlone) {
   Limits limits;
   limits.max_waiting_calls = 5;
   Begin(limits);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(Refusal(Rpc::kGetStatus, "b"), "");
   size_t writers = 5;
   size_t others = 4;
   admission_->SetBacklog([&](Rpc rpc) { return UsesWriters(rpc) ? writers : others; });
@@ -96,25 +97,57 @@ TEST_F(FairShare, ACallWaitsForItsOwnPoolAlone) {
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "max-waiting-calls");
 }
 
+// Thousands of opened or woken watches wait.
+TEST_F(FairShare, StreamsThatWaitKeepOutNoSingleCall) {
+  Limits limits;
+  limits.max_waiting_calls = 5;
+  Begin(limits);
+  size_t waiting = 5000;
+  admission_->SetBacklog([&](Rpc) { return waiting; });
+  EXPECT_EQ(Refusal(Rpc::kWatchHulls, "a"), "max-waiting-calls");
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "");
+  EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "max-waiting-calls");
+  // None of the running single calls waits.
+  waiting = 0;
+  EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "");
+}
+
+TEST_F(FairShare, CallsWithoutATokenHaveAShareOfTheirOwn) {
+  Limits limits;
+  limits.max_calls = 12;
+  limits.max_anonymous_calls = 16;
+  Begin(limits);
+  for (int client = 0; client < 8; ++client) {
+    const std::string address = "ipv4:192.0.2." + std::to_string(client);
+    for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, address), "");
+    EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, address), "max-anonymous-calls");
+  }
+  EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, "ipv4:192.0.2.9"), "max-anonymous-calls");
+  for (int i = 0; i < 9; ++i) EXPECT_EQ(Refusal(Rpc::kAppendPoints, "token:a"), "");
+  EXPECT_EQ(Refusal(Rpc::kAppendPoints, "token:a"), "max-calls");
+  tickets_.pop_front();
+  EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, "ipv4:192.0.2.0"), "");
+}
+
 TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {
   using Clock = CallLifetime::Clock;
   using WallClock = CallLifetime::WallClock;
   using std::chrono::hours;
   using std::chrono::seconds;
   const Clock::time_point now = Clock::now();
-  // The time of day does not matter, even when it is set a year on or back.
+  // Wall-clock changes have no effect, even by a year in either direction.
   for (const WallClock::time_point wall :
        {WallClock::now(), WallClock::now() + hours(8760), WallClock::now() - hours(8760)}) {
     EXPECT_EQ(CallLifetime(wall + seconds(5), wall, now).deadline(), now + seconds(5));
     EXPECT_FALSE(CallLifetime(wall + seconds(500), wall, now).ShouldStop());
     EXPECT_TRUE(CallLifetime(wall - seconds(1), wall, now).ShouldStop());
     EXPECT_TRUE(absl::IsDeadlineExceeded(CallLifetime(wall, wall, now).StopStatus()));
-    // As good as none.
+    // Effectively none.
     EXPECT_EQ(CallLifetime(wall + hours(1'000'000), wall, now).deadline(),
               Clock::time_point::max());
   }
   EXPECT_EQ(CallLifetime(WallClock::time_point::max()).deadline(), Clock::time_point::max());
 }
 
-}  // namespace
+}  // namespace fair_share_test
 }  // namespace hulld::server

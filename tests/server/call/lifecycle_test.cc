@@ -7,11 +7,11 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace lifecycle_test {
 
 using ::testing::HasSubstr;
 
-// Calls of grpc.health and grpc.reflection, whose generated code Debian does not ship.
+// Calls of grpc.health and grpc.reflection; Debian does not ship their generated code.
 class Lifecycle : public ServerTest {
  protected:
   static grpc::ByteBuffer Bytes(const std::string& text) {
@@ -29,7 +29,7 @@ class Lifecycle : public ServerTest {
     return text;
   }
 
-  // The reply to the only message of a call; empty when there is none.
+  // Returns the reply to the only message of a call; empty if none.
   std::string Call(const std::string& method, const std::string& request) {
     grpc::GenericStub stub(channel_);
     grpc::ClientContext context;
@@ -55,7 +55,7 @@ class Lifecycle : public ServerTest {
     return replied ? Text(reply) : "";
   }
 
-  // HealthCheckResponse.status of a service: 1 SERVING, 2 NOT_SERVING; 0 for none.
+  // Returns HealthCheckResponse.status of a service: 1 SERVING, 2 NOT_SERVING; 0 for none.
   int Health(const std::string& service) {
     const std::string request =
         service.empty() ? "" : "\n" + std::string(1, static_cast<char>(service.size())) + service;
@@ -182,5 +182,5 @@ TEST_F(Lifecycle, MessagesLargerThanTheLimitAreRefused) {
   EXPECT_EQ(appender.Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
 }
 
-}  // namespace
+}  // namespace lifecycle_test
 }  // namespace hulld::server

@@ -21,13 +21,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace limits_test {
 
 using ::testing::HasSubstr;
 
 using BatchReader = std::unique_ptr<grpc::ClientReader<v1::BatchCheckCollisionsResponse>>;
 
-// The value of a key in trailing metadata; empty when it is not there.
+// Returns the value of a key in trailing metadata; empty if missing.
 std::string Trailing(const grpc::ClientContext& context, const char* key) {
   const auto& metadata = context.GetServerTrailingMetadata();
   const auto found = metadata.find(key);
@@ -56,7 +56,7 @@ class LimitsTest : public ServerTest {
     EXPECT_THAT(status.error_details(), HasSubstr("google.rpc.RetryInfo"));
   }
 
-  // A batch that runs until it is cancelled: hours of work.
+  // A batch of hours of work, which runs until cancelled.
   v1::BatchCheckCollisionsRequest LongBatch() {
     v1::BatchCheckCollisionsRequest request;
     request.set_method(v1::METHOD_TEXTBOOK_SAT);
@@ -69,7 +69,7 @@ class LimitsTest : public ServerTest {
     return request;
   }
 
-  // Starts it; once this returns, it runs.
+  // Starts the batch; it is running on return.
   BatchReader StartBatch(grpc::ClientContext* context,
                          const v1::BatchCheckCollisionsRequest& request) {
     BatchReader reader = collisions_->BatchCheckCollisions(context, request);
@@ -78,7 +78,7 @@ class LimitsTest : public ServerTest {
     return reader;
   }
 
-  // Reads what is left; gRPC tells the status only after that.
+  // Drains the stream, which gRPC requires before it returns the status.
   static grpc::Status FinishBatch(grpc::ClientReader<v1::BatchCheckCollisionsResponse>& reader) {
     v1::BatchCheckCollisionsResponse part;
     while (reader.Read(&part)) {
@@ -86,7 +86,7 @@ class LimitsTest : public ServerTest {
     return reader.Finish();
   }
 
-  // Until no call runs.
+  // Waits until no call runs.
   bool WaitIdle() { return server_->WaitIdle(std::chrono::minutes(5)); }
 
   grpc::Status GetHull(grpc::ClientContext* context) {
@@ -172,8 +172,8 @@ TEST_F(LimitsTest, AClientHasSoManyCallsWhateverTheServerHasLeft) {
   EXPECT_TRUE(GetHull(&again).ok());
 }
 
-// A textbook query of hours runs on the one thread that opens teams. One that lasts some
-// milliseconds, of the same kind, is answered meanwhile.
+// A textbook query of hours runs on the one thread that opens teams. A similar one of some
+// milliseconds is answered during it.
 TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   Config config = TestConfig();
   config.limits.max_textbook_axes = uint64_t{1} << 40;
@@ -197,10 +197,10 @@ TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
     const std::string text = prometheus::TextSerializer().Serialize(server_->metrics().Collect());
     return text.find("hulld_requests_running{rpc=\"CheckCollision\"} 1") != std::string::npos;
   };
-  // Bounded by the time limit of the test alone.
+  // Bounded by the test's time limit only.
   while (!running()) std::this_thread::yield();
   grpc::ClientContext context;
-  // Where it has to wait for the long one, this ends the test.
+  // Fails the test if it waits for the long one.
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(2));
   v1::CheckCollisionResponse response;
   const grpc::Status status = collisions_->CheckCollision(&context, query("small"), &response);
@@ -208,7 +208,7 @@ TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   EXPECT_EQ(response.relation(), v1::RELATION_OVERLAPPING);
   long_context.TryCancel();
   long_query.join();
-  // It ran all the while: it was not answered, and could still be cancelled.
+  // It ran throughout: it was not answered, and could still be cancelled.
   EXPECT_EQ(long_status.error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(WaitIdle());
 }
@@ -229,7 +229,7 @@ TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   ExpectRefused(collisions_->FindCollisions(&scene_context, {})->Finish(),
                 "max-concurrent-batches");
   EXPECT_EQ(Hits("max-concurrent-batches"), 2);
-  // Single pairs go on.
+  // Single pairs continue.
   v1::CheckCollisionRequest pair;
   *pair.mutable_a() = PlacementOf("ball");
   *pair.mutable_b() = PlacementOf("ball", 0.5);
@@ -242,7 +242,7 @@ TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   EXPECT_TRUE(FinishBatch(*collisions_->BatchCheckCollisions(&next_context, {})).ok());
 }
 
-// What a replacement has built so far is memory like that of any hull.
+// The points built by a replacement count like the points of any hull.
 TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
   Config config = TestConfig();
   config.limits.memory_limit = 1 << 20;
@@ -265,7 +265,7 @@ TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
   const Coordinates sphere = Sphere(10'000);
   request.mutable_points()->mutable_xyz()->Assign(sphere.begin(), sphere.end());
   ASSERT_TRUE(writer->Write(request));
-  // Bounded by the time limit of the test alone.
+  // Bounded by the test's time limit only.
   while (cache_bytes() < 1 << 20) std::this_thread::yield();
   Create("other");
   const auto append = [this] {
@@ -282,7 +282,7 @@ TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
   EXPECT_TRUE(append().ok());
 }
 
-// What a stream keeps of each pair is kept for as long as it lives.
+// A stream keeps its state of each pair throughout its lifetime.
 TEST_F(LimitsTest, PairsOfAStreamCountAgainstTheMemoryLimit) {
   Config config = TestConfig();
   config.limits.memory_limit = 1 << 20;
@@ -346,7 +346,7 @@ TEST_F(LimitsTest, ACallWhoseClientDoesNotReadLosesItsPlaceWhenItsTimeIsUp) {
   EXPECT_FALSE(FinishBatch(*unread).ok());
 }
 
-// Calls of gRPC's own that nobody answers.
+// Calls to gRPC itself that remain unanswered.
 class UnansweredCalls {
  public:
   UnansweredCalls() {
@@ -381,7 +381,7 @@ class UnansweredCalls {
     grpc_call_start_batch(call.call, &end, 1, &call, nullptr);
     return call.call;
   }
-  // Waits for the end of any of them.
+  // Waits until any of them ends.
   grpc_status_code Next() {
     const grpc_event event =
         grpc_completion_queue_next(queue_, gpr_inf_future(GPR_CLOCK_REALTIME), nullptr);
@@ -484,5 +484,5 @@ TEST(LimitError, KeepsItsLimitAndHintUnderAPrefix) {
   EXPECT_EQ(ExceededLimit(absl::ResourceExhaustedError("other")), std::nullopt);
 }
 
-}  // namespace
+}  // namespace limits_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// What requests take in memory: counted before they are parsed, and held to a limit.
+// Memory of requests: counted before parsing, and limited.
 
 #include "server/call/request_memory.h"
 
@@ -24,7 +24,7 @@
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
-namespace {
+namespace request_memory_test {
 
 using google::protobuf::Message;
 using ::testing::HasSubstr;
@@ -43,7 +43,7 @@ grpc::ByteBuffer BytesOf(const std::string& text) {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-// Repeats `bytes`, which on the wire adds up to one message.
+// Returns `bytes` repeated, which parses as one message.
 std::string Times(int count, const std::string& bytes) {
   std::string all;
   for (int i = 0; i < count; ++i) all += bytes;
@@ -54,7 +54,7 @@ struct Sample {
   const char* name;
   std::shared_ptr<Message> type;
   std::string bytes;
-  // How many times as much as the message takes the bound may be.
+  // Maximum ratio of the bound to the message's memory.
   double slack;
 };
 
@@ -88,7 +88,7 @@ std::vector<Sample> Samples() {
       {"empty placements", batch, Times(10'000, std::string("\x0a\x00", 2)), 3},
       {"pairs one by one", batch, Times(10'000, std::string("\x10\x01", 2)), 3},
       {"hull IDs of packed placements", batch, ids.SerializeAsString(), 3},
-      // An entry of protobuf's set of unknown fields takes less than what is counted for any.
+      // An entry of protobuf's set of unknown fields takes less than the amount counted for any.
       {"unknown numbers", batch, Times(10'000, std::string("\x70\x01", 2)), 8},
       {"unknown texts", batch, Times(10'000, std::string("\x72\x00", 2)), 4},
       {"unknown numbers in placements", batch, Times(3000, std::string("\x0a\x02\x78\x01", 4)), 4},
@@ -106,15 +106,15 @@ TEST(MessageLayout, BoundsWhatParsingTakes) {
     const auto taken = static_cast<double>(message->SpaceUsedLong());
     EXPECT_GE(bound, taken) << sample.name;
     EXPECT_LE(bound, sample.slack * taken) << sample.name;
-    // However the bytes are cut.
+    // For any fragmentation of the bytes.
     EXPECT_EQ(static_cast<double>(ParsedBytes(*sample.type, sample.bytes, kAny, 3)), bound)
         << sample.name;
   }
 }
 
-// What is damaged is parsed up to the damage at most.
+// A damaged message is parsed up to the damage at most.
 TEST(MessageLayout, BoundsWhatParsingDamagedMessagesTakes) {
-  // It says on standard error which strings are not UTF-8.
+  // Protobuf logs strings that are not UTF-8 to standard error.
   const google::protobuf::LogSilencer silencer;
   constexpr uint64_t kSeed = 71;
   std::mt19937_64 random(kSeed);
@@ -208,5 +208,5 @@ TEST(ParseRequest, RefusesWhatIsMalformedAndWhatIsTooLargeWithoutParsingIt) {
   EXPECT_EQ(untouched.placements_size(), 0);
 }
 
-}  // namespace
+}  // namespace request_memory_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// The bases of all streams, under reactors that do no more than a test asks for.
+// The bases of all streams, under minimal reactors controlled by a test.
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -18,13 +18,13 @@
 #include "server/call/queued_stream.h"
 
 namespace hulld::server {
-namespace {
+namespace stream_bases_test {
 
 using ::testing::ElementsAre;
 using Batch = v1::BatchCheckCollisionsResponse;
 using Mesh = v1::GetHullMeshResponse;
 
-// Says when the test may go on; shared with reactors that outlive it.
+// Signals that the test may continue; shared with reactors that outlive it.
 struct Signal {
   void Set() { promise.set_value(); }
   void Wait() { future.wait(); }
@@ -81,7 +81,7 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
   std::atomic<bool> keeps_waiting_ = false;
 };
 
-// Makes `count` replies, and notes how many it made.
+// Makes `count` replies, and counts them.
 class TestPull : public PulledStream<WriteReactor, Mesh> {
  public:
   TestPull(grpc::CallbackServerContext& context, Admission& admission, size_t count, size_t bytes,
@@ -146,7 +146,7 @@ class StreamBases : public ::testing::Test, public Collisions, public Hulls {
         std::make_shared<TestPull>(*context, admission_, count_, bytes_, end_, made_));
   }
 
-  // The numbers of all replies to a call, and how it ended.
+  // Returns the status of a call and the numbers of all its replies.
   grpc::Status Run(TestQueue::Script script, std::vector<uint64_t>* numbers) {
     script_ = std::move(script);
     grpc::ClientContext context;
@@ -189,7 +189,7 @@ TEST_F(StreamBases, AnErrorComesAfterTheRepliesBeforeIt) {
         stream->Reply(1);
         stream->Reply(2);
         stream->SetEnd(absl::InvalidArgumentError("the third is wrong"));
-        stream->SetEnd(absl::OkStatus());  // the first stands
+        stream->SetEnd(absl::OkStatus());  // the first status stands
       },
       &numbers);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
@@ -207,7 +207,7 @@ TEST_F(StreamBases, AStreamEndsOnlyWhenItsWorkIsOver) {
         stream->SetEnd(absl::OkStatus());
         worker = std::thread([stream] {
           stream->Do([&] { EXPECT_FALSE(stream->finished()); });
-          stream->Reply(1);  // what was found meanwhile still goes out
+          stream->Reply(1);  // replies found in the interim are still sent
           stream->SetWorking(false);
         });
       },
@@ -235,7 +235,7 @@ TEST_F(StreamBases, CancellingStopsTheWorkAndDropsWhatWaits) {
     EXPECT_FALSE(stream->finished());
     EXPECT_EQ(stream->unsent_bytes(), 0u);
   });
-  EXPECT_EQ(admission_.running(), 1u);  // as long as it works
+  EXPECT_EQ(admission_.running(), 1u);  // while it works
   stream->SetWorking(false);
   EXPECT_TRUE(stream->finished());
   stream.reset();
@@ -250,7 +250,7 @@ TEST_F(StreamBases, UnsentBytesCountWhatWaitsAndWhatIsBeingWritten) {
           EXPECT_EQ(stream->LastWaiting(), nullptr);
           EXPECT_EQ(stream->unsent_bytes(), 0u);
         });
-        stream->Reply(1, 100);  // on its way
+        stream->Reply(1, 100);  // in flight
         stream->Reply(2, 20);
         stream->Do([&] {
           ASSERT_NE(stream->LastWaiting(), nullptr);
@@ -305,7 +305,7 @@ TEST_F(StreamBases, RepliesOfManyThreadsAllArrive) {
   for (std::thread& thread : threads) thread.join();
   EXPECT_TRUE(status.ok());
   ASSERT_EQ(numbers.size(), kThreads * kReplies);
-  // In order as each thread queued them.
+  // In the order in which each thread queued them.
   std::vector<uint64_t> next(kThreads);
   for (const uint64_t number : numbers) {
     EXPECT_EQ(number % kReplies, next[number / kReplies]++);
@@ -334,7 +334,7 @@ TEST_F(StreamBases, PulledRepliesComeInTurnAndThenTheEnd) {
   EXPECT_EQ(made_, 3u);
 }
 
-// 100 MB, of which gRPC's windows take a part.
+// 100 MB; gRPC's windows hold only a part.
 TEST_F(StreamBases, PulledRepliesAreNotMadeAheadOfTheClient) {
   count_ = 1000;
   bytes_ = 100'000;
@@ -351,5 +351,5 @@ TEST_F(StreamBases, PulledRepliesAreNotMadeAheadOfTheClient) {
   EXPECT_LT(made_, 1000u);
 }
 
-}  // namespace
+}  // namespace stream_bases_test
 }  // namespace hulld::server

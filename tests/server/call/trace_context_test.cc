@@ -5,7 +5,7 @@
 #include <string>
 
 namespace hulld::server {
-namespace {
+namespace trace_context_test {
 
 const std::string kTrace = "0af7651916cd43dd8448eb211c80319c";
 const std::string kParent = "b7ad6b7169203331";
@@ -20,7 +20,7 @@ TEST(TraceContext, ReadsWhatIsOne) {
   EXPECT_TRUE(TraceContext::Parse("00-" + kTrace + "-" + kParent + "-ff").has_value());
 }
 
-// They may say more, which is left out.
+// Later versions may have more fields, which are ignored.
 TEST(TraceContext, ReadsOfLaterVersionsWhatItKnows) {
   const std::string text = "00-" + kTrace + "-" + kParent + "-01";
   for (const std::string& later : {"01" + text.substr(2), "cc" + text.substr(2) + "-more"}) {
@@ -40,7 +40,7 @@ TEST(TraceContext, TakesNothingElse) {
         "00-" + kTrace + "-" + kParent + "-0G"}) {
     EXPECT_FALSE(TraceContext::Parse(wrong).has_value()) << wrong;
   }
-  // Any other byte in any place.
+  // Any other byte at any position.
   for (size_t i = 0; i < text.size(); ++i) {
     for (const char c : {'A', 'g', ' ', '\0', '\x80'}) {
       std::string wrong = text;
@@ -50,5 +50,5 @@ TEST(TraceContext, TakesNothingElse) {
   }
 }
 
-}  // namespace
+}  // namespace trace_context_test
 }  // namespace hulld::server

@@ -11,7 +11,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace batch_service_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -86,7 +86,7 @@ class BatchCall : public ServerTest {
     EXPECT_THAT(status.error_message(), HasSubstr(what));
   }
 
-  // The first 1024 pairs are quick, so that answers begin to stream; what follows would take hours.
+  // The first 1024 pairs are quick, so that answers start streaming; the rest would take hours.
   v1::BatchCheckCollisionsRequest EndlessBatch() {
     Put("cube", Cube());
     Put("ball", Sphere(700));
@@ -102,8 +102,8 @@ class BatchCall : public ServerTest {
   }
 };
 
-// The table of the hulls of 20000 placements with long names is more than 5 MB; no client need take
-// a message above 4 MiB, and this one does not.
+// The table of the hulls of 20000 placements with long names exceeds 5 MB. No client must accept a
+// message above 4 MiB, and this one does not.
 class LongTable : public BatchCall {
  protected:
   static constexpr int kPlacements = 20'000;
@@ -120,7 +120,7 @@ class LongTable : public BatchCall {
     }
   }
 
-  // Whether the pieces together are the table, each of them of moderate size.
+  // Expects that the parts form the table and are each of moderate size.
   template <typename Response>
   void CheckTable(const std::vector<Response>& parts) const {
     int placement = 0;
@@ -181,7 +181,7 @@ TEST_F(LongTable, OfABatchComesInPieces) {
 TEST_F(LongTable, OfASceneComesInPieces) {
   v1::FindCollisionsRequest request;
   AddPlacements(&request);
-  // The second placement against all others.
+  // The second placement against all other placements.
   request.set_movers(2);
   request.mutable_wanted()->set_clearance(1);
   grpc::ClientContext context;
@@ -212,7 +212,7 @@ TEST_F(LongTable, OfAStreamComesInPieces) {
   AddPlacements(request.mutable_open());
   request.mutable_open()->add_pairs(1);
   request.mutable_open()->add_pairs(2);
-  // To open, and to tell the hulls anew.
+  // Opens the stream, then refreshes the hulls.
   for (uint64_t message = 0; message < 2; ++message) {
     ASSERT_TRUE(stream->Write(request));
     std::vector<v1::StreamCollisionsResponse> parts;
@@ -231,7 +231,7 @@ TEST_F(LongTable, OfAStreamComesInPieces) {
     }
     request.mutable_update()->set_refresh_hulls(true);
   }
-  // Without that there is no table.
+  // Without a refresh no table is sent.
   request.mutable_update()->set_refresh_hulls(false);
   ASSERT_TRUE(stream->Write(request));
   v1::StreamCollisionsResponse part;
@@ -444,7 +444,7 @@ TEST_F(BatchCall, WishesThatExcludeEachOtherFailWhole) {
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "tolerance is NaN");
 }
 
-// The same with measures wanted of every pair, whose cost nobody can foretell.
+// Like the previous test, with measures wanted of every pair, at an unpredictable cost.
 TEST_F(BatchCall, CancellingEndsALongBatchOfMeasures) {
   Put("ball", Sphere(2000));
   v1::BatchCheckCollisionsRequest request;
@@ -476,7 +476,7 @@ TEST_F(BatchCall, CancellingEndsALongBatch) {
   while (stream->Read(&part)) {
   }
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
-  // The server stops computing: without that, this call would still be running in an hour.
+  // The server stops computing: otherwise this call would run for hours.
   server_->BeginDrain();
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
@@ -496,7 +496,7 @@ TEST_F(BatchCall, ADeadlineEndsALongBatch) {
 
 TEST_F(BatchCall, BatchesTakeTurns) {
   Put("cube", Cube());
-  // One pair of these is over soon; all of them are not.
+  // One pair of these finishes quickly; all of them do not.
   Put("small", Sphere(100));
   v1::BatchCheckCollisionsRequest endless;
   endless.set_method(v1::METHOD_TEXTBOOK_SAT);
@@ -517,8 +517,8 @@ TEST_F(BatchCall, BatchesTakeTurns) {
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
-// An axis across wide facets came in one message with the answers before it, and with the table of
-// hulls, and no client could read it.
+// Formerly, an axis across wide facets shared a message with the preceding answers and the table of
+// hulls, which exceeded every client's limit.
 TEST_F(BatchCall, MessagesStayBelowFourMebibytesWhateverTheAnswers) {
   constexpr int kCorners = Config::kMaxFeatureVertices;
   Create("wide");
@@ -571,5 +571,5 @@ TEST_F(BatchCall, MessagesStayBelowFourMebibytesWhateverTheAnswers) {
   EXPECT_EQ(answers, 4002);
 }
 
-}  // namespace
+}  // namespace batch_service_test
 }  // namespace hulld::server

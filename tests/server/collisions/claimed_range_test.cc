@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace hulld::server {
-namespace {
+namespace claimed_range_test {
 
 TEST(ClaimedRange, BlocksAreDisjointAndTheLastOneGivenBackIsTold) {
   ClaimedRange range;
@@ -30,12 +30,13 @@ TEST(ClaimedRange, BlocksAreDisjointAndTheLastOneGivenBackIsTold) {
   EXPECT_TRUE(range.GiveBack(range.Claim(4)));
 }
 
-// As the steps of a stream: the thread that ends one begins the next, while others still claim.
+// Models the steps of a stream: the thread that ends one range begins the next, while other threads
+// still claim.
 TEST(ClaimedRange, RangesThatFollowEachOtherAreEachDoneOnce) {
   constexpr uint32_t kCount = 100;
   constexpr int kRanges = 20'000;
   ClaimedRange range;
-  // Written by the one thread that has claimed the index, or that ended the range.
+  // Written by the single thread that claimed the index or ended the range.
   std::vector<int> done(kCount, 0);
   int ended = 0;
   std::atomic<bool> is_over = false;
@@ -63,5 +64,5 @@ TEST(ClaimedRange, RangesThatFollowEachOtherAreEachDoneOnce) {
   EXPECT_EQ(wrong, 0);
 }
 
-}  // namespace
+}  // namespace claimed_range_test
 }  // namespace hulld::server

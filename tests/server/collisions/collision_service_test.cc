@@ -8,7 +8,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace collision_service_test {
 
 using ::testing::HasSubstr;
 
@@ -95,8 +95,8 @@ TEST_F(CheckCollisionCall, ReadersSeeEachCommittedChunk) {
   }
 }
 
-// The first query of a hull is answered by a reader, which makes what queries need of it, and later
-// ones where they arrive.
+// A reader thread answers the first query of a hull and prepares the query data; the arriving
+// thread answers later ones.
 TEST_F(CheckCollisionCall, AnswersDoNotDependOnWhereTheyAreComputed) {
   Put("cube", Cube());
   Put("ball", Sphere(200, 1.25));
@@ -241,12 +241,12 @@ TEST_F(CheckCollisionCall, ADeadlineEndsALongTextbookQuery) {
       &context, Pair(PlacementOf("ball"), PlacementOf("ball", 0.5), v1::METHOD_TEXTBOOK_SAT),
       &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
-  // The executor is free again: a query that is worth its team, and soon over, gets through.
+  // The executor is free again: a short query that uses its team gets through.
   Put("small", Sphere(100));
   EXPECT_EQ(Check(Pair(PlacementOf("small"), PlacementOf("small", 5), v1::METHOD_TEXTBOOK_SAT))
                 .relation(),
             v1::RELATION_SEPARATED);
 }
 
-}  // namespace
+}  // namespace collision_service_test
 }  // namespace hulld::server

@@ -13,7 +13,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace collision_stream_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -51,14 +51,14 @@ v1::StreamCollisionsRequest Refresh() {
   return request;
 }
 
-// One stream; whatever fails shows in how it ends.
+// One stream; failures show in its final status.
 class Stream {
  public:
   explicit Stream(v1::CollisionService::Stub& stub) : call_(stub.StreamCollisions(&context_)) {}
 
   bool Send(const v1::StreamCollisionsRequest& request) { return call_->Write(request); }
 
-  // The pieces of the next answer, put together.
+  // Returns the next answer, merged from its parts.
   v1::StreamCollisionsResponse Read() {
     v1::StreamCollisionsResponse answer;
     v1::StreamCollisionsResponse piece;
@@ -80,7 +80,7 @@ class Stream {
     return Read();
   }
 
-  // How the call ends when nothing more is said; what is left is read.
+  // Half-closes the stream, drains it, and returns its final status.
   grpc::Status Finish() {
     call_->WritesDone();
     v1::StreamCollisionsResponse rest;
@@ -256,7 +256,7 @@ TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
   EXPECT_EQ(answer.hulls(0).revision(), Get("grows").hull().revision());
   EXPECT_EQ(answer.placement_problems_size(), 0);
   EXPECT_THAT(stream.Ask(Refresh()).pairs(), IsEmpty());
-  // Smaller hulls under the same names: what was kept of the pairs names vertices that are gone.
+  // Smaller hulls under the same names: cached pair state names vertices that no longer exist.
   ASSERT_TRUE(Delete("grows").ok() && Delete("later").ok());
   Put("grows", {5, 5, 5});
   answer = stream.Ask(Refresh());
@@ -268,7 +268,7 @@ TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// Refreshed after each of many chunks: every answer is that of a single call.
+// Refreshed after each of many chunks: every answer equals that of a single call.
 TEST_F(StreamCollisionsCall, AHullThatGrowsIsAskedAtEveryStep) {
   Create("grows");
   Put("ball", Sphere(300));
@@ -286,7 +286,7 @@ TEST_F(StreamCollisionsCall, AHullThatGrowsIsAskedAtEveryStep) {
     Coordinates xyz(30);
     for (double& x : xyz) x = coordinate(random) * (0.5 + 0.01 * static_cast<double>(i));
     ASSERT_TRUE(appender.Append(i, xyz).has_value());
-    // Both at once, and one after the other.
+    // Both together, then separately.
     const double x = -2 - coordinate(random);
     v1::StreamCollisionsRequest move = MoveX(0, x);
     if (i % 2 == 0) stream.Ask(Refresh());
@@ -366,7 +366,7 @@ TEST_F(StreamCollisionsCall, LongAnswersComeInPiecesOfAMebibyte) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// Those of a hull that is missing among them.
+// Includes pairs with a missing hull.
 TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   Put("cube", Cube());
   Put("ball", Sphere(60));
@@ -374,7 +374,7 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   v1::BatchCheckCollisionsRequest batch;
   std::vector<v1::Placement> placements;
   std::vector<uint32_t> pairs;
-  // So many that threads share the placing of those that move, and then their pairs.
+  // So many that threads share the placing of movers, and then their pairs.
   constexpr uint32_t kPlacements = 250;
   constexpr uint32_t kPairsEach = 40;
   for (uint32_t i = 0; i < kPlacements; ++i) {
@@ -433,8 +433,8 @@ TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// Steps of any size, some of which have the hulls looked up: those of many placements are placed
-// and decided by several threads.
+// Steps of any size, some with a refresh: several threads place and decide many
+// placements.
 TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
   Put("cube", Cube());
   Put("ball", Sphere(60));
@@ -574,7 +574,7 @@ TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsOthersEnd) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-// Its answers take minutes: every pair is decided by exact arithmetic on large features.
+// Its answers take minutes: every pair needs exact arithmetic on large features.
 v1::StreamCollisionsRequest EndlessOpen() {
   std::vector<uint32_t> pairs;
   for (uint32_t i = 0; i < 900'000; ++i) pairs.insert(pairs.end(), {0, 1});
@@ -607,5 +607,5 @@ TEST_F(StreamCollisionsCall, ADeadlineEndsALongAnswer) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-}  // namespace
+}  // namespace collision_stream_test
 }  // namespace hulld::server

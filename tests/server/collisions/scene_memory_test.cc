@@ -1,4 +1,4 @@
-// What a scene holds while it runs, and how it is counted, whatever collides.
+// Memory of a running scene, and its accounting, for any number of collisions.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,13 +10,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace scene_memory_test {
 
 using ::testing::HasSubstr;
 
 class SceneMemory : public ServerTest {
  protected:
-  // The sum of all series of this name.
+  // Returns the sum of all series of this name.
   double Metric(const std::string& name) const {
     double sum = 0;
     for (const prometheus::MetricFamily& family : server_->metrics().Collect()) {
@@ -41,8 +41,8 @@ class SceneMemory : public ServerTest {
   }
 };
 
-// 2e10 pairs overlap and nobody takes an answer. What is held is the placements, the tree of their
-// boxes, and the answers that gRPC has not taken: some MiB, counted against --memory-limit.
+// 2e10 pairs overlap and the client reads no answer. The scene holds the placements, the tree of
+// their boxes, and the answers that gRPC has not taken: some MiB, counted against --memory-limit.
 TEST_F(SceneMemory, OfASceneThatNobodyReadsIsCountedAndBounded) {
   constexpr int kPlacements = 200'000;
   // Placed hulls, their boxes twice, the tree.
@@ -54,17 +54,17 @@ TEST_F(SceneMemory, OfASceneThatNobodyReadsIsCountedAndBounded) {
   request.mutable_wanted()->set_certificate(true);
   grpc::ClientContext context;
   const auto unread = collisions_->FindCollisions(&context, request);
-  // Each is bounded by the time limit of the test alone.
+  // Each is bounded by the test's time limit only.
   while (Metric("hulld_pairs_total") == 0) std::this_thread::yield();
   EXPECT_GT(Metric("hulld_cache_bytes") - before, kLeast);
-  // Beside it a scene that is read runs to its end; both take turns.
+  // A concurrent scene with a reader runs to its end; both take turns.
   grpc::ClientContext read_context;
   const auto read = collisions_->FindCollisions(&read_context, Heap(1500));
   v1::FindCollisionsResponse part;
   while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMost);
   ASSERT_TRUE(read->Finish().ok());
   EXPECT_EQ(part.totals().overlapping(), 1500u * 1499 / 2);
-  // There are 2e10 pairs.
+  // 2e10 pairs in total.
   EXPECT_LT(Metric("hulld_pairs_total"), 2e6);
   context.TryCancel();
   while (unread->Read(&part)) {
@@ -84,7 +84,7 @@ TEST_F(SceneMemory, BeyondTheMemoryLimitIsRefused) {
     const auto reader = collisions_->FindCollisions(&context, Heap(placements));
     v1::FindCollisionsResponse part;
     while (reader->Read(&part)) {
-      // A scene that is let in would take long.
+      // An admitted scene would take long.
       if (placements > 100 && part.pairs_size() > 0) context.TryCancel();
     }
     return reader->Finish();
@@ -97,7 +97,7 @@ TEST_F(SceneMemory, BeyondTheMemoryLimitIsRefused) {
   EXPECT_TRUE(find(100).ok());
 }
 
-// The placements of a batch are as many.
+// A batch has the same number of placements.
 TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
   Config config = TestConfig();
   config.limits.memory_limit = 4 << 20;
@@ -117,7 +117,7 @@ TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
   EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
 }
 
-// An error takes more than the placement that it is about.
+// An error takes more memory than its placement.
 TEST_F(SceneMemory, OfWhatIsWrongWithPlacementsCounts) {
   Config config = TestConfig();
   config.limits.memory_limit = 30'000'000;
@@ -142,5 +142,5 @@ TEST_F(SceneMemory, OfWhatIsWrongWithPlacementsCounts) {
   EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
 }
 
-}  // namespace
+}  // namespace scene_memory_test
 }  // namespace hulld::server

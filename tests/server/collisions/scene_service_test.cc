@@ -12,7 +12,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace scene_service_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -226,8 +226,8 @@ TEST_F(FindCollisionsCall, LongAnswersStreamInMessagesOfAMebibyte) {
   EXPECT_LT(scene.largest_message, (1 << 20) + 4096);
 }
 
-// Needles side by side along the diagonal of space: all their boxes meet and none of them does, so
-// that there are 2e9 pairs to look at and nothing to send.
+// Parallel needles along the space diagonal: all boxes meet, but no needles do, so the scene has
+// 2e9 pairs to test and nothing to send.
 v1::FindCollisionsRequest EndlessScene() {
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 65'536; ++i) *request.add_placements() = PlacementOf("needle", 1e-6 * i);
@@ -262,5 +262,5 @@ TEST_F(FindCollisionsCall, ADeadlineEndsALongScene) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-}  // namespace
+}  // namespace scene_service_test
 }  // namespace hulld::server

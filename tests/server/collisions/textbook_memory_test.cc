@@ -1,4 +1,4 @@
-// What pairs for the textbook hold between their slices, and how it is counted.
+// Memory that textbook pairs hold between their slices, and its accounting.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,13 +13,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace textbook_memory_test {
 
 using ::testing::HasSubstr;
 
 class TextbookMemory : public ServerTest {
  protected:
-  // A sphere whose vertices, multiplied out in integers, take more than the readers' share.
+  // Puts a sphere with vertices that, multiplied out in integers, exceed the readers' share.
   void PutLarge() {
     Config config = TestConfig();
     config.limits.memory_limit = 35'000'000;
@@ -40,7 +40,7 @@ class TextbookMemory : public ServerTest {
     *request.mutable_b() = PlacementOf(b);
     return request;
   }
-  // What counts against the limit.
+  // Bytes counted against the limit.
   double HeldBytes() const {
     for (const prometheus::MetricFamily& family : server_->metrics().Collect()) {
       if (family.name == "hulld_cache_bytes") return family.metric.front().gauge.value;
@@ -70,7 +70,7 @@ TEST_F(TextbookMemory, OfAPairThatIsBegunIsCountedAndOthersAreRefused) {
   while (!IsCounted() && !is_answered) std::this_thread::yield();
   EXPECT_FALSE(is_answered);
   ExpectRefused(CheckError(Question("large", "cube")));
-  // A small pair is answered all the same.
+  // A small pair is still answered.
   EXPECT_EQ(Check(Question("cube", "cube")).relation(), v1::RELATION_OVERLAPPING);
   context.TryCancel();
   first.join();
@@ -162,5 +162,5 @@ TEST(TextbookTeam, AnswersLargeHullsAgainstPoints) {
   EXPECT_FALSE(is_for_team(query_small, query_point));
 }
 
-}  // namespace
+}  // namespace textbook_memory_test
 }  // namespace hulld::server

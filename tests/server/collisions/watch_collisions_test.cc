@@ -18,7 +18,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace watch_collisions_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -57,7 +57,7 @@ class Watch {
   bool Write(const v1::WatchCollisionsRequest& request) { return stream_->Write(request); }
   bool Read(v1::WatchCollisionsResponse* message) { return stream_->Read(message); }
 
-  // The messages up to the next that ends a round, as one.
+  // Returns all messages up to the end of the round, merged.
   v1::WatchCollisionsResponse Round() {
     v1::WatchCollisionsResponse all;
     v1::WatchCollisionsResponse message;
@@ -314,8 +314,7 @@ TEST_F(WatchCollisions, EndsWhenTheServerDrains) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::hours(1)));
 }
 
-// What hulls were at each revision, and where placements are after each update: what is needed to
-// ask core about what a watch said.
+// Hulls by revision and poses by update, to check a watch's events against core.
 class Truth {
  public:
   void Grow(const std::string& id, uint64_t revision, const std::vector<Vector>& points) {
@@ -357,9 +356,9 @@ class Truth {
   std::map<std::pair<std::string, uint64_t>, std::vector<Vector>> hulls_;
 };
 
-// Hulls grow and placements move at random, on a coarse lattice so that many pairs touch: each
-// event is exact for the poses and revisions that it states, and at the end the watch knows what a
-// batch says.
+// Hulls grow and placements move at random, on a coarse lattice so that many pairs touch. Each
+// event is exact for its stated poses and revisions, and the watch's final state equals a batch's
+// answer.
 TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
   constexpr int kHulls = 6;
   constexpr int kUpdates = 150;
@@ -388,7 +387,7 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
         for (uint32_t b = a + 1; b < kHulls; ++b) open = Pair(open, a, b);
       }
     }
-    // Where each placement is after each update.
+    // Pose of each placement after each update.
     std::vector<std::vector<Pose>> poses(1);
     for (const v1::Placement& placement : open.placements()) {
       poses[0].push_back(Pose());
@@ -424,7 +423,7 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
         appender.Finish();
       });
     }
-    // Checked once all revisions are known.
+    // Checked after all revisions are known.
     std::vector<std::pair<uint64_t, v1::CollisionEvent>> events;
     std::map<std::pair<uint32_t, uint32_t>, v1::Relation> known;
     uint64_t revision = 0;
@@ -441,7 +440,7 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
       updated = message.update();
       revision = message.header().revision();
     };
-    // A few updates are under way at a time, so that hulls grow between them.
+    // Keeps a few updates in flight, so that hulls grow between them.
     for (size_t sent = 0; updated < kUpdates && !HasFatalFailure(); read()) {
       while (sent < kUpdates && sent < updated + 3) watch.Write(updates[sent++]);
     }
@@ -450,7 +449,7 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
     for (const std::string& id : ids) last = std::max(last, Get(id).hull().revision());
     while (revision < last && !HasFatalFailure()) read();
 
-    // How many depends on how fast they are read: what changed twice in between is told once.
+    // The number depends on the reading speed: two changes between reads are reported as one.
     ASSERT_GT(events.size(), 5);
     for (const auto& [update, event] : events) {
       const uint32_t a = event.placement_a();
@@ -472,5 +471,5 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
   }
 }
 
-}  // namespace
+}  // namespace watch_collisions_test
 }  // namespace hulld::server

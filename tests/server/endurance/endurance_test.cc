@@ -1,8 +1,8 @@
-// One server, and clients that do all that clients do, for as long as wished: they append, replace,
-// delete and ask, send what is malformed, and vanish. The server is killed in between, and its disk
-// is full at times. Every answer is checked, and what the server holds must not creep up.
+// One server, and clients that perform all operations for any length of time: they append, replace,
+// delete, and query, send malformed requests, and disappear. The server is killed repeatedly, and
+// its disk is sometimes full. Every answer is checked, and the server's resource use must not grow.
 //
-// HULLD_ENDURANCE_ROUNDS in the environment: how long, by hand; a round takes a few seconds.
+// HULLD_ENDURANCE_ROUNDS: number of rounds, for manual runs; a round takes a few seconds.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
@@ -30,7 +30,7 @@
 #include "tests/server/harness/restartable_server.h"
 
 namespace hulld::server {
-namespace {
+namespace endurance_test {
 
 using Outcome = HullModel::Outcome;
 
@@ -80,7 +80,7 @@ v1::Relation TrueRelation(const Hull& a, const Pose& X_WA, const Hull& b, const 
   }
 }
 
-// How often all clients together made each kind of call, and how it ended.
+// Counts the calls of all clients by kind and outcome.
 class Tally {
  public:
   void Count(const std::string& kind, const absl::Status& status) {
@@ -112,7 +112,7 @@ class Tally {
   std::map<std::string, std::map<absl::StatusCode, uint64_t>> counts_;
 };
 
-// One client, with hulls that it alone changes, and some that all change. For one thread.
+// A client with hulls that it alone changes, and some shared ones. Not thread-safe.
 class MixedClient {
  public:
   MixedClient(int number, uint64_t seed, const std::shared_ptr<grpc::Channel>& channel,
@@ -132,7 +132,7 @@ class MixedClient {
     (this->*calls[Below(calls.size())])();
   }
 
-  // What became of all its hulls; nobody kills the server meanwhile.
+  // Checks all its hulls. Requires: the server is not killed concurrently.
   void LookAtAll() {
     for (HullModel& hull : own_) {
       EXPECT_TRUE(LookAt(&hull));
@@ -149,7 +149,7 @@ class MixedClient {
   HullModel& OwnAtRandom() { return own_[Below(own_.size())]; }
   std::string SharedAtRandom() { return absl::StrCat("shared/", Below(kSharedHulls)); }
 
-  // A lattice, so that points coincide, lie in planes, and hulls touch.
+  // On a lattice, so that points coincide, lie in planes, and hulls touch.
   double Coordinate() { return static_cast<double>(Below(17)) / 8 - 1; }
   v1::PointBlock SomePoints() {
     v1::PointBlock block;
@@ -183,7 +183,7 @@ class MixedClient {
     EXPECT_TRUE(is_right) << problem;
     return is_right;
   }
-  // Whether it is known what this hull is.
+  // Returns true if the hull's state is known.
   bool Know(HullModel* hull) {
     if (!hull->is_known()) LookAt(hull);
     return hull->is_known();
@@ -229,9 +229,9 @@ class MixedClient {
     hull.Delete(Changed("delete", status));
   }
 
-  // --- Questions ---
+  // --- Queries ---
 
-  // The hulls that there are, of those that are known. Only this client changes them.
+  // Returns the hulls known to exist. Only this client changes them.
   std::vector<const HullModel*> Present() {
     std::vector<const HullModel*> present;
     for (HullModel& hull : own_) {
@@ -375,9 +375,9 @@ class MixedClient {
     EXPECT_LE(listed->hulls_size(), kClients * kHulls + kSharedHulls + 1);
   }
 
-  // --- What no server likes ---
+  // --- Malformed requests ---
 
-  // Bytes that are no message, to a call at random.
+  // Sends bytes that are not a message to a random call.
   void SendGarbage() {
     const std::array methods = {"HullService/GetHull", "HullService/CreateHull",
                                 "CollisionService/CheckCollision",
@@ -406,7 +406,7 @@ class MixedClient {
                 code == absl::StatusCode::kUnavailable || code == absl::StatusCode::kCancelled)
         << status.error_message();
   }
-  // Requests that can be read and make no sense: all are refused, and change nothing.
+  // Sends well-formed but invalid requests: all are refused and change nothing.
   void SendNonsense() {
     HullModel& hull = OwnAtRandom();
     v1::PointBlock points = SomePoints();
@@ -422,7 +422,7 @@ class MixedClient {
     EXPECT_FALSE(status.ok());
     EXPECT_FALSE(absl::IsInternal(status)) << status;
   }
-  // Calls that end in the middle, without a word.
+  // Abandons calls in the middle.
   void Vanish() {
     const auto hulls = v1::HullService::NewStub(channel_);
     const auto collisions = v1::CollisionService::NewStub(channel_);
@@ -451,7 +451,7 @@ class MixedClient {
   }
 
  public:
-  // Answers whose certificate was checked.
+  // Answers with a verified certificate.
   uint64_t verified() const { return verified_; }
 
  private:
@@ -463,11 +463,11 @@ class MixedClient {
   uint64_t verified_ = 0;
 };
 
-// What a process holds.
+// Resources of a process.
 struct Holdings {
   int64_t resident_kib = 0;
   int64_t threads = 0;
-  // Sockets and other descriptors that are no files: the store opens files as it sees fit.
+  // Sockets and other non-file descriptors: the number of files open depends on the store.
   int64_t descriptors = 0;
 };
 
@@ -497,7 +497,7 @@ class Endurance : public RestartableServer {
   static constexpr int64_t kDiskBytes = int64_t{256} << 20;
 
   void SetUp() override {
-    // A disk of its own that can be filled, where this process may mount one.
+    // A separate disk that can be filled, if this process may mount one.
     const std::string store = directory_.path() + "/store";
     mkdir(store.c_str(), 0700);
     has_disk_ =
@@ -512,7 +512,7 @@ class Endurance : public RestartableServer {
 
   void Start() {
     StartServer({"--log-level", "error", "--drain-timeout", "5"});
-    // Somebody must read what it says, or it waits.
+    // Drains the server's output, so that the server never blocks on it.
     reader_ = std::thread([server = server_.get()] { server->ReadToEnd(); });
   }
   void Stop(int signal) {
@@ -528,7 +528,7 @@ class Endurance : public RestartableServer {
     while (out.write(block.data(), static_cast<std::streamsize>(block.size())).flush()) {
     }
   }
-  // Changes a hull until the disk is in the way: the store has set some space aside.
+  // Changes a hull until the disk is full: the store has reserved some space.
   absl::Status WriteUntilRefused(const Client& client) {
     v1::PointBlock sphere;
     for (int i = 0; i < 8000; ++i) {
@@ -606,7 +606,7 @@ TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
     full_disks += is_full;
     for (std::thread& thread : threads) thread.join();
     for (const auto& client : clients) client->LookAtAll();
-    // A start begins with less.
+    // A freshly started server holds less.
     if (round >= kWarmRounds) held.push_back(HoldingsOf(server_->pid()));
   }
   uint64_t verified = 0;
@@ -620,7 +620,7 @@ TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
                 static_cast<long long>(h.descriptors));
   }
   ASSERT_GE(held.size(), 2u);
-  // Clients and hulls are as many as ever; caches of the store and of memory may differ.
+  // The numbers of clients and hulls are constant; caches of the store and of memory may differ.
   const size_t half = held.size() / 2;
   const auto most = [&held](size_t from, size_t to, int64_t Holdings::*what) {
     int64_t value = 0;
@@ -630,7 +630,7 @@ TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
   for (const auto what : {&Holdings::threads, &Holdings::descriptors}) {
     EXPECT_LE(most(half, held.size(), what), most(0, half, what) + 4);
   }
-// What is freed stays for a while under the address sanitizer.
+// AddressSanitizer retains freed memory for a while.
 #ifndef HULLD_SANITIZED
   EXPECT_LE(most(half, held.size(), &Holdings::resident_kib),
             most(0, half, &Holdings::resident_kib) + (32 << 10));
@@ -644,5 +644,5 @@ TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
   EXPECT_GT(tally.Of("garbage", absl::StatusCode::kInvalidArgument), 0u);
 }
 
-}  // namespace
+}  // namespace endurance_test
 }  // namespace hulld::server

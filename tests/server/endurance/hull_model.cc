@@ -58,7 +58,7 @@ void HullModel::Append(std::span<const Vector> points, Outcome outcome) {
   if (outcome == Outcome::kNothing) return;
   std::vector<State> changed;
   for (const State& state : states_) {
-    // Nothing is appended to what is not there.
+    // Appending to a missing hull has no effect.
     if (state) changed.emplace_back(HullOf(state->vertices(), points));
   }
   Become(std::move(changed), outcome);

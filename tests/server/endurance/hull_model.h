@@ -12,34 +12,34 @@
 
 namespace hulld::server {
 
-// What one hull must be that a single client changes. A call that ended without saying whether it
-// changed anything leaves two possibilities; looking at the hull decides.
+// Expected state of a hull that a single client changes. A call of unknown outcome leaves two
+// possible states; reading the hull decides.
 class HullModel {
  public:
-  // What a call did.
+  // The effect of a call.
   enum class Outcome { kDone, kNothing, kUnknown };
-  // By the status that a change ended with: what refuses a request has changed nothing.
+  // Returns the outcome by the status of a change: a refused request has changed nothing.
   static Outcome OutcomeOf(const absl::Status& status);
 
   explicit HullModel(std::string hull_id) : hull_id_(std::move(hull_id)), states_(1) {}
 
   const std::string& hull_id() const { return hull_id_; }
-  // Unless it is there.
+  // Has no effect if the hull exists.
   void Create(Outcome outcome);
   void Append(std::span<const Vector> points, Outcome outcome);
   void Replace(std::span<const Vector> points, Outcome outcome);
   void Delete(Outcome outcome);
 
-  // Asks the server; which of the possibilities is true holds from then on. False, with `problem`
-  // set: none is. Nothing is decided, and true is returned, when the server does not answer.
+  // Reads the hull and keeps the possible state that matches. Returns false and sets `problem` if
+  // none matches. If the server does not answer, returns true and keeps all states.
   bool Look(const Client& client, std::string* problem);
-  // Whether there is one possibility.
+  // True if exactly one state is possible.
   bool is_known() const { return states_.size() == 1; }
-  // The hull; requires that it is known. Null when there is none.
+  // Returns the hull, or null if none exists. Requires: is_known().
   const Hull* hull() const { return states_[0] ? &*states_[0] : nullptr; }
 
  private:
-  // Absent: there is no hull.
+  // nullopt if the hull does not exist.
   using State = std::optional<Hull>;
   void Become(std::vector<State> changed, Outcome outcome);
 

@@ -10,7 +10,7 @@
 
 namespace hulld::server {
 
-// spdlog's default logger into a string, as the server writes it, until this goes.
+// Captures the output of spdlog's default logger, formatted as the server does, until destruction.
 class CapturedLog {
  public:
   CapturedLog() {
@@ -21,7 +21,7 @@ class CapturedLog {
     spdlog::set_default_logger(std::move(logger));
   }
   ~CapturedLog() { spdlog::set_default_logger(before_); }
-  // Requires that nothing logs any more.
+  // Requires: no thread still logs.
   std::string text() const { return text_.str(); }
 
  private:

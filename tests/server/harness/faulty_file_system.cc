@@ -16,7 +16,7 @@ using rocksdb::IODebugContext;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
-// RocksDB joins paths with slashes of its own.
+// RocksDB adds slashes of its own when it joins paths.
 std::string Normal(const std::string& path) {
   std::string normal = std::filesystem::path(path).lexically_normal().string();
   if (normal.size() > 1 && normal.ends_with('/')) normal.pop_back();
@@ -45,6 +45,12 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
     }
     rocksdb::Slice written = data;
     if (error.IsNoSpace()) written = rocksdb::Slice(data.data(), data.size() / 2);
+    if (error.ok()) {
+      const std::lock_guard lock(system_.state_mutex_);
+      const uint64_t fitting = system_.Fitting(data.size());
+      if (fitting < data.size()) error = IOStatus::NoSpace("No space left on device");
+      written = rocksdb::Slice(data.data(), fitting);
+    }
     if (error.ok() || error.IsNoSpace()) {
       const IOStatus appended = FSWritableFileOwnerWrapper::Append(written, options, debug);
       if (!appended.ok()) return appended;
@@ -67,6 +73,16 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
     file.synced = std::min(file.synced, size);
     return truncated;
   }
+  IOStatus Allocate(uint64_t offset, uint64_t size, const IOOptions& options,
+                    IODebugContext* debug) override {
+    const std::shared_lock writing(system_.mutex_);
+    const std::lock_guard lock(system_.state_mutex_);
+    if (IOStatus error = system_.Error(false); !error.ok()) return error;
+    if (system_.Fitting(size) < size) return IOStatus::NoSpace("No space left on device");
+    const IOStatus allocated = FSWritableFileOwnerWrapper::Allocate(offset, size, options, debug);
+    if (allocated.ok()) system_.files_[name_].reserved = size;
+    return allocated;
+  }
   IOStatus Sync(const IOOptions&, IODebugContext*) override { return SyncWritten(); }
   IOStatus Fsync(const IOOptions&, IODebugContext*) override { return SyncWritten(); }
   IOStatus RangeSync(uint64_t, uint64_t, const IOOptions&, IODebugContext*) override {
@@ -74,7 +90,7 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   }
 
  private:
-  // The real disk need not be bothered: its power is not cut.
+  // The real disk is not synced: its power is not cut.
   IOStatus SyncWritten() {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
@@ -85,6 +101,39 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
     return IOStatus::OK();
   }
 
+  FaultyFileSystem& system_;
+  const std::string name_;
+};
+
+// A file with writes at random offsets.
+class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper {
+ public:
+  Overwritten(FaultyFileSystem& system, std::string name,
+              std::unique_ptr<rocksdb::FSRandomRWFile> file)
+      : FSRandomRWFileOwnerWrapper(std::move(file)), system_(system), name_(std::move(name)) {}
+
+  IOStatus Write(uint64_t offset, const rocksdb::Slice& data, const IOOptions& options,
+                 IODebugContext* debug) override {
+    const std::shared_lock writing(system_.mutex_);
+    const std::lock_guard lock(system_.state_mutex_);
+    // Overwriting takes no space, so it succeeds on a full disk.
+    if (IOStatus error = system_.Error(false); !error.ok() && !error.IsNoSpace()) return error;
+    std::string former(data.size(), '\0');
+    rocksdb::Slice read;
+    IOStatus status = Read(offset, data.size(), options, &read, former.data(), debug);
+    if (!status.ok()) return status;
+    system_.files_[name_].overwritten.emplace(offset, former);
+    return FSRandomRWFileOwnerWrapper::Write(offset, data, options, debug);
+  }
+  IOStatus Sync(const IOOptions&, IODebugContext*) override {
+    const std::shared_lock writing(system_.mutex_);
+    const std::lock_guard lock(system_.state_mutex_);
+    if (IOStatus error = system_.Error(true); !error.ok()) return error;
+    system_.files_[name_].overwritten.clear();
+    return IOStatus::OK();
+  }
+
+ private:
   FaultyFileSystem& system_;
   const std::string name_;
 };
@@ -136,6 +185,24 @@ void FaultyFileSystem::SetFault(Fault fault, int64_t failures) {
   const std::lock_guard lock(state_mutex_);
   fault_ = fault;
   failures_left_ = failures;
+}
+
+void FaultyFileSystem::SetRoom(uint64_t bytes) {
+  const std::lock_guard lock(state_mutex_);
+  room_ = bytes;
+}
+
+uint64_t FaultyFileSystem::used() const {
+  const std::lock_guard lock(state_mutex_);
+  uint64_t bytes = 0;
+  for (const auto& [name, file] : files_) bytes += file.size + file.reserved;
+  return bytes;
+}
+
+uint64_t FaultyFileSystem::Fitting(uint64_t size) const {
+  uint64_t used = 0;
+  for (const auto& [name, file] : files_) used += file.size + file.reserved;
+  return used >= room_ ? 0 : std::min(size, room_ - used);
 }
 
 int64_t FaultyFileSystem::syncs() const {
@@ -215,6 +282,9 @@ void FaultyFileSystem::CopySurvivors(const std::string& source, const std::strin
     if (file.entry_synced) {
       const uint64_t torn = random() % (file.size - file.synced + 1);
       content.resize(std::min<uint64_t>(content.size(), file.synced + torn));
+      for (const auto& [offset, former] : file.overwritten) {
+        if (random() % 2 == 0) content.replace(offset, former.size(), former);
+      }
     }
     std::ofstream(copy, std::ios::binary) << content;
   }
@@ -232,6 +302,17 @@ IOStatus FaultyFileSystem::NewWritableFile(const std::string& name,
   if (!opened.ok()) return opened;
   files_[Normal(name)] = {};
   *result = std::make_unique<File>(*this, Normal(name), std::move(file));
+  return opened;
+}
+
+IOStatus FaultyFileSystem::NewRandomRWFile(const std::string& name,
+                                           const rocksdb::FileOptions& options,
+                                           std::unique_ptr<rocksdb::FSRandomRWFile>* result,
+                                           IODebugContext* debug) {
+  std::unique_ptr<rocksdb::FSRandomRWFile> file;
+  const IOStatus opened = FileSystemWrapper::NewRandomRWFile(name, options, &file, debug);
+  if (!opened.ok()) return opened;
+  *result = std::make_unique<Overwritten>(*this, Normal(name), std::move(file));
   return opened;
 }
 

@@ -16,42 +16,47 @@
 
 namespace hulld::server {
 
-// A file system in front of the real one that can fail, and that knows what a disk would hold if
-// the power went out now: the bytes of each file that were synced, and the entries of each
-// directory that were there when it was synced last. Deletions count at once.
+// A wrapper of the real file system that injects faults and tracks the data that would survive a
+// power failure: the synced bytes of each file, and the entries of each directory as of its last
+// sync. Deletions take effect immediately.
 class FaultyFileSystem : public rocksdb::FileSystemWrapper {
  public:
   enum class Fault {
     kNone,
-    // Writes fail half done: the disk is full.
+    // The disk is full: writes are cut short.
     kNoSpace,
-    // Writes, syncs and changes of directories fail.
+    // Writes, syncs, and directory changes fail.
     kIoError,
-    // As kIoError, with the error of a file system that is mounted for reading.
+    // As kIoError, with the error of a read-only file system.
     kReadOnly,
-    // Writes work, syncs fail.
+    // Writes succeed, syncs fail.
     kSyncError,
-    // The same, as where a file system finds room for what was written only when it is synced.
+    // As kSyncError, for file systems that allocate space only at sync.
     kNoSpaceAtSync,
-    // Reading tables fails, which are the files that end in .sst; the rest works.
+    // Reads of table files (.sst) fail; everything else succeeds.
     kReadError,
   };
 
   FaultyFileSystem() : FileSystemWrapper(rocksdb::FileSystem::Default()) {}
   const char* Name() const override { return "FaultyFileSystem"; }
 
-  // failures: after this many, the fault is over.
+  // failures: the fault clears after this many.
   void SetFault(Fault fault, int64_t failures = std::numeric_limits<int64_t>::max());
-  // Syncs of files so far.
+  // Limits the space for all files written through this file system. Writes that do not fit are cut
+  // short. Space that RocksDB preallocates for its own files does not count.
+  void SetRoom(uint64_t bytes);
+  // Space used by files that count towards SetRoom.
+  uint64_t used() const;
+  // File syncs so far, except those of files overwritten in place.
   int64_t syncs() const;
 
-  // The directories that were made, and those of them whose entries could be lost.
+  // Directories created so far, and the subset with entries that a power failure would lose.
   std::vector<std::string> directories() const;
   std::vector<std::string> unsynced_directories() const;
 
-  // Makes `target` what would be left of `source` if the power went out at this very moment. A
-  // random part, from the front, of the bytes that were not synced is left, too. Both names come
-  // without a slash at the end. Nothing that is written meanwhile is seen in part.
+  // Makes `target` the state of `source` after a power failure at this instant. A random prefix of
+  // the unsynced bytes survives as well. Paths have no trailing slash. Concurrent writes are seen
+  // completely or not at all.
   void CopySurvivors(const std::string& source, const std::string& target, std::mt19937_64& random);
 
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
@@ -61,6 +66,9 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
                                         const rocksdb::FileOptions& options,
                                         std::unique_ptr<rocksdb::FSRandomAccessFile>* result,
                                         rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus NewRandomRWFile(const std::string& name, const rocksdb::FileOptions& options,
+                                    std::unique_ptr<rocksdb::FSRandomRWFile>* result,
+                                    rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus NewDirectory(const std::string& name, const rocksdb::IOOptions& options,
                                  std::unique_ptr<rocksdb::FSDirectory>* result,
                                  rocksdb::IODebugContext* debug) override;
@@ -76,6 +84,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
 
  private:
   class File;
+  class Overwritten;
   class Table;
   class Directory;
 
@@ -83,24 +92,31 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     uint64_t size = 0;
     uint64_t synced = 0;
     bool entry_synced = false;
-    // What was there under this name when its directory was synced last.
+    // Preallocated beyond `size`.
+    uint64_t reserved = 0;
+    // Unsynced in-place overwrites: the previous bytes by offset.
+    std::map<uint64_t, std::string> overwritten;
+    // Contents under this name at the directory's last sync.
     std::optional<std::string> former;
   };
 
-  // What an operation fails with now; counts that it does. Requires state_mutex_ (unchecked: a
-  // std::mutex does not tell).
+  // Returns the current error of an operation and counts the failure. Requires: state_mutex_ (not
+  // annotated: std::mutex has no capability attributes).
   rocksdb::IOStatus Error(bool is_sync);
   rocksdb::IOStatus WhatFails(bool is_sync) const;
+  // Returns how many of `size` more bytes fit. Requires: state_mutex_.
+  uint64_t Fitting(uint64_t size) const;
 
-  // Held shared while something is written, alone while survivors are copied.
+  // Held shared by writes, exclusively while survivors are copied.
   mutable std::shared_mutex mutex_;
   mutable std::mutex state_mutex_;
   // Guarded by state_mutex_.
   Fault fault_ = Fault::kNone;
   int64_t failures_left_ = 0;
   int64_t syncs_ = 0;
+  uint64_t room_ = std::numeric_limits<uint64_t>::max();
   std::map<std::string, Written> files_;
-  // Whether the entry of each that was made is synced.
+  // By directory created: true if its entry is synced.
   std::map<std::string, bool> directories_;
 };
 

@@ -15,8 +15,8 @@
 namespace hulld::server {
 namespace {
 
-// The environment, in which hulld keeps nothing on disk unless its arguments say otherwise: tests
-// leave nothing behind.
+// Returns an environment in which hulld stores nothing on disk by default, so that tests leave no
+// files behind.
 std::vector<char*> Environment() {
   static char memory[] = "HULLD_STORE=memory";
   std::vector<char*> environment;
@@ -42,8 +42,8 @@ Process::Process(const std::string& program, std::vector<std::string> arguments)
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  // Not fork: threads of clients run here, and whatever lock one of them holds at that moment, the
-  // child would wait for ever.
+  // Not fork(): client threads run here, and the child would deadlock on any lock that one of them
+  // holds.
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);

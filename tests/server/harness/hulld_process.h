@@ -9,27 +9,28 @@
 
 namespace hulld::server {
 
-// A program, hulld, whose standard error is read here; killed, if it still runs, with this.
+// A child process, by default hulld, with its standard error readable. Killed on destruction if
+// still running.
 class Process {
  public:
   explicit Process(std::vector<std::string> arguments);
-  // Another program than hulld, by its path.
+  // Runs another program, by its path.
   Process(const std::string& program, std::vector<std::string> arguments);
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
   ~Process();
 
-  // Reads up to the first line that holds `text` and returns it; empty at the end of the output.
+  // Reads up to the first line that contains `text` and returns it; empty at the end of the output.
   std::string ReadLineWith(const std::string& text);
 
-  // Reads what is left of the output, which ends when the process does.
+  // Reads the remaining output, until the process ends.
   void ReadToEnd();
 
   const std::vector<std::string>& lines() const { return lines_; }
   pid_t pid() const { return pid_; }
   void Signal(int number);
 
-  // The exit status, or -1 when a signal ended it.
+  // Returns the exit status, or -1 if a signal ended it.
   int Wait();
 
  private:
@@ -39,10 +40,10 @@ class Process {
   std::vector<std::string> lines_;
 };
 
-// The address in the line in which hulld says that it listens.
+// Returns the address in hulld's "listening" log line.
 std::string AddressIn(const std::string& line);
 
-// An address of this machine that nothing listens at.
+// Returns a local address without a listener.
 std::string UnusedAddress();
 
 }  // namespace hulld::server

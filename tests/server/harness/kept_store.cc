@@ -107,7 +107,7 @@ class KeptPostgres : public KeptStore {
     return number;
   }
 
-  // Where a store_keys.h key's value is.
+  // Returns the location of the value of a store_keys.h key.
   static Place PlaceOf(const std::string& key) {
     const std::string incarnation = absl::StrCat(" WHERE incarnation = ", NumberAt(key, 1, 8));
     const std::string revision = absl::StrCat(incarnation, " AND revision = ", NumberAt(key, 9, 8));
@@ -132,7 +132,7 @@ class KeptPostgres : public KeptStore {
   std::vector<std::string> Ask(const std::string& sql) const {
     return PostgresCluster::Shared().Ask(database_, sql);
   }
-  // Exactly one row.
+  // Requires: the statement changes exactly one row.
   void Change(const std::string& sql) const { HULLD_CHECK(Ask(sql + " RETURNING 1").size() == 1); }
 
   const std::string database_ = PostgresCluster::Shared().MakeDatabase();

@@ -14,35 +14,35 @@
 
 namespace hulld::server {
 
-// Over any store that keeps hulls.
+// A registry over any persistent store.
 using KeptRegistry = TestRegistry<Store>;
 
-// One store of some kind, as tests open it, look into it and damage it. Values go by the keys of
-// store_keys.h, wherever the store puts them, and must be there.
+// A persistent store that tests can open, inspect, and damage. Values are addressed by the keys of
+// store_keys.h, wherever the store keeps them. Requires: the value exists.
 class KeptStore {
  public:
   virtual ~KeptStore() = default;
-  // What was open before must be closed.
+  // Requires: any store opened before is closed.
   virtual absl::StatusOr<std::unique_ptr<Store>> Open() = 0;
   virtual uint64_t latest_format() const = 0;
 
-  // Requires that it is open.
+  // Requires: the store is open.
   virtual std::string Get(const std::string& key) = 0;
   virtual void Put(const std::string& key, const std::string& value) = 0;
   virtual void Delete(const std::string& key) = 0;
-  // Values of one kind.
+  // Returns the number of values with this prefix.
   virtual size_t Count(char prefix) = 0;
   virtual void SetFormat(uint64_t format) = 0;
 };
 
-// A test that holds for each of them: "rocksdb", "postgres".
+// A test parameterized by persistent store: "rocksdb", "postgres".
 class KeptStoreTest : public ::testing::TestWithParam<const char*> {
  protected:
-  // Skips the test where what it needs is not installed.
+  // Skips the test if its store is not installed.
   void SetUp() override;
   void TearDown() override { hulls_ = nullptr; }
 
-  // The store must open. Closes the one that was open before.
+  // Closes the open store and opens it again; this must succeed.
   KeptRegistry& Start(const Limits& limits = {});
 
   std::unique_ptr<KeptStore> kept_;

@@ -18,7 +18,7 @@
 
 namespace hulld::server {
 
-// A directory that goes with this.
+// A directory that is deleted on destruction.
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
@@ -32,13 +32,13 @@ class TemporaryDirectory {
   std::string path_;
 };
 
-// A server that can be killed and started again, on a unix socket and a store of its own.
+// A server that can be killed and restarted, with its own unix socket and store.
 class RestartableServer : public ::testing::Test {
  protected:
   std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
 
-  // Arguments of a connection that tries again at once while the server starts. It may take a
-  // second to be made, which is what gRPC means by the least backoff.
+  // Returns channel arguments that reconnect immediately while the server starts. Connecting may
+  // take a second, which gRPC treats as the minimum backoff.
   static grpc::ChannelArguments ReconnectAtOnce() {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
@@ -47,7 +47,7 @@ class RestartableServer : public ::testing::Test {
     return arguments;
   }
 
-  // A connection of client number `i` alone.
+  // Returns a separate connection of client `i`.
   std::shared_ptr<grpc::Channel> Channel(int i) const {
     grpc::ChannelArguments own = ReconnectAtOnce();
     own.SetInt("hulld.test.client", i);
@@ -56,7 +56,7 @@ class RestartableServer : public ::testing::Test {
 
   void StartServer(const std::vector<std::string>& options = {}) {
     std::vector<std::string> arguments = {"--listen", address(),
-                                          // Nobody reads what it says while clients call.
+                                          // Its output is not read while clients call.
                                           "--log-level", "warn"};
     arguments.insert(arguments.end(), store_.begin(), store_.end());
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -71,7 +71,7 @@ class RestartableServer : public ::testing::Test {
     EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself" << Said();
   }
 
-  // What the server logged until it was killed, which this does if nobody has.
+  // Kills the server if it still runs, and returns its log.
   std::string Said() {
     server_->Signal(SIGKILL);
     server_->ReadToEnd();
@@ -79,7 +79,7 @@ class RestartableServer : public ::testing::Test {
   }
 
   const TemporaryDirectory directory_;
-  // The settings that say where hulls live.
+  // Settings that select the store.
   std::vector<std::string> store_ = {"--store", "rocksdb", "--data-dir",
                                      absl::StrCat(directory_.path(), "/store")};
   std::unique_ptr<Process> server_;

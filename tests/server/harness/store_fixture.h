@@ -32,7 +32,7 @@ class TestRegistry {
   Registry& registry() { return registry_; }
   const absl::Status& loaded() const { return loaded_; }
 
-  // Waits for the reply of one call.
+  // Waits for the reply of a call.
   template <typename T, typename Call>
   static absl::StatusOr<T> Wait(const Call& call) {
     std::promise<absl::StatusOr<T>> promise;
@@ -62,7 +62,7 @@ class TestRegistry {
                        std::move(done));
     });
   }
-  // One chunk in a session of its own.
+  // Sends one chunk in its own session.
   absl::StatusOr<ChunkResult> Put(const std::string& id, std::vector<Vector> points,
                                   const std::string& writer = "w") {
     const absl::StatusOr<OpenResult> opened = Open(id, writer);
@@ -93,7 +93,7 @@ class TestRegistry {
 using DurableRegistry = TestRegistry<RocksDbStore>;
 using MemoryRegistry = TestRegistry<MemoryStore>;
 
-// Gives each test a directory of its own, and opens stores in it.
+// Gives each test its own directory and opens stores in it.
 class StoreTest : public ::testing::Test {
  protected:
   StoreTest() {
@@ -107,10 +107,11 @@ class StoreTest : public ::testing::Test {
     options.data_dir = directory_ + "/" + name;
     options.durability = durability_;
     options.sync_interval = sync_interval_;
+    options.reserve_bytes = reserve_bytes_;
     options.env = env_;
     return RocksDbStore::Open(options);
   }
-  // The store must open. Closes the one that was open before.
+  // Closes the open store and opens it again; this must succeed.
   DurableRegistry& Start(const Limits& limits = {}) {
     hulls_ = nullptr;
     absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore();
@@ -126,16 +127,17 @@ class StoreTest : public ::testing::Test {
   std::string directory_;
   Durability durability_ = Durability::kSync;
   std::chrono::milliseconds sync_interval_{1};
+  uint64_t reserve_bytes_ = 1 << 20;
   rocksdb::Env* env_ = nullptr;
   std::unique_ptr<DurableRegistry> hulls_;
 };
 
-// The canonical snapshot of what was resolved, which must not be damaged; it lives as long as
+// Returns the canonical snapshot of a resolved hull, which must be undamaged; valid as long as
 // view.served.
 const Hull& CanonicalOf(const HullView& view);
-// The corners of the cube [low, low + size]^3.
+// Returns the corners of the cube [low, low + size]^3.
 std::vector<Vector> CubeCorners(double low = 0, double size = 1);
-// `count` points on the unit sphere, all of them extreme.
+// Returns `count` points on the unit sphere, all extreme.
 std::vector<Vector> SpherePoints(int count, double radius = 1);
 
 }  // namespace hulld::server

@@ -21,7 +21,7 @@ class TestAuthority {
  public:
   explicit TestAuthority(const std::string& name);
 
-  // Its own certificate, which clients that trust it need.
+  // Its own certificate, for clients that trust it.
   const std::string& certificate() const { return certificate_pem_; }
   // Valid from now + `from` until now + `until`.
   TestIdentity Issue(const std::string& name, std::chrono::hours from = std::chrono::hours(-1),
@@ -33,7 +33,7 @@ class TestAuthority {
   std::string certificate_pem_;
 };
 
-// Replaces the file at once, as an exchange of certificates should; only we can read it.
+// Replaces the file atomically, as certificate rotation should; readable by the owner only.
 void WriteSecret(const std::string& path, const std::string& text);
 
 }  // namespace hulld::server

@@ -68,7 +68,7 @@ void ServerTest::Restart(const Config& config) {
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config);
   ASSERT_TRUE(server.ok()) << server.status().ToString();
   server_ = *std::move(server);
-  // Not a connection that another channel had to the server before, under the same address.
+  // Avoids a connection of another channel to a previous server at the same address.
   grpc::ChannelArguments own;
   own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   channel_ = grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), own);

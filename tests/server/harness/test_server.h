@@ -20,9 +20,9 @@ namespace hulld::server {
 // Coordinates, three per point.
 using Coordinates = std::vector<double>;
 
-// The corners of the cube [low, low + size]^3.
+// Returns the corners of the cube [low, low + size]^3.
 Coordinates Cube(double low = 0, double size = 1);
-// `count` points on the unit sphere around (x, 0, 0), all of them extreme, spread evenly
+// Returns `count` points on the unit sphere around (x, 0, 0), all extreme, evenly spread
 // (Fibonacci).
 Coordinates Sphere(int count, double x = 0);
 
@@ -32,10 +32,10 @@ v1::AppendPointsRequest ChunkMessage(uint64_t sequence, const Coordinates& xyz,
                                      std::optional<uint64_t> if_revision = std::nullopt);
 v1::Placement PlacementOf(const std::string& hull_id, double x = 0, double y = 0, double z = 0);
 
-// A server on a free port of 127.0.0.1, and stubs that talk to it over TCP.
+// A server on a free port of 127.0.0.1, and stubs that call it over TCP.
 class ServerTest : public ::testing::Test {
  protected:
-  // A test that needs other settings calls this first.
+  // Restarts the server with other settings; call first in a test that needs them.
   void Restart(const Config& config);
   void SetUp() override;
   void TearDown() override;
@@ -47,7 +47,7 @@ class ServerTest : public ::testing::Test {
   grpc::Status Delete(const std::string& hull_id);
   v1::GetHullResponse Get(const std::string& hull_id);
   v1::CheckCollisionResponse Check(const v1::CheckCollisionRequest& request);
-  // The status of a call that must fail.
+  // Returns the status of a call that must fail.
   grpc::Status CheckError(const v1::CheckCollisionRequest& request);
 
   std::unique_ptr<Server> server_;
@@ -63,17 +63,17 @@ class Appender {
   Appender(v1::HullService::Stub& stub, const std::string& hull_id, const std::string& writer_id,
            bool create_if_absent = false);
 
-  // Whether the server opened the stream.
+  // True if the server opened the stream.
   bool is_open() const { return open_; }
   const v1::AppendOpened& opened() const { return opened_.opened(); }
 
   bool Send(const v1::AppendPointsRequest& request) { return stream_->Write(request); }
-  // The next ack; nullopt when the stream has ended.
+  // Returns the next ack; nullopt at the end of the stream.
   std::optional<v1::AppendAck> ReadAck();
   // Sends a chunk and reads its ack.
   std::optional<v1::AppendAck> Append(uint64_t sequence, const Coordinates& xyz,
                                       std::optional<uint64_t> if_revision = std::nullopt);
-  // Says that nothing follows, reads what is left, and returns how the call ended.
+  // Half-closes the stream, drains it, and returns its final status.
   grpc::Status Finish();
   void Cancel() { context_.TryCancel(); }
 

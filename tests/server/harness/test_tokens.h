@@ -7,11 +7,11 @@
 
 namespace hulld::server {
 
-// A line of --tokens-file. role: read-only, read-write or admin. prefix: "*" for all.
+// Returns a line of --tokens-file. role: read-only, read-write, or admin. prefix: "*" for all.
 std::string TokenLine(const std::string& name, const std::string& role, const std::string& prefix,
                       const std::string& token);
 
-// Makes a call one of the token's owner.
+// Authenticates a call with this token.
 void Authorize(grpc::ClientContext& context, const std::string& token);
 
 }  // namespace hulld::server

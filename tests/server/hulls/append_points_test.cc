@@ -7,13 +7,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace append_points_test {
 
 using ::testing::HasSubstr;
 
 class AppendPoints : public ServerTest {
  protected:
-  // How a fresh stream of `writer` ends after these messages.
+  // Returns the status of a new stream of `writer` after these messages.
   grpc::Status Outcome(const std::vector<v1::AppendPointsRequest>& messages) {
     grpc::ClientContext context;
     auto stream = hulls_->AppendPoints(&context);
@@ -296,5 +296,5 @@ TEST_F(AppendPoints, LimitsNameTheirFlags) {
   EXPECT_EQ(Get("h").hull().vertex_count(), 8);
 }
 
-}  // namespace
+}  // namespace append_points_test
 }  // namespace hulld::server

@@ -10,7 +10,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace hull_service_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -31,7 +31,7 @@ class HullCalls : public ServerTest {
     return hulls_->ListHulls(&context, request, response);
   }
 
-  // The IDs of all pages.
+  // Returns the IDs of all pages.
   std::vector<std::string> ListAll(const std::string& prefix, uint32_t page_size) {
     std::vector<std::string> ids;
     v1::ListHullsRequest request;
@@ -362,5 +362,5 @@ TEST_F(HullCalls, TheStoreIdIsAnotherAfterARestartInMemory) {
   EXPECT_NE(Get("h").header().store_id(), before);
 }
 
-}  // namespace
+}  // namespace hull_service_test
 }  // namespace hulld::server

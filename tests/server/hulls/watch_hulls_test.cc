@@ -17,7 +17,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace watch_hulls_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -487,5 +487,5 @@ TEST_F(WatchHulls, TheClientGoesOnAfterARestart) {
   EXPECT_TRUE(absl::IsCancelled(message.status()));
 }
 
-}  // namespace
+}  // namespace watch_hulls_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// The program itself: a server's store moves from RocksDB to PostgreSQL and back.
+// Tests of the program: a server's store moves from RocksDB to PostgreSQL and back.
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -16,7 +16,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace migration_process_test {
 
 using ::testing::HasSubstr;
 
@@ -51,7 +51,7 @@ class MigrateProgram : public ::testing::Test {
     hulld.ReadToEnd();
     EXPECT_EQ(hulld.Wait(), 0);
   }
-  // The exit status, and what it said was wrong.
+  // Returns the exit status and the error output.
   static std::pair<int, std::string> Migrate(const Words& options) {
     Process program(Words{"migrate"} + options);
     program.ReadToEnd();
@@ -87,7 +87,7 @@ TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
     body.add_pieces()->set_hull_id("h");
     ASSERT_TRUE(client.PutBody(body).ok());
     revision = client.GetHull("h")->header().revision();
-    // While a server has it open, it is not moved.
+    // A store open in a server is not migrated.
     const auto [code, error] = Migrate(to_postgres);
     EXPECT_EQ(code, 2);
     EXPECT_THAT(error, HasSubstr("is in use by another hulld"));
@@ -102,7 +102,7 @@ TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
     EXPECT_TRUE(hull->audit().ok());
     EXPECT_EQ(hull->header().revision(), revision);
     EXPECT_EQ(client.GetBody("body")->pieces_size(), 1);
-    // The writer goes on by its sequence.
+    // The writer continues with its sequence.
     const auto appender = client.OpenAppend("h", writer);
     ASSERT_TRUE(appender.ok()) << appender.status();
     v1::PointBlock points;
@@ -126,7 +126,7 @@ TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
   EXPECT_EQ(client.GetBody("body")->pieces_size(), 1);
 }
 
-// kill -9 at any time leaves what the next run goes on with.
+// After kill -9 at any time, the next run resumes the migration.
 TEST_F(MigrateProgram, AKilledRunIsGoneOnWith) {
   {
     const auto hulld = Serve(Words{"--store", "rocksdb", "--data-dir"} + Directory("first"));
@@ -154,7 +154,8 @@ TEST_F(MigrateProgram, AKilledRunIsGoneOnWith) {
   }
   int code = 2;
   std::string error = "a hulld is active";
-  // The database takes a moment to see that the last one is gone. One that was all done is refused.
+  // The database takes a moment to notice the end of the last run. A completed migration is
+  // refused.
   while (code == 2 && error.find("a hulld is active") != error.npos) {
     std::tie(code, error) = Migrate(options);
   }
@@ -169,5 +170,5 @@ TEST_F(MigrateProgram, AKilledRunIsGoneOnWith) {
   }
 }
 
-}  // namespace
+}  // namespace migration_process_test
 }  // namespace hulld::server

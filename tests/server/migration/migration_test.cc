@@ -1,5 +1,4 @@
-// Stores that are copied to another place: by rocksdb to postgres and back, interrupted, damaged,
-// and where it is refused.
+// Copies of stores between RocksDB and PostgreSQL: complete, interrupted, damaged, and refused.
 #include "server/migration/migration.h"
 
 #include <absl/strings/str_cat.h>
@@ -19,14 +18,14 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace migration_test {
 
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 using AnyRegistry = TestRegistry<Store>;
 
-// Where a store is, or will be.
+// The location of an existing or future store.
 class StorePlace {
  public:
   explicit StorePlace(const std::string& kind) {
@@ -45,7 +44,7 @@ class StorePlace {
   const std::string& database() const { return database_; }
   bool is_postgres() const { return !database_.empty(); }
 
-  // As `hulld migrate` names it; side: "--from" or "--to".
+  // Returns the options of `hulld migrate`; side: "--from" or "--to".
   std::vector<std::string> Options(const std::string& side) const {
     if (is_postgres()) return {side + "-postgres-conninfo-file", conninfo_file_};
     return {side + "-data-dir", data_dir()};
@@ -100,7 +99,7 @@ Ran Migrate(const StorePlace& from, const StorePlace& to) {
   return {code, out.str(), err.str()};
 }
 
-// The target of another, which fails once it has kept this many batches.
+// A wrapper of another target that fails after this many batches.
 class InterruptedTarget : public MigrationTarget {
  public:
   InterruptedTarget(std::unique_ptr<MigrationTarget> target, int batches)
@@ -131,8 +130,8 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     to_ = std::make_unique<StorePlace>(to);
   }
 
-  // Hulls that grew, that were created anew, that hold nothing, in one part and in several; writers
-  // beyond the first; a body; and more hulls than a transaction takes.
+  // Fills the source with hulls that grew, were recreated, or are empty, with one part or several;
+  // writers beyond the first; a body; and more hulls than a transaction takes.
   void FillSource() {
     const auto hulls = from_->Serve();
     ASSERT_TRUE(hulls->Put("grown", CubeCorners()).ok());
@@ -145,7 +144,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     ASSERT_TRUE(hulls->Put("large", SpherePoints(40'000)).ok());
     PutBody(*hulls, "zz");
     PutBody(*hulls, "a body");
-    // Together, so that they are committed together.
+    // Concurrently, so that they are committed together.
     std::latch created(kMany);
     for (int i = 0; i < kMany; ++i) {
       hulls->registry().Create(absl::StrCat("many/", i), false, [&](const auto& result) {
@@ -165,7 +164,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     ASSERT_TRUE(put.ok()) << put.status();
   }
 
-  // What clients can see, beside the ID of the store.
+  // Expects equal client-visible state, except for the store ID.
   static void ExpectSame(AnyRegistry& a, AnyRegistry& b) {
     EXPECT_NE(a.store().id(), b.store().id());
     EXPECT_EQ(a.store().revision(), b.store().revision());
@@ -203,7 +202,7 @@ TEST_P(MigrationTest, TheCopyServesTheSame) {
   const auto copy = to_->Serve();
   EXPECT_THAT(ran.out, HasSubstr("is store " + copy->store().id() + " now\n"));
   ExpectSame(*source, *copy);
-  // It goes on where the source was.
+  // It continues at the source's revision.
   ASSERT_TRUE(copy->Put("grown", {{0, 0, 99}}).ok());
   EXPECT_EQ(copy->View("grown")->record.revision, source->store().revision() + 1);
   ASSERT_TRUE(copy->Delete("large").ok());
@@ -222,7 +221,7 @@ TEST_P(MigrationTest, AnInterruptedRunIsGoneOnWith) {
     auto migration = Migration::Read(**source, [](uint64_t, uint64_t) {});
     ASSERT_TRUE(migration.ok()) << migration.status();
     EXPECT_TRUE(absl::IsUnavailable(migration->CopyTo(interrupted).status()));
-    // Not to be taken for the whole.
+    // A partial copy is not mistaken for a complete one.
     EXPECT_TRUE(absl::IsDataLoss(migration->Compare(interrupted.store())));
     uint64_t held = 0;
     ASSERT_TRUE(
@@ -230,7 +229,7 @@ TEST_P(MigrationTest, AnInterruptedRunIsGoneOnWith) {
     EXPECT_EQ(held > before, batches > 0);
     before = held;
   }
-  // No server opens what is there so far.
+  // No server opens a partial copy.
   const absl::Status opened = to_->Open().status();
   EXPECT_TRUE(absl::IsFailedPrecondition(opened)) << opened;
   EXPECT_THAT(std::string(opened.message()), HasSubstr("run 'hulld migrate' again"));
@@ -260,7 +259,7 @@ TEST_P(MigrationTest, ASourceThatChangedMeanwhileIsCopiedAnew) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
-// Chunks that change no vertex take no revision of the store.
+// Chunks without new vertices take no revision of the store.
 TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
   FillSource();
   std::vector<std::string> copied;
@@ -288,14 +287,14 @@ TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
 
 TEST_P(MigrationTest, OnlyAnEmptyDestinationIsTaken) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
-  // One that a server made, and that never held anything, will do.
+  // A store created by a server that never held data is accepted.
   { to_->Serve(); }
   ASSERT_EQ(Migrate(*from_, *to_).code, 0);
   const Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("the destination is not empty: it is store "));
   EXPECT_EQ(to_->Serve()->View("h")->record.vertex_count, 8);
-  // Nor one that was emptied: its clients know its revisions.
+  // A store that was emptied is refused: its clients know its revisions.
   ASSERT_TRUE(to_->Serve()->Delete("h").ok());
   EXPECT_EQ(Migrate(*from_, *to_).code, 2);
 }
@@ -332,7 +331,7 @@ TEST_P(MigrationTest, ASourceThatIsNotThereIsNotMade) {
   EXPECT_EQ(ran.code, 2);
 }
 
-// What is compared is what was copied, and every kind of difference is found.
+// The comparison covers the copied data and finds every kind of difference.
 TEST_P(MigrationTest, DifferencesAreFound) {
   FillSource();
   ASSERT_EQ(Migrate(*from_, *to_).code, 0);
@@ -378,5 +377,5 @@ INSTANTIATE_TEST_SUITE_P(Kinds, MigrationTest,
                                                std::get<1>(kinds.param));
                          });
 
-}  // namespace
+}  // namespace migration_test
 }  // namespace hulld::server

@@ -8,10 +8,10 @@
 #include <vector>
 
 namespace hulld::server {
-namespace {
+namespace heap_test {
 
 #ifdef HULLD_SANITIZED
-// Sanitizers' allocators keep what was freed, to recognize its use.
+// Sanitizers' allocators retain freed memory to detect its use.
 TEST(Heap, DISABLED_FreeMemoryGoesBackOnlyWhenThereIsMuch) {
 #else
 TEST(Heap, FreeMemoryGoesBackOnlyWhenThereIsMuch) {
@@ -25,11 +25,11 @@ TEST(Heap, FreeMemoryGoesBackOnlyWhenThereIsMuch) {
     std::memset(block.get(), 1, kBlock);
   }
   EXPECT_FALSE(GiveBackFreeMemory());
-  // The last one keeps all before it from going back by itself.
+  // The last block keeps all earlier ones from being returned automatically.
   for (size_t i = 0; i + 1 < kBlocks; ++i) blocks[i] = nullptr;
   EXPECT_TRUE(GiveBackFreeMemory());
   EXPECT_FALSE(GiveBackFreeMemory());
 }
 
-}  // namespace
+}  // namespace heap_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// What an operator sees: metrics, request IDs, log lines, health.
+// Observability: metrics, request IDs, log lines, health.
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
@@ -23,13 +23,13 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace {
+namespace observation_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-// A connection to "127.0.0.1:port"; -1 when there is none.
+// Returns a connection to "127.0.0.1:port", or -1.
 int Connect(const std::string& address) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in name = {};
@@ -41,7 +41,7 @@ int Connect(const std::string& address) {
   return -1;
 }
 
-// What comes back for these bytes at "127.0.0.1:port", until the server closes the connection.
+// Sends these bytes to "127.0.0.1:port" and returns the reply, up to the close by the server.
 std::string HttpReply(const std::string& address, const std::string& request) {
   const int fd = Connect(address);
   std::string reply;
@@ -66,7 +66,7 @@ class Observation : public ServerTest {
     return prometheus::TextSerializer().Serialize(server_->metrics().Collect());
   }
 
-  // The value of one series, written as Prometheus shows it; -1 when there is none.
+  // Returns the value of one series in Prometheus notation; -1 if missing.
   double Metric(const std::string& series) const {
     std::istringstream lines(Metrics());
     for (std::string line; std::getline(lines, line);) {
@@ -122,7 +122,7 @@ TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
   const std::string head = reply("HEAD /metrics HTTP/1.1\r\nHost: h" + end);
   EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
   EXPECT_TRUE(head.ends_with("\r\n\r\n"));
-  // A body, a header without an end, and what is no HTTP.
+  // A body, an unterminated header, and malformed HTTP.
   EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nContent-Length: 9\r\n\r\n123456789"), "");
   EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nX: " + std::string(9000, 'x')), "");
   EXPECT_EQ(reply("\x16\x03\x01 hello\r\n\r\n"), "");
@@ -133,7 +133,7 @@ TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
   EXPECT_THAT(two, HasSubstr("HTTP/1.1 404"));
 }
 
-// A client that sends half a request, or reads no reply, holds up no other.
+// A client that sends half a request, or reads no reply, delays no other.
 TEST_F(Observation, AConnectionThatSaysNothingDoesNotHoldUpTheMetrics) {
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
@@ -166,12 +166,12 @@ TEST_F(Observation, WhatIsOpenAndRunsIsShown) {
   EXPECT_EQ(Metric("hulld_requests_running{rpc=\"AppendPoints\"}"), 0);
   const std::string address = server_->address();
   const int another = Connect(address);
-  // Both ends are in this process. Bounded by the time limit of the test alone.
+  // Both ends are in this process. Bounded by the test's time limit only.
   while (Metric("hulld_connections") != 2) std::this_thread::yield();
   EXPECT_GE(Metric("process_open_fds"), before + 2);
   close(another);
   while (Metric("hulld_connections") != 1) std::this_thread::yield();
-  // Nothing of this store is on a disk.
+  // This store has nothing on disk.
   EXPECT_EQ(Metric("hulld_store_disk_bytes"), 0);
   EXPECT_EQ(Metric("hulld_snapshot_duration_seconds_count"), 0);
   Get("a");
@@ -217,11 +217,11 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_requests_total{code=\"NOT_FOUND\",rpc=\"CheckCollision\"}"), 1);
   EXPECT_EQ(Metric("hulld_request_duration_seconds_count{rpc=\"CheckCollision\"}"), 3);
   EXPECT_EQ(Metric("hulld_message_duration_seconds_count{rpc=\"AppendPoints\"}"), 1);
-  // Far apart: their spheres; sharing a facet: nothing but exact arithmetic can tell.
+  // Far apart: decided by their spheres. Sharing a facet: decided by exact arithmetic only.
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  // None of this waits for anything; the canonical snapshot is no work for the thread of gRPC.
+  // None of this waits; the canonical snapshot is no work for gRPC's thread.
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 0);
   Get("a");
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
@@ -257,7 +257,7 @@ TEST_F(Observation, TheMemoryOfReadersAndOfWritersIsToldApart) {
   v1::StreamCollisionsResponse answer;
   ASSERT_TRUE(stream->Read(&answer));
   EXPECT_GT(Metric("hulld_cache_reading_bytes"), 0);
-  // In memory alone, no hull is at rest.
+  // With memory alone, no hull is at rest.
   EXPECT_EQ(Metric("hulld_cache_bytes"),
             Metric("hulld_cache_reading_bytes") + Metric("hulld_cache_writing_bytes"));
   stream->WritesDone();
@@ -302,7 +302,7 @@ TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {
   ASSERT_TRUE(stream->Finish().ok());
 }
 
-// The value of a key in metadata; empty when it is not there.
+// Returns the value of a key in metadata; empty if missing.
 std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata,
                     const char* key) {
   const auto found = metadata.find(key);
@@ -325,7 +325,7 @@ TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
   EXPECT_FALSE(made.contains(""));
   EXPECT_FALSE(made.contains("no spaces"));
   EXPECT_EQ(ask(std::string(128, 'x')), std::string(128, 'x'));
-  // A call that succeeds gets no ID when its client sent none: nothing is logged about it.
+  // A successful call without a client's ID gets none: nothing is logged about it.
   Put("cube", Cube());
   EXPECT_EQ(ask("", "cube"), "");
   EXPECT_EQ(ask("mine", "cube"), "mine");
@@ -334,7 +334,7 @@ TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
 
 TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
   Put("ball", Sphere(50'000));
-  // Makes the snapshot, so that an audit is all that is left to do.
+  // Makes the snapshot, so that only an audit remains.
   Get("ball");
   const std::string begun = "hulld_queue_wait_seconds_count{pool=\"long_readers\"}";
   const double before = Metric(begun);
@@ -347,13 +347,13 @@ TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
     request.set_audit(true);
     status = hulls_->GetHull(&context, request, &response);
   });
-  // Bounded by the time limit of the test alone.
+  // Bounded by the test's time limit only.
   while (Metric(begun) == before) std::this_thread::yield();
   context.TryCancel();
   client.join();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
   ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
-  // The client says so by itself: here it is the server that did.
+  // The client reports this status by itself; here the server did.
   EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"GetHull\"}"), 1);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"CANCELLED\",rpc=\"GetHull\"}"), 1);
 }
@@ -386,14 +386,14 @@ TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), 0);
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), std::nullopt);
   EXPECT_EQ(budget.Spend(start + std::chrono::milliseconds(9999)), std::nullopt);
-  // The next stretch begins with its first line, however late that is.
+  // The next interval begins with its first line, however late.
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(15)), 2);
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), 0);
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), std::nullopt);
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(25)), 1);
 }
 
-// A name that is not UTF-8: protobuf would write about it to standard error in full, every time.
+// A name that is not UTF-8: protobuf would log it to standard error in full, every time.
 TEST_F(Observation, MalformedMessagesDoNotFloodTheLog) {
   const CapturedLog log;
   RouteLibraryLogs();
@@ -430,7 +430,7 @@ TEST_F(Observation, LogLinesAboutACallNameItsRequest) {
   grpc::ClientContext again;
   again.AddMetadata("x-request-id", "made-2");
   EXPECT_FALSE(hulls_->CreateHull(&again, request, &response).ok());
-  server_.reset();  // so that nothing logs any more
+  server_.reset();  // so that nothing logs after this
   EXPECT_THAT(log.text(), HasSubstr("info hull created rpc=CreateHull request_id=made-1 peer="));
   EXPECT_THAT(log.text(), HasSubstr("debug request failed rpc=CreateHull request_id=made-2 peer="));
   EXPECT_THAT(log.text(), HasSubstr(" code=ALREADY_EXISTS milliseconds="));
@@ -471,7 +471,7 @@ TEST(LogEventTest, TextQuotesWhatIsNoWordAndEscapes) {
   EXPECT_EQ(log.text(), "info done id=a/b name=\"two words\" bad=\"a\\u000a\\\"b\\\"\" count=3\n");
 }
 
-// A watcher of grpc.health.v1, whose generated code Debian does not ship.
+// A watcher of grpc.health.v1; Debian does not ship its generated code.
 TEST_F(Observation, WatchersOfHealthSeeTheServerDrain) {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
@@ -505,5 +505,5 @@ TEST_F(Observation, WatchersOfHealthSeeTheServerDrain) {
   done();
 }
 
-}  // namespace
+}  // namespace observation_test
 }  // namespace hulld::server

@@ -14,11 +14,11 @@
 #include "server/process/worker_pool.h"
 
 namespace hulld::server {
-namespace {
+namespace task_pool_test {
 
 using ::testing::ElementsAre;
 
-// Tasks say their names in the order in which they run.
+// Records the names of tasks in the order in which they run.
 class Order {
  public:
   std::function<void()> Task(const std::string& name) {
@@ -27,7 +27,7 @@ class Order {
       names_.push_back(name);
     };
   }
-  // After the pool is gone.
+  // Requires: the pool is destroyed.
   const std::vector<std::string>& names() const { return names_; }
 
  private:
@@ -35,7 +35,7 @@ class Order {
   std::vector<std::string> names_;
 };
 
-// A pool of one thread, which is held back until Release.
+// A pool of one thread, blocked until Release.
 class HeldPool {
  public:
   HeldPool()
@@ -50,7 +50,7 @@ class HeldPool {
 
   TaskPool& pool() { return *pool_; }
   void Release() { released_.set_value(); }
-  // Runs what is queued.
+  // Runs the queued tasks.
   void End() { pool_.reset(); }
 
  private:
@@ -139,7 +139,7 @@ TEST(WorkerPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
 }
 
 TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
-  // Before the pool: a task may look at them until it has ended.
+  // Declared before the pool: a task may access them until it ends.
   std::promise<void> first;
   std::promise<void> second;
   std::promise<void> done;
@@ -224,5 +224,5 @@ TEST(SharedLoop, WaitsForWhatAnotherThreadBegan) {
   EXPECT_EQ(ended, 2);
 }
 
-}  // namespace
+}  // namespace task_pool_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Everything at once: writers, readers, refusals, evictions and ends.
+// Concurrent writers, readers, refusals, evictions, and deletions.
 #include <absl/status/status.h>
 #include <gtest/gtest.h>
 
@@ -16,13 +16,13 @@
 #include "tests/server/registry/registry_interleaving.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_chaos_test {
 
-// Chunk k of a hull is the point (k, k^2, k^3): how far the hull reaches along x tells which chunks
-// it holds, in whatever order writers, readers, refusals, evictions and ends come.
+// Chunk k of a hull is the point (k, k^2, k^3): the hull's extent along x shows which chunks it
+// contains, in any interleaving of writers, readers, refusals, evictions, and deletions.
 class RegistryChaos : public RegistryInterleaving {
  protected:
-  // Appends this many times, and deletes the hull now and then.
+  // Appends this many times, and occasionally deletes the hull.
   void Write(const std::string& id, uint64_t seed, uint64_t times) {
     std::mt19937_64 random(seed);
     std::optional<AppendSession> session;
@@ -47,7 +47,8 @@ class RegistryChaos : public RegistryInterleaving {
     }
   }
 
-  // Reads all hulls, and at times has memory run short, until nobody writes; how many it was given.
+  // Reads all hulls, sometimes under memory pressure, until all writers end. Returns the number of
+  // hulls read.
   uint64_t Read(uint64_t seed, const std::atomic<int>& writing) {
     std::mt19937_64 random(seed);
     const std::vector<std::string> ids = {"0", "1", "2"};
@@ -72,7 +73,7 @@ class RegistryChaos : public RegistryInterleaving {
         ++seen;
       }
       if (random() % 5 > 0) continue;
-      // Whatever is quiet leaves memory, and chunks that come just now are refused.
+      // Evicts everything idle; chunks that arrive now are refused.
       const MemoryCharge charge(registry_.memory(), MemoryUse::kWriting,
                                 registry_.Cache().limit_bytes);
       registry_.CheckMemory(MemoryUse::kWriting).IgnoreError();
@@ -81,7 +82,8 @@ class RegistryChaos : public RegistryInterleaving {
   }
 
  private:
-  // At once, each built on those before. How many were applied: the first of them.
+  // Appends chunks in flight together, each built on its predecessors. Returns the number applied,
+  // which are the first ones.
   uint64_t AppendSome(const AppendSession& session, uint64_t sequence, uint64_t count) {
     std::vector<std::future<absl::StatusOr<ChunkResult>>> chunks;
     for (uint64_t k = sequence + 1; k <= sequence + count; ++k) {
@@ -137,5 +139,5 @@ TEST_F(RegistryChaos, EveryVersionHoldsWhatItsRecordSays) {
   EXPECT_GT(registry_.Commits().failed_batches, 0);
 }
 
-}  // namespace
+}  // namespace registry_chaos_test
 }  // namespace hulld::server

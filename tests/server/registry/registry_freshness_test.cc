@@ -1,6 +1,6 @@
-// Reads over a store that other servers commit to, too: which of them ask it, and what they are
-// answered from. The store is asked only when a test lets it answer, so nothing here waits for a
-// clock: a read says when it began.
+// Reads over a store with peer servers: which reads send a request to the store, and the revision
+// that answers them. The store answers only when a test permits it, so nothing depends on a clock:
+// a read states its start time.
 #include <absl/status/status.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,17 +22,17 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_freshness_test {
 
 using std::chrono::hours;
 using std::chrono::minutes;
 using std::chrono::nanoseconds;
 
-// Another server commits to it when a test says so. A question to it may be held.
+// A peer server commits on the test's request. Requests to the store may be held.
 class SharedStore : public MemoryStore {
  public:
   bool is_shared() const override { return true; }
-  // Only those without points.
+  // Keeps hulls without points only.
   bool keeps_hulls() const override { return true; }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
     return std::vector<Vector>();
@@ -50,7 +50,7 @@ class SharedStore : public MemoryStore {
     std::unique_lock lock(mutex_);
     ++asked_;
     changed_.notify_all();
-    // What is committed while the question is under way may be missing in the answer.
+    // The answer may lack changes committed while the request is in flight.
     OtherChanges found = std::exchange(committed_, {});
     changed_.wait(lock, [this] { return !is_held_; });
     if (failure_.ok()) {
@@ -66,7 +66,7 @@ class SharedStore : public MemoryStore {
     return std::exchange(found_, {});
   }
 
-  // Another server creates an empty hull.
+  // A peer server creates an empty hull.
   void CreateElsewhere(const std::string& id, uint64_t revision) {
     const std::lock_guard lock(mutex_);
     StoredHull hull;
@@ -77,7 +77,7 @@ class SharedStore : public MemoryStore {
     change.revision = committed_.revision = revision;
     change.hull = hull;
   }
-  // Questions wait from now on, or go on.
+  // Block and unblock later requests.
   void Hold() { SetHeld(true); }
   void Release() { SetHeld(false); }
   void Fail(absl::Status failure) {
@@ -115,7 +115,7 @@ class RegistryFreshnessTest : public ::testing::Test {
   RegistryFreshnessTest() { EXPECT_TRUE(hulls_.loaded().ok()); }
   ~RegistryFreshnessTest() override { store_.Release(); }
 
-  // A read that begins this long after now.
+  // Freshness of a read that begins this long after now.
   static Freshness AtMost(nanoseconds bound, nanoseconds later = nanoseconds(0)) {
     Freshness freshness;
     freshness.max_staleness = bound;
@@ -137,7 +137,7 @@ class RegistryFreshnessTest : public ::testing::Test {
                                                   const Freshness& freshness) {
     return std::async(std::launch::async, [=, this] { return Read(id, freshness); });
   }
-  // Whether gRPC's thread may answer.
+  // Returns true if gRPC's thread may answer.
   bool IsAnsweredAtOnce(const std::string& id, const Freshness& freshness) {
     return registry_.TryResolve(std::span(&id, 1), {.freshness = freshness}).has_value();
   }
@@ -169,7 +169,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatHoldsIsAnsweredAtOnceAndSaysHowStale) {
   EXPECT_GE(read->staleness, nanoseconds(0));
   EXPECT_LE(read->staleness, hours(1));
   EXPECT_TRUE(IsAnsweredAtOnce("h", AtMost(hours(1))));
-  // As a read twenty minutes later is told.
+  // As a read twenty minutes later receives it.
   const auto later = Read("h", AtMost(hours(1), minutes(20)));
   ASSERT_TRUE(later.ok());
   EXPECT_GE(later->staleness, minutes(20));
@@ -200,7 +200,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatIsHalfUsedUpHasTheStoreAskedOnceForReads
   }
   store_.AwaitQuestion(before + 1);
   store_.Release();
-  // One that follows what the others asked: no other question came between.
+  // One read that followed the other reads' request: no other request was sent in between.
   ASSERT_TRUE(registry_.AwaitOthers({}).ok());
   EXPECT_EQ(store_.asked(), before + 2);
 }
@@ -210,7 +210,7 @@ TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQuestionAndNotFromItsAnswer
   const int before = store_.asked();
   auto first = ReadElsewhere("h", {});
   store_.AwaitQuestion(before + 1);
-  // Acknowledged before the second read begins, after the question was sent.
+  // Acknowledged before the second read begins, after the request was sent.
   store_.CreateElsewhere("h", 1);
   Freshness after_the_question;
   after_the_question.began = SteadyClock::now();
@@ -280,7 +280,7 @@ TEST_F(RegistryFreshnessTest, BothConditionsHoldWhereBothAreGiven) {
   EXPECT_FALSE(IsAnsweredAtOnce("h", freshness));
 }
 
-// Reads that are content with what is here go on; the others say why they do not.
+// Reads that accept the local state continue; the rest return the reason for their failure.
 TEST_F(RegistryFreshnessTest, AStoreThatCannotBeAskedStopsOnlyReadsThatNeedIt) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   store_.Fail(absl::UnavailableError("no database"));
@@ -289,7 +289,7 @@ TEST_F(RegistryFreshnessTest, AStoreThatCannotBeAskedStopsOnlyReadsThatNeedIt) {
   EXPECT_TRUE(absl::IsUnavailable(Read("h", AtLeast(2)).status()));
   EXPECT_TRUE(Read("h", AtMost(hours(1))).ok());
   EXPECT_TRUE(Read("h", AtLeast(1)).ok());
-  // A question that was not answered makes nothing fresher.
+  // An unanswered request does not improve freshness.
   EXPECT_FALSE(IsAnsweredAtOnce("h", AtMost(hours(1), hours(2))));
 }
 
@@ -321,5 +321,5 @@ TEST(RegistryFreshness, AStoreOfOneServerIsAlwaysFresh) {
   EXPECT_EQ(ReasonOf(refused), v1::ERROR_REASON_FUTURE_REVISION) << refused;
 }
 
-}  // namespace
+}  // namespace registry_freshness_test
 }  // namespace hulld::server

@@ -20,14 +20,13 @@
 #include "server/store/memory_store.h"
 #include "tests/server/harness/store_fixture.h"
 
-// A registry whose store stops where a test says.
+// A registry over a store that blocks at points chosen by a test.
 namespace hulld::server {
 
-// Keeps hulls in memory so that they can be read back, and calls a test at the moments that it
-// waits for.
+// Keeps hulls in memory, and calls a test's hooks at defined points.
 class ScriptedStore : public MemoryStore {
  public:
-  // A call to a test, once, without a lock, by the next call of a kind.
+  // A one-shot hook, called without a lock by the next call of a kind.
   template <typename Result>
   class Hook {
    public:
@@ -86,8 +85,8 @@ class ScriptedStore : public MemoryStore {
     return absl::OkStatus();
   }
 
-  // Damage: there are no points of this incarnation; one of them is another, inside; all of them
-  // are in a plane.
+  // Inject damage: the points of this incarnation are missing; one of them is replaced by an
+  // interior point; all of them are coplanar.
   void Lose(const HullRecord& hull) {
     const std::lock_guard lock(mutex_);
     vertices_.erase(hull.create_revision);
@@ -102,12 +101,12 @@ class ScriptedStore : public MemoryStore {
     for (Vector& vertex : vertices_[hull.create_revision]) vertex.z() = 0;
   }
 
-  // Before the points are looked for.
+  // Before the points are looked up.
   Hook<void> before_load;
   Hook<void> before_load_sequence;
   Hook<void> after_load_sequence;
   Hook<absl::Status> before_commit;
-  // The store has the change, and the registry does not know it yet.
+  // The store has the change, and the registry has not applied it yet.
   Hook<void> after_commit;
   std::atomic<uint64_t> refused_of_1000 = 0;
   std::atomic<int> loads = 0;
@@ -135,15 +134,15 @@ class ScriptedStore : public MemoryStore {
   std::mt19937_64 random_{811};
 };
 
-// A thread that stops somewhere until the test lets it go on.
+// A point where a thread blocks until the test opens it.
 class Gate {
  public:
-  // By the thread.
+  // Called by the thread.
   void Stop() {
     reached_.set_value();
     open_.get_future().wait();
   }
-  // By the test.
+  // Called by the test.
   void WaitUntilReached() { reached_.get_future().wait(); }
   void Open() { open_.set_value(); }
 
@@ -189,7 +188,7 @@ class RegistryInterleaving : public ::testing::Test {
                         return registry_.Resolve(ids, should_stop);
                       });
   }
-  // All hulls that nobody uses leave memory.
+  // Evicts all unused hulls.
   void DropAll() {
     const MemoryCharge charge(registry_.memory(), MemoryUse::kReading,
                               registry_.Cache().limit_bytes);

@@ -1,4 +1,4 @@
-// Moments between two steps of one call in which another call comes.
+// Interleavings in which a call arrives between two steps of another.
 #include "tests/server/registry/registry_interleaving.h"
 
 #include <absl/status/status.h>
@@ -15,10 +15,10 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_interleaving_test {
 
-// A reader waits in the store for the points of one hull, and for those of another that a third
-// party reads, when it is cancelled. Neither has anything to do with what writers do.
+// A reader is cancelled while it waits in the store for the points of a hull, and for points of
+// another hull that a third reader loads. Neither affects writers.
 TEST_F(RegistryInterleaving, AReaderThatIsCancelledHoldsNoWriterBack) {
   const AppendSession a = Open("a", "w");
   const AppendSession b = Open("b", "w");
@@ -88,17 +88,17 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
     sessions.push_back(Open(ids.back(), "w"));
     ASSERT_TRUE(Append(sessions.back(), 1, CubeCorners()).ok());
   }
-  // A few at a time.
+  // Each eviction asks only a few hulls.
   for (int i = 0; i < kHulls; ++i) DropAll();
   store_.Lose(registry_.List(ids[kLost], "", 1)->hulls[0].record);
   Gate gate;
   store_.before_load.Set([&] { gate.Stop(); });
   auto reader = StartResolve(ids, {});
   gate.WaitUntilReached();
-  // Does not end where one part is read after the other. It stopped at the first of its part.
+  // Ends only if parts are read concurrently. The reader stopped at the first hull of its part.
   constexpr int kPart = kSlice / 8;
   while (store_.loads < kSlice - kPart + 1) std::this_thread::yield();
-  // What was read is old.
+  // The points read are stale.
   for (int i = 0; i < kHulls; ++i) {
     ASSERT_EQ(Append(sessions[i], 2, {{100, 0, 0}}).ok(), i != kLost);
   }
@@ -118,8 +118,8 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   EXPECT_LE(registry_.Holds().most_lookups, kMostLookupsPerHold);
 }
 
-// Those that come next are read while the first are looked up: what is deleted meanwhile is not
-// found, and a reader that waits for one of them is not held up by a reader that is cancelled.
+// The next hulls are read while the first are looked up. Hulls deleted in the interim are not
+// found, and a reader that waits for one is not delayed by a cancelled reader.
 TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
   constexpr int kHulls = 300;
   std::vector<std::string> ids;
@@ -149,7 +149,7 @@ TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
   }
 }
 
-// Before it reads the next one.
+// Cancelled before it reads the next one.
 TEST_F(RegistryInterleaving, AReaderOfAFewHullsCanBeCancelled) {
   // So few that no other thread helps.
   constexpr int kHulls = 7;
@@ -167,7 +167,7 @@ TEST_F(RegistryInterleaving, AReaderOfAFewHullsCanBeCancelled) {
   EXPECT_EQ(store_.loads, kHulls);
 }
 
-// And what it read meanwhile is old.
+// The points that the reader loaded become stale.
 TEST_F(RegistryInterleaving, AWriterDoesNotWaitForAReader) {
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
@@ -180,7 +180,7 @@ TEST_F(RegistryInterleaving, AWriterDoesNotWaitForAReader) {
     const double x = drop ? 200 : 100;
     const uint64_t sequence = drop ? 3 : 2;
     ASSERT_TRUE(Append(session, sequence, {{x, 0, 0}}).ok());
-    // The hull is as cold as the reader found it, and another one.
+    // The hull is as cold as when the reader found it, but another version.
     if (drop) DropAll();
     gate.Open();
     const auto resolved = reader.get();
@@ -256,7 +256,7 @@ TEST_F(RegistryInterleaving, AHullThatIsDeletedWhileItIsReadIsNotFound) {
   EXPECT_EQ(registry_.Cache().damaged, 0);
 }
 
-// The store has let go of the points, and the registry does not know that yet.
+// The store has deleted the points, and the registry has not applied the deletion yet.
 TEST_F(RegistryInterleaving, AHullWhoseEndIsOnItsWayIsNotTakenForDamaged) {
   ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
   DropAll();
@@ -315,7 +315,7 @@ TEST_F(RegistryInterleaving, PointsOfAnotherDimensionAreDamage) {
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
 }
 
-// What was read makes another hull than the record says: who builds it finds out.
+// The points read make another hull than recorded, which its builder detects.
 TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
   for (const bool by_writer : {false, true}) {
     const std::string id = by_writer ? "writer" : "reader";
@@ -352,14 +352,13 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
   registry_.CloseAppend(opened.session);
 }
 
-// The chunk is already with a thread, which has not begun, when the batch before it fails.
-// The store has the deletion before the registry knows: a writer's sequence that is read then is
-// that of no hull.
+// The chunk is queued on a thread, not yet started, when the batch before it fails. The store has
+// the deletion before the registry: a writer's sequence read at that point belongs to no hull.
 TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
   const OpenResult first = OpenResultOf("h", "w");
   ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
   registry_.CloseAppend(first.session);
-  // One of two threads is busy, so what is submitted after the opening comes after it.
+  // One of two threads is busy, so tasks submitted after the opening run after it.
   Gate busy, reads, committed;
   writers_.Submit([&] { busy.Stop(); });
   busy.WaitUntilReached();
@@ -410,5 +409,5 @@ TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   EXPECT_EQ(registry_.Resolve("h", {})->second.record.counts.received, 1);
 }
 
-}  // namespace
+}  // namespace registry_interleaving_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Lists over a store that finds records: what they tell is told by every read that follows.
+// Lists over a store that finds records: every later read agrees with a list.
 #include <absl/status/status.h>
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_listing_test {
 
-// Keeps records. A batch that is committed may be held before the registry is told.
+// Keeps records. A committed batch may be held before the registry is notified.
 class ListedStore : public MemoryStore {
  public:
   bool keeps_hulls() const override { return true; }
@@ -71,7 +71,7 @@ class ListedStore : public MemoryStore {
   bool is_held_ = false;
 };
 
-// Points that lie inside take no revision, so that alone does not tell what was committed.
+// Interior points take no revision, so the revision alone does not identify the committed state.
 TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) {
   TestRegistry<ListedStore> hulls(std::make_unique<ListedStore>());
   Registry& registry = hulls.registry();
@@ -85,7 +85,7 @@ TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) 
     return hulls.Append(writer->session, writer->last_sequence + 1, {{0.5, 0.5, 0.5}});
   });
   store.AwaitCommit(commits + 1);
-  // A listing may have to wait until the registry is told.
+  // A listing may wait until the registry is notified.
   const auto release = [&] {
     store.Hold(false);
     return false;
@@ -100,5 +100,5 @@ TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) 
   hulls.registry().CloseAppend(writer->session);
 }
 
-}  // namespace
+}  // namespace registry_listing_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Readers of many hulls: how long they hold the mutex, and that what they get is of one moment.
+// Readers of many hulls: the time they hold the mutex, and the consistency of their snapshot.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -13,13 +13,13 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_lookup_test {
 
 constexpr uint64_t kMost = kMostLookupsPerHold;
 
 class RegistryLookup : public ::testing::Test {
  protected:
-  // Hulls "0000", "0001" and so on.
+  // Creates hulls "0000", "0001", ...
   std::vector<std::string> Create(int count) {
     std::vector<std::string> ids;
     for (int i = 0; i < count; ++i) {
@@ -67,7 +67,7 @@ TEST_F(RegistryLookup, WhatChangesBetweenTwoSlicesIsLookedUpAgain) {
   const std::vector<std::string> ids = Create(1000);
   uint64_t round = 0;
   const auto change = [&] {
-    // Those looked up first, last, and in between.
+    // Hulls looked up first, last, and in between.
     if (round++ >= 5) return false;
     for (size_t i = 0; i < ids.size(); i += 100) {
       EXPECT_TRUE(hulls_.Put(ids[i], {{static_cast<double>(round), 0, 0}}).ok());
@@ -92,7 +92,7 @@ TEST_F(RegistryLookup, WhatChangesBetweenTwoSlicesIsLookedUpAgain) {
   EXPECT_EQ(registry_.Holds().most_lookups, kMost);
 }
 
-// A writer appends to one hull, then to another, and so on: no reader sees the second ahead of the
+// A writer appends to one hull, then to the next, and so on: no reader sees the second ahead of the
 // first, nor two steps behind it, whatever lies between them.
 TEST_F(RegistryLookup, WhatIsGivenIsOfOneMoment) {
   const std::vector<std::string> ids = Create(600);
@@ -149,7 +149,7 @@ TEST_F(RegistryLookup, ARefreshLooksUpWhatChangedAlone) {
   EXPECT_EQ(Lookups(), 1003);
 }
 
-// What is remembered of changes is bounded; beyond that, all is looked up.
+// The record of changes is bounded; beyond it, all hulls are looked up.
 TEST_F(RegistryLookup, ARefreshAfterMoreChangesThanAreKnownLooksUpAll) {
   const std::vector<std::string> ids = Create(300);
   KnownHulls known;
@@ -177,7 +177,7 @@ TEST_F(RegistryLookup, ALookupCanBeCancelledBetweenSlices) {
   EXPECT_LE(Lookups(), kMost);
 }
 
-// A thread that waits for the mutex gets it before the one that lets go of it and wants it again.
+// A waiting thread gets the mutex before the thread that releases it and locks it again.
 TEST(FairMutexTest, WhoWaitsGoesFirst) {
   FairMutex mutex;
   for (int round = 0; round < 100; ++round) {
@@ -214,9 +214,9 @@ TEST(FairMutexTest, WaitingOnAConditionIsNoHold) {
   locked.Unlock();
   const Clock::duration elapsed = Clock::now() - begin;
   const std::lock_guard lock(mutex);
-  // However long this thread was kept from running, that is what is left for holds.
+  // However long this thread was descheduled, this remains for holds.
   EXPECT_LE(mutex.Statistics().longest, elapsed - waited);
 }
 
-}  // namespace
+}  // namespace registry_lookup_test
 }  // namespace hulld::server

@@ -10,7 +10,7 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_memory_test {
 
 using ::testing::HasSubstr;
 
@@ -75,7 +75,7 @@ TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {
   EXPECT_EQ(view.served->query_hull().point_count(), 2000);
   EXPECT_LT(hulls_->registry().Cache().bytes, builder.MemoryBytes() / 2);
   EXPECT_TRUE(hulls_->registry().TryResolve(ids).has_value());
-  // A writer goes on with what the reader read.
+  // A writer continues with the points that the reader loaded.
   ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
   EXPECT_EQ(hulls_->View("h")->served->high(),
@@ -93,7 +93,7 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
     ASSERT_TRUE(registry.Canonical(view, {}).ok());
     EXPECT_GE(registry.Cache().bytes, before + view.served->canonical()->MemoryBytes());
     EXPECT_GE(registry.Cache().reading_bytes, view.served->canonical()->MemoryBytes());
-    // What is asked of it comes on top.
+    // Derived data that queries need is added.
     const uint64_t without = registry.Cache().reading_bytes;
     view.served->canonical_query_hull();
     EXPECT_GT(registry.Cache().reading_bytes, without);
@@ -104,8 +104,8 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
   EXPECT_EQ(registry.Cache().bytes, registry.Cache().limit_bytes);
 }
 
-// Where two hulls have no room together, a reader of both would read one after the other for ever:
-// each is prepared while the other is read, and so looked up again.
+// Two hulls do not fit together. Without this, a reader of both would load one after the other
+// forever: each is prepared while the other is loaded, and so looked up again.
 TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());
@@ -129,7 +129,7 @@ TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped
   ASSERT_TRUE(second.ok() && second->hulls[0].ok());
   EXPECT_EQ(registry.Cache().loads, loads);
   EXPECT_EQ(second->hulls[0]->served, first->hulls[0]->served);
-  // A change is read.
+  // A change causes a read.
   ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
   EXPECT_EQ(registry.Refresh(ids, known, {}, plan)->hulls[0]->served->high().x(), 2);
 }
@@ -149,7 +149,7 @@ TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
   EXPECT_EQ(hulls_->registry().Cache().loads, loads);
   ASSERT_TRUE(hulls_->View("0").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, loads + 1);
-  // A dropped hull goes on as if it had stayed.
+  // An evicted hull continues as if it had stayed.
   ASSERT_TRUE(hulls_->Put("1", {{3, 3, 3}}).ok());
   EXPECT_EQ(hulls_->View("1")->record.counts.received, 2001);
 }
@@ -200,7 +200,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
   for (int h = 0; h < kHulls; ++h) {
     EXPECT_EQ(hulls_->View(std::to_string(h))->record.vertex_count, 1200);
   }
-  // The builders of all of them and what is served are together beyond the limit.
+  // All builders and served versions together exceed the limit.
   EXPECT_GT(hulls_->registry().Cache().evictions, 0);
 }
 
@@ -227,7 +227,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   EXPECT_EQ(CanonicalOf(registry.Resolve("first", {})->second).vertices().size(), 1000);
 }
 
-// Points that wait for their turn, and what they are once they are built.
+// Points waiting for their turn, and their size after building.
 TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   MemoryStore store;
   WorkerPool writers(2);
@@ -258,7 +258,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   EXPECT_TRUE(first.ok());
   EXPECT_TRUE(asked);
   EXPECT_TRUE(next.get_future().get().ok());
-  // The builder is left, what became vertices, and nothing else of the points.
+  // Only the builder, with the points that became vertices, remains.
   HullBuilder builder;
   LiveHull live;
   for (const std::vector<Vector>& points : {line, waiting}) {
@@ -338,7 +338,7 @@ TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn
   EXPECT_THAT(std::string(refused.message()), HasSubstr("name fewer hulls"));
   EXPECT_LT(registry.Cache().loads, 30);
   EXPECT_LE(registry.Cache().bytes, limits.memory_limit);
-  // Those that it did not get are free again; what is held is served, and writers go on.
+  // The hulls that were refused are free again; held ones are served, and writers continue.
   EXPECT_TRUE(registry.Resolve(few, {}).ok());
   EXPECT_TRUE(hulls_->Put("39", {{5, 5, 5}}).ok());
   EXPECT_TRUE(hulls_->Put("0", {{5, 5, 5}}).ok());
@@ -346,8 +346,8 @@ TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn
   EXPECT_TRUE(hulls_->View("38").ok());
 }
 
-// A stream, say, that never refreshes: what it holds counts until it goes, whatever becomes of the
-// hull.
+// A stream, for example, that never refreshes: its versions count until released, whatever happens
+// to the hull.
 TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
   Start();
   Registry& registry = hulls_->registry();
@@ -360,7 +360,7 @@ TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
     const uint64_t held = registry.Cache().reading_bytes;
     EXPECT_GT(held, view->record.vertex_count * sizeof(Vector) +
                         view->served->canonical()->MemoryBytes());
-    // Another version, then another LiveHull, then none of either.
+    // Another version, then another LiveHull, then neither.
     ASSERT_TRUE(hulls_->Put("h", {{3. + deleted, 0, 0}}).ok());
     EXPECT_EQ(registry.Cache().reading_bytes, held);
     if (deleted) {
@@ -380,7 +380,7 @@ TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
   EXPECT_EQ(registry.Cache().bytes, 0);
 }
 
-// Versions of one hull share most of what they are, which counts once.
+// Versions of a hull share most of their data, which counts one time only.
 TEST_F(RegistryMemory, WhatVersionsShareCountsOnce) {
   Start();
   Registry& registry = hulls_->registry();
@@ -418,7 +418,7 @@ TEST_F(RegistryMemory, IdleStreamsRefuseNoAppendsAndWritersNoStreams) {
       const auto put = hulls_->Put(std::to_string(i), SpherePoints(500));
       EXPECT_TRUE(put.ok()) << put.status();
     }
-    // What must be read from the store is not; what is in memory is served.
+    // Cold hulls are refused; hulls in memory are served.
     EXPECT_TRUE(hulls_->Create("empty").ok());
     EXPECT_TRUE(hulls_->View("empty").ok());
     const absl::Status refused = hulls_->View("0").status();
@@ -444,5 +444,5 @@ TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {
   EXPECT_EQ(hulls_->registry().Cache().bytes, bytes);
 }
 
-}  // namespace
+}  // namespace registry_memory_test
 }  // namespace hulld::server

@@ -1,5 +1,5 @@
-// What a registry asks of a store that finds records: nothing at the start, and each record once
-// while it is kept.
+// Requests of a registry to a store that finds records: none at the start, and one per record while
+// it is cached.
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include "server/store/memory_store.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_records_test {
 
 // Holds any number of empty hulls, "h" and a number each, and of bodies, "b" and a number.
 class VastStore : public MemoryStore {
@@ -45,7 +45,7 @@ class VastStore : public MemoryStore {
     }
     return found;
   }
-  // As many as are asked for, but no more than eight.
+  // Returns at most eight, even if more are requested.
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
                                            size_t most, RecordKinds kinds) override {
     EXPECT_TRUE(kinds.bodies && !kinds.hulls);
@@ -64,7 +64,7 @@ class VastStore : public MemoryStore {
   std::atomic<uint64_t> questions = 0;
   std::atomic<uint64_t> records = 0;
   std::atomic<bool> is_gone = false;
-  // The number of pieces of each body.
+  // Number of pieces of each body.
   size_t pieces = 1;
 
  private:
@@ -160,20 +160,20 @@ TEST_F(RegistryRecords, WhoMayNotWaitIsNotAnsweredUntilItIsKnown) {
   EXPECT_TRUE(registry_.TryResolve(ids).has_value());
 }
 
-// What is asked for later takes the place of what was asked for before.
+// Records requested later replace earlier ones.
 TEST_F(RegistryRecords, NoMoreAreKeptThanItIsTold) {
   Start(200);
   for (uint64_t first = 0; first < 20'000; first += 100) ExpectThere(Ids(first, 100));
   const uint64_t records = store_.records;
   ExpectThere(Ids(0, 100));
   EXPECT_EQ(store_.records, records + 100);
-  // Those of now stay.
+  // Recent ones stay.
   const uint64_t again = store_.records;
   ExpectThere(Ids(0, 100));
   EXPECT_EQ(store_.records, again);
 }
 
-// A call that names more than are kept is answered all the same.
+// A call may name more records than the cache holds.
 TEST_F(RegistryRecords, ACallMayNameMoreThanAreKept) {
   Start(10);
   ExpectThere(Ids(0, 3000));
@@ -188,7 +188,7 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
   EXPECT_EQ(store_.questions, 4);
 }
 
-// A caller that looks for bodies among hulls learns what there is under all of the IDs at once.
+// A caller that looks for bodies among hulls learns the kind of every ID in one request.
 TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
@@ -215,18 +215,18 @@ TEST_F(RegistryRecords, BodiesThatNobodyUsesAreBoundedInBytes) {
   for (uint64_t first = 0; first < 20'000; first += 100) ExpectBodies(Ids(first, 100, "b"));
   EXPECT_LE(registry_.Cache().bytes - before, 400 * BodyTable::kBytesOfEntry);
   const uint64_t records = store_.records;
-  // Those of now are here, those of before are not.
+  // Recent ones are cached, earlier ones are not.
   ExpectBodies({"b19999"});
   EXPECT_EQ(store_.records, records);
   ExpectBodies({"b0"});
   EXPECT_EQ(store_.records, records + 1);
-  // Fewer of larger ones.
+  // The cache holds fewer large bodies.
   store_.pieces = 10'000;
   for (uint64_t i = 0; i < 50; ++i) ExpectBodies({absl::StrCat("b", 30'000 + i)});
   EXPECT_LE(registry_.Cache().bytes - before, 2 * 10'000 * sizeof(StoredPiece));
 }
 
-// It would be in memory twice otherwise.
+// Otherwise it would be in memory twice.
 TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
   Start(1);
   const std::vector<std::string> ids = {"b7"};
@@ -268,5 +268,5 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   EXPECT_FALSE(registry_.TryFindBodies(Ids(10, 1, "b")).has_value());
 }
 
-}  // namespace
+}  // namespace registry_records_test
 }  // namespace hulld::server

@@ -15,9 +15,9 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_test {
 
-// Counts batches, and refuses them once told to.
+// Counts batches, and refuses them when set to.
 class CountingStore : public MemoryStore {
  public:
   absl::Status Commit(std::span<Change* const> changes) override {
@@ -29,7 +29,7 @@ class CountingStore : public MemoryStore {
 
 class RegistryTest : public ::testing::Test {
  protected:
-  // Waits for the reply of one call.
+  // Waits for the reply of a call.
   template <typename T, typename Call>
   static absl::StatusOr<T> Wait(const Call& call) {
     std::promise<absl::StatusOr<T>> promise;
@@ -79,7 +79,7 @@ TEST_F(RegistryTest, WhatIsServedIsMadeOnceAndSharedUntilTheNextChange) {
   EXPECT_NE(first->second.served, third->second.served);
   EXPECT_EQ(first->second.served->high(), Vector(1, 0, 0));
   EXPECT_EQ(third->second.served->high(), Vector(2, 0, 0));
-  // In whatever order they are asked for.
+  // In any order of requests.
   EXPECT_EQ(CanonicalOf(third->second).vertices()[1], Vector(2, 0, 0));
   EXPECT_EQ(CanonicalOf(first->second).vertices()[1], Vector(1, 0, 0));
 }
@@ -116,7 +116,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
     return opened.get_future().get();
   };
   std::vector<AppendSession> sessions = {open("a", 1), open("b", 1), open("c", 1), open("d", 2)};
-  // All of them wait for the one thread.
+  // All of them wait for the only thread.
   std::promise<void> released;
   writers.Submit([&] { released.get_future().wait(); });
   std::mutex mutex;
@@ -144,11 +144,11 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   EXPECT_THAT(built, testing::ElementsAre(0, 3, 1, 2));
 }
 
-// Nothing is ready to be served, and the builder is busy with this very chunk.
+// No version is ready to be served, and the builder is busy with this chunk.
 TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
-  // The builder polls this in the midst of a large chunk.
+  // The builder polls this while it processes a large chunk.
   int polls = 0;
   std::vector<Vector> points;
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
@@ -213,7 +213,7 @@ TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
   for (const Hull* hull : made) EXPECT_EQ(hull, view.served->canonical());
   EXPECT_FALSE(view.served->has_canonical_query_hull());
   EXPECT_EQ(view.served->canonical_query_hull().canonical(), made[0]);
-  // It serves all questions from now on.
+  // It serves all queries from now on.
   EXPECT_EQ(&view.served->query_hull(), &view.served->canonical_query_hull());
   ASSERT_TRUE(Append(OpenAppend("h", "other")->session, 1, {{0, 0, 9000}}).ok());
   EXPECT_EQ(registry_.Resolve("h", {})->second.served->canonical(), nullptr);
@@ -235,7 +235,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForTheCanonicalSnapshotCanBeCancelled) {
   EXPECT_TRUE(asked);
 }
 
-// The version is one that the hull left long ago, and what was prepared since holds later points.
+// The hull replaced the version long ago, and later preparations contain later points.
 TEST_F(RegistryTest, ReadersKeepTheVersionThatTheyResolved) {
   const AppendSession session = Open("h");
   std::vector<HullView> views;
@@ -269,11 +269,11 @@ TEST_F(RegistryTest, WhatQuestionsPayForIsPreparedFirstOnlyForWhoeverWaits) {
   const auto after = registry_.TryResolve(ids, many);
   ASSERT_TRUE(after.has_value());
   EXPECT_EQ(after->hulls[0]->served, prepared->hulls[0]->served);
-  // The snapshot is that of the revision, whatever is prepared.
+  // The snapshot is that of the revision, regardless of preparation.
   EXPECT_EQ(&CanonicalOf(*before->hulls[0]), &CanonicalOf(*after->hulls[0]));
 }
 
-// Each chunk takes all points before it into the hull. Nobody asks.
+// Each chunk covers all earlier points. No reader queries it.
 TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
   constexpr int kVertices = 100;
   constexpr uint64_t kChunks = 1000;
@@ -283,20 +283,20 @@ TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
     ASSERT_EQ(result->counts.outside, kVertices);
     ASSERT_EQ(result->vertex_count, kVertices);
   }
-  // All of them would be 2.4 MB. Bounded by the time limit of the test alone.
+  // All of them would be 2.4 MB. Bounded by the test's time limit only.
   while (registry_.Cache().bytes > 2'000'000) std::this_thread::yield();
   const HullView view = registry_.Resolve("h", {})->second;
   EXPECT_LT(view.served->query_hull().point_count(), 30'000);
   EXPECT_EQ(CanonicalOf(view).vertices().size(), view.record.vertex_count);
 }
 
-// The thread that prepares does it after the reader has gone on.
+// The preparing thread runs after the reader has continued.
 TEST_F(RegistryTest, WhatManyQuestionsPaidForIsPrepared) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const auto first = registry_.TryResolve(ids, {1'000'000, false});
   ASSERT_TRUE(first.has_value());
-  // Bounded by the time limit of the test alone.
+  // Bounded by the test's time limit only.
   while (registry_.TryResolve(ids)->hulls[0]->served == first->hulls[0]->served) {
     std::this_thread::yield();
   }
@@ -378,5 +378,5 @@ TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {
   EXPECT_EQ(resolved->hulls[0]->served, resolved->hulls[3]->served);
 }
 
-}  // namespace
+}  // namespace registry_test
 }  // namespace hulld::server

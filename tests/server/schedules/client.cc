@@ -54,7 +54,7 @@ Client::Call Client::Begin(size_t hull) {
   return call;
 }
 
-// Empty: it cannot be stopped.
+// Empty if the call cannot be stopped.
 std::function<bool()> Client::StopOf(const Call& call) {
   if (!random().OneIn(simulation_.plan.cancellations)) return {};
   // Some are stopped from the beginning.
@@ -247,7 +247,7 @@ void Client::List() {
   ++simulation_.reached.answers;
 }
 
-// As a call that has no thread to wait with. Whether it was told that all is fresh.
+// Waits for freshness as a call without a thread does. Returns true if the registry reported it.
 bool Client::AwaitFresh(const Freshness& freshness) {
   const auto told = std::make_shared<Event>();
   const auto fresh = std::make_shared<absl::Status>();
@@ -261,7 +261,7 @@ bool Client::AwaitFresh(const Freshness& freshness) {
   return fresh->ok();
 }
 
-// All hulls, or one of them, in one of the three ways.
+// Reads all hulls, or one, in one of the three ways.
 void Client::Read() {
   const Plan& plan = simulation_.plan;
   std::vector<std::string> ids;
@@ -323,7 +323,7 @@ void Client::CheckView(const Call& call, uint64_t revision, const absl::StatusOr
   ++simulation_.reached.reads;
 }
 
-// The points are those of the record, whatever came since.
+// The points are those of the record, regardless of later changes.
 void Client::CheckServed(const Call& call, const State& state, const HullView& view) {
   const ServedHull& served = *view.served;
   if (served.empty() != (state.points == 0)) Fail(call, "a reader is given points, or none");
@@ -360,7 +360,7 @@ void Client::MakeCanonical(const Call& before, const HullView& view) {
   ++simulation_.reached.snapshots;
 }
 
-// Whatever nobody uses leaves memory, and a call that asks for more meanwhile is refused.
+// Evicts everything unused; calls that need more memory concurrently are refused.
 void Client::Press() {
   const bool reads = random().OneIn(2);
   Scheduler::Current().Note("presses on memory");
@@ -377,7 +377,7 @@ void Client::CheckAll() {
     Call call = Begin(hull);
     const std::vector<std::string> ids = {HullName(hull)};
     const absl::StatusOr<Resolved> resolved = simulation_.registry.Resolve(ids, {});
-    // Memory may be less than the hull takes, and points may be damaged.
+    // Memory may be too small for the hull, and points may be damaged.
     if (resolved.ok()) {
       CheckView(call, resolved->store_revision, resolved->hulls[0]);
     } else if (!MayFail(call, resolved.status(), false)) {

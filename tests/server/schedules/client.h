@@ -21,21 +21,21 @@ class Client {
  public:
   explicit Client(Simulation& simulation) : simulation_(simulation) {}
 
-  // A few calls, one after another.
+  // A few sequential calls.
   static constexpr uint32_t kMostCalls = 3;
   void Run();
 
-  // What a registry that was opened anew must answer: what the store kept.
+  // Checks the answers of a reopened registry against the contents of the store.
   void CheckAll();
 
  private:
-  // A call: what was there when it began.
+  // A call, with the state when it began.
   struct Call {
     size_t hull = 0;
     Ledger::Moment since;
     uint64_t failures_before = 0;
     std::optional<uint64_t> if_revision;
-    // Whether it was told to stop.
+    // True if the call was stopped.
     std::shared_ptr<bool> was_stopped = std::make_shared<bool>(false);
   };
   struct Stream;
@@ -48,14 +48,14 @@ class Client {
   std::optional<uint64_t> AnyCondition(size_t hull);
   [[noreturn]] void Fail(const Call& call, const std::string& what);
 
-  // Waits for the answer, which is checked as it comes.
+  // Waits for the answer and checks it on arrival.
   template <typename T, typename Send, typename Check>
   void Await(const Send& send, const Check& check);
-  // Whether an error may come at any time; or the schedule ends.
+  // Returns true if this error may occur at any time; otherwise ends the schedule.
   bool MayFail(const Call& call, const absl::Status& status, bool may_be_stopped);
   void CheckNotFound(const Call& call);
   void CheckAborted(const Call& call);
-  // A change of which this call was told that it made it.
+  // Claims a change that this call was acknowledged to have made.
   void Claim(const Call& call, std::optional<size_t> state, const std::string& what);
 
   void Create();
@@ -70,7 +70,7 @@ class Client {
   void FindBodies();
   void ListBodies();
   void CheckBody(const Call& call, std::optional<uint64_t> revision, const Body* body);
-  // Whether the ID may have been that of the other kind.
+  // Returns true if the ID may have belonged to the other kind.
   bool MayBeOther(const Call& call, const absl::Status& status, bool is_body);
   void Press();
 
@@ -91,7 +91,7 @@ class Client {
   void CheckSequences(size_t hull);
 
   Simulation& simulation_;
-  // What it knows of all hulls of the plan.
+  // Its knowledge of all hulls of the plan.
   KnownHulls known_;
 };
 

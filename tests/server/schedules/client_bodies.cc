@@ -1,4 +1,4 @@
-// Calls about bodies, whose IDs are those of hulls.
+// Calls about bodies; they share IDs with hulls.
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -107,7 +107,7 @@ void Client::DeleteBody() {
       check);
 }
 
-// body: null for none. revision: that of the answer, where it has one.
+// body: null for none. revision: the answer's, if it has one.
 void Client::CheckBody(const Call& call, std::optional<uint64_t> revision, const Body* body) {
   const auto is_it = [&](const State& state) {
     return body == nullptr ? !state.is_body : IsOf(state, body->record());

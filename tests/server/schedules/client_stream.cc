@@ -17,7 +17,7 @@ uint64_t CountOf(CurveSet set) { return static_cast<uint64_t>(std::popcount(set)
 
 }  // namespace
 
-// A session and the chunks that were sent in it.
+// A session and the chunks sent in it.
 struct Client::Stream {
   size_t hull = 0;
   size_t writer = 0;
@@ -27,7 +27,7 @@ struct Client::Stream {
   uint64_t last_sequence = 0;
   bool is_open = false;
   bool is_gone = false;
-  // How chunks were answered, by their order.
+  // Answers of the chunks, by their order.
   struct Sent {
     Event built;
     Event answered;
@@ -43,7 +43,7 @@ void Client::AppendStream() {
   if (!OpenStream(stream, !random().OneIn(4))) return;
   const bool waits = random().OneIn(2);
   uint64_t sequence = stream->last_sequence + 1;
-  // As a client does that lost its answer.
+  // Resends, as a client does that lost its answer.
   if (sequence > 1 && random().OneIn(simulation_.plan.repetitions)) --sequence;
   for (uint32_t chunks = random().Below(4); chunks > 0; --chunks, ++sequence) {
     SendChunk(stream, sequence);
@@ -189,7 +189,7 @@ void Client::CheckRefused(const Call& call, const Stream& stream, const absl::St
       break;
     case v1::ERROR_REASON_SEQUENCE_GAP:
       ++reached.gaps;
-      return;  // CheckOrder
+      return;  // reported by CheckOrder
     case v1::ERROR_REASON_REVISION_MISMATCH:
       ++reached.aborted;
       if (call.if_revision.has_value() && ledger().Find(call.hull, call.since, differs)) return;
@@ -200,7 +200,7 @@ void Client::CheckRefused(const Call& call, const Stream& stream, const absl::St
   Fail(call, absl::StrCat("wrong: ", status.ToString()));
 }
 
-// A gap follows a chunk that was refused for another reason. Answers may come in another order.
+// A gap follows a chunk refused for another reason. Answers may arrive out of order.
 void Client::CheckOrder(const Stream& stream) {
   const auto refused =
       std::ranges::find_if(stream.sent, [](const auto& sent) { return !sent->status.ok(); });

@@ -9,9 +9,9 @@
 
 namespace hulld::server {
 
-// Points (t, t^2, t^3) with t = 1, 2, ...: t is in the set where bit t is. Each of them is extreme
-// whatever the others are, so a hull of some has exactly these as its vertices (the cyclic
-// polytope: Ziegler 1995, Lectures on Polytopes, 0.6).
+// Points (t, t^2, t^3), t = 1, 2, ...: bit t is set if t is in the set. Every point is extreme in
+// any subset, so a hull of a subset has exactly that subset as vertices (the cyclic polytope:
+// Ziegler 1995, Lectures on Polytopes, 0.6).
 using CurveSet = uint32_t;
 inline constexpr uint32_t kCurvePoints = 12;
 
@@ -28,7 +28,7 @@ inline std::vector<Vector> PointsOf(CurveSet set) {
   return points;
 }
 
-// Adds a point; false where it is none of the curve's, or in the set already.
+// Adds a point. Returns false if it is not on the curve, or already in the set.
 inline bool AddPoint(const Vector& point, CurveSet& set) {
   const double x = point.x();
   if (!(x >= 1 && x <= kCurvePoints)) return false;
@@ -38,7 +38,7 @@ inline bool AddPoint(const Vector& point, CurveSet& set) {
   return true;
 }
 
-// None where one of them is none of the curve's, or comes twice.
+// Returns nullopt if a point is not on the curve or occurs twice.
 template <typename Points>
 std::optional<CurveSet> SetOf(const Points& points) {
   CurveSet set = 0;

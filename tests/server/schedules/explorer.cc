@@ -19,7 +19,7 @@ std::string Heading(uint64_t seed, const std::string& what) {
                       " HULLD_SCHEDULES=1): ", what, "\n");
 }
 
-// Not safe in a signal handler in general; here abort() is called by the code that runs, not within
+// Generally unsafe in a signal handler; here the running code calls abort() itself, not from within
 // another library.
 void ReportAbort(int) {
   if (running == nullptr) return;

@@ -10,27 +10,26 @@
 
 namespace hulld::server {
 
-// A schedule of the registry with a fault.
+// A registry schedule with a fault.
 struct FoundFault {
   uint64_t seed = 0;
-  // With it.
+  // Schedules run, including this one.
   uint64_t schedules = 0;
   ScheduleFault fault;
   std::string steps;
 };
 
-// Runs the schedules of this many seeds, until one has a fault; nothing is to be explored in the
-// process after that. A broken invariant (HULLD_CHECK) prints its seed and its steps as it ends the
-// process.
+// Runs the schedules of this many seeds until one has a fault; the process cannot explore after
+// that. A broken invariant (HULLD_CHECK) prints its seed and steps, then ends the process.
 std::optional<FoundFault> Explore(uint64_t first_seed, uint64_t count, Reached& reached);
 
-// A digest of the steps of one schedule, which has no fault.
+// Returns a digest of the steps of one schedule. Requires: the schedule has no fault.
 uint64_t DigestOf(uint64_t seed);
 
-// The seed, how to run it again, what is wrong, and the steps.
+// Returns the seed, the command to reproduce it, the fault, and the steps.
 std::string Report(const FoundFault& found);
 
-// A number in the environment.
+// Returns a number from the environment.
 uint64_t NumberIn(const char* variable, uint64_t otherwise);
 
 }  // namespace hulld::server

@@ -15,7 +15,7 @@ namespace hulld::server {
 namespace {
 
 #ifdef __SANITIZE_ADDRESS__
-// Frames are several times larger.
+// Sanitized frames are several times larger.
 constexpr size_t kStackBytes = size_t{1} << 20;
 
 void BeginSwitch(void** own, const void* bottom, size_t size) {
@@ -24,7 +24,7 @@ void BeginSwitch(void** own, const void* bottom, size_t size) {
 void EndSwitch(void* own, const void** from_bottom, size_t* from_size) {
   __sanitizer_finish_switch_fiber(own, from_bottom, from_size);
 }
-// The search for leaks does not know mapped memory unless told.
+// LeakSanitizer does not scan mapped memory unless registered.
 void KeepReferences(const void* bottom, size_t size) { __lsan_register_root_region(bottom, size); }
 #else
 constexpr size_t kStackBytes = size_t{1} << 18;
@@ -78,7 +78,7 @@ void Fiber::Abandon() {
   KeepReferences(this, sizeof(*this));
 }
 
-// Never returns: the stack is used again.
+// Never returns: the stack is reused.
 void Fiber::Run() {
   while (true) {
     task_();

@@ -7,11 +7,11 @@
 
 namespace hulld::server {
 
-// A stack of its own that runs one task after another, each until it suspends itself. All fibers of
-// a thread run on that thread, one at a time. Cost of a switch: some 10 ns.
+// A stack that runs tasks sequentially, each until it suspends itself. All fibers of a thread run
+// on that thread, one after another. Cost of a switch: some 10 ns.
 //
-// AddressSanitizer is told of each switch. A fiber is never destroyed: the stack of a task that
-// hangs cannot be unwound. It is used again, or abandoned.
+// AddressSanitizer is notified of each switch. A fiber is never destroyed, because the stack of a
+// hung task cannot be unwound. It is reused or abandoned.
 class Fiber {
  public:
   Fiber();
@@ -19,14 +19,15 @@ class Fiber {
   Fiber& operator=(const Fiber&) = delete;
   ~Fiber() = delete;
 
-  // The next Resume begins the task. Requires that the one before has ended.
+  // Sets the task that the next Resume begins. Requires: the previous task has ended.
   void Start(std::function<void()> task);
-  // Runs the task until it suspends or ends. Returns whether it ended. Not within a fiber.
+  // Runs the task until it suspends or ends. Returns true if it ended. Requires: not called within
+  // a fiber.
   bool Resume();
-  // Within the task: returns to the caller of Resume.
+  // Returns to the caller of Resume. Requires: called within the task.
   void Suspend();
-  // Not within a fiber: its task is never resumed. The fiber is not used again, and what its stack
-  // refers to does not count as leaked.
+  // Abandons the task and the fiber, which is not used again. Objects referenced by its stack do
+  // not count as leaked. Requires: not called within a fiber.
   void Abandon();
 
  private:
@@ -36,7 +37,7 @@ class Fiber {
   bool has_ended_ = true;
   boost::context::fiber inside_;
   boost::context::fiber outside_;
-  // For the sanitizer: the two stacks, and where it keeps what is on them.
+  // For the sanitizer: the two stacks, and the storage for its record of them.
   const void* bottom_ = nullptr;
   size_t size_ = 0;
   const void* outside_bottom_ = nullptr;

@@ -26,7 +26,7 @@ bool HasSize(const HullRecord& record, CurveSet points) {
          record.dimension == static_cast<int>(std::min<uint64_t>(count, 4)) - 1;
 }
 
-// What is appended or kept anew, if all of it is right.
+// Returns true if the appended or rewritten vertices are all correct.
 bool HasVertices(const Change& change, CurveSet expected) {
   const std::optional<CurveSet> set = SetOf(change.vertices);
   return set.has_value() && *set == expected;
@@ -37,7 +37,7 @@ bool HasVertices(const Change& change, CurveSet expected) {
 std::string HullName(size_t hull) { return std::string(1, static_cast<char>('a' + hull)); }
 std::string WriterName(size_t writer) { return std::string(1, static_cast<char>('u' + writer)); }
 
-// One point or two, some of them as those of other chunks.
+// One or two points, some shared with other chunks.
 CurveSet ChunkPoints(size_t writer, uint64_t sequence) {
   const uint64_t first = (sequence * 5 + writer * 3) % kCurvePoints;
   const uint64_t second = (sequence * 7 + writer) % kCurvePoints;
@@ -84,7 +84,7 @@ std::string Ledger::KeepEnd(const Change& change, State& state) {
   return {};
 }
 
-// A creation, or a replacement with or without a hull to replace.
+// Records a creation, or a replacement with or without an existing hull.
 std::string Ledger::KeepBeginning(const Change& change, State& state) {
   const HullRecord& record = change.hull.record;
   if (state.is_body) return "the ID is a body's";
@@ -104,7 +104,7 @@ std::string Ledger::KeepBeginning(const Change& change, State& state) {
   return {};
 }
 
-// Put, or deleted.
+// Records a put or a deletion.
 std::string Ledger::KeepBody(const Change& change, State& state) {
   const BodyRecord& record = change.body->record;
   if (state.exists) return "the ID is a hull's";
@@ -168,7 +168,7 @@ std::string Ledger::KeepChunk(const Change& change, State& state) {
 bool Ledger::IsCurrentAt(size_t hull, size_t index, uint64_t revision) const {
   const std::vector<State>& states = states_[hull];
   const uint64_t own = states[index].revision;
-  // Chunks that brought no vertex share the revision of what they were added to.
+  // Chunks without new vertices share the revision of the state that they were added to.
   size_t next = index + 1;
   while (next < states.size() && states[next].revision == own) ++next;
   return own <= revision && (next == states.size() || states[next].revision > revision);

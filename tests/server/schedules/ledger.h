@@ -16,35 +16,36 @@
 
 namespace hulld::server {
 
-// The hulls, any of which may be a body, and the writers of a schedule, by number.
+// Hulls (any may be a body) and writers of a schedule, by number.
 inline constexpr size_t kHulls = 2;
 inline constexpr size_t kWriters = 2;
 std::string HullName(size_t hull);
 std::string WriterName(size_t writer);
 
-// What a writer sends as its chunk of this sequence, to whatever hull and however often.
+// Returns the points that a writer sends as its chunk of this sequence, to any hull and any number
+// of times.
 CurveSet ChunkPoints(size_t writer, uint64_t sequence);
 
-// The specification: all that the store kept, as the states of hulls that do one thing at a time.
-// The store says when a change takes effect, so an answer is right if one of the states between the
-// call and its answer explains it, none of which is older than what anyone was told before.
+// The specification: everything that the store kept, as states of sequential hulls. The store
+// determines when a change takes effect. An answer is correct if a state between the call and its
+// answer explains it, and that state is no older than any state reported before.
 class Ledger {
  public:
   // A hull after a change of it.
   struct State {
     bool exists = false;
-    // There is a body under the ID; then no hull exists.
+    // True if the ID belongs to a body; then no hull exists.
     bool is_body = false;
-    // The record of the hull that is there, or that went; for a body, its revisions alone.
+    // Record of the existing or deleted hull; for a body, only its revisions.
     HullRecord record;
-    // The store's, when the hull last became another for readers.
+    // Revision of the store when readers last saw the hull change.
     uint64_t revision = 0;
     CurveSet points = 0;
     std::array<uint64_t, kWriters> sequences{};
-    // A call was told that it made this change; or nobody waits for that any more.
+    // True if a call was acknowledged to have made this change, or no call waits for it.
     bool is_claimed = false;
   };
-  // When a call began: the oldest states that it may be answered from.
+  // The start of a call: the oldest states that may answer it.
   struct Moment {
     std::array<size_t, kHulls> states{};
     uint64_t revision = 0;
@@ -53,18 +54,18 @@ class Ledger {
 
   Ledger();
 
-  // The store keeps a change. Returns what is wrong with it, if anything. nobody_waits: the call
-  // that made it will not be answered.
+  // Records a change that the store keeps. Returns its fault, if any. nobody_waits: the call that
+  // made it will not be answered.
   std::optional<std::string> Keep(const Change& change, bool nobody_waits);
 
-  // The store's revision at the last change.
+  // Revision of the store at the last change.
   uint64_t revision() const { return revision_; }
   const State& Last(size_t hull) const { return states_[hull].back(); }
   const State& At(size_t hull, size_t index) const { return states_[hull][index]; }
   size_t size(size_t hull) const { return states_[hull].size(); }
 
   Moment Now() const { return told_; }
-  // The first state since the moment that explains an answer.
+  // Returns the first state since the moment that explains an answer.
   template <typename Predicate>
   std::optional<size_t> Find(size_t hull, const Moment& since, const Predicate& explains) const {
     for (size_t i = since.states[hull]; i < states_[hull].size(); ++i) {
@@ -72,7 +73,7 @@ class Ledger {
     }
     return std::nullopt;
   }
-  // The same, of what is current at a revision of the store.
+  // As Find, restricted to the states current at a revision of the store.
   template <typename Predicate>
   std::optional<size_t> FindAt(size_t hull, const Moment& since, uint64_t revision,
                                const Predicate& explains) const {
@@ -82,16 +83,17 @@ class Ledger {
     return std::nullopt;
   }
 
-  // Somebody was told of a state, or of a revision: later calls are answered from no older one.
+  // Record that a state or a revision was reported: later calls are answered from no older one.
   void Tell(size_t hull, size_t index);
   void TellRevision(uint64_t revision);
-  // Somebody was told to have made this change. False: another was told so before.
+  // Records that a call was acknowledged to have made this change. Returns false if another call
+  // was before.
   bool Claim(size_t hull, size_t index);
-  // A change that the store kept, and of which nobody was told that it was made.
+  // Returns a change that the store kept but no call was acknowledged to have made.
   std::optional<std::string> Unclaimed() const;
 
   static std::string Describe(const State& state);
-  // All states of a hull.
+  // Returns all states of a hull.
   std::string Describe(size_t hull) const;
 
  private:

@@ -1,5 +1,5 @@
-// The registry with a defect that it had once, or could have (mutants/): that schedules find it
-// tells that they look in the right places.
+// The registry with a past or possible defect (mutants/). Schedules that find it demonstrate that
+// they cover the right places.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -10,14 +10,14 @@
 #include "tests/server/schedules/explorer.h"
 
 namespace hulld::server {
-namespace {
+namespace mutant_test {
 
 constexpr uint64_t kMost = 300'000;
-// The rarest defect, AReaderIsNotWoken, is found within 22,613 schedules from here, and by none of
-// the first 300,000 from 1 (observed); the others are found within some 50,000 from either.
+// **Observed**: the rarest defect, AReaderIsNotWoken, is found within 22,613 schedules from here,
+// and by none of the first 300,000 from 1; the rest are found within some 50,000 from either.
 constexpr uint64_t kFirstSeed = 1'000'001;
 
-// Returns the exit status of a process that explores: a defect may break an invariant.
+// Explores in a separate process, because a defect may break an invariant. Returns its exit status.
 int ExploreElsewhere() {
   std::fflush(nullptr);
   const pid_t child = fork();
@@ -40,5 +40,5 @@ TEST(Mutant, HULLD_MUTANT) {
   EXPECT_TRUE(is_reported || is_broken) << "not found by " << kMost << " schedules: " << status;
 }
 
-}  // namespace
+}  // namespace mutant_test
 }  // namespace hulld::server

@@ -5,8 +5,8 @@
 
 namespace hulld::server {
 
-// SplitMix64: the same numbers for the same seed everywhere, and good ones from seeds that follow
-// each other. Cost: ~1 ns. Source: Steele, Lea and Flood 2014, Fast Splittable Pseudorandom Number
+// SplitMix64: the same numbers for the same seed on every platform, and good ones for consecutive
+// seeds. Cost: ~1 ns. Source: Steele, Lea and Flood 2014, Fast Splittable Pseudorandom Number
 // Generators.
 class Random {
  public:
@@ -18,9 +18,9 @@ class Random {
     z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
     return z ^ (z >> 31);
   }
-  // Below n, or 0 for n = 0. Not quite uniform: by one in 2^32.
+  // Returns a number below n, or 0 for n = 0. Not quite uniform: by one in 2^32.
   uint32_t Below(uint32_t n) { return static_cast<uint32_t>(((Next() >> 32) * n) >> 32); }
-  // True once in `n` times; never for n = 0.
+  // True with probability 1/n; never for n = 0.
   bool OneIn(uint32_t n) { return n > 0 && Below(n) == 0; }
 
  private:

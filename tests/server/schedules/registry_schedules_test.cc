@@ -1,6 +1,6 @@
-// The registry, its committer, its budget and its feed, under schedules that a seed chooses.
+// The registry with its committer, budget, and feed, under schedules chosen by a seed.
 //
-// HULLD_SCHEDULES in the environment: how many, by hand. HULLD_TEST_SEED: the first.
+// HULLD_SCHEDULES: number of schedules, for manual runs. HULLD_TEST_SEED: the first seed.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -10,7 +10,7 @@
 #include "tests/server/schedules/explorer.h"
 
 namespace hulld::server {
-namespace {
+namespace registry_schedules_test {
 
 #ifdef HULLD_SANITIZED
 constexpr uint64_t kSchedules = 10'000;
@@ -63,5 +63,5 @@ TEST(RegistrySchedules, TheSameSeedTakesTheSameSteps) {
   }
 }
 
-}  // namespace
+}  // namespace registry_schedules_test
 }  // namespace hulld::server

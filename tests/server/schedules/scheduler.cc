@@ -14,7 +14,7 @@ namespace {
 
 Scheduler* current = nullptr;
 
-// Fibers that have nothing to run. Making one costs a system call or two, so they are kept.
+// Idle fibers. Creating one costs a system call or two, so they are pooled.
 std::vector<Fiber*>& IdleFibers() {
   static auto* const idle = new std::vector<Fiber*>;
   return *idle;
@@ -29,7 +29,7 @@ Fiber* TakeFiber() {
 }
 
 constexpr size_t kNobody = SIZE_MAX;
-// About how many steps a schedule has: where the changes of priority lie.
+// Approximate number of steps of a schedule: the range of the priority changes.
 constexpr uint32_t kUsualSteps = 800;
 constexpr uint32_t kMostChangePoints = 5;
 
@@ -115,7 +115,7 @@ void Scheduler::Fail(std::string what) {
 
 void Scheduler::Suspend() { threads_[running_].fiber->Suspend(); }
 
-// Lets another go on where it is another's turn, and comes back when it is this one's.
+// Switches to another thread if it is that one's turn, and returns when it is this one's.
 void Scheduler::GoOn() {
   if (steps_.size() > kMostSteps) {
     fault_ = {ScheduleFault::Kind::kLivelock,
@@ -152,8 +152,8 @@ size_t Scheduler::ChooseAmong(const std::vector<uint16_t>& ready) {
   return stays ? running_ : ready[choices_.Below(static_cast<uint32_t>(ready.size()))];
 }
 
-// By its time limit, or for no reason at all. Only where others can go on: who needs that lost a
-// wakeup.
+// Wakes a waiting thread by its time limit or spuriously. Only if other threads can run: a thread
+// that depends on this lost a wakeup.
 void Scheduler::MayWakeOne() {
   const bool by_time = choices_.OneIn(timeouts_);
   if (!by_time && !choices_.OneIn(spurious_)) return;
@@ -291,7 +291,7 @@ std::string Scheduler::Steps() const {
   return text;
 }
 
-// Without objects: what is freed may come again at the same address, or not.
+// Excludes objects: freed addresses may or may not be reused.
 uint64_t Scheduler::Digest() const {
   uint64_t digest = 0;
   const auto add = [&digest](uint64_t value) { digest = (digest ^ value) * 0x100000001B3; };

@@ -14,90 +14,90 @@
 
 namespace hulld::server {
 
-// What is wrong with a schedule.
+// A fault of a schedule.
 struct ScheduleFault {
   enum class Kind {
-    // Threads wait, and none can go on.
+    // Threads wait, and none can run.
     kDeadlock,
-    // The same, and what one of them waits for has come: nobody woke it. A wait that ends by its
-    // time limit is no excuse.
+    // As kDeadlock, but the condition of a waiting thread holds: its notification is missing. A
+    // wait with a time limit counts as well.
     kLostWakeup,
-    // It does not come to an end.
+    // The schedule does not end.
     kLivelock,
-    // An answer, or what the store keeps, is not what the specification says.
+    // An answer, or a change that the store keeps, violates the specification.
     kWrongAnswer,
   };
   Kind kind;
   std::string what;
 };
 
-// Runs threads of a test as fibers, one at a time, and decides by a seed who goes on whenever one
-// takes a mutex, waits, notifies, or calls the store: the same seed, the same steps. What a thread
-// does between two such points is one step for others, so races on memory are not found here but by
+// Runs threads of a test as fibers, one after another. A seed decides which runs next whenever a
+// thread takes a mutex, waits, notifies, or calls the store: the same seed gives the same steps.
+// Code between two such points is atomic for other threads, so data races are left to
 // ThreadSanitizer.
 //
-// Half of the seeds walk at random, with a bias of their own towards staying with the same thread.
-// The others go by priorities that change a few times (PCT: Burckhardt, Kothari, Musuvathi and
+// Half of the seeds walk at random, each with its own bias towards staying with the same thread.
+// The rest use priorities that change a few times (PCT: Burckhardt, Kothari, Musuvathi and
 // Nagarakatte 2010, A Randomized Scheduler with Probabilistic Guarantees of Finding Bugs): a defect
-// that needs d steps in a certain order among n threads and k steps is found by one schedule in
-// n k^(d-1) at least.
+// that needs d steps in a certain order among n threads and k steps is found by at least one in n
+// k^(d-1) schedules.
 //
-// Time stands still but for a moment at each step. A wait with a time limit ends by it only if the
-// seed says so while others could go on. So where nothing can go on but by a time limit, a wakeup
-// is missing, which is a fault. Some seeds also wake threads that nobody notified, as the standard
-// allows.
+// Time advances slightly at each step only. A wait reaches its time limit only if the seed chooses
+// so while other threads can run. So if only a time limit could continue the schedule, a wakeup is
+// missing, which is a fault. Some seeds also wake threads spuriously, as the standard allows.
 class Scheduler {
  public:
-  // A schedule of more steps than this does not end. Observed: 3 000 at most.
+  // A schedule with more steps does not end. **Observed**: 3 000 at most.
   static constexpr size_t kMostSteps = 100'000;
   static constexpr int64_t kNoDeadline = -1;
 
   using Location = std::source_location;
 
-  // What a thread waits for, if it is known.
+  // The condition that a thread waits for, if known.
   struct Condition {
     bool (*holds)(const void*) = nullptr;
     const void* context = nullptr;
   };
 
-  // The scheduler of the schedule that runs on this thread. There must be one.
+  // Returns the scheduler that runs on this thread. Requires: one exists.
   static Scheduler& Current();
 
   explicit Scheduler(uint64_t seed);
   Scheduler(const Scheduler&) = delete;
   Scheduler& operator=(const Scheduler&) = delete;
-  // After a fault the threads and all that they hold are left as they are.
+  // After a fault, threads and everything they hold are abandoned.
   ~Scheduler();
 
-  // Runs `body` as the first thread, and whatever it starts, until all ended. Once.
+  // Runs `body` as the first thread, and all threads that it starts, until they end. Call at most
+  // once.
   std::optional<ScheduleFault> Run(std::function<void()> body);
 
-  // What happened, a line for each step.
+  // Returns the steps, one per line.
   std::string Steps() const;
   size_t step_count() const { return steps_.size(); }
-  // A digest of all steps, equal for equal schedules.
+  // Returns a digest of all steps, equal for equal schedules.
   uint64_t Digest() const;
 
   // The rest is for threads of the schedule.
 
-  // Numbers for what a test does, apart from those that choose who goes on.
+  // Random numbers for the test, independent of those that schedule threads.
   Random& random() { return random_; }
-  // Nanoseconds since the schedule began.
+  // Returns nanoseconds since the schedule began.
   int64_t Now() const { return now_; }
-  // A step that others can see: who goes on next?
+  // A step visible to other threads; may switch threads.
   void Yield(const char* what, const void* object = nullptr,
              const Location& where = Location::current());
-  // The same, of a test or of its store, with numbers that tell of it.
+  // As Yield, for the test or its store, with numbers that describe the step.
   void Note(const char* what, uint64_t first = 0, uint64_t second = 0, uint64_t third = 0);
   // Ends the schedule.
   [[noreturn]] void Fail(std::string what);
 
   size_t StartThread(std::function<void()> task, const char* name, const Location& where);
   void JoinThread(size_t thread);
-  // Waits until the thread that holds an object lets go of it.
+  // Waits until the thread that holds an object releases it.
   void Block(const char* what, const void* object, const Location& where);
   void Unblock(const void* object);
-  // Waits for a notification, which is true, or for the deadline.
+  // Waits for a notification or the deadline. Returns true if notified.
   bool Wait(const void* object, int64_t deadline, const Condition& condition,
             const Location& where);
   void Notify(const void* object, bool all, const Location& where);
@@ -114,7 +114,7 @@ class Scheduler {
     int64_t deadline = kNoDeadline;
     Condition condition = {};
     Location where = {};
-    // The thread's priority in PCT; the highest goes first.
+    // PCT priority of the thread; the highest runs first.
     int64_t priority = 0;
     const char* name = nullptr;
     Location started = {};
@@ -125,7 +125,7 @@ class Scheduler {
     const void* object;
     uint64_t numbers[3];
     Location where;
-    // Not the thread's own doing.
+    // Caused by another thread or the scheduler.
     bool is_given;
   };
 
@@ -141,12 +141,12 @@ class Scheduler {
   Random choices_;
   Random random_;
   bool by_priority_ = false;
-  // Walk: stays with a thread in this many of 16 steps.
+  // Random walk: stays with a thread in this many of 16 steps.
   uint32_t stickiness_ = 0;
   // PCT: the steps at which the running thread gets the lowest priority, descending.
   std::vector<size_t> change_points_;
   int64_t lowest_priority_ = 0;
-  // Once in this many steps; 0: never.
+  // One in this many steps; 0: never.
   uint32_t timeouts_ = 0;
   uint32_t spurious_ = 0;
 
@@ -154,7 +154,7 @@ class Scheduler {
   std::vector<ThreadState> threads_;
   std::vector<uint16_t> ready_;
   size_t running_ = 0;
-  // Whom to resume.
+  // The next thread to resume.
   size_t next_ = 0;
   std::vector<Step> steps_;
   std::optional<ScheduleFault> fault_;

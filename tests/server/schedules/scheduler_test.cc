@@ -1,4 +1,4 @@
-// Small programs with the faults that the scheduler is to find, and without.
+// Small programs with and without the faults that the scheduler must find.
 #include "tests/server/schedules/scheduler.h"
 
 #include <gtest/gtest.h>
@@ -14,11 +14,11 @@
 #include "server/process/synchronization.h"
 
 namespace hulld::server {
-namespace {
+namespace scheduler_test {
 
 using Kind = ScheduleFault::Kind;
 
-// The first fault among this many seeds.
+// Returns the first fault among this many seeds.
 std::optional<ScheduleFault> Find(const std::function<void()>& body, uint64_t seeds = 1000) {
   for (uint64_t seed = 1; seed <= seeds; ++seed) {
     if (auto fault = Scheduler(seed).Run(body)) return fault;
@@ -49,7 +49,7 @@ TEST(Scheduler, FindsMutexesThatAreTakenInTwoOrders) {
   EXPECT_NE(fault->what.find("scheduler_test.cc"), std::string::npos) << fault->what;
 }
 
-// The flag is set without the mutex, between the look at it and the wait.
+// The flag is set without the mutex, between its check and the wait.
 void LoseAWakeup(bool waits_for_a_while) {
   Mutex mutex;
   ConditionVariable changed;
@@ -72,7 +72,7 @@ TEST(Scheduler, FindsALostWakeup) {
   EXPECT_TRUE(Find([] { LoseAWakeup(false); }).has_value());
 }
 
-// It would go on after a second, and nobody would notice.
+// The thread would continue after a second, hiding the fault.
 TEST(Scheduler, FindsALostWakeupBehindATimeLimit) {
   EXPECT_TRUE(Find([] { LoseAWakeup(true); }).has_value());
 }
@@ -142,7 +142,7 @@ TEST(Scheduler, FindsNothingWhereMutexesAreHeld) {
   EXPECT_FALSE(fault.has_value()) << fault->what;
 }
 
-// A chain of hand-overs, each of which a notification before the wait must not break.
+// A chain of hand-overs; a notification before the wait must not break any.
 TEST(Scheduler, FindsNothingWhereConditionsAreUsedRightly) {
   const auto fault = Find([] {
     constexpr int kThreads = 4;
@@ -164,7 +164,7 @@ TEST(Scheduler, FindsNothingWhereConditionsAreUsedRightly) {
   EXPECT_FALSE(fault.has_value()) << fault->what;
 }
 
-// The order in which three threads take a mutex: each of the six comes.
+// The order in which three threads take a mutex: all six occur.
 TEST(Scheduler, ReachesEveryOrder) {
   std::vector<std::string> orders;
   for (uint64_t seed = 1; seed <= 500; ++seed) {
@@ -200,5 +200,5 @@ TEST(Scheduler, TellsItsSteps) {
       << steps;
 }
 
-}  // namespace
+}  // namespace scheduler_test
 }  // namespace hulld::server

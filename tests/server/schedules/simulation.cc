@@ -15,11 +15,11 @@ namespace hulld::server {
 namespace {
 
 constexpr uint64_t kPlentyOfMemory = uint64_t{1} << 30;
-// The most that a body of one piece takes.
+// Upper bound for a body of one piece.
 constexpr uint64_t kMostBytesOfBody = 512;
 
-// What an idle registry must say of itself: that it holds what the store keeps, that it can let go
-// of all of it, and that nothing is counted then.
+// Checks the statistics of an idle registry: it holds the contents of the store, can evict all of
+// it, and then counts nothing.
 void CheckAtRest(const Simulation& simulation) {
   Scheduler& scheduler = Scheduler::Current();
   const Ledger& ledger = simulation.ledger();
@@ -53,8 +53,8 @@ void CheckAtRest(const Simulation& simulation) {
   }
   const CacheStatistics cache = registry.Cache();
   simulation.reached.evictions += cache.evictions;
-  // What is prepared just now is held for a moment longer.
-  // So are bodies that were put just now: each client puts kMostCalls at most.
+  // A preparation in progress is held slightly longer, and so are recently put bodies: each client
+  // puts kMostCalls at most.
   if (simulation.plan.bodies > 0) bodies += simulation.plan.clients * Client::kMostCalls;
   if (simulation.plan.preparations > 0 || cache.bytes <= bodies * kMostBytesOfBody) return;
   scheduler.Fail(absl::StrCat("nobody holds anything, and ", cache.bytes,
@@ -91,7 +91,7 @@ void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
   reached.superseded += counts.superseded;
 }
 
-// What others did is known here, too.
+// The registry has applied all peer changes.
 void CatchUp(Registry& registry) {
   absl::Status status = absl::UnavailableError("");
   while (absl::IsUnavailable(status)) status = registry.AwaitOthers({});
@@ -112,7 +112,7 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
     Simulation simulation{plan, database, registry, reached};
     RunClients(simulation);
     if (--working == 0) all_ended.Set();
-    // Some end while others go on.
+    // Some end while others continue.
     if (Scheduler::Current().random().OneIn(3)) return;
     all_ended.Wait();
     CatchUp(registry);
@@ -174,7 +174,7 @@ Plan::Plan(Random& random) {
   records = random.Below(3);
   bodies = random.OneIn(2) ? 1 + weight() : 0;
   if (random.OneIn(16)) {
-    // Several read what is not in memory, and some of them give up.
+    // Several read cold hulls, and some of them are cancelled.
     clients = 3;
     hulls = creations = streams = 1;
     deletions = replacements = listings = bodies = preparations = 0;
@@ -184,7 +184,7 @@ Plan::Plan(Random& random) {
   }
   if (!random.OneIn(3)) return;
   servers = 2;
-  // A watch may be told of several changes as one.
+  // A watch may report several changes as one.
   has_watch = false;
   faults.damage = 0;
   faults.killed_at_batch = 0;
@@ -216,7 +216,7 @@ void Simulate(Reached& reached) {
     store.Reopen({});
     run([](Simulation& simulation) { Client(simulation).CheckAll(); });
   }
-  // Hulls that are not in memory at first.
+  // Hulls that are initially cold.
   if (Scheduler::Current().random().OneIn(3)) {
     Scheduler::Current().Note("test: opens the store for clients");
     StoreFaults faults = plan.faults;

@@ -10,7 +10,7 @@
 
 namespace hulld::server {
 
-// What schedules came to, so that a test can tell that they reach what they are for.
+// Coverage of schedules, so that a test can check that they reach the intended cases.
 struct Reached {
   uint64_t schedules = 0;
   uint64_t steps = 0;
@@ -37,12 +37,12 @@ struct Reached {
   uint64_t recovered = 0;
   uint64_t kills = 0;
   uint64_t revived = 0;
-  // Schedules of several servers, and their changes that were made anew.
+  // Schedules with several servers, and their rebased changes.
   uint64_t shared = 0;
   uint64_t superseded = 0;
 };
 
-// Something that happens once, and that threads wait for.
+// A one-time event that threads wait for.
 class Event {
  public:
   bool is_set() const { return is_set_; }
@@ -53,25 +53,25 @@ class Event {
   bool is_set_ = false;
 };
 
-// What a schedule does, drawn from its seed. Leaving out much makes the rest meet more often (swarm
-// testing: Groce, Zhang, Eide, Chen and Regehr 2012).
+// Parameters of a schedule, drawn from its seed. Omitting many features makes the remaining ones
+// interact more often (swarm testing: Groce, Zhang, Eide, Chen and Regehr 2012).
 struct Plan {
   explicit Plan(Random& random);
 
   StoreFaults faults;
   uint64_t memory_limit = 0;
-  // Whether that is never reached but by pressure.
+  // If true, the memory limit is reached under pressure only.
   bool has_memory = false;
-  // Whether the store finds records, and how many of them a server keeps.
+  // True if the store finds records; and the number of records that a server keeps.
   bool finds_records = false;
   size_t records = 0;
-  // Over one database; and of each its clients.
+  // Servers over one database, and the clients of each.
   size_t servers = 1;
   size_t clients = 0;
   size_t hulls = 0;
   size_t writers = 0;
   bool has_watch = false;
-  // How often each kind of call comes, relative to the others.
+  // Relative frequency of each kind of call.
   uint32_t creations = 0;
   uint32_t deletions = 0;
   uint32_t replacements = 0;
@@ -87,7 +87,7 @@ struct Plan {
   uint32_t repetitions = 0;
 };
 
-// What the clients of a schedule share.
+// State shared by the clients of a schedule.
 struct Simulation {
   const Plan& plan;
   SimulatedStore& store;
@@ -97,9 +97,9 @@ struct Simulation {
   Ledger& ledger() const { return store.ledger(); }
 };
 
-// One schedule: a registry over a store with faults, and clients that call it; then a registry over
-// what the store kept. Or several registries over one database, which start and end while others go
-// on. The body of Scheduler::Run.
+// Runs one schedule: a registry over a store with faults and clients that call it, then a registry
+// over the data that the store kept. Or several registries over one database, which start and end
+// independently. The body of Scheduler::Run.
 void Simulate(Reached& reached);
 
 }  // namespace hulld::server

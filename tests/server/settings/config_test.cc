@@ -9,7 +9,7 @@
 #include <map>
 
 namespace hulld::server {
-namespace {
+namespace config_test {
 
 using ::testing::HasSubstr;
 
@@ -84,6 +84,9 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"max-message-bytes", "16"},
                                                        {"max-points-per-hull", "27"},
                                                        {"max-placements", "28"},
+                                                       {"max-connections", "31"},
+                                                       {"max-connections-per-address", "32"},
+                                                       {"max-anonymous-calls", "33"},
                                                        {"max-calls", "19"},
                                                        {"max-waiting-calls", "20"},
                                                        {"max-streams-per-client", "21"},
@@ -136,6 +139,9 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_message_bytes, 16);
     EXPECT_EQ(config.limits.max_points_per_hull, 27);
     EXPECT_EQ(config.limits.max_placements, 28);
+    EXPECT_EQ(config.limits.max_connections, 31);
+    EXPECT_EQ(config.limits.max_connections_per_address, 32);
+    EXPECT_EQ(config.limits.max_anonymous_calls, 33);
     EXPECT_EQ(config.limits.max_calls, 19);
     EXPECT_EQ(config.limits.max_waiting_calls, 20);
     EXPECT_EQ(config.limits.max_streams_per_client, 21);
@@ -175,12 +181,6 @@ TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
   ExpectRefused({"--postgres-servers=many"}, "--postgres-servers many is for --store postgres");
   ExpectRefused({postgres[0], postgres[1], "--postgres-servers=many", "--take-over"},
                 "--take-over is for --postgres-servers one");
-  const std::vector<std::string> shards = {"--store=postgres", "--postgres-shards=/s"};
-  EXPECT_EQ(Accepted({shards[0], shards[1], "--postgres-servers=many"}).postgres_shards, "/s");
-  ExpectRefused(shards, "--postgres-shards needs --postgres-servers many");
-  ExpectRefused({shards[0], shards[1], postgres[1], "--postgres-servers=many"},
-                "takes the place of --postgres-conninfo-file");
-  ExpectRefused({"--postgres-shards=/s"}, "--postgres-shards is for --store postgres");
   environment_["HULLD_STORE"] = "postgres";
   environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
   EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");
@@ -258,7 +258,6 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--durability",
                            "--postgres-conninfo-file",
                            "--postgres-servers",
-                           "--postgres-shards",
                            "--take-over",
                            "--memory-limit",
                            "--max-writers-per-hull",
@@ -285,5 +284,5 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
   EXPECT_EQ(Parse({"--version"})->print, "hulld " HULLD_VERSION "\n");
 }
 
-}  // namespace
+}  // namespace config_test
 }  // namespace hulld::server

@@ -10,7 +10,7 @@
 #include <string>
 
 namespace hulld::server {
-namespace {
+namespace cpu_limit_test {
 
 class CpuLimitTest : public ::testing::Test {
  protected:
@@ -91,5 +91,5 @@ TEST(CpuLimit, TheLogSaysWhy) {
   EXPECT_EQ((CpuLimit{1, 3}).Describe(), "1, as the process may use 1 processor");
 }
 
-}  // namespace
+}  // namespace cpu_limit_test
 }  // namespace hulld::server

@@ -9,7 +9,7 @@
 #include <string>
 
 namespace hulld::server {
-namespace {
+namespace memory_limit_test {
 
 constexpr uint64_t kNone = std::numeric_limits<uint64_t>::max();
 
@@ -92,5 +92,5 @@ TEST_F(MemoryLimit, LinesThatAreNotUnderstoodAreLeftOut) {
   EXPECT_EQ(ControlGroupMemory(root_), 2000);
 }
 
-}  // namespace
+}  // namespace memory_limit_test
 }  // namespace hulld::server

@@ -6,7 +6,7 @@
 #include <vector>
 
 namespace hulld::server {
-namespace {
+namespace change_revisions_test {
 
 Change Creation(const std::string& id) {
   Change change;
@@ -48,7 +48,7 @@ TEST(NumberChanges, ChunksOfOneHullBuildOnEachOther) {
   std::vector<Change> changes = {
       Chunk(before, VertexChange::kReplaced), Chunk(before, VertexChange::kNone),
       Chunk(before, VertexChange::kAdded), Chunk(before, VertexChange::kNone)};
-  // What is numbered again, as when others went before, is numbered anew.
+  // Renumbering, as after a peer committed first, replaces the revisions.
   for (const uint64_t revision : {7, 20}) {
     EXPECT_EQ(Number(changes, revision), revision + 2);
     const std::vector<uint64_t> revisions = {revision + 1, revision + 1, revision + 2,
@@ -86,5 +86,5 @@ TEST(NumberChanges, WhatIsDeletedStaysAsItWas) {
   EXPECT_EQ(changes[1].body->record.revision, 5);
 }
 
-}  // namespace
+}  // namespace change_revisions_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Bytes of a store that turned into others: recognized, named, and never served.
+// Damaged bytes of a store are detected, reported, and never served.
 
 #include <absl/strings/str_cat.h>
 
@@ -13,11 +13,11 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace store_damage_test {
 
 using ::testing::HasSubstr;
 
-// Three hulls, of which the second is to be damaged.
+// Makes three hulls. Tests damage the second one.
 template <typename Hulls>
 void PutThree(Hulls& hulls) {
   for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(hulls.Put(id, CubeCorners()).ok());
@@ -25,7 +25,7 @@ void PutThree(Hulls& hulls) {
 
 class StoreDamage : public KeptStoreTest {
  protected:
-  // Flips a bit of the value that is kept under `key`, as a faulty disk controller might.
+  // Flips a bit of the value of `key`, like a faulty disk controller.
   void Flip(const std::string& key) {
     std::string value = kept_->Get(key);
     value[value.size() / 2] ^= 4;
@@ -92,7 +92,7 @@ TEST_P(StoreDamage, ADamagedDeltaIsReportedByHullAndNeverServed) {
   ExpectOnlyBIsDamaged();
 }
 
-// Hulls that are read together, of which one is damaged: the others are served.
+// One damaged hull does not affect the hulls that are read together with it.
 TEST_P(StoreDamage, ADamagedDeltaAmongManyIsReportedByHull) {
   constexpr size_t kHulls = 40;
   constexpr size_t kDamaged = 17;
@@ -158,7 +158,8 @@ TEST_P(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothingAfterAStart) {
   for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
 }
 
-// A look at all records finds what such a hull leaves: a start takes it, once, and no deletion.
+// Finding the remains of such a hull takes a scan of all records. A start scans, a deletion does
+// not.
 TEST_F(RocksDbDamage, DeletingAHullWhoseRecordIsDamagedDoesNotReadTheOthers) {
   FillThree();
   FlipRecord("b");
@@ -172,7 +173,7 @@ TEST_F(RocksDbDamage, DeletingAHullWhoseRecordIsDamagedDoesNotReadTheOthers) {
   EXPECT_TRUE(hulls_->store().db().Get({}, kLostKey, &mark).IsNotFound());
 }
 
-// With two such hulls, nothing says which keys belong to which.
+// With two such hulls, the owner of each key is unknown.
 TEST_F(RocksDbDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
   FillThree();
   FlipRecord("a");
@@ -237,8 +238,8 @@ TEST_P(StoreDamage, ADamagedSequenceIsNotTakenForAnother) {
   EXPECT_TRUE(hulls_->View("b").ok());
 }
 
-// One bit after the other, spread over all files of a store: whatever opens serves what was kept,
-// or says that it is damaged.
+// Flips single bits in all files of a store. A store that opens serves the original hulls or
+// reports damage.
 TEST_F(RocksDbDamage, FlippedBitsInItsFilesAreNeverServed) {
   Start();
   const std::vector<Vector> sphere = SpherePoints(300);
@@ -305,21 +306,23 @@ TEST_F(RocksDbDamage, FlippedBitsInItsFilesAreNeverServed) {
   EXPECT_GT(reported, 0);
 }
 
+// Simulates a process that is killed while it writes a record.
 TEST_F(RocksDbDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
-  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
-  const HullView before = *hulls_->View("a");
-  const uint64_t revision = before.record.revision;
+  const std::string store_id = hulls_->store().id();
+  const uint64_t revision = hulls_->View("a")->record.revision;
   hulls_ = nullptr;
-  std::filesystem::resize_file(LogFile(), std::filesystem::file_size(LogFile()) - 10);
+  char half_record[40];
+  ASSERT_TRUE(std::ifstream(LogFile(), std::ios::binary).read(half_record, sizeof half_record));
+  std::ofstream(LogFile(), std::ios::binary | std::ios::app).write(half_record, sizeof half_record);
   Start();
   EXPECT_EQ(hulls_->View("a")->record.revision, revision);
-  EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+  EXPECT_EQ(hulls_->View("a")->record.vertex_count, 8);
+  EXPECT_EQ(hulls_->store().id(), store_id);
 }
 
-// As when the power goes out while the pages of a record are on their way to the disk, the last of
-// them first. What is read does not tell whether the record was acknowledged.
+// Simulates an acknowledged record whose middle was lost.
 TEST_F(RocksDbDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
@@ -333,7 +336,7 @@ TEST_F(RocksDbDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
   EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
   RocksDbOptions options;
   options.data_dir = directory_ + "/data";
-  options.cut_log = true;
+  options.accept_loss = true;
   ASSERT_TRUE(RocksDbStore::Open(options).ok());
   Start();
   EXPECT_EQ(hulls_->View("a")->record.vertex_count, 8);
@@ -354,15 +357,15 @@ TEST_F(RocksDbDamage, ALogThatIsDamagedInItsMiddleCanBeCutThere) {
   EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
   RocksDbOptions options;
   options.data_dir = directory_ + "/data";
-  options.cut_log = true;
+  options.accept_loss = true;
   ASSERT_TRUE(RocksDbStore::Open(options).ok());
   Start();
   EXPECT_EQ(hulls_->View("a")->record.revision, revision);
   EXPECT_EQ(hulls_->View("b").status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(hulls_->View("c").status().code(), absl::StatusCode::kNotFound);
-  // The revisions of b and c will be given to other changes.
+  // Later changes get the revisions of b and c.
   EXPECT_NE(hulls_->store().id(), store_id);
 }
 
-}  // namespace
+}  // namespace store_damage_test
 }  // namespace hulld::server

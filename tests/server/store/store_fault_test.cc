@@ -1,4 +1,4 @@
-// The disk fails, fills up, or loses its power while hulls grow.
+// Disk errors, full disks, and power failures while hulls grow.
 
 #include <absl/strings/str_cat.h>
 #include <rocksdb/env.h>
@@ -17,7 +17,7 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace store_fault_test {
 
 using ::testing::HasSubstr;
 using Fault = FaultyFileSystem::Fault;
@@ -44,7 +44,7 @@ class StoreFault : public StoreTest {
         EXPECT_FALSE(hulls_->Create("new").ok());
         EXPECT_FALSE(hulls_->Delete("h").ok());
         EXPECT_FALSE(hulls_->Replace({"h", {}, false, std::make_shared<HullBuilder>(), {}}).ok());
-        // Queries go on, on what is in memory and on what is not.
+        // Queries go on, for hulls in memory and for others.
         EXPECT_EQ(hulls_->View("h")->record, before.record);
         EXPECT_EQ(CanonicalOf(*hulls_->View("h")).vertices().size(), 8);
         EXPECT_EQ(hulls_->View("cold")->record.vertex_count, 8);
@@ -65,7 +65,7 @@ class StoreFault : public StoreTest {
     EXPECT_EQ(hulls_->View("h")->record, after.record);
   }
 
-  // The points that the hull "h" took, as the store in a directory keeps it.
+  // Returns the points received by hull "h", as stored in a directory.
   uint64_t ReceivedIn(const std::string& name) {
     rocksdb::Env* const faulty = std::exchange(env_, nullptr);
     absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore(name);
@@ -95,7 +95,7 @@ TEST_F(StoreFault, WhatCannotBeSyncedIsNotAcked) {
   ExpectRefusedThenWell(Fault::kSyncError, absl::StatusCode::kUnavailable, "syncing");
 }
 
-// Each database counts its own, from when it was opened.
+// Each database counts only its own stalls.
 TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
   Start();
   RocksDbStore& store = hulls_->store();
@@ -120,9 +120,8 @@ TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
   EXPECT_GT(stall(), after);
 }
 
-// As a process leaves the store that is killed now, or a machine whose power goes out: what was
-// refused with the words that nothing was changed must not be there. Where that cannot be had, the
-// answer says so.
+// Simulates a kill and a power failure after a refused change. The change must be absent if the
+// error says that nothing was changed; otherwise the error says that it may appear.
 TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
   constexpr int64_t kForever = std::numeric_limits<int64_t>::max();
   struct Case {
@@ -162,7 +161,7 @@ TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
       const uint64_t received = ReceivedIn("left");
       EXPECT_TRUE(received == 8 || (received == 9 && !c.is_certain)) << received;
     }
-    // Once the disk is well, it is gone for certain, and takes the place that is free.
+    // After the disk has recovered, the refused change is gone for good.
     files_->SetFault(Fault::kNone);
     ASSERT_TRUE(hulls_->Create("other").ok());
     std::filesystem::remove_all(directory_ + "/left");
@@ -174,7 +173,7 @@ TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
   }
 }
 
-// An end of the process that nothing came before is no kill, and leaves no more behind.
+// An orderly end leaves no refused change behind.
 TEST_F(StoreFault, WhatWasRefusedDoesNotOutliveAnEnd) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -193,14 +192,14 @@ TEST_F(StoreFault, FailuresAreCountedByWhatFailed) {
   };
   for (const Expected& expected :
        {Expected{Fault::kIoError, 1, 0}, {Fault::kNoSpace, 1, 0}, {Fault::kSyncError, 0, 1}}) {
-    // A new store, which has nothing to compact in the background.
+    // A new store has nothing to compact in the background.
     hulls_ = nullptr;
     std::filesystem::remove_all(directory_ + "/data");
     Start();
     ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
     EXPECT_EQ(hulls_->store().failures().write, 0);
     files_->SetFault(expected.fault);
-    // The second attempt is to recover the store first.
+    // The second attempt starts with a recovery of the store.
     for (uint64_t attempt = 1; attempt <= 2; ++attempt) {
       EXPECT_FALSE(hulls_->Create("new").ok());
       const StoreFailures failures = hulls_->store().failures();
@@ -228,7 +227,7 @@ TEST_F(StoreFault, SyncsThatFailLaterAreCounted) {
 
 TEST_F(StoreFault, WhatCannotBeReadIsCounted) {
   Start();
-  // More than the block that holds the records, which is read when the store is opened.
+  // More than the block of the records, which is read when the store is opened.
   ASSERT_TRUE(hulls_->Put("h", SpherePoints(1000)).ok());
   Start();
   files_->SetFault(Fault::kReadError);
@@ -274,7 +273,7 @@ TEST_F(StoreFault, RelaxedChangesAreSyncedSoon) {
   while (files_->syncs() == before) std::this_thread::yield();
 }
 
-// That an outage is one: what was not synced is lost.
+// Shows that the simulated power failure loses unsynced changes.
 TEST_F(StoreFault, AnOutageLosesWhatWasNotSynced) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
@@ -304,7 +303,7 @@ TEST_F(StoreFault, TheDirectoriesOfANewStoreAreOnDiskBeforeItServes) {
   EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
 }
 
-// As after a first start that was killed before it had synced what it made.
+// Simulates a first start that was killed before it had synced its directories.
 TEST_F(StoreFault, DirectoriesThatAFirstStartLeftUnsyncedAreSyncedByTheNext) {
   ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new").ok());
   ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new/data").ok());
@@ -360,7 +359,7 @@ TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
   EXPECT_EQ(directories(), before);
 }
 
-// The revisions that it gave before may be given to other changes.
+// Its former revisions may be given to other changes.
 TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
@@ -378,7 +377,7 @@ TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
     ids.push_back((*left)->id());
   }
   EXPECT_NE(ids[0], id);
-  // Those ended cleanly.
+  // These starts ended in order.
   EXPECT_EQ(ids[1], ids[0]);
   EXPECT_EQ(ids[2], ids[0]);
 }
@@ -409,7 +408,7 @@ TEST_F(StoreFault, AStoreThatSyncsKeepsItsIdThroughAnOutage) {
   EXPECT_EQ((*left)->id(), hulls_->store().id());
 }
 
-// What writers were told, by hull: sums of the chunks that were acked.
+// Acknowledgements by hull: sums over the acknowledged chunks.
 class Acks {
  public:
   struct Hull {
@@ -434,8 +433,8 @@ class Acks {
   std::map<std::string, Hull> hulls_;
 };
 
-// The power goes out at random moments under four writers. Whatever was acked before is there
-// afterwards, every hull is sound, and revisions did not go back.
+// Power fails at random moments under four writers. Every acknowledged chunk survives, every hull
+// passes its audit, and no revision goes back.
 TEST_F(StoreFault, NoAckPrecedesItsSync) {
 #ifdef HULLD_SANITIZED
   constexpr int kOutages = 12;
@@ -462,7 +461,7 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
         for (uint64_t i = random() % 60; i > 0; --i) {
           points.emplace_back(coordinate(random), coordinate(random), coordinate(random));
         }
-        // Several are on their way, so that batches and chains of changes are cut in two.
+        // Several chunks are in flight, so that batches and chains of changes are cut.
         while (in_flight >= 8) std::this_thread::yield();
         ++in_flight;
         hulls_->registry().Append(opened->session, {sequence, std::move(points), std::nullopt}, {},
@@ -510,5 +509,5 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
   RecordProperty("chunks_of_one_writer", static_cast<int>(chunks));
 }
 
-}  // namespace
+}  // namespace store_fault_test
 }  // namespace hulld::server

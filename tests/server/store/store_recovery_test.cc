@@ -1,4 +1,4 @@
-// What a durable store gives back after it was opened again.
+// Contents of a durable store after it was reopened.
 
 #include <absl/strings/str_cat.h>
 
@@ -10,13 +10,13 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace store_recovery_test {
 
 using ::testing::HasSubstr;
 
 class StoreRecovery : public KeptStoreTest {
  protected:
-  // What is kept under the incarnation's keys of one kind.
+  // Counts the stored keys of one kind.
   size_t CountKeys(char prefix) { return kept_->Count(prefix); }
 };
 
@@ -61,7 +61,7 @@ TEST_P(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
   EXPECT_EQ(second.View("gone").status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(second.Open("cube", "one")->last_sequence, 1);
   EXPECT_EQ(second.Open("cube", "three")->last_sequence, 0);
-  // Revisions go on where they were, and so do sequences.
+  // Revisions and sequences continue.
   const auto next = second.Put("cube", {{9, 9, 9}}, "one");
   ASSERT_TRUE(next.ok()) << next.status();
   EXPECT_EQ(next->hull_revision, sizes.store_revision + 1);
@@ -273,5 +273,5 @@ TEST_P(StoreRecovery, WritersPerHullAreLimited) {
   EXPECT_TRUE(again.Put("h", CubeCorners(), "two").ok());
 }
 
-}  // namespace
+}  // namespace store_recovery_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// Encoding of what an answer may hold, from answers made by hand.
+// Encoding of all answer contents, from hand-written answers.
 #include "server/wire/answer_columns.h"
 
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@
 #include "server/wire/encode.h"
 
 namespace hulld::server {
-namespace {
+namespace answer_columns_test {
 
 using ::testing::ElementsAre;
 
@@ -124,7 +124,7 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   EXPECT_EQ(columns.pair_problems(0).reason(), v1::ERROR_REASON_LIMIT_EXCEEDED);
 }
 
-// Then hulls without a canonical snapshot will do.
+// Then hulls without a canonical snapshot suffice.
 TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
   const LiveHull live({{0, 0, 0}, {0, 0, 4}, {0, 4, 0}, {4, 0, 0}}, 3);
   const std::shared_ptr<const QueryHull> asked = live.VersionAt(live.Now());
@@ -139,5 +139,5 @@ TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
   EXPECT_EQ(columns.ShortDebugString(), expected.ShortDebugString());
 }
 
-}  // namespace
+}  // namespace answer_columns_test
 }  // namespace hulld::server

@@ -1,4 +1,5 @@
-// What is refused before it reaches a hull: addresses, IDs, page tokens; and what reaches the log.
+// Requests refused before they reach a hull: addresses, IDs, page tokens; and the contents of the
+// log.
 
 #include <absl/status/status.h>
 #include <gmock/gmock.h>
@@ -18,7 +19,7 @@
 #include "server/wire/page_token.h"
 
 namespace hulld::server {
-namespace {
+namespace validation_test {
 
 using ::testing::HasSubstr;
 
@@ -50,39 +51,37 @@ TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
 TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {
   using std::chrono::nanoseconds;
   const MemoryStore store;
-  const std::vector<std::string> ids = {store.id()};
   const auto began = SteadyClock::now();
   v1::Freshness message;
-  auto freshness = DecodeFreshness(message, ids, began);
+  auto freshness = DecodeFreshness(message, store, began);
   ASSERT_TRUE(freshness.ok());
   EXPECT_EQ(freshness->max_staleness, nanoseconds(0));
   EXPECT_EQ(freshness->at_least_revision, 0);
   EXPECT_EQ(freshness->began, began);
   message.mutable_max_staleness()->set_seconds(2);
   message.mutable_max_staleness()->set_nanos(5);
-  freshness = DecodeFreshness(message, ids, began);
+  freshness = DecodeFreshness(message, store, began);
   EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
   message.set_at_least_revision(7);
   message.set_store_id(store.id());
-  freshness = DecodeFreshness(message, ids, began);
+  freshness = DecodeFreshness(message, store, began);
   EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
   EXPECT_EQ(freshness->at_least_revision, 7);
-  // The revision alone is content with any age.
+  // A revision alone accepts any age.
   message.clear_max_staleness();
-  freshness = DecodeFreshness(message, ids, began);
+  freshness = DecodeFreshness(message, store, began);
   EXPECT_EQ(freshness->max_staleness, std::nullopt);
-  // As long as can be said, without overflow.
+  // The maximum representable duration does not overflow.
   message.mutable_max_staleness()->set_seconds(315'576'000'000);
-  freshness = DecodeFreshness(message, ids, began);
+  freshness = DecodeFreshness(message, store, began);
   EXPECT_GT(freshness->max_staleness, nanoseconds(std::chrono::hours(24 * 365)));
 }
 
 TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
   const MemoryStore store;
-  const std::vector<std::string> ids = {store.id()};
-  const auto expect = [&ids](const v1::Freshness& message, absl::StatusCode code,
-                             const std::string& what) {
-    const absl::Status status = DecodeFreshness(message, ids, SteadyClock::now()).status();
+  const auto expect = [&store](const v1::Freshness& message, absl::StatusCode code,
+                               const std::string& what) {
+    const absl::Status status = DecodeFreshness(message, store, SteadyClock::now()).status();
     EXPECT_EQ(status.code(), code) << status;
     EXPECT_THAT(std::string(status.message()), HasSubstr(what));
   };
@@ -131,14 +130,16 @@ TEST(ListenAddress, MalformedOnesNameTheFlag) {
   }
 }
 
-TEST(PageToken, RoundTripsForItsPrefixOnly) {
-  const std::string token = EncodePageToken("a/", "a/7");
-  EXPECT_EQ(*DecodePageToken(token, "a/"), "a/7");
-  EXPECT_EQ(*DecodePageToken("", "a/"), "");
+TEST(PageToken, RoundTripsForItsCallAndPrefixOnly) {
+  constexpr Rpc kCall = Rpc::kListHulls;
+  const std::string token = EncodePageToken(kCall, "a/", "a/7");
+  EXPECT_EQ(*DecodePageToken(kCall, token, "a/"), "a/7");
+  EXPECT_EQ(*DecodePageToken(kCall, "", "a/"), "");
   for (const std::string& bad :
-       {token.substr(1), std::string("%%"), std::string("YQ"), EncodePageToken("a/", "b"),
-        EncodePageToken("a/", "a/ "), EncodePageToken("b", "b")}) {
-    EXPECT_EQ(DecodePageToken(bad, "a/").status().code(), absl::StatusCode::kInvalidArgument)
+       {token.substr(1), std::string("%%"), std::string("YQ"), EncodePageToken(kCall, "a/", "b"),
+        EncodePageToken(kCall, "a/", "a/ "), EncodePageToken(kCall, "b", "b"),
+        EncodePageToken(Rpc::kListBodies, "a/", "a/7")}) {
+    EXPECT_EQ(DecodePageToken(kCall, bad, "a/").status().code(), absl::StatusCode::kInvalidArgument)
         << bad;
   }
 }
@@ -167,5 +168,5 @@ TEST(Log, WhatIsNotUtf8IsReplaced) {
   EXPECT_EQ(JsonEscape("\xF4\x90\x80\x80x"), "\\ufffd\\ufffd\\ufffd\\ufffdx");
 }
 
-}  // namespace
+}  // namespace validation_test
 }  // namespace hulld::server

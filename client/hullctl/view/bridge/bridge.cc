@@ -11,6 +11,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <list>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -39,8 +40,10 @@ constexpr size_t kNonceBytes = 16;
 std::string_view ViewOf(beast::string_view text) { return {text.data(), text.size()}; }
 
 class PageConnection;
+class HttpConnection;
 
-// What all connections share; used by the io thread alone, and by the destructor once that ended.
+// State shared by all connections. Used by the io thread only, and by the destructor after that
+// thread has ended.
 struct Shared {
   Shared(BridgeOptions given_options, SessionGuard given_guard)
       : options(std::move(given_options)), guard(std::move(given_guard)) {}
@@ -48,14 +51,16 @@ struct Shared {
   BridgeOptions options;
   SessionGuard guard;
   size_t connections = 0;
+  // Connections that await a request, the longest waiting first.
+  std::list<HttpConnection*> awaiting;
   std::thread::id io_thread;
   std::vector<std::weak_ptr<PageConnection>> pages;
-  // Each destroys the handler of a page that has gone: that waits for threads of the handler, which
-  // may wait for an answer of hulld, and other pages must not wait for it.
+  // Each destroys the handler of a closed page. This waits for the handler's threads, which may
+  // wait for an answer of hulld; other pages must not wait for it.
   std::vector<std::thread> reapers;
 };
 
-// Counts a connection while it lives.
+// Counts a connection during its lifetime.
 class Counted {
  public:
   explicit Counted(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) {
@@ -69,7 +74,7 @@ class Counted {
   std::shared_ptr<Shared> shared_;
 };
 
-// The WebSocket of one page. Handlers run on the io thread; SendText and SendBinary on any.
+// The WebSocket of a page. Handlers run on the io thread; SendText and SendBinary on any.
 class PageConnection final : public PageChannel,
                              public std::enable_shared_from_this<PageConnection> {
  public:
@@ -94,7 +99,7 @@ class PageConnection final : public PageChannel,
   bool SendText(std::string json) override { return Enqueue({std::move(json), true}); }
   bool SendBinary(std::string frame) override { return Enqueue({std::move(frame), false}); }
 
-  // Ends the connection and whatever waits to send.
+  // Closes the connection and drops pending messages.
   void Close() {
     {
       const std::lock_guard lock(mutex_);
@@ -115,7 +120,7 @@ class PageConnection final : public PageChannel,
 
   bool Enqueue(Message message) {
     std::unique_lock lock(mutex_);
-    // The io thread writes what is queued: it must not wait for itself.
+    // The io thread writes the queue: it must not wait for itself.
     if (std::this_thread::get_id() != shared_->io_thread) {
       room_.wait(lock,
                  [this] { return closed_ || queued_bytes_ <= shared_->options.max_queued_bytes; });
@@ -144,7 +149,7 @@ class PageConnection final : public PageChannel,
   void Write() {
     const std::lock_guard lock(mutex_);
     if (closed_ || queue_.empty()) return;
-    // References to elements of a deque stay while others are added behind them.
+    // References to elements of a deque stay valid when elements are added at its end.
     const Message& message = queue_.front();
     socket_.text(message.text);
     socket_.async_write(asio::buffer(message.bytes),
@@ -174,7 +179,7 @@ class PageConnection final : public PageChannel,
 
   std::mutex mutex_;
   std::condition_variable room_;
-  // Guarded by the mutex. The front one is being written.
+  // Guarded by the mutex. The front message is being written.
   std::deque<Message> queue_;
   size_t queued_bytes_ = 0;
   bool closed_ = false;
@@ -187,15 +192,28 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
       : stream_(std::move(socket)),
         shared_(std::move(shared)),
         counted_(std::make_unique<Counted>(shared_)) {}
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
+  ~HttpConnection() { shared_->awaiting.remove(this); }
+
+  // Closes this idle connection to make room for a new one.
+  void MakeRoom() {
+    shared_->awaiting.remove(this);
+    counted_.reset();
+    stream_.close();
+  }
 
   void Read() {
+    shared_->awaiting.push_back(this);
     parser_.emplace();
     parser_->header_limit(kMaxHeaderBytes);
     parser_->body_limit(0);
     stream_.expires_after(kRequestTimeout);
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](error_code error, size_t /*size*/) {
-                       if (!error) self->Answer();
+                       self->shared_->awaiting.remove(self.get());
+                       // An uncounted connection was closed by MakeRoom.
+                       if (!error && self->counted_) self->Answer();
                      });
   }
 
@@ -214,8 +232,8 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
       case SessionGuard::Verdict::kRefuse:
         return Send(Text(decision.http_status, decision.reason + "\n"));
       case SessionGuard::Verdict::kExchange: {
-        // Not a redirect: a browser that was sent here by another program or site would not send
-        // the cookie with it. The next request comes from a page of ours.
+        // A redirect would not work: a browser sent here by another program or site would omit the
+        // cookie from it. The refresh is a request from our own page.
         Response response = Text(decision.http_status,
                                  "<!doctype html><meta http-equiv=\"refresh\" content=\"0; url=/\">"
                                  "<title>hulld</title>\n");
@@ -320,6 +338,10 @@ class BeastBridge final : public Bridge {
   void Accept() {
     acceptor_.async_accept([this](error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
+      // Idle connections must not block the page.
+      if (shared_->connections >= shared_->options.max_connections && !shared_->awaiting.empty()) {
+        shared_->awaiting.front()->MakeRoom();
+      }
       if (!error && shared_->connections < shared_->options.max_connections) {
         error_code ignored;
         socket.set_option(tcp::no_delay(true), ignored);

@@ -12,48 +12,49 @@
 
 namespace hulld {
 
-// The way to one open page. Any thread may call it.
+// Channel to one open page. Thread-safe.
 class PageChannel {
  public:
   virtual ~PageChannel() = default;
-  // Sends a message. Waits while more than BridgeOptions::max_queued_bytes wait for the page, so
-  // that a slow page costs no memory. False when the page has gone.
+  // Sends a message. Blocks while more than BridgeOptions::max_queued_bytes are pending for the
+  // page, so that a slow page has bounded memory. Returns false if the page has closed.
   virtual bool SendText(std::string json) = 0;
   virtual bool SendBinary(std::string frame) = 0;
 };
 
-// What takes the messages of one page. Destroyed when the page has gone; the destructor may wait
-// for threads that send, as sending no longer waits then.
+// Handles the messages of a page. Destroyed after the page has closed; the destructor may wait for
+// threads that send, as sending then no longer blocks.
 class PageHandler {
  public:
   virtual ~PageHandler() = default;
-  // Called one at a time, by the bridge's thread: must not wait.
+  // Called by the bridge's thread, never concurrently. Must not block.
   virtual void OnMessage(std::string_view json) = 0;
 };
 
 struct BridgeOptions {
-  // 0: any free one.
+  // 0: any free port.
   uint16_t port = 0;
-  // Connections at once; more are closed. A page takes one that stays and some while it loads.
+  // Maximum number of connections. At the limit, a new connection replaces the longest idle one;
+  // without an idle one, it is closed. A page needs one permanently and several while it loads.
   size_t max_connections = 32;
-  // The most bytes of one message of a page; a page that sends more is disconnected.
+  // Maximum size of a message from a page; a page that exceeds it is disconnected.
   size_t max_message_bytes = size_t{4} << 20;
   size_t max_queued_bytes = size_t{64} << 20;
-  // Called when a page connects, by the bridge's thread.
+  // Called by the bridge's thread when a page connects.
   std::function<std::unique_ptr<PageHandler>(std::shared_ptr<PageChannel>)> open_page;
 };
 
-// Serves the viewer's page over HTTP on 127.0.0.1, and one WebSocket to each page. Who may ask:
-// session_guard.h. Runs on one thread of its own. Includes nothing of Boost.Beast here: its headers
-// take many seconds to compile.
+// Serves the viewer's page over HTTP on 127.0.0.1, and one WebSocket to each page. Access control:
+// session_guard.h. Runs on its own thread. The header includes nothing of Boost.Beast, which takes
+// many seconds to compile.
 class Bridge {
  public:
-  // INVALID_ARGUMENT: the port cannot be listened on.
+  // INVALID_ARGUMENT: cannot listen on the port.
   static absl::StatusOr<std::unique_ptr<Bridge>> Start(BridgeOptions options);
   // Closes every connection.
   virtual ~Bridge() = default;
 
-  // What to open in a browser; works once.
+  // Returns the address to open in a browser; valid for one use.
   virtual std::string Address() const = 0;
   virtual uint16_t port() const = 0;
 };

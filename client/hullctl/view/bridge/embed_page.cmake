@@ -1,5 +1,5 @@
-# Makes page_files.cc, which holds the files of the viewer's page and three.js. The assembler reads them (.incbin), so that
-# half a megabyte costs no compile time. Sets page_files_source.
+# Generates page_files.cc, which holds the files of the viewer's page and three.js. The assembler includes them (.incbin), so
+# that half a megabyte adds no compile time. Sets page_files_source.
 find_path(HULLD_THREE_JS three.min.js PATHS /usr/share/javascript/three NO_DEFAULT_PATH
           DOC "Where three.js lies (Debian: libjs-three)")
 if(NOT HULLD_THREE_JS)
@@ -7,7 +7,7 @@ if(NOT HULLD_THREE_JS)
                       "directory with -DHULLD_THREE_JS=DIR")
 endif()
 
-# hulld_embed_page(NAME FILE): a file under the name that the page knows it by.
+# hulld_embed_page(NAME FILE): embeds a file under the name used by the page.
 function(hulld_embed_page name file)
   string(MAKE_C_IDENTIFIER hulld_page_${name} symbol)
   set(page_symbols "${page_symbols}HULLD_EMBED(${symbol}, \"${file}\")\n" PARENT_SCOPE)
@@ -32,5 +32,5 @@ endforeach()
 
 set(page_files_source ${CMAKE_CURRENT_BINARY_DIR}/page_files.cc)
 configure_file(${CMAKE_CURRENT_LIST_DIR}/page_files.cc.in ${page_files_source} @ONLY)
-# ccache sees .incbin and compiles anew; the build system must know the inputs.
+# ccache detects .incbin and recompiles; the build system must know the inputs.
 set_source_files_properties(${page_files_source} PROPERTIES OBJECT_DEPENDS "${page_inputs}" SKIP_PRECOMPILE_HEADERS ON)

@@ -6,20 +6,20 @@
 
 namespace hulld {
 
-// A file of the viewer's page, as it was at build time.
+// A file of the viewer's page, embedded at build time.
 struct PageFile {
-  // As in "index.html"; those of three.js start with "three/".
+  // For example "index.html"; names of three.js files start with "three/".
   std::string_view name;
   std::string_view bytes;
 };
 
-// All of them; embed_page.cmake makes them part of the program.
+// Returns all files. embed_page.cmake embeds them in the program.
 std::span<const PageFile> PageFiles();
 
-// Null when there is none of this name.
+// Returns null for an unknown name.
 const PageFile* FindPageFile(std::string_view name);
 
-// The media type of a file by its name.
+// Returns the media type of a file by its name.
 std::string_view MediaTypeOf(std::string_view name);
 
 }  // namespace hulld

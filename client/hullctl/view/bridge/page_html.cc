@@ -12,10 +12,10 @@
 namespace hulld {
 namespace {
 
-// Where index.html wants styles and scripts.
+// Marks the position of styles and scripts in index.html.
 constexpr char kMarker[] = "<!-- resources -->";
 
-// three.js comes as classic scripts, in this order, before our modules.
+// Classic scripts of three.js, loaded in this order before our modules.
 constexpr std::string_view kClassicScripts[] = {"three/three.min.js", "three/OrbitControls.js",
                                                 "three/TransformControls.js"};
 
@@ -23,8 +23,8 @@ bool IsModule(std::string_view name) {
   return name.ends_with(".js") && !name.starts_with("three/");
 }
 
-// Our modules name each other "hulld/NAME.js"; the map tells what that is. So the same files work
-// when they are fetched and when all stands in one page.
+// Our modules import each other as "hulld/NAME.js"; the import map resolves these names. So the
+// same files work when served and when embedded in one page.
 template <typename AddressOf>
 std::string ImportMap(const AddressOf& address_of) {
   JsonObject imports;
@@ -40,8 +40,8 @@ std::string FillIn(const std::string& resources) {
                              {{kMarker, resources}});
 }
 
-// Text of a script that ends no <script> before its time: "</" only occurs in strings, where the
-// backslash means nothing.
+// Escapes a script so that it cannot close its <script> element: "</" occurs only in strings, where
+// the backslash has no effect.
 std::string InScript(std::string_view text) {
   return absl::StrReplaceAll(absl::string_view(text.data(), text.size()), {{"</", "<\\/"}});
 }
@@ -67,7 +67,7 @@ std::string ServedPagePolicy(std::string_view nonce, std::string_view host) {
 }
 
 std::string StandalonePage(std::string_view recording_json) {
-  // No connection to anywhere is among what it may do.
+  // The policy permits no connection at all.
   std::string resources =
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
       "script-src 'unsafe-inline' data:; style-src 'unsafe-inline'\">\n";

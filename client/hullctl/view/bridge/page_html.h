@@ -7,16 +7,16 @@
 
 namespace hulld {
 
-// index.html, whose scripts and styles the browser fetches one by one. `nonce` admits the one
-// script that stands in the page: the map from modules' names to addresses.
+// Returns index.html; the browser fetches its scripts and styles separately. `nonce` admits the
+// inline script: the import map.
 std::string ServedPage(std::string_view nonce);
 
-// What the page may do, as the value of the header Content-Security-Policy: its own scripts and
-// styles, and a WebSocket to `host`, nothing else.
+// Returns the Content-Security-Policy header: own scripts and styles, and a WebSocket to `host`,
+// nothing else.
 std::string ServedPagePolicy(std::string_view nonce, std::string_view host);
 
-// The same page as one file that needs no server and no network. `recording_json`: what the page
-// shows (protocol.h).
+// Returns the page as a single file that needs no server and no network. `recording_json`: its
+// content (protocol.h).
 std::string StandalonePage(std::string_view recording_json);
 
 // In pixels.
@@ -25,8 +25,8 @@ struct PictureSize {
   uint32_t height = 1000;
 };
 
-// The same without its panels, which puts a PNG of what it shows, as a data URL, into the attribute
-// data-png of its body.
+// Returns a standalone page without panels that stores a PNG of its view, as a data URL, in the
+// attribute data-png of its body.
 std::string PicturePage(std::string_view recording_json, const PictureSize& size);
 
 }  // namespace hulld

@@ -7,7 +7,7 @@ namespace hulld {
 
 absl::StatusOr<std::string> RandomHex(size_t bytes) {
   std::string random(bytes, '\0');
-  // Up to 256 bytes come whole or not at all.
+  // Requests of up to 256 bytes are never partially filled.
   if (getrandom(random.data(), bytes, 0) != static_cast<ssize_t>(bytes)) {
     return absl::InternalError("the system gives no random bytes");
   }

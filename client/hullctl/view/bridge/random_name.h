@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// `bytes` (at most 256) random bytes of the system, fit for secrets, as hexadecimal digits.
-// INTERNAL: the system gives none.
+// Returns `bytes` (at most 256) random bytes of the system, suitable for secrets, as hexadecimal
+// digits. INTERNAL: the system returns none.
 absl::StatusOr<std::string> RandomHex(size_t bytes);
 
 }  // namespace hulld

@@ -16,7 +16,7 @@ namespace {
 constexpr size_t kSecretBytes = 32;
 constexpr std::string_view kTokenTarget = "/?token=";
 
-// In time that tells nothing of where they differ.
+// Compares in time independent of the first difference.
 bool IsSame(std::string_view given, std::string_view secret) {
   return given.size() == secret.size() && !secret.empty() &&
          CRYPTO_memcmp(given.data(), secret.data(), secret.size()) == 0;
@@ -45,7 +45,7 @@ std::string SessionGuard::Address() const {
   return absl::StrCat("http://", Host(), std::string(kTokenTarget), one_time_token_);
 }
 
-// Browsers share cookies among the ports of a host, so that the name holds the port.
+// Browsers share cookies among the ports of a host, so the name includes the port.
 std::string SessionGuard::SetCookie() const {
   return absl::StrCat("hullctl-view-", port_, "=", session_, "; Path=/; HttpOnly; SameSite=Strict");
 }
@@ -80,7 +80,7 @@ SessionGuard::Decision SessionGuard::Judge(const PageRequest& request) {
       one_time_token_.clear();
       return {Verdict::kExchange, 200, ""};
     }
-    // A browser that has been let in and opens the address again comes in again.
+    // A browser with a session that opens the address again is admitted again.
     if (has_session) return {Verdict::kExchange, 200, ""};
     return Refuse(403,
                   "This address worked once and was used. Run 'hullctl view' again for another.");

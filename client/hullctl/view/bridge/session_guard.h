@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// What a browser says when it asks for something. Absent headers are empty.
+// A browser's request. Absent headers are empty.
 struct PageRequest {
   std::string_view method;
   // Path and query, as in "/?token=...".
@@ -17,53 +17,53 @@ struct PageRequest {
   std::string_view host;
   std::string_view origin;
   std::string_view cookie;
-  // Whether it asks to become a WebSocket.
+  // True if it asks to upgrade to a WebSocket.
   bool upgrade = false;
 };
 
-// Decides who may talk to the bridge. The bridge holds the user's token of hulld, so that any page
-// of any site in the user's browser, and any other user of the machine, must be kept out:
-//  - Host must be this very address, which stops names that an attacker points at 127.0.0.1.
-//  - Origin, where it is given, must be this page's; a WebSocket must give it.
-//  - The address that hullctl prints holds a token that works once. It is exchanged for a cookie
-//    that no script can read and that no request of another site carries.
-// Not safe for use by several threads.
+// Controls access to the bridge. The bridge holds the user's hulld token, so pages of other sites
+// in the user's browser, and other users of the machine, must be kept out:
+// - Host must be exactly this address. This stops names that an attacker points at 127.0.0.1.
+// - Origin, if present, must be this page's; a WebSocket must send it.
+// - The address printed by hullctl contains a one-time token. It is exchanged for a cookie that no
+//   script can read and that no request from another site carries.
+// Not thread-safe.
 class SessionGuard {
  public:
-  // With secrets of 256 random bits. INTERNAL: the system gives no random bytes.
+  // Uses secrets of 256 random bits. INTERNAL: the system returns no random bytes.
   static absl::StatusOr<SessionGuard> Create(uint16_t port);
-  // With given secrets, for tests.
+  // Uses given secrets, for tests.
   SessionGuard(uint16_t port, std::string one_time_token, std::string session);
 
   enum class Verdict {
-    // Answer it.
+    // Serve the request.
     kServe,
-    // Send the browser to "/", and give it SetCookie().
+    // Send the browser to "/" with SetCookie().
     kExchange,
-    // Refuse it with `http_status` and `reason`.
+    // Refuse the request with `http_status` and `reason`.
     kRefuse,
   };
   struct Decision {
     Verdict verdict = Verdict::kRefuse;
     int http_status = 0;
-    // For people: what is wrong and what to do.
+    // For people: the problem and its remedy.
     std::string reason;
   };
-  // kExchange uses the one-time token up.
+  // Decides on a request. kExchange consumes the one-time token.
   Decision Judge(const PageRequest& request);
 
-  // The address to open, with the one-time token.
+  // Returns the address to open, with the one-time token.
   std::string Address() const;
-  // "127.0.0.1:PORT".
+  // Returns "127.0.0.1:PORT".
   std::string Host() const;
-  // The value of the header Set-Cookie.
+  // Returns the value of the header Set-Cookie.
   std::string SetCookie() const;
 
  private:
   bool HasSession(std::string_view cookies) const;
 
   uint16_t port_;
-  // Empty once it was used.
+  // Empty after its use.
   std::string one_time_token_;
   std::string session_;
 };

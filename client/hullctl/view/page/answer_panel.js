@@ -1,4 +1,4 @@
-// What the server says of the pair, and of all pairs of the scene.
+// The server's answer about the pair, and about all pairs of the scene.
 import {element, exact, facts, grouped, short, vector} from 'hulld/dom.js';
 import {MARK_COLOURS, RELATIONS, RUNGS} from 'hulld/palette.js';
 import {poseText} from 'hulld/pose.js';
@@ -25,12 +25,12 @@ export class AnswerPanel {
     this.marks = marks;
     this.live = live;
     this.root = document.getElementById('answer');
-    // Beside the objects, as it is about all of them.
+    // Shown next to the objects, as it concerns all of them.
     this.list = document.getElementById('collisions');
     this.body = element('div', {'aria-live': 'polite', 'aria-busy': 'false'});
   }
 
-  // The pair changed.
+  // Called when the pair changes.
   rebuild() {
     const {model} = this;
     const {pair} = model;
@@ -69,7 +69,7 @@ export class AnswerPanel {
     return [element('b', {}, letter), select];
   }
 
-  // The answer changed.
+  // Called when the answer changes.
   update() {
     const {answer, pair} = this.model;
     if (!pair) return;
@@ -83,7 +83,7 @@ export class AnswerPanel {
       this.body.replaceChildren(element('p', {}, answer.problem));
       return;
     }
-    // Read aloud once it is at rest.
+    // Announced by screen readers only at rest.
     this.body.setAttribute('aria-busy', String(!answer.rest));
     const open = this.body.querySelector('details')?.open;
     this.body.replaceChildren(
@@ -123,13 +123,13 @@ export class AnswerPanel {
     return list;
   }
 
-  // For bodies, the pieces that decided.
+  // Rows for the deciding pieces of bodies.
   pieceRows({pieces}) {
     return this.model.decidingPieces().map(
         (piece, k) => [`piece of ${'AB'[k]}`, piece && `${pieces[k]}: ${piece.hullId}`]);
   }
 
-  // What the tolerance makes of it: perhaps a lesser answer, by a cheaper rung.
+  // The result with the tolerance: possibly a weaker relation, decided by a cheaper rung.
   tolerantRows({tolerant}) {
     if (!tolerant) return [];
     const {word, sign} = RELATIONS[tolerant.relation];
@@ -165,7 +165,7 @@ export class AnswerPanel {
         }));
   }
 
-  // The same question for a shell; every number reads back as the same double.
+  // The same query as a shell command; every number reads back as the same double.
   command(answer, open) {
     const [a, b] = this.model.pair.map((i) => this.model.objects[i]);
     const {poses} = answer;
@@ -216,7 +216,7 @@ export class AnswerPanel {
     this.model.tell('fly', [this.model.objects[a], this.model.objects[b]]);
   }
 
-  // From exact to a tenth of the scene, by powers.
+  // A logarithmic slider from 0 to a tenth of the scene.
   toleranceSlider() {
     const {model} = this;
     const output = element('output', {}, 'exact');

@@ -3,7 +3,7 @@
 
 const utf8 = new TextDecoder();
 
-// {head, xyz: Float64Array, rest: Uint32Array} of one binary frame.
+// Returns {head, xyz: Float64Array, rest: Uint32Array} for a binary frame.
 export function decodeFrame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(utf8.decode(new Uint8Array(buffer, 4, length)));
@@ -35,7 +35,7 @@ class BridgeConnection {
   }
 }
 
-// Answers from what was recorded; what was not recorded has no answer.
+// Answers from a recording; unrecorded questions get no answer.
 class Recording {
   constructor(handlers, recording) {
     this.live = false;

@@ -1,11 +1,11 @@
-// Many objects as one surface and one set of lines, placed in double and then made float: two calls
-// of the GPU instead of two for each object.
+// Draws many objects as a single surface and a single set of lines, placed in double and converted
+// to float: two draw calls instead of two per object.
 import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
-// Lines of more edges than this hide what they stand on.
+// With more edges, lines would hide the surface.
 const MOST_EDGES = 400000;
 
 export class Crowd extends DrawnGroup {
@@ -14,7 +14,7 @@ export class Crowd extends DrawnGroup {
     this.ranges = new Map();
   }
 
-  // `except`: the object that is drawn on its own.
+  // `except`: the object that is drawn separately.
   rebuild(except) {
     this.clear();
     const {model} = this;
@@ -74,7 +74,7 @@ export class Crowd extends DrawnGroup {
               {color: this.stage.theme.edge, size: 2, sizeAttenuation: false})));
     }
     for (const part of parts) {
-      // One sphere about all of it is never out of sight.
+      // A bounding sphere of the whole crowd is always in view.
       part.frustumCulled = false;
       this.group.add(part);
     }
@@ -97,7 +97,7 @@ export class Crowd extends DrawnGroup {
     }
   }
 
-  // Colours of all anew, as what collides changed.
+  // Updates all colours after a change of the colliding objects.
   recolour() {
     for (const [index, vertex] of this.ranges) {
       const object = this.model.objects[index];

@@ -13,16 +13,16 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
-// A number that reads back as the same double.
+// Shows a number that reads back as the same double.
 export const exact = (value) => element('span', {className: 'number'}, String(Number(value)));
 
-// "1234567" as "1 234 567", with thin spaces.
+// Formats "1234567" as "1 234 567", with thin spaces.
 export const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u2009');
 
-// For people: a few digits.
+// Rounds to a few digits, for people.
 export const short = (value) => Number(Number(value).toPrecision(4)).toString();
 
-// A list of facts; rows without a value are left out.
+// Makes a list of facts; omits rows without a value.
 export function facts(rows) {
   const list = element('dl', {className: 'facts'});
   for (const [name, ...values] of rows) {

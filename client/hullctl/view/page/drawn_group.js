@@ -1,4 +1,4 @@
-// What is drawn for one purpose: parts in a group of the scene, which come and go together.
+// Parts drawn for one purpose, in a group of the scene, added and removed together.
 import {THREE} from 'hulld/three.js';
 
 export class DrawnGroup {
@@ -9,7 +9,7 @@ export class DrawnGroup {
     stage.scene.add(this.group);
   }
 
-  // Takes all parts away, with what they hold on the graphics processor.
+  // Removes all parts and frees their GPU resources.
   clear() {
     this.group.traverse((part) => {
       if (!part.userData.sharesGeometry) part.geometry?.dispose();
@@ -24,7 +24,7 @@ export class DrawnGroup {
   }
 }
 
-// Facets, each of one shade.
+// Material of flat-shaded facets.
 export const facetMaterial = (options) => new THREE.MeshPhongMaterial({
   flatShading: true,
   shininess: 12,

@@ -1,9 +1,9 @@
-// Handles that move and turn the selected object. They stand at the middle of its box.
+// Handles at the centre of the selected object's box that move and turn it.
 import {AXIS_COLOURS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
-// three.js paints axes pure red, green and blue, which not all eyes tell apart.
+// three.js paints axes pure red, green, and blue, which colour-blind users may confuse.
 function repaint(handles) {
   const colours = {ff0000: AXIS_COLOURS.x, '00ff00': AXIS_COLOURS.y, '0000ff': AXIS_COLOURS.z};
   handles.traverse((part) => {
@@ -44,7 +44,7 @@ export class Gizmo {
     return this.model.selected === null ? null : this.model.objects[this.model.selected];
   }
 
-  // To where the object is, or away.
+  // Moves the handles to the object, or hides them.
   update() {
     const {object, model} = this;
     if (!this.handles.enabled || !object || !object.hullId || !model.isShown(object) ||
@@ -67,8 +67,8 @@ export class Gizmo {
     this.startPosition = this.proxy.position.clone();
   }
 
-  // The pose that the handles stand for. A move adds to the translation and leaves the quaternion
-  // as it is, bit for bit; a turn keeps the middle of the box where it is.
+  // Applies the handles to the pose. A move adds to the translation and keeps the quaternion bit
+  // for bit; a turn keeps the centre of the box in place.
   follow(rest) {
     const {object, model} = this;
     if (!object || !this.startPose) return;
@@ -86,15 +86,15 @@ export class Gizmo {
     model.setPose(object.index, pose, rest);
   }
 
-  // Moves the selected object along an axis of the world, by `steps` of about a hundredth of its
-  // size: a power of ten, so that numbers stay short.
+  // Moves the selected object along a world axis by `steps` of about a hundredth of its size: a
+  // power of ten, so that numbers stay short.
   nudge(axis, steps) {
     const {object, model} = this;
     if (!object || !object.hullId) return;
     const step = 10 ** Math.floor(Math.log10((model.radiusOf(object) || 1) / 20));
     const pose = object.pose.slice();
     const k = 4 + 'xyz'.indexOf(axis);
-    // In whole steps where that is exact enough to be one.
+    // Snaps to a whole step if close enough.
     const count = pose[k] / step + steps;
     const rounded = Math.abs(count - Math.round(count)) < 1e-6 ? Math.round(count) : count;
     pose[k] = step < 1 ? rounded / Math.round(1 / step) : rounded * step;

@@ -1,7 +1,7 @@
-// The keyboard: everything that the pointer can do.
+// Keyboard access to every action of the pointer.
 import {element} from 'hulld/dom.js';
 
-// Keys, what they do for people, and what they call.
+// Keys, their descriptions, and their actions.
 export function bindKeys(actions) {
   const table = [
     [['0', '7'], '\u2013', 'show a scene of the demo', null],

@@ -36,7 +36,7 @@ export class Labels {
     this.stage.draw();
   }
 
-  // Above the object's box, as it is in the picture.
+  // Above the object's box in the picture.
   place() {
     const {model, stage} = this;
     for (const [object, element] of this.rows) {

@@ -1,4 +1,4 @@
-// Puts the page together: messages change the model, the model tells the parts, the parts draw.
+// Connects the page: messages change the model, the model notifies the parts, the parts draw.
 import {AnswerPanel} from 'hulld/answer_panel.js';
 import {connect} from 'hulld/connection.js';
 import {Crowd} from 'hulld/crowd.js';
@@ -18,7 +18,7 @@ import {Stage} from 'hulld/stage.js';
 import {Tree} from 'hulld/tree.js';
 
 const $ = (id) => document.getElementById(id);
-// Revisions are 64-bit numbers as text; none is older than any.
+// Compares revisions, 64-bit numbers as text; an absent one is the oldest.
 const isNewer = (a, b) => BigInt(a || 0) > BigInt(b || 0);
 
 class Viewer {
@@ -35,7 +35,7 @@ class Viewer {
     this.crowd = null;
     this.update = 0;
     this.moved = new Set();
-    // Hulls that were asked for and did not come yet.
+    // Requested hulls that have not arrived yet.
     this.awaited = new Set();
     this.connection = connect({
       hello: (message) => this.hello(message),
@@ -61,7 +61,7 @@ class Viewer {
     document.body.dataset.ready = 'yes';
   }
 
-  // The model changed.
+  // Subscribes to changes of the model.
   listen() {
     const {model} = this;
     model.on('selection', () => {
@@ -142,7 +142,7 @@ class Viewer {
     this.awaited.clear();
     this.former = new Map();
     this.fitted = false;
-    // Answers to earlier questions are about another scene.
+    // Answers to earlier questions concern another scene.
     this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
@@ -194,7 +194,7 @@ class Viewer {
     }
   }
 
-  // A hull or a body that changed while its shape was on its way comes once more.
+  // Requests a hull or a body again if it changed while its shape was in flight.
   fetchIfOlder(id) {
     const told = this.model.info.get(id)?.revision;
     if (isNewer(told, this.model.revisionOf(id))) this.fetchHulls([id]);
@@ -235,8 +235,8 @@ class Viewer {
     if (wasAbsent) this.soon('tree', () => this.tree.rebuild());
   }
 
-  // What objects with this hull looked like before it changed: new vertices flash once the views
-  // are built anew.
+  // Keeps the previous shape of objects with this hull, so that new vertices flash after the views
+  // are rebuilt.
   keepForFlash(id) {
     this.former ??= new Map();
     for (const object of this.model.objects) {
@@ -246,7 +246,7 @@ class Viewer {
     }
   }
 
-  // Its pieces are asked for like hulls that are objects themselves.
+  // Requests the pieces of a body like hulls of objects.
   bodyCame(body, id) {
     const {model} = this;
     model.setBody(id, body);
@@ -278,7 +278,7 @@ class Viewer {
     }
   }
 
-  // Some shapes are here that were not before.
+  // Called when new shapes have arrived.
   geometryChanged() {
     this.soon('geometry', () => {
       const {model} = this;
@@ -286,7 +286,7 @@ class Viewer {
       this.rebuildViews();
       for (const [index, before] of this.former || []) {
         const shape = model.hullOf(model.objects[index]);
-        // A body whose other pieces are on their way waits for them.
+        // Waits until all pieces of a body have arrived.
         if (!shape) continue;
         const fresh = newVertices(before, shape);
         if (fresh.length) this.views.get(index)?.flash(shape, fresh);
@@ -300,7 +300,7 @@ class Viewer {
     });
   }
 
-  // Everything is here: the origin goes to the middle of it, and a small scene gets a pair.
+  // Called when all shapes have arrived: centres the origin, and selects a pair in a small scene.
   firstFit() {
     const {model} = this;
     const bounds = model.bounds();
@@ -417,7 +417,7 @@ class Viewer {
     this.stage.flyTo(bounds);
   }
 
-  // Runs `work` once, before the next frame, however often it is asked for.
+  // Runs `work` a single time before the next frame, regardless of the number of calls.
   soon(name, work) {
     this.waiting ??= new Map();
     if (this.waiting.size === 0) {
@@ -528,7 +528,7 @@ class Viewer {
     });
   }
 
-  // A click selects; a drag does not.
+  // Selects on a click, but not on a drag.
   bindPicking() {
     const canvas = $('canvas');
     let down = null;

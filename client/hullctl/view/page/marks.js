@@ -1,10 +1,10 @@
-// Draws what an answer says: the separating plane and its axis, the witness points, and the vertex
-// pairs of the certificate.
+// Draws an answer: the separating plane and its axis, the witness points, and the vertex pairs of
+// the certificate.
 import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {discTexture, THREE} from 'hulld/three.js';
 
-// More lines hide what they stand on.
+// With more edges, lines would hide the surface.
 const MOST_PIECE_EDGES = 20000;
 
 const number = ({x, y, z}) => [Number(x), Number(y), Number(z)];
@@ -60,7 +60,7 @@ export class Marks extends DrawnGroup {
     this.group.add(dots);
   }
 
-  // The edges of the pieces that decided.
+  // Draws the edges of the deciding pieces.
   addPieces(objects) {
     this.model.decidingPieces().forEach((piece, k) => {
       const hull = piece && this.model.hulls.get(piece.hullId);
@@ -79,7 +79,7 @@ export class Marks extends DrawnGroup {
     this.dots([a, b], MARK_COLOURS.witness, 9);
   }
 
-  // The plane stands between the two features of the axis, and near the witness points.
+  // Draws the plane between the two features of the axis, near the witness points.
   addAxis(direction, witness, objects) {
     const n = new THREE.Vector3(...direction).normalize();
     if (!(n.length() > 0.5)) return;

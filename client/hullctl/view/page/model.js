@@ -1,14 +1,15 @@
-// What is looked at and what the user chose, without any drawing. Parts of the page listen to it.
+// The displayed scene and the user's choices, without drawing. Parts of the page listen to its
+// changes.
 import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
-// At most this many objects are each drawn and labelled on their own; more are drawn as a crowd.
+// Maximum number of objects drawn and labelled individually; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
 
-// No certificate is asked for about bodies with more pairs of pieces than this.
+// Bodies with more pairs of pieces than this are queried without a certificate.
 const MOST_PIECE_PAIRS = 1000;
 
-// The box stands for shapes with more vertices than this.
+// Shapes with more vertices than this are represented by their box.
 const MOST_CORNERS = 100;
 
 export class Model extends EventTarget {
@@ -22,7 +23,7 @@ export class Model extends EventTarget {
   clear() {
     this.objects = [];
     this.files = [];
-    // By ID, and by file. Hulls are those of objects and of the pieces of bodies.
+    // Shapes by ID, and by file. Hulls include the pieces of bodies.
     this.hulls = new Map();
     this.bodies = new Map();
     // Hulls of pieces that do not exist.
@@ -34,7 +35,7 @@ export class Model extends EventTarget {
     this.answer = null;
     this.collisions = {pairs: [], problems: [], totals: {}};
     this.relationOf = new Map();
-    // In double; what is drawn is relative to it.
+    // In double; drawn coordinates are relative to it.
     this.origin = [0, 0, 0];
   }
 
@@ -73,7 +74,7 @@ export class Model extends EventTarget {
     return this.objects.length > MOST_SINGLE_OBJECTS;
   }
 
-  // The hull, or all pieces of a body; undefined while it is on its way.
+  // Returns the hull, or all pieces of a body; undefined while in flight.
   hullOf(object) {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
   }
@@ -82,7 +83,7 @@ export class Model extends EventTarget {
     return this.bodies.get(object.hullId);
   }
 
-  // The hull of an ID; null where there is none.
+  // Sets the hull of an ID; null if it does not exist.
   setHull(id, hull) {
     if (hull) {
       this.hulls.set(id, hull);
@@ -104,13 +105,13 @@ export class Model extends EventTarget {
     return [...this.bodies.values()].filter(({hullIds}) => hullIds.has(id));
   }
 
-  // What has been told of an ID, hull or body, at which revision.
+  // Returns the known revision of a hull or a body.
   revisionOf(id) {
     return (this.hulls.get(id) ?? this.bodies.get(id))?.revision;
   }
 
-  // The pieces that decided the answer, of the objects of the pair: null for a hull, and where none
-  // decided alone.
+  // Returns the deciding pieces of the pair's objects: null for a hull, or if no single piece
+  // decided.
   decidingPieces() {
     const {answer, pair} = this;
     return [0, 1].map((k) => {
@@ -119,7 +120,7 @@ export class Model extends EventTarget {
     });
   }
 
-  // A point of an object in the world; `piece` is the piece in whose frame it is, or null.
+  // Returns a point of an object in the world; `piece` is the piece that is its frame, or null.
   placed(object, piece, p) {
     return toWorld(object.pose, piece ? toWorld(piece.pose, p) : p);
   }
@@ -136,7 +137,7 @@ export class Model extends EventTarget {
     return object.visible && !object.gone;
   }
 
-  // The middle of an object's box, in the world, in double.
+  // Returns the centre of an object's box in the world, in double.
   centreOf(object) {
     const shape = this.shapeOf(object);
     return toWorld(object.pose, shape ? shape.centre : [0, 0, 0]);
@@ -146,8 +147,8 @@ export class Model extends EventTarget {
     return this.shapeOf(object)?.radius || 0;
   }
 
-  // Points of the world that are about an object: its vertices where they are few, otherwise the
-  // corners of its box.
+  // Returns world points that enclose an object: its vertices if few, otherwise the corners of its
+  // box.
   cornersOf(object) {
     const {low, high, xyz, vertexCount} = this.shapeOf(object);
     if (vertexCount <= MOST_CORNERS) {
@@ -161,8 +162,8 @@ export class Model extends EventTarget {
     return corners;
   }
 
-  // {centre, radius, corners}: a sphere about all that is shown, and what it was made of; null when
-  // nothing is shown.
+  // Returns {centre, radius, corners}: a sphere around all shown objects, and its input points;
+  // null if none is shown.
   bounds(objects = this.objects) {
     const corners = objects
                         .filter(
@@ -203,7 +204,7 @@ export class Model extends EventTarget {
     this.tell('selection');
   }
 
-  // The other object whose sphere is nearest; null when there is none.
+  // Returns the other object with the nearest bounding sphere; null if none exists.
   nearestTo(index) {
     const object = this.objects[index];
     const centre = this.centreOf(object);
@@ -219,22 +220,22 @@ export class Model extends EventTarget {
     return nearest;
   }
 
-  // The pair that is asked about, lower index first; null when there is none.
+  // Returns the queried pair, lower index first; null if none.
   get pair() {
     if (this.selected === null || this.other === null) return null;
     const pair = [this.selected, this.other].sort((a, b) => a - b);
     return pair.every((i) => this.objects[i].hullId) ? pair : null;
   }
 
-  // Whether the pair's certificate is asked for: for large bodies it is one for each of very many
-  // pairs of pieces.
+  // Returns true if the pair's certificate is requested. For large bodies it would hold one for
+  // each of very many pairs of pieces.
   wantsCertificate(rest) {
     const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);
     const isPlain = counts.every((count) => count === 0);
     return isPlain || (rest && Math.max(1, counts[0]) * Math.max(1, counts[1]) <= MOST_PIECE_PAIRS);
   }
 
-  // `rest`: whether the motion has ended.
+  // `rest`: true if the motion has ended.
   setPose(index, pose, rest) {
     const object = this.objects[index];
     if (samePose(object.pose, pose) && !rest) return;

@@ -1,4 +1,4 @@
-// The selected object: what it is, where it is, and a simpler hull in its place.
+// The selected object: its properties, its pose, and a simpler hull in its place.
 import {element, exact, facts, grouped, short} from 'hulld/dom.js';
 
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
@@ -9,7 +9,7 @@ export class ObjectPanel {
     this.live = live;
     this.simplify = simplify;
     this.edit = edit;
-    // The bridge says so.
+    // Set by the bridge.
     this.mayEdit = false;
     this.root = document.getElementById('object');
     this.side = 'inside';
@@ -28,7 +28,7 @@ export class ObjectPanel {
           element('p', {className: 'quiet'}, 'Nothing is selected. Click an object, or press J.'));
       return;
     }
-    // Typing must not be disturbed by an object that changes.
+    // A change of the object must not disturb typing.
     if (this.root.contains(document.activeElement) && this.shownIndex === object.index &&
         document.activeElement.matches('input, textarea, button')) {
       this.factsBlock.replaceChildren(...this.factRows(object));
@@ -135,7 +135,7 @@ export class ObjectPanel {
     if (pose.every(Number.isFinite) && turns) this.model.setPose(object.index, pose, true);
   }
 
-  // The pose changed by other means.
+  // Called when the pose changes by other means.
   updatePose() {
     const {object, inputs} = this;
     if (!object || !inputs || this.shownIndex !== object.index) return;
@@ -144,7 +144,7 @@ export class ObjectPanel {
     });
   }
 
-  // From nothing to half of the size, by powers.
+  // A logarithmic range from 0 to half of the size.
   simplifyBlock(object) {
     this.steps = 0;
     this.output = element('output', {}, 'off');
@@ -189,9 +189,9 @@ export class ObjectPanel {
         this.result);
   }
 
-  // Points to append, and an end to the hull.
+  // Controls that append points and delete the hull.
   editBlock(object) {
-    // What was typed, and what came of it, stays while the object does.
+    // Keeps the input and its result while the object is selected.
     if (this.editing?.object === object) return this.editing.block;
     const points = element('textarea', {
       id: 'edit-points',
@@ -204,7 +204,7 @@ export class ObjectPanel {
         'button', {type: 'button', id: 'edit-append', onclick: () => this.append(object, points)},
         'Append points');
     const remove = element('button', {type: 'button', id: 'edit-delete'}, 'Delete this hull');
-    // A second press, of other words, so that a slip deletes nothing.
+    // Requires a second press, with another label, to prevent accidental deletion.
     remove.addEventListener('click', () => {
       if (remove.dataset.sure) {
         this.edit({action: 'delete', hullId: object.hullId, points: []});
@@ -239,7 +239,7 @@ export class ObjectPanel {
     this.edit({action: 'append', hullId, points: points.flat()});
   }
 
-  // Whether it was told here.
+  // Returns true if the result was shown here.
   edited({hullId, done, message}) {
     if (this.object?.hullId !== hullId || !this.editResult?.isConnected) return false;
     this.editResult.textContent = message;

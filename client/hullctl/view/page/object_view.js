@@ -1,5 +1,5 @@
-// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the
-// middle of the object's box, turned as the pose says.
+// Draws one object with three.js: points, mesh, and hull with its edges. Its group is at the centre
+// of the object's box, turned by the pose.
 import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
 import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
@@ -7,7 +7,7 @@ import {discTexture, THREE} from 'hulld/three.js';
 
 const FLASH_MS = 1200;
 
-// Shapes are shared by objects; each is given to the GPU once.
+// Objects share shapes and their GPU resources.
 const geometries = new WeakMap();
 export function geometryOf(shape, kind) {
   const kinds = geometries.get(shape) || {};
@@ -23,10 +23,10 @@ export function geometryOf(shape, kind) {
   return kinds[kind];
 }
 
-// The lines of a larger hull would cover all of it, and both of its sides cost twice.
+// For a larger hull, lines would cover the surface, and drawing both sides would double the cost.
 const isHuge = (hull) => hull.facetCount > 200000;
 
-// Many lines hide what they stand on.
+// Many lines hide the surface.
 const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
 export class ObjectView extends DrawnGroup {
@@ -35,7 +35,7 @@ export class ObjectView extends DrawnGroup {
     this.object = object;
   }
 
-  // Builds what is to be drawn anew; cheap, as geometries are shared.
+  // Rebuilds the drawn parts; cheap, as geometries are shared.
   rebuild() {
     const {model, object} = this;
     this.clear();
@@ -45,7 +45,7 @@ export class ObjectView extends DrawnGroup {
     this.centre = (hull || mesh)?.centre || [0, 0, 0];
     const {show} = model;
     if (mesh && show.mesh && mesh.triangles.length) this.addMesh(mesh);
-    // A file without triangles has nothing but its points to show.
+    // A file without triangles has only points.
     const cloud = mesh || hull;
     if (cloud && (show.points || (mesh && !mesh.triangles.length && show.mesh))) {
       this.addPoints(cloud);
@@ -59,7 +59,7 @@ export class ObjectView extends DrawnGroup {
     this.place();
   }
 
-  // Parts of other shapes than the hull have centres of their own.
+  // Shapes other than the hull have their own centres.
   shift(part, shape) {
     part.position.set(...shape.centre.map((value, k) => value - this.centre[k]));
     part.userData.sharesGeometry = true;
@@ -85,7 +85,7 @@ export class ObjectView extends DrawnGroup {
     this.shift(points, shape);
   }
 
-  // Far sides first, then near ones: right for anything convex.
+  // Far sides first, then near ones: correct for convex shapes.
   addHull(hull, isBeside) {
     const flat = hull.dimension < 3;
     const sides = flat ? [THREE.DoubleSide] :
@@ -113,7 +113,7 @@ export class ObjectView extends DrawnGroup {
     this.shift(edges, hull);
   }
 
-  // The difference of two doubles, then float: no jitter.
+  // Subtracts in double, then converts to float: no jitter.
   place() {
     const centre = this.model.centreOf(this.object);
     const [w, x, y, z] = unitQuaternion(this.object.pose);
@@ -121,7 +121,7 @@ export class ObjectView extends DrawnGroup {
     this.group.quaternion.set(x, y, z, w);
   }
 
-  // Vertices that were not there before.
+  // Highlights new vertices.
   flash(hull, indices) {
     const geometry = new THREE.BufferGeometry();
     const positions = new Float32Array(3 * indices.length);
@@ -145,7 +145,7 @@ export class ObjectView extends DrawnGroup {
     this.stage.draw();
   }
 
-  // Lets flashes fade; whether there are any.
+  // Fades flashes; returns true while any is visible.
   fade(now) {
     let any = false;
     for (const part of [...this.group.children]) {

@@ -1,11 +1,11 @@
-// Colours that people with any kind of colour vision tell apart, and the words that stand beside
-// them. Source: Okabe and Ito 2008, Color Universal Design.
+// Colours distinguishable with any kind of colour vision, and the accompanying words. Source: Okabe
+// and Ito 2008, Color Universal Design.
 export const OBJECT_COLOURS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
 
-// Among many objects, those that collide are to stand out, and nothing else.
+// A neutral colour: among many objects, only the colliding ones stand out.
 export const CROWD_COLOUR = '#8fa9bd';
 
-// `sign` tells relations apart without colour.
+// `sign` distinguishes relations without colour.
 export const RELATIONS = {
   RELATION_OVERLAPPING: {word: 'overlapping', sign: '\u25cf', style: 'overlapping', lit: '#d55e00'},
   RELATION_TOUCHING: {word: 'touching', sign: '\u25d0', style: 'touching', lit: '#e69f00'},

@@ -1,9 +1,9 @@
-// Which object is under the pointer: the first one that a ray meets, in double.
+// Finds the object under the pointer: the first one on a ray, in double.
 import {rotateBack, unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
-// Distance along the ray to the nearest triangle; Infinity when it meets none. Source: Moeller and
-// Trumbore 1997.
+// Returns the distance along the ray to the nearest triangle; Infinity if it meets none. Source:
+// Moeller and Trumbore 1997.
 function hitTriangles(shape, o, d) {
   const {xyz, triangles} = shape;
   let nearest = Infinity;
@@ -26,7 +26,7 @@ function hitTriangles(shape, o, d) {
   return nearest;
 }
 
-// The index of the object under (x, y), in CSS pixels of the canvas; null when there is none.
+// Returns the index of the object under (x, y), in CSS pixels of the canvas; null if none.
 export function pick(model, stage, x, y) {
   const ray = new THREE.Raycaster();
   ray.setFromCamera(

@@ -1,6 +1,6 @@
-// A picture of the stage, for `hullctl view --png`: what was drawn, its labels and its axes, as a
-// PNG in an attribute of the body, which the browser hands over as text. So it depends neither on
-// the browser's window nor on when that is shown.
+// A picture of the stage, for `hullctl view --png`: the drawing, its labels, and its axes, as a PNG
+// in an attribute of the body, which the browser outputs as text. So it depends neither on the
+// browser's window nor on the time at which it is shown.
 
 export function keepPicture(stage) {
   const sheet = document.createElement('canvas');

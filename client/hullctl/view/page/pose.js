@@ -1,15 +1,14 @@
-// Poses as the contract has them: seven doubles, quaternion w x y z (of any length) and
-// translation.
+// Poses as in the contract: seven doubles, quaternion w x y z (of any length) and translation.
 
 export const IDENTITY = [1, 0, 0, 0, 0, 0, 0];
 
-// The rotation of a pose as a unit quaternion [w, x, y, z].
+// Returns the rotation of a pose as a unit quaternion [w, x, y, z].
 export function unitQuaternion([w, x, y, z]) {
   const length = Math.hypot(w, x, y, z) || 1;
   return [w / length, x / length, y / length, z / length];
 }
 
-// p turned by a unit quaternion.
+// Rotates p by a unit quaternion.
 export function rotate([w, x, y, z], [px, py, pz]) {
   const tx = 2 * (y * pz - z * py);
   const ty = 2 * (z * px - x * pz);
@@ -25,7 +24,7 @@ export function rotateBack([w, x, y, z], p) {
   return rotate([w, -x, -y, -z], p);
 }
 
-// Where a point of the object's own frame is in the world.
+// Transforms a point from the object's frame to the world.
 export function toWorld(pose, p) {
   const [x, y, z] = rotate(unitQuaternion(pose), p);
   return [x + pose[4], y + pose[5], z + pose[6]];
@@ -33,5 +32,6 @@ export function toWorld(pose, p) {
 
 export const samePose = (a, b) => a.every((value, i) => Object.is(value, b[i]));
 
-// The pose as `hullctl check --pose-b` takes it; every number reads back as the same double.
+// Returns the pose in the form of `hullctl check --pose-b`; every number reads back as the same
+// double.
 export const poseText = (pose) => pose.map(String).join(',');

@@ -1,5 +1,5 @@
-// What a frame holds, made ready for drawing and measured. All in double; only what goes to the
-// GPU is float, relative to the shape's centre, so that nothing jitters far from the origin.
+// The content of a frame, prepared for drawing and measuring. In double; only GPU data is float,
+// relative to the shape's centre, so that distant shapes do not jitter.
 import {toWorld} from 'hulld/pose.js';
 
 function boxOf(xyz) {
@@ -13,7 +13,7 @@ function boxOf(xyz) {
   return {low, high};
 }
 
-// Facets as fans of triangles, and each edge once.
+// Splits facets into triangle fans, and collects the distinct edges.
 function triangulate(rest, facets) {
   const sizes = rest.subarray(0, facets);
   const corners = rest.subarray(facets);
@@ -28,7 +28,7 @@ function triangulate(rest, facets) {
     for (let i = 0; i < size; ++i) {
       const a = corners[first + i];
       const b = corners[first + (i + 1) % size];
-      // On a closed surface, each edge comes once in each direction.
+      // A closed surface has each edge once in each direction.
       if (a < b || facets === 1) {
         edges[e++] = a;
         edges[e++] = b;
@@ -43,7 +43,8 @@ function triangulate(rest, facets) {
   return {triangles, edges: edges.subarray(0, e)};
 }
 
-// Volume (signed, by the divergence theorem) and area of triangles, about the centre.
+// Returns the signed volume (by the divergence theorem) and the area of triangles, about the
+// centre.
 function measure(xyz, triangles, [cx, cy, cz]) {
   let volume = 0;
   let area = 0;
@@ -61,8 +62,8 @@ function measure(xyz, triangles, [cx, cy, cz]) {
   return {volume: volume / 6, area: area / 2};
 }
 
-// Whether every edge of a mesh is met once in each direction, corners at one place taken as one.
-// Only then has it a volume.
+// Returns true if every edge of a mesh is traversed once in each direction, with corners at the
+// same place merged. Only then the mesh has a volume.
 function isClosed(xyz, triangles) {
   const places = new Map();
   const place = (v) => {
@@ -84,7 +85,7 @@ function isClosed(xyz, triangles) {
   return [...open.values()].every((balance) => balance === 0);
 }
 
-// Larger meshes are not asked whether they are closed: it takes a second for a million triangles.
+// Larger meshes are not checked for closedness, which takes a second for a million triangles.
 const MOST_TRIANGLES_TO_CLOSE = 400000;
 
 export class Shape {
@@ -123,7 +124,7 @@ export class Shape {
     return positions;
   }
 
-  // {volume, area}; volume is null where there is none.
+  // Returns {volume, area}; volume is null if undefined.
   get measures() {
     if (!this.measured) {
       this.measured = measure(this.xyz, this.triangles, this.centre);
@@ -154,7 +155,7 @@ export class HullShape extends Shape {
   }
 }
 
-// The hulls of a body's pieces as one shape, in the frame of the body.
+// The hulls of a body's pieces merged into a shape in the frame of the body.
 class BodyShape extends Shape {
   // placed: [{hull, pose}].
   constructor(placed) {
@@ -179,7 +180,7 @@ class BodyShape extends Shape {
   }
 }
 
-// A body as the bridge tells it, and its shape once its pieces have come.
+// A body from the bridge, and its shape after its pieces have arrived.
 export class Body {
   constructor({info, pieces}) {
     this.info = info;
@@ -192,12 +193,12 @@ export class Body {
     return this.info.revision;
   }
 
-  // The hull of one of the pieces came, changed or went.
+  // Called when the hull of a piece arrives, changes, or is deleted.
   pieceChanged() {
     this.made = undefined;
   }
 
-  // Undefined while a piece is on its way; pieces that are `absent` are left out.
+  // Returns undefined while a piece is in flight; omits `absent` pieces.
   shape(hulls, absent) {
     if (this.made === undefined) {
       const isReady = [...this.hullIds].every((id) => hulls.has(id) || absent.has(id));
@@ -226,7 +227,7 @@ export class MeshShape extends Shape {
   }
 }
 
-// The vertices of `after` that `before` does not have, as indices.
+// Returns the indices of the vertices of `after` that `before` lacks.
 export function newVertices(before, after) {
   const known = new Set();
   const key = (xyz, i) => `${xyz[i]},${xyz[i + 1]},${xyz[i + 2]}`;

@@ -23,8 +23,8 @@ export class ShellView extends DrawnGroup {
     this.expected = object;
   }
 
-  // Inside: the hull lies within the error of the simpler one, so that the shell is about that one.
-  // Outside: the simpler one lies within the error of the hull.
+  // Inside: the hull lies within the error of the simpler one, so the shell surrounds the simpler
+  // one. Outside: the simpler one lies within the error of the hull.
   showSimplified({hullId, side}, simpler) {
     const object = this.expected;
     if (!object || object.hullId !== hullId) return;
@@ -73,7 +73,7 @@ export class ShellView extends DrawnGroup {
     this.group.add(part);
   }
 
-  // Where the object is.
+  // Moves the shell to the object.
   place() {
     if (!this.object || !this.group.children.length) return;
     const base = this.model.hullOf(this.object).centre;
@@ -88,18 +88,18 @@ export class ShellView extends DrawnGroup {
   }
 }
 
-// A shell at a given distance around a hull: its facets moved outwards, with flat strips for the
-// round parts over edges and vertices. What is within the distance of the hull lies inside of the
-// round shell, which this one follows from within.
+// Returns a shell at a given distance around a hull: its facets moved outward, with flat strips in
+// place of the round parts over edges and vertices. The points within the distance of the hull form
+// the round shell; this one approximates it from inside.
 function shellGeometry(hull, distance) {
   const sizes = hull.facets.subarray(0, hull.facetCount);
   const corners = hull.facets.subarray(hull.facetCount);
   const [cx, cy, cz] = hull.centre;
   const positions = [];
   const indices = [];
-  // For each directed edge, where its two ends went.
+  // New indices of the two ends of each directed edge.
   const moved = new Map();
-  // For each vertex, where its copies are, with the facet that follows each around it.
+  // Copies of each vertex, with the next facet around it.
   const around = new Map();
   let first = 0;
   for (let f = 0; f < sizes.length; ++f) {
@@ -132,10 +132,10 @@ function shellGeometry(hull, distance) {
   return geometry;
 }
 
-// The same for a hull of many small facets, in time and memory linear in them: each vertex moves
-// out by the distance along a mean of the normals around it. That direction is one in which the
-// hull reaches farthest at the vertex, so that the moved one is just as far from the hull as the
-// distance; what is spanned by such points lies inside of the round shell.
+// Returns a shell of a hull with many small facets, in linear time and memory. Each vertex moves
+// out by the distance along a mean of the normals around it. The hull is extreme at the vertex in
+// that direction, so the moved vertex is exactly at the distance from the hull, and the hull of
+// such points lies inside the round shell.
 function fineShell(hull, distance) {
   const {xyz, triangles} = hull;
   const normals = new Float64Array(xyz.length);
@@ -164,7 +164,7 @@ function fineShell(hull, distance) {
   return geometry;
 }
 
-// A fan over the copies of one vertex, in the order of the facets around it.
+// Fills a fan over the copies of a vertex, in the order of the facets around it.
 function fillVertex(ring, indices) {
   const start = ring.keys().next().value;
   const copies = [];
@@ -177,7 +177,7 @@ function fillVertex(ring, indices) {
   for (let i = 1; i + 1 < copies.length; ++i) indices.push(copies[0], copies[i + 1], copies[i]);
 }
 
-// By Newell's method, which takes any polygon.
+// Newell's method, for any polygon.
 function normalOf(xyz, facet) {
   const n = [0, 0, 0];
   facet.forEach((v, i) => {

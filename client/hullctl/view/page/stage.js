@@ -1,5 +1,5 @@
-// The picture: renderer, camera, lights, orbiting. Draws when something changed, and not otherwise.
-// Coordinates here are relative to model.origin.
+// The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
+// relative to model.origin.
 import {AXIS_COLOURS, THEMES} from 'hulld/palette.js';
 import {THREE} from 'hulld/three.js';
 
@@ -33,7 +33,7 @@ export class Stage {
     this.up = up;
     this.camera.up.set(...{x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1]}[up]);
     this.controls?.dispose();
-    // Orbiting reads the axis when it is made.
+    // OrbitControls reads the axis in its constructor.
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
@@ -60,7 +60,7 @@ export class Stage {
     this.draw();
   }
 
-  // Asks for a frame.
+  // Requests a frame.
   draw() {
     if (this.waiting) return;
     this.waiting = requestAnimationFrame((now) => {
@@ -69,12 +69,12 @@ export class Stage {
     });
   }
 
-  // `update(now)` is called before each frame; while one returns true, frames follow each other.
+  // Calls `update(now)` before each frame; frames continue while one returns true.
   beforeFrame(update) {
     this.before.push(update);
   }
 
-  // `update()` is called after each frame, when the camera is where it was drawn from.
+  // Calls `update()` after each frame, with the camera of that frame.
   afterFrame(update) {
     this.after.push(update);
   }
@@ -90,7 +90,7 @@ export class Stage {
     if (more) this.draw();
   }
 
-  // Near and far planes about the scene, so that depth has all its digits there.
+  // Fits the near and far planes to the scene, for full depth precision.
   fitDepth() {
     const distance = this.camera.position.distanceTo(this.controls.target);
     const reach = 4 * this.radius + this.controls.target.length();
@@ -99,7 +99,7 @@ export class Stage {
     this.camera.updateProjectionMatrix();
   }
 
-  // The direction from the target to the camera that shows three sides.
+  // Returns the direction from the target to the camera that shows three sides.
   defaultView() {
     const view = {x: [0.45, 0.8, 0.75], y: [0.75, 0.45, 0.8], z: [0.75, -0.8, 0.45]}[this.up];
     return new THREE.Vector3(...view).normalize();
@@ -112,7 +112,7 @@ export class Stage {
     if (!(view.length() > 0.5)) view.copy(this.defaultView());
     const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();
     const up = new THREE.Vector3().crossVectors(view, right);
-    // So far away that each corner is within the picture, with a margin for handles and labels.
+    // Distance at which each corner is within the picture, with a margin for handles and labels.
     const height = 0.84 * Math.tan(this.camera.fov * Math.PI / 360);
     const width = height * this.camera.aspect;
     let distance = 0.05 * radius;
@@ -153,7 +153,7 @@ export class Stage {
     return false;
   }
 
-  // By the keyboard: angles in radians, or a factor of the distance, or a shift across the picture.
+  // For the keyboard: angles in radians, a factor of the distance, or a shift across the picture.
   orbit(around, over) {
     const offset = this.camera.position.clone().sub(this.controls.target);
     const up = this.camera.up;
@@ -184,14 +184,14 @@ export class Stage {
     this.draw();
   }
 
-  // Where a point of the scene is in the picture, in CSS pixels; null behind the camera.
+  // Returns the position of a scene point in the picture, in CSS pixels; null behind the camera.
   toScreen(point) {
     const p = point.clone().project(this.camera);
     if (p.z > 1 || p.z < -1) return null;
     return [(p.x + 1) / 2 * this.canvas.clientWidth, (1 - p.y) / 2 * this.canvas.clientHeight];
   }
 
-  // The axes of the world, in a corner.
+  // Draws the world axes in a corner.
   drawTriad() {
     const svg = document.getElementById('triad');
     if (!svg.firstChild) {
@@ -218,7 +218,7 @@ export class Stage {
     });
   }
 
-  // Frames a second while the camera goes around, each awaited; for measurements.
+  // Returns frames per second while the camera orbits, each frame awaited; for measurements.
   async measure(frames = 60) {
     const pixel = new Uint8Array(4);
     const gl = this.renderer.getContext();

@@ -1,8 +1,8 @@
-// three.js r111, as Debian's libjs-three has it: a classic script that was loaded before us.
-// Nothing else names the global, so that another version or library needs a change here alone.
+// three.js r111, as in Debian's libjs-three: a classic script loaded before our modules. Only this
+// file names the global, so another version or library needs a change only here.
 export const THREE = globalThis.THREE;
 
-// Points as discs; without it they are squares.
+// Draws points as discs; without the texture they are squares.
 let disc = null;
 export function discTexture() {
   if (!disc) {

@@ -1,11 +1,12 @@
-// The list of objects: search, select, show and hide, colour. IDs with slashes make groups.
+// The list of objects: search, select, show and hide, colour. IDs with slashes form groups.
 import {element, grouped} from 'hulld/dom.js';
 import {RELATIONS} from 'hulld/palette.js';
 
-// More rows make the page slow; the search finds the rest.
+// More rows would slow down the page; the search finds the rest.
 const MOST_ROWS = 400;
 
-// The pieces of a body that are listed unasked, and the most that are listed.
+// Number of pieces up to which a body is expanded by default, and the maximum number of listed
+// pieces.
 const MOST_OPEN_PIECES = 8;
 const MOST_PIECE_ROWS = 100;
 
@@ -17,7 +18,7 @@ export class Tree {
     this.root = document.getElementById('tree');
     this.search = document.getElementById('search');
     this.closed = new Set();
-    // Bodies whose pieces are listed, where that differs from what few or many pieces suggest.
+    // Bodies expanded or collapsed contrary to the default.
     this.turned = new Set();
     this.search.addEventListener('input', () => this.rebuild());
     this.search.addEventListener('keydown', (event) => {
@@ -99,7 +100,7 @@ export class Tree {
     return Boolean(body) && isShort !== this.turned.has(index);
   }
 
-  // Opens and closes the list of a body's pieces.
+  // Expands and collapses the list of a body's pieces.
   opener(object) {
     const isOpen = this.isOpen(object);
     return element(
@@ -117,7 +118,7 @@ export class Tree {
         isOpen ? '\u25be' : '\u25b8');
   }
 
-  // The pieces are not chosen or moved by themselves: the body is one thing.
+  // Pieces cannot be selected or moved individually: the body is one object.
   pieceRows(object, nested) {
     const {model} = this;
     const {pieces} = model.bodies.get(object.hullId);

@@ -1,2 +1,1 @@
-"""What the server answers, as plain values: frozen, with numpy arrays where there are many numbers.
-"""
+"""Answers of the server as plain values: frozen, with numpy arrays for columns of numbers."""

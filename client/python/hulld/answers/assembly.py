@@ -1,4 +1,5 @@
-"""Puts the messages of a batch, a scene or a step of a stream together, whole columns at a time."""
+"""Puts the messages of a batch, a scene, or a step of a stream together, whole columns per
+message."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from hulld.calls.wanted import Wanted
 
 
 class BatchAssembly:
-    """The messages of one BatchCheckCollisions."""
+    """Assembles the answer to BatchCheckCollisions."""
 
     def __init__(self, pairs: npt.NDArray[np.uint32], wanted: Wanted) -> None:
         self._pairs = pairs
@@ -42,7 +43,7 @@ class BatchAssembly:
 
 
 class SceneAssembly:
-    """The messages of one FindCollisions."""
+    """Assembles the answer to FindCollisions."""
 
     def __init__(self, wanted: Wanted) -> None:
         self._frame = new_frame(wanted)
@@ -76,7 +77,7 @@ class StepAssembly:
         self._frame = new_frame(wanted)
 
     def add(self, data: bytes) -> bool:
-        """Whether this was the last. ValueError: it answers another message."""
+        """Returns true for the last message of the step. ValueError: it answers another step."""
         update, last = self._frame.read_stream(data)
         if update != self._update:
             raise ValueError(f"the server answered message {update}, not {self._update}")

@@ -17,9 +17,9 @@ from hulld.v1 import body_pb2
 class BodyInfo:
     """A body without its pieces.
 
-    revision: at which its pieces were put last. create_revision: tells incarnations of one ID
-    apart. damaged: what the store keeps of it is damaged; calls that need it raise DataLossError,
-    other fields may be missing, and put_body and delete_body end that.
+    revision: of the last put_body. create_revision: distinguishes incarnations of an ID. damaged:
+    the stored body is damaged; calls that need it raise DataLossError, other fields may be missing,
+    and put_body and delete_body repair it.
     """
 
     body_id: str
@@ -31,8 +31,8 @@ class BodyInfo:
 
 @dataclass(frozen=True)
 class Body:
-    """pieces: in the order in which they were put, each a hull at a pose in the frame of the body;
-    the numbers of the poses are those that were put."""
+    """pieces: in the order of put_body, each a hull at a pose in the frame of the body, with the
+    same doubles."""
 
     info: BodyInfo
     pieces: Placements

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-import grpc
 import numpy as np
 import numpy.typing as npt
 
@@ -38,12 +37,12 @@ from hulld.answers.collisions import (
 )
 from hulld.answers.hulls import Header, enum_or_zero, header_of
 from hulld.calls.wanted import Wanted
-from hulld.geometry.placements import Placement
+from hulld.errors import status_name
+from hulld.geometry.placements import Placements
 from hulld.notebook import Viewer
 from hulld.v1 import collision_pb2, error_pb2, geometry_pb2
 from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 
-_CODES = {code.value[0]: code.name for code in grpc.StatusCode}
 T = TypeVar("T")
 
 
@@ -64,7 +63,7 @@ def _problem_of(message: Any) -> Problem:
     # A reason of a later contract has no name here.
     if message.reason and message.reason in error_pb2.ErrorReason.values():
         reason = error_pb2.ErrorReason.Name(message.reason).removeprefix("ERROR_REASON_")
-    return Problem(_CODES.get(message.code, "UNKNOWN"), message.message, reason)
+    return Problem(status_name(message.code), message.message, reason)
 
 
 def _feature_of(message: Any) -> Feature:
@@ -126,9 +125,7 @@ def _analysis_of(message: Any) -> Analysis:
     )
 
 
-def decode_collision(
-    data: bytes, question: tuple[Placement, Placement], viewer: Viewer | None
-) -> Collision:
+def decode_collision(data: bytes, question: Placements, viewer: Viewer | None) -> Collision:
     message = collision_pb2.CheckCollisionResponse.FromString(data)
 
     def part(name: str, read: Callable[[Any], T]) -> T | None:
@@ -160,7 +157,7 @@ def decode_collision(
 
 @dataclass
 class ColumnReader:
-    """Collects the columns of one or more messages, and makes answers of them."""
+    """Collects the columns of messages into answers."""
 
     wanted: Wanted
     relations: list[Unsigned] = field(default_factory=list)
@@ -179,7 +176,7 @@ class ColumnReader:
     rows: int = 0
 
     def read(self, data: memoryview) -> None:
-        """Adds the rows of one AnswerColumns. ValueError: it is malformed."""
+        """Adds the rows of an AnswerColumns message. ValueError: it is malformed."""
         first = self.rows
         arrays: dict[int, tuple[list[Any], Callable[[Any], npt.NDArray[Any]]]] = {
             1: (self.relations, packed_varints),
@@ -286,8 +283,8 @@ class ColumnReader:
 
 @dataclass
 class Frame:
-    """What the messages of batches, scenes and streams have in common, collected over one or more
-    of them."""
+    """The common fields of the messages of batches, scenes, and streams, collected over
+    messages."""
 
     columns: ColumnReader
     header: Header | None = None
@@ -311,7 +308,7 @@ class Frame:
         pairs: int | None = None,
         totals: int | None = None,
     ) -> None:
-        """Adds one message, whose fields have these numbers."""
+        """Adds a message, by the numbers of its fields."""
         self.numbers = {}
         for number, _, value in read_fields(data):
             if number == pairs:
@@ -350,7 +347,8 @@ class Frame:
         self.read(data, header=1, hulls=2, problems=3, columns=5, piece_hulls=7, pairs=4, totals=6)
 
     def read_stream(self, data: bytes) -> tuple[int, bool]:
-        """Returns which message of the client this answers, and whether nothing follows."""
+        """Returns the number of the client's message that this answers, and true if it is the
+        last."""
         self.read(data, header=3, hulls=4, problems=5, columns=7, piece_hulls=8, pairs=6)
         return self.numbers.get(1, 0), bool(self.numbers.get(2, 0))
 

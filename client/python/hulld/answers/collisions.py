@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hulld.answers.hulls import Header
-from hulld.geometry.placements import Placement, Placements
+from hulld.answers.hulls import Header, enum_or_zero
+from hulld.geometry.placements import Placements
 from hulld.notebook import Viewer
 
 
 class Relation(IntEnum):
-    """How two hulls lie: exactly, for the doubles given."""
+    """The relation of two hulls: exact, for the doubles given."""
 
-    #: No answer; a problem tells why.
+    #: No answer; see the problem.
     UNSPECIFIED = 0
     #: No common point.
     SEPARATED = 1
@@ -40,11 +40,11 @@ class Method(IntEnum):
 
 
 class Rung(IntEnum):
-    """What decided an answer."""
+    """The method that decided an answer."""
 
     UNSPECIFIED = 0
     BOUNDS = 1
-    #: What decided the previous question of the pair, in a stream.
+    #: The witness of the pair's previous answer in a stream.
     CACHED = 2
     #: Floating point with a proven error bound.
     FLOATING_POINT = 4
@@ -52,7 +52,7 @@ class Rung(IntEnum):
 
 
 class AxisKind(IntEnum):
-    """Where an axis comes from."""
+    """The origin of an axis."""
 
     UNSPECIFIED = 0
     FACET_A = 1
@@ -72,6 +72,9 @@ class HullVersion:
     create_revision: int
     revision: int
     store_id: str
+
+    def __repr__(self) -> str:
+        return f"{self.hull_id}@{self.revision}"
 
 
 @dataclass(frozen=True)
@@ -108,10 +111,10 @@ class Witness:
 
 @dataclass(frozen=True)
 class Feature:
-    """The points of one hull that lie farthest along an axis.
+    """The points of a hull that lie farthest along an axis.
 
     vertex_indices: into the canonical snapshot. vertices: the same vertices, n x 3, in the hull's
-    own frame. facet_index: the facet, when the feature is a whole facet.
+    own frame. facet_index: the facet, if the feature is a whole facet.
     """
 
     vertex_indices: npt.NDArray[np.uint32]
@@ -142,12 +145,12 @@ class VertexPair:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What proves the relation from vertices and poses alone.
+    """A proof of the relation from vertices and poses alone.
 
-    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size)
-    where doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max
-    n.A <= min n.B, and the differences of at most four pairs hold 0 in their convex hull.
-    OVERLAPPING: those of at most six pairs hold 0 strictly inside.
+    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size) if
+    doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max n.A
+    <= min n.B, and the differences of at most four pairs hold 0 in their convex hull. OVERLAPPING:
+    the differences of at most six pairs hold 0 strictly inside.
     """
 
     direction: tuple[float, float, float] | tuple[int, int, int] | None
@@ -156,8 +159,8 @@ class Certificate:
 
 @dataclass(frozen=True)
 class PieceCertificate:
-    """What proves the relation of a piece of A and a piece of B, by index, 0 for a hull; as of two
-    hulls, each where the pose of the placement and its pose in the body lead together."""
+    """A proof of the relation of a piece of A and a piece of B, by index, 0 for a hull; each at the
+    product of the pose of its placement and its pose in the body."""
 
     piece_a: int
     piece_b: int
@@ -176,8 +179,8 @@ class HullSize:
 
 @dataclass(frozen=True)
 class Analysis:
-    """How much work an answer took. time: seconds, without the network. axes_total: TEXTBOOK_SAT
-    only, else 0."""
+    """The work for an answer. time: seconds, without the network. axes_total: TEXTBOOK_SAT only,
+    else 0."""
 
     time: float
     size_a: HullSize
@@ -199,15 +202,14 @@ class Problem:
 
 @dataclass(frozen=True)
 class Collision:
-    """The answer about one pair.
+    """The answer about a pair.
 
-    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness:
-    where they were wanted and there is one, else None. within_clearance: whether separation <=
-    clearance; None where no clearance was wanted. hull_a, hull_b: the hulls or bodies that the
-    answer is about, and their revisions. piece_a, piece_b: of a body, the piece that decided; axis,
-    analysis and witness are those of its hull. None of a hull, and where no pair of pieces decided
-    alone. piece_certificates: with a body, in place of the certificate, what the relation follows
-    from; piece_hulls: then the hulls of all pieces, by ID.
+    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness: None
+    if not asked for, or if there is none. within_clearance: separation <= clearance; None without a
+    clearance. hull_a, hull_b: the hulls or bodies of the answer, with their revisions. piece_a,
+    piece_b: of a body, the piece that decided; axis, analysis, and witness are of its hull. None
+    for a hull, and if no pair of pieces decided alone. piece_certificates: with a body, the proof
+    in place of the certificate; piece_hulls: then the hulls of all pieces, by ID.
     """
 
     relation: Relation
@@ -225,7 +227,7 @@ class Collision:
     piece_b: DecidingPiece | None = None
     piece_certificates: Sequence[PieceCertificate] = ()
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
-    _question: tuple[Placement, Placement] | None = field(default=None, repr=False, compare=False)
+    _question: Placements | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -235,13 +237,15 @@ class Collision:
 
     def __bool__(self) -> bool:
         raise TypeError(
-            "an answer is neither true nor false; ask it for .colliding, .relation or "
-            ".within_clearance"
+            "an answer is neither true nor false; use .colliding, .relation, or .within_clearance"
         )
 
+    def __repr__(self) -> str:
+        return _short(self, f"{self.hull_a!r}, {self.hull_b!r}", ("hull_a", "hull_b", "header"))
+
     def _repr_html_(self) -> str:
-        """The viewer's page of both hulls as they are now, where hullctl is found; a table in any
-        case. For notebooks."""
+        """For notebooks: the viewer's page of both current hulls, if hullctl is found, and a
+        table."""
         separation, witness = self.separation, self.witness
         rows = [
             ("relation", self.relation.name),
@@ -257,7 +261,26 @@ class Collision:
             ("axis", self.axis and self.axis.direction),
         ]
         viewer = self._viewer or Viewer.absent("this answer did not come from a server")
-        return viewer.html(rows, Placements.of(self._question or ()), [(0, 1)])
+        return viewer.html(rows, self._question or Placements([]), [(0, 1)])
+
+
+def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:
+    """A repr without the parts that were not asked for. Long parts are given by name alone."""
+    parts = [first] if first else []
+    for part in fields(answer):
+        value = getattr(answer, part.name)
+        if part.name.startswith("_") or part.name in left_out or value is None:
+            continue
+        if isinstance(value, IntEnum):
+            if value:
+                parts.append(value.name)
+        elif isinstance(value, Separation):
+            parts.append(f"separation={value.value!r}")
+        elif isinstance(value, (bool, tuple, Problem)) and value != ():
+            parts.append(f"{part.name}={value!r}")
+        elif isinstance(value, (Witness, Axis, Certificate, Analysis)):
+            parts.append(f"{part.name}=...")
+    return f"{type(answer).__name__}({', '.join(parts)})"
 
 
 def _named(piece: DecidingPiece | None) -> str | None:
@@ -267,17 +290,52 @@ def _named(piece: DecidingPiece | None) -> str | None:
 
 
 @dataclass(frozen=True)
+class AnswerRow:
+    """The answer about one of many pairs.
+
+    pair: the indices of its placements; None in rows of Answers. problem: why there is no answer.
+    pieces: the pieces of bodies that decided, by index; -1 for a hull. The rest as in Collision.
+    """
+
+    pair: tuple[int, int] | None
+    relation: Relation
+    rung: Rung
+    separation: Separation | None
+    witness: Witness | None
+    within_clearance: bool | None
+    axis: Axis | None
+    analysis: Analysis | None
+    certificate: Certificate | None
+    piece_certificates: Sequence[PieceCertificate]
+    pieces: tuple[int, int] | None
+    problem: Problem | None
+
+    @property
+    def colliding(self) -> bool:
+        """TOUCHING or OVERLAPPING."""
+        return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "an answer is neither true nor false; use .colliding, .relation, or .within_clearance"
+        )
+
+    def __repr__(self) -> str:
+        return _short(self, "" if self.pair is None else f"pair={self.pair}", ("pair",))
+
+
+@dataclass(frozen=True)
 class Answers:
-    """Answers of several pairs, a row for each; m rows.
+    """Answers of several pairs, a row for each; m rows. answers[i] is row i as AnswerRow.
 
     relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
-    Relation.TOUCHING. Where they were wanted: separations, separation_bounds (m), witness_points (m
-    x 2 x 3: the point of A, then that of B, world frame), witness_errors (m), NaN in rows that have
-    none; within_clearance (m, bool); axes, analyses, certificates, None in rows that have none.
-    What was not wanted is None. problems: by row, why it has no answer although both its placements
-    could. pieces: m x 2, of bodies the pieces that decided, by index; -1 for a hull, and where no
-    pair of pieces decided alone; None where no placement is a body. piece_proofs: by row, of a pair
-    with a body, the certificates of pairs of pieces; its entry of `certificates` is None.
+    Relation.TOUCHING. If asked for: separations, separation_bounds (m), witness_points (m x 2 x 3:
+    the point of A, then of B, world frame), witness_errors (m), NaN in rows without one;
+    within_clearance (m, bool); axes, analyses, certificates, None in rows without one. Otherwise
+    None. problems: by row, the reason for a missing answer that is not in placement_problems.
+    pieces: m x 2, of bodies the pieces that decided, by index; -1 for a hull, and if no pair of
+    pieces decided alone; None without bodies. piece_proofs: by row, for a pair with a body, the
+    certificates of pairs of pieces; its entry of `certificates` is None.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -297,6 +355,47 @@ class Answers:
     def __len__(self) -> int:
         return len(self.relations)
 
+    def __getitem__(self, row: int) -> AnswerRow:
+        """The answer in a row; -1: the last. IndexError: no such row."""
+        row = range(len(self))[row]
+
+        def cell(column: Any) -> Any:
+            return None if column is None else column[row]
+
+        separation = witness = pieces = within = None
+        if self.separations is not None and self.separation_bounds is not None:
+            value, bound = float(self.separations[row]), float(self.separation_bounds[row])
+            separation = None if np.isnan(value) else Separation(value, bound)
+        if self.witness_points is not None and self.witness_errors is not None:
+            error = float(self.witness_errors[row])
+            point_a, point_b = self.witness_points[row]
+            witness = None if np.isnan(error) else Witness(point_a, point_b, error)
+        relation = enum_or_zero(Relation, int(self.relations[row]))
+        if self.within_clearance is not None and relation != Relation.UNSPECIFIED:
+            within = bool(self.within_clearance[row])
+        if self.pieces is not None:
+            pieces = (int(self.pieces[row, 0]), int(self.pieces[row, 1]))
+        return AnswerRow(
+            None,
+            relation,
+            enum_or_zero(Rung, int(self.rungs[row])),
+            separation,
+            witness,
+            within,
+            cell(self.axes),
+            cell(self.analyses),
+            cell(self.certificates),
+            self.piece_proofs.get(row, ()),
+            pieces,
+            self.problems.get(row),
+        )
+
+    def __iter__(self) -> Iterator[AnswerRow]:
+        return (self[row] for row in range(len(self)))
+
+    def __repr__(self) -> str:
+        return f"Answers({_counted(self)})"
+
     @property
     def colliding(self) -> npt.NDArray[np.bool_]:
         """m: TOUCHING or OVERLAPPING."""
@@ -306,9 +405,54 @@ class Answers:
         return found
 
     def __bool__(self) -> bool:
-        raise TypeError(
-            "answers are neither true nor false; ask them for .colliding.any() or .relations"
-        )
+        raise TypeError("answers are neither true nor false; use .colliding.any() or .relations")
+
+
+def _counted(answers: Answers) -> str:
+    """The number of rows, in total and by relation."""
+    counts = np.bincount(answers.relations, minlength=len(Relation))
+    names = [
+        f"{count} {Relation(relation).name if relation else 'without an answer'}"
+        for relation, count in enumerate(counts[: len(Relation)].tolist())
+        if count
+    ]
+    return f"{len(answers)} pairs" + (f": {', '.join(names)}" if names else "")
+
+
+class _Rows:
+    """Pairs with their answers, row by row."""
+
+    pairs: npt.NDArray[np.uint32]
+    answers: Answers
+    placement_problems: Mapping[int, Problem]
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def __getitem__(self, row: int) -> AnswerRow:
+        """The answer about pairs[row]; -1: the last. IndexError: no such row."""
+        answer = self.answers[row]
+        a, b = self.pairs[row].tolist()
+        return replace(answer, pair=(a, b), problem=self.problem(row))
+
+    def __iter__(self) -> Iterator[AnswerRow]:
+        return (self[row] for row in range(len(self)))
+
+    def __bool__(self) -> bool:
+        raise TypeError("answers are neither true nor false; use len() or .answers.colliding.any()")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({_counted(self.answers)})"
+
+    def problem(self, row: int) -> Problem | None:
+        """Why pairs[row] has no answer; None: it has one."""
+        row = range(len(self))[row]
+        if row in self.answers.problems:
+            return self.answers.problems[row]
+        for placement in self.pairs[row].tolist():
+            if placement in self.placement_problems:
+                return self.placement_problems[placement]
+        return None
 
 
 @dataclass(frozen=True)
@@ -324,8 +468,8 @@ class BatchPart:
     piece_hulls: Sequence[HullVersion] = ()
 
 
-@dataclass(frozen=True)
-class Batch:
+@dataclass(frozen=True, repr=False)
+class Batch(_Rows):
     """The answers to all pairs of a batch.
 
     pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the
@@ -341,19 +485,10 @@ class Batch:
     header: Header
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
-    def problem(self, row: int) -> Problem | None:
-        """Why pairs[row] has no answer; None where it has one."""
-        if row in self.answers.problems:
-            return self.answers.problems[row]
-        for placement in self.pairs[row]:
-            if int(placement) in self.placement_problems:
-                return self.placement_problems[int(placement)]
-        return None
-
 
 @dataclass(frozen=True)
 class SceneTotals:
-    """Counts of pairs: asked about; whose boxes meet; found, by relation; without an answer."""
+    """Counts of pairs: asked about; with boxes that meet; found, by relation; without an answer."""
 
     pairs: int
     candidates: int
@@ -379,8 +514,8 @@ class ScenePart:
     piece_hulls: Sequence[HullVersion] = ()
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, repr=False)
+class Scene(_Rows):
     """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
     lower index first, ascending. The rest as in Batch."""
 
@@ -393,8 +528,8 @@ class Scene:
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class StreamAnswer:
+@dataclass(frozen=True, repr=False)
+class StreamAnswer(_Rows):
     """The answer to one message of a collision stream.
 
     update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as
@@ -414,7 +549,7 @@ class StreamAnswer:
 
 
 class CollisionEventKind(IntEnum):
-    """How a pair is other than it was told of last."""
+    """The change of a pair since its last event."""
 
     UNSPECIFIED = 0
     #: It overlaps, and did not before.
@@ -449,11 +584,10 @@ class CollisionEvent:
 class CollisionChanges:
     """One message of a watch of collisions.
 
-    header: once synced, every change of a watched hull up to this revision is taken into account.
-    update: the last update that these events take into account, 0 being the opening. synced: all
-    pairs have been told of as they are with that update's poses. hulls: those that are new to the
-    watch, or changed. placement_problems: those that begin. piece_hulls: the hulls of the pieces of
-    bodies, as `hulls`.
+    header: when synced, every change of a watched hull up to this revision is included. update: the
+    last update that these events include, 0 for the opening. synced: all pairs have been reported
+    at that update's poses. hulls: new to the watch, or changed. placement_problems: new ones.
+    piece_hulls: the hulls of the pieces of bodies, as `hulls`.
     """
 
     header: Header

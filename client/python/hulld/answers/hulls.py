@@ -18,21 +18,17 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 @dataclass(frozen=True)
 class Header:
     """The store, and its revision that a reply was answered from. Revisions of different stores
-    mean nothing to each other. If a reply was answered from several stores (shards), `shards` names
-    each with its revision, and store_id and revision are empty. staleness: seconds; the answer to a
-    read with a Freshness holds everything that was committed up to that long before the call, at
-    least."""
+    mean nothing to each other. staleness: seconds; the answer to a read with a Freshness holds
+    everything that was committed up to that long before the call, at least."""
 
     store_id: str
     revision: int
     staleness: float = 0.0
-    #: (store_id, revision), where there are several.
-    shards: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
 class PointCounts:
-    """What became of points: received = outside + duplicate + inside."""
+    """Counts of points: received = outside + duplicate + inside."""
 
     received: int = 0
     #: Became vertices, and still were at the end of their chunk.
@@ -55,10 +51,10 @@ class PointCounts:
 class HullInfo:
     """A hull without its geometry.
 
-    dimension: -1 (empty), 0 (point), 1 (segment), 2 (polygon) or 3. revision: of the last change of
-    its vertices. create_revision: tells incarnations of one ID apart. damaged: what the store keeps
-    of it is damaged; calls that need it raise DataLossError, other fields may be missing, and
-    delete_hull removes it.
+    dimension: -1 (empty), 0 (point), 1 (segment), 2 (polygon), or 3. revision: of the last change
+    of its vertices. create_revision: distinguishes incarnations of an ID. damaged: the stored hull
+    is damaged; calls that need it raise DataLossError, other fields may be missing, and delete_hull
+    removes it.
     """
 
     hull_id: str
@@ -71,7 +67,7 @@ class HullInfo:
 
 
 class Durability(IntEnum):
-    """What an acknowledgement means."""
+    """The guarantee of an acknowledgement."""
 
     UNSPECIFIED = 0
     #: Held in memory: lost when the server ends.
@@ -103,7 +99,7 @@ class ReplacedHull:
 
 @dataclass(frozen=True)
 class Audit:
-    """A check by means independent of the builder; finding: what is wrong, when not ok."""
+    """A check by code independent of the builder; finding: the defect, if not ok."""
 
     ok: bool
     finding: str
@@ -126,9 +122,15 @@ class Hull:
     header: Header
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        return (
+            f"Hull({self.info.hull_id}@{self.info.revision}, dimension {self.info.dimension}, "
+            f"{self.info.vertex_count} vertices)"
+        )
+
     def _repr_html_(self) -> str:
-        """The viewer's page of the hull as it is now, where hullctl is found; a table in any case.
-        For notebooks."""
+        """For notebooks: the viewer's page of the current hull, if hullctl is found, and a
+        table."""
         rows = [
             ("hull", self.info.hull_id),
             ("dimension", self.info.dimension),
@@ -150,13 +152,13 @@ class Hull:
 
 @dataclass(frozen=True)
 class HullMesh:
-    """The canonical snapshot of a hull, or a simplification of it, all of one revision.
+    """The canonical snapshot of a hull, or a simplification of it, all at the same revision.
 
-    vertices: n x 3, the caller's length unit, in canonical order; the doubles that were sent.
-    facet_sizes: vertices of each facet. facet_indices: indices of vertices, facet after facet,
-    counter-clockwise seen from outside. A hull of dimension 2 has one facet, seen from both sides;
-    one of lower dimension has none. error: the Hausdorff distance between mesh and hull is at most
-    this (proven); None where the mesh is the hull itself.
+    vertices: n x 3, the caller's length unit, in canonical order, with the doubles that were
+    appended. facet_sizes: vertices of each facet. facet_indices: indices of vertices, facet after
+    facet, counter-clockwise seen from outside. A hull of dimension 2 has one facet, seen from both
+    sides; one of lower dimension has none. error: the Hausdorff distance between mesh and hull is
+    at most this (proven); None if the mesh is the hull itself.
     """
 
     info: HullInfo
@@ -189,8 +191,15 @@ class HullMesh:
         triangles: npt.NDArray[np.int64] = self.facet_indices.astype(np.int64)[corners]
         return triangles
 
+    def __repr__(self) -> str:
+        error = "" if self.error is None else f", error={self.error!r}"
+        return (
+            f"HullMesh({self.info.hull_id}@{self.info.revision}, {len(self.vertices)} vertices, "
+            f"{len(self.facet_sizes)} facets{error})"
+        )
+
     def _repr_html_(self) -> str:
-        """As Hull's."""
+        """As Hull._repr_html_."""
         rows = [
             ("hull", self.info.hull_id),
             ("vertices", len(self.vertices)),
@@ -204,7 +213,7 @@ class HullMesh:
 
 @dataclass(frozen=True)
 class MeshHeader:
-    """The first part of a mesh: the sizes of what follows. The rest as in HullMesh."""
+    """The first part of a mesh: the sizes of all that follow. Other fields as in HullMesh."""
 
     info: HullInfo
     vertex_count: int
@@ -215,14 +224,14 @@ class MeshHeader:
 
 @dataclass(frozen=True)
 class MeshVertices:
-    """n x 3, in canonical order, after those of the parts before."""
+    """n x 3, in canonical order, continued from earlier parts."""
 
     vertices: npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class MeshFacets:
-    """Facets after those of the parts before, as in HullMesh."""
+    """Facets as in HullMesh, continued from earlier parts."""
 
     sizes: npt.NDArray[np.uint32]
     indices: npt.NDArray[np.uint32]
@@ -232,13 +241,13 @@ MeshPart = MeshHeader | MeshVertices | MeshFacets
 
 
 class HullEventKind(IntEnum):
-    """What happened to a hull since the header before."""
+    """The change of a hull since the previous header."""
 
     UNSPECIFIED = 0
     #: There is this hull. The only kind besides DELETED until `synced`.
     PRESENT = 1
     CREATED = 2
-    #: Its vertices changed, or a body was put anew; it is the same incarnation.
+    #: Its vertices changed, or a body was put again; it is the same incarnation.
     CHANGED = 3
     #: It is a new incarnation: it was replaced, or deleted and created again.
     REPLACED = 4
@@ -247,27 +256,25 @@ class HullEventKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullEvent:
-    """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box:
-    as in Hull. is_body: it is about a body, of which `hull` holds ID, revisions and whether it is
-    damaged, and piece_count how many pieces it has. store_id: whose revisions these are, where the
-    header names several stores."""
+    """hull: as of its revision; DELETED: only hull_id, and the revision of the deletion. box: as in
+    Hull. is_body: a body, of which `hull` holds ID, revisions, and damage, and piece_count the
+    number of pieces."""
 
     kind: HullEventKind
     hull: HullInfo
     box: npt.NDArray[np.float64] | None
     is_body: bool = False
     piece_count: int = 0
-    store_id: str = ""
 
 
 @dataclass(frozen=True)
 class HullChanges:
     """One message of a watch of hulls.
 
-    header: every change up to this revision is in this message or one before it, unless a later one
-    superseded it; a watch resumes from here. events: each hull at most once. synced: what was there
-    has been told; what follows are changes as they are committed. anew: forget all that was told
-    before; the watch tells everything from the start.
+    header: every change up to this revision is in this message or an earlier one, unless a later
+    change superseded it; a watch resumes from here. events: each hull at most once. synced: the
+    initial state is complete; later events are changes as they are committed. anew: discard all
+    earlier events; the watch starts again with the full state.
     """
 
     header: Header
@@ -292,7 +299,6 @@ def header_of(message: Any) -> Header:
         message.store_id,
         message.revision,
         message.staleness.ToNanoseconds() / 1_000_000_000,
-        tuple((shard.store_id, shard.revision) for shard in message.shards),
     )
 
 
@@ -357,7 +363,6 @@ def decode_changes(data: bytes) -> HullChanges:
             _box_of(event),
             event.is_body,
             event.piece_count,
-            event.store_id,
         )
         for event in message.events
     )
@@ -401,14 +406,16 @@ def decode_mesh_part(data: bytes) -> MeshPart:
 
 
 class MeshAssembly:
-    """Puts the parts of a mesh together, and checks that they fit: drawing relies on it."""
+    """Puts the parts of a mesh together, and checks that they are consistent."""
 
-    def __init__(self) -> None:
+    def __init__(self, viewer: Viewer | None) -> None:
+        self._viewer = viewer
         self._header: MeshHeader | None = None
         self._vertices: list[npt.NDArray[np.float64]] = []
         self._facets: list[MeshFacets] = []
 
-    def add(self, part: MeshPart) -> None:
+    def add(self, data: bytes) -> None:
+        part = decode_mesh_part(data)
         if isinstance(part, MeshHeader):
             self._header = part
         elif isinstance(part, MeshVertices):
@@ -416,8 +423,8 @@ class MeshAssembly:
         else:
             self._facets.append(part)
 
-    def finish(self, viewer: Viewer | None) -> HullMesh:
-        """Raises ValueError where the parts contradict each other."""
+    def finish(self) -> HullMesh:
+        """ValueError: the parts contradict each other."""
         if self._header is None:
             raise ValueError("the mesh stream ended without a header")
         head = self._header
@@ -430,4 +437,4 @@ class MeshAssembly:
             raise ValueError("the mesh stream's facet sizes and indices disagree")
         if indices.size and int(indices.max()) >= len(vertices):
             raise ValueError("the mesh stream names a vertex that it does not hold")
-        return HullMesh(head.info, vertices, sizes, indices, head.error, head.header, viewer)
+        return HullMesh(head.info, vertices, sizes, indices, head.error, head.header, self._viewer)

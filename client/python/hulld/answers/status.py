@@ -31,7 +31,7 @@ class Limits:
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
-    #: The limits of one client, which is a token or, without tokens, an address.
+    #: The limits of a client: a token or, without tokens, an address.
     max_calls_per_client: int
     max_batches_per_client: int
     #: Bytes that requests may take until they are answered.
@@ -40,11 +40,10 @@ class Limits:
 
 @dataclass(frozen=True)
 class ServerStatus:
-    """What runs, since when, and how much it holds.
+    """Version, uptime, sizes, and limits of the server.
 
-    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb", "postgres" or "memory".
-    hull_count, vertex_count: None where the token is limited to a prefix, as it may not see the
-    sizes of others.
+    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb", "postgres", or "memory".
+    hull_count, vertex_count: None if the token is limited to a prefix.
     """
 
     header: Header

@@ -1,2 +1,1 @@
-"""Calls without input or output: requests, how to read their answers, and what may be repeated.
-Both clients use them."""
+"""The calls of both clients: requests, decoders, retries, and the operations that wait."""

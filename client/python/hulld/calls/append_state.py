@@ -1,13 +1,14 @@
-"""What an appender knows, without input or output: what was sent, what is acknowledged, what to
-send again."""
+"""The state of an appender, without input or output: chunks sent and acknowledged."""
 
 from __future__ import annotations
 
 import collections
-import secrets
+import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from hulld import arguments
 from hulld.answers.hulls import (
     Durability,
     Header,
@@ -19,7 +20,7 @@ from hulld.answers.hulls import (
     info_of,
 )
 from hulld.errors import FailedPreconditionError, HulldError, InternalError, NotFoundError
-from hulld.geometry.points import Points, point_block
+from hulld.geometry.points import Points, PointsLike, as_points, chunks_of, point_block
 from hulld.v1 import hull_pb2
 from hulld.wire import MessageWriter
 
@@ -39,12 +40,12 @@ class Opened:
 
 @dataclass(frozen=True)
 class Appended:
-    """What became of an append so far.
+    """The progress of an append.
 
-    chunks, points: sent. points_acknowledged: committed, as durability says. counts: sums over the
-    acknowledgements received; they lack chunks_recovered, which the server had committed although
-    their acknowledgement was lost with a connection. hull_revision, vertex_count: after the last
-    acknowledged chunk. header: of the last reply.
+    chunks, points: sent. points_acknowledged: committed with this durability. counts: sums over the
+    acknowledgements received; without chunks_recovered, which are committed, but lost their
+    acknowledgement with a connection. hull_revision, vertex_count: after the last acknowledged
+    chunk. header: of the last reply.
     """
 
     chunks: int
@@ -68,7 +69,7 @@ class _Chunk:
 
 class AppendState:
     """A writer's side of AppendPoints. Chunks are numbered 1, 2, 3, ... and kept until they are
-    acknowledged, so that each is applied once, whatever is sent twice."""
+    acknowledged; the server ignores a repeated number."""
 
     def __init__(
         self,
@@ -78,17 +79,21 @@ class AppendState:
         max_in_flight_bytes: int,
         max_in_flight_chunks: int,
     ) -> None:
-        self.hull_id = hull_id
-        self.writer_id = writer_id or f"python-{secrets.token_hex(8)}"
+        self.hull_id = arguments.hull_id(hull_id)
+        self.writer_id = (
+            arguments.text(writer_id, "writer_id", least=1)
+            if writer_id is not None
+            else f"python-{os.urandom(8).hex()}"
+        )
         self._create = create
-        self._max_bytes = max(1, max_in_flight_bytes)
-        self._max_chunks = max(1, max_in_flight_chunks)
+        self._max_bytes = arguments.count(
+            max_in_flight_bytes, "max_in_flight_bytes", least=1, most=1 << 62
+        )
+        self._max_chunks = arguments.count(max_in_flight_chunks, "max_in_flight_chunks", least=1)
         self.opened: Opened | None = None
         self._unacknowledged: collections.deque[_Chunk] = collections.deque()
         self._bytes_in_flight = 0
         self._next_sequence = 1
-        #: Connections lost since the last acknowledgement.
-        self.failures = 0
         self._chunks = self._points = self._acknowledged = self._recovered = self._reconnects = 0
         self._counts = PointCounts()
         self._revision = self._vertices = 0
@@ -113,8 +118,8 @@ class AppendState:
         return self.opened
 
     def resume(self, data: bytes) -> list[bytes]:
-        """The first answer of a later connection: what is to be sent again. HulldError: it cannot
-        go on."""
+        """Takes the first answer of a later connection. Returns the requests to send again.
+        HulldError: the append cannot go on."""
         assert self.opened is not None
         opened = _opened(data)
         if (opened.header.store_id, opened.hull.create_revision) != (
@@ -122,7 +127,7 @@ class AppendState:
             self.opened.hull.create_revision,
         ):
             raise FailedPreconditionError(
-                f'hull "{self.hull_id}" is another one since the connection was lost; '
+                f'hull "{self.hull_id}" was replaced while the connection was lost; '
                 f"{self._acknowledged} acknowledged points are gone with the old one; append "
                 "everything again"
             )
@@ -131,7 +136,7 @@ class AppendState:
             raise InternalError(
                 f'the server\'s last sequence of writer "{self.writer_id}" is '
                 f"{opened.last_sequence}, which this stream cannot continue; does another client "
-                "write under the same name?"
+                "use the same writer_id?"
             )
         self._reconnects += 1
         self._drop(opened.last_sequence, recovered=True)
@@ -162,7 +167,7 @@ class AppendState:
 
     @property
     def full(self) -> bool:
-        """Whether to wait for acknowledgements before the next chunk."""
+        """True if the next chunk has to wait for acknowledgements."""
         return (
             len(self._unacknowledged) >= self._max_chunks
             or self._bytes_in_flight >= self._max_bytes
@@ -170,11 +175,11 @@ class AppendState:
 
     @property
     def idle(self) -> bool:
-        """Whether all is acknowledged."""
+        """True if every chunk is acknowledged."""
         return not self._unacknowledged
 
     def take_ack(self, data: bytes) -> None:
-        """InternalError: the server acknowledged what was not sent."""
+        """InternalError: the server acknowledged a chunk that was not sent."""
         message = hull_pb2.AppendPointsResponse.FromString(data)
         if not message.HasField("ack"):
             raise InternalError("the server sent `opened` twice")
@@ -183,7 +188,6 @@ class AppendState:
             raise InternalError(
                 f"the server acknowledged sequence {ack.sequence}, which was not sent"
             )
-        self.failures = 0
         self._drop(ack.sequence, recovered=False)
         self._counts += counts_of(ack.counts)
         self._revision, self._vertices = ack.hull_revision, ack.vertex_count
@@ -220,3 +224,17 @@ def _opened(data: bytes) -> Opened:
     return Opened(
         info_of(opened.hull), opened.writer_id, opened.last_sequence, header_of(opened.header)
     )
+
+
+def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Iterator[Points]:
+    """The chunks of points. ValueError: wrong arguments; several chunks with if_revision."""
+    array = as_points(points)
+    arguments.revision(if_revision)
+    size = arguments.count(chunk_bytes, "chunk_bytes", least=1)
+    chunks = list(chunks_of(array, size))
+    if if_revision is not None and len(chunks) > 1:
+        raise ValueError(
+            f"{len(array)} points make {len(chunks)} chunks, and if_revision holds only for the "
+            "first; pass fewer points, or a larger chunk_bytes"
+        )
+    return iter(chunks)

@@ -1,7 +1,8 @@
-"""The attempts of one call, within its deadline."""
+"""Attempts of a call, and of a search for a lost server."""
 
 from __future__ import annotations
 
+import dataclasses
 import time
 
 from hulld.errors import HulldError
@@ -9,7 +10,7 @@ from hulld.retry import RetryPolicy
 
 
 class Attempts:
-    """Counts the attempts of a call; the clients wait in between."""
+    """Counts the attempts of a call within its deadline; the clients wait in between."""
 
     def __init__(self, policy: RetryPolicy, safe_to_repeat: bool, timeout: float | None) -> None:
         self._policy = policy if safe_to_repeat else RetryPolicy(max_attempts=1)
@@ -17,13 +18,30 @@ class Attempts:
         self._failures = 0
 
     def remaining(self) -> float | None:
-        """Seconds until the deadline; None: there is none."""
+        """Seconds until the deadline; None: unbounded."""
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
 
     def wait_after(self, error: HulldError) -> float:
-        """The seconds to wait after this attempt. Raises `error` where there is no other."""
+        """The seconds to wait after this attempt. Raises `error` if it was the last."""
         self._failures += 1
         wait = self._policy.wait_after(self._failures, error, self.remaining())
         if wait is None:
             raise error from None
         return wait
+
+
+class Search:
+    """Attempts to reach a lost server. The deadline counts from the first failure on, however long
+    the connection was quiet before."""
+
+    def __init__(self, policy: RetryPolicy, patience: float | None, connected: bool) -> None:
+        """connected: the server was reached before, so that only `patience` bounds the search."""
+        self._policy = dataclasses.replace(policy, max_attempts=None) if connected else policy
+        self._patience = patience
+        self._attempts: Attempts | None = None
+
+    def wait_after(self, error: HulldError) -> float:
+        """As Attempts.wait_after."""
+        if self._attempts is None:
+            self._attempts = Attempts(self._policy, True, self._patience)
+        return self._attempts.wait_after(error)

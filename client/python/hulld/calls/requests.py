@@ -1,5 +1,5 @@
-"""One function per call of the contract: its request, how its answer is read, and whether it is
-safe to repeat."""
+"""One function per call of the contract: its request, its decoder, and True if it is safe to
+repeat."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Literal, TypeVar
 
-import numpy.typing as npt
 import numpy as np
+import numpy.typing as npt
 
+from hulld import arguments
 from hulld.answers import bodies, collision_messages, hulls, status
 from hulld.answers.bodies import Body, BodyPage, ReplacedBody
 from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
@@ -17,8 +18,7 @@ from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo
 from hulld.answers.status import ServerStatus
 from hulld.calls.freshness import FIELD, Freshness
 from hulld.calls.wanted import Wanted
-from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, as_placement
-from hulld.geometry.poses import PoseLike, pack_pose
+from hulld.geometry.placements import Placements, as_integers
 from hulld.notebook import Viewer
 from hulld.v1 import body_pb2, collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
 from hulld.wire import MessageWriter
@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """method: gRPC's path. decode: raises ValueError where the answer is malformed."""
+    """method: gRPC's path. decode: raises ValueError for a malformed answer."""
 
     method: str
     request: bytes
@@ -37,8 +37,8 @@ class Call(Generic[T]):
 
 
 def method_path(service: str, name: str) -> str:
-    """gRPC's path of a call of the contract, as in "/hulld.v1.HullService/GetHull". KeyError: there
-    is none."""
+    """gRPC's path of a call, as in "/hulld.v1.HullService/GetHull". KeyError: not in the
+    contract."""
     for module in (hull_pb2, body_pb2, collision_pb2, status_pb2, maintenance_pb2):
         found = module.DESCRIPTOR.services_by_name.get(service)
         if found is not None:
@@ -54,12 +54,16 @@ CHECK_HEALTH = "/grpc.health.v1.Health/Check"
 
 
 def is_serving(answer: bytes) -> bool:
-    """Whether a HealthCheckResponse of grpc.health.v1 says SERVING: field 1 is 1."""
+    """True if a HealthCheckResponse of grpc.health.v1 is SERVING: field 1 is 1."""
     return answer == b"\x08\x01"
 
 
+def check_health() -> Call[bool]:
+    return Call(CHECK_HEALTH, b"", is_serving, False)
+
+
 def as_fresh(call: Call[T], freshness: Freshness | None) -> Call[T]:
-    """The same read, whose answer must be as fresh."""
+    """Adds a freshness to a read."""
     if freshness is None:
         return call
     return replace(call, request=call.request + _freshness_field(freshness))
@@ -70,7 +74,7 @@ def _freshness_field(freshness: Freshness) -> bytes:
 
 
 def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
-    request = hull_pb2.CreateHullRequest(hull_id=hull_id, if_absent=if_absent)
+    request = hull_pb2.CreateHullRequest(hull_id=arguments.hull_id(hull_id), if_absent=if_absent)
     return Call(
         method_path("HullService", "CreateHull"),
         request.SerializeToString(),
@@ -80,7 +84,9 @@ def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
 
 
 def get_hull(hull_id: str, audit: bool, facets: bool, viewer: Viewer) -> Call[Hull]:
-    request = hull_pb2.GetHullRequest(hull_id=hull_id, audit=audit, without_facets=not facets)
+    request = hull_pb2.GetHullRequest(
+        hull_id=arguments.hull_id(hull_id), audit=audit, without_facets=not facets
+    )
     return Call(
         method_path("HullService", "GetHull"),
         request.SerializeToString(),
@@ -95,10 +101,10 @@ def get_hull_mesh(
     max_vertices: int | None,
     max_error: float | None,
 ) -> Call[MeshPart]:
-    request = hull_pb2.GetHullMeshRequest(hull_id=hull_id)
+    request = hull_pb2.GetHullMeshRequest(hull_id=arguments.hull_id(hull_id))
     if side is None and (max_vertices is not None or max_error is not None):
         raise ValueError(
-            'say on which side of the hull the simpler one lies: side="inside" or side="outside"'
+            'a simpler hull lies on one side of the hull: pass side="inside" or side="outside"'
         )
     if side is not None:
         if side not in ("inside", "outside"):
@@ -108,8 +114,12 @@ def get_hull_mesh(
             if side == "inside"
             else hull_pb2.SIMPLIFICATION_SIDE_OUTSIDE
         )
-        request.simplification.max_vertices = max_vertices or 0
-        request.simplification.max_error = max_error or 0.0
+        if max_vertices is None and max_error is None:
+            raise ValueError("side needs max_vertices or max_error")
+        request.simplification.max_vertices = (
+            arguments.optional_count(max_vertices, "max_vertices", least=1) or 0
+        )
+        request.simplification.max_error = arguments.optional_length(max_error, "max_error") or 0.0
     return Call(
         method_path("HullService", "GetHullMesh"),
         request.SerializeToString(),
@@ -138,7 +148,11 @@ def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
             hulls.header_of(message.header),
         )
 
-    request = hull_pb2.ListHullsRequest(prefix=prefix, page_size=page_size, page_token=page_token)
+    request = hull_pb2.ListHullsRequest(
+        prefix=arguments.text(prefix, "prefix"),
+        page_size=arguments.count(page_size, "page_size"),
+        page_token=page_token,
+    )
     return Call(method_path("HullService", "ListHulls"), request.SerializeToString(), decode, True)
 
 
@@ -146,29 +160,32 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
     def decode(data: bytes) -> Header:
         return hulls.header_of(hull_pb2.DeleteHullResponse.FromString(data).header)
 
-    request = hull_pb2.DeleteHullRequest(hull_id=hull_id, if_revision=if_revision)
-    # A repeated delete could remove a hull that someone has created anew.
+    request = hull_pb2.DeleteHullRequest(
+        hull_id=arguments.hull_id(hull_id), if_revision=arguments.revision(if_revision)
+    )
+    # A repeated delete could remove a new hull of the same ID.
     return Call(
         method_path("HullService", "DeleteHull"), request.SerializeToString(), decode, False
     )
 
 
-def _put_placement(target: Any, hull_id: str, pose: PoseLike) -> None:
-    """Into a Placement of the contract."""
+def _put_placement(target: Any, hull_id: str, pose: npt.NDArray[np.float64]) -> None:
+    """Fills a Placement of the contract."""
     target.hull_id = hull_id
-    if pose is None:
-        return
-    w, x, y, z, tx, ty, tz = (float(number) for number in pack_pose(pose))
+    w, x, y, z, tx, ty, tz = pose.tolist()
     target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
     target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
 
 
-def put_body(body_id: str, pieces: PlacementsLike, if_revision: int | None) -> Call[ReplacedBody]:
-    request = body_pb2.PutBodyRequest(body_id=body_id, if_revision=if_revision)
-    packed = Placements.of(pieces)
-    for index, pose in zip(packed.indices, packed.poses):
-        _put_placement(request.pieces.add(), packed.ids[index], pose)
-    # To put the same again does no harm; a revision that matched does so no more.
+def put_body(body_id: str, pieces: Placements, if_revision: int | None) -> Call[ReplacedBody]:
+    request = body_pb2.PutBodyRequest(
+        body_id=arguments.hull_id(body_id, "body_id"), if_revision=arguments.revision(if_revision)
+    )
+    if not len(pieces):
+        raise ValueError("pieces is empty; a body has at least one")
+    for index, pose in zip(pieces.indices, pieces.poses):
+        _put_placement(request.pieces.add(), pieces.ids[index], pose)
+    # Putting the same pieces twice is idempotent, unless it depends on the revision.
     return Call(
         method_path("BodyService", "PutBody"),
         request.SerializeToString(),
@@ -178,7 +195,7 @@ def put_body(body_id: str, pieces: PlacementsLike, if_revision: int | None) -> C
 
 
 def get_body(body_id: str) -> Call[Body]:
-    request = body_pb2.GetBodyRequest(body_id=body_id)
+    request = body_pb2.GetBodyRequest(body_id=arguments.hull_id(body_id, "body_id"))
     return Call(
         method_path("BodyService", "GetBody"), request.SerializeToString(), bodies.decode_body, True
     )
@@ -191,13 +208,18 @@ def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[BodyPage]:
             raise ValueError("the server answered a page that continues with itself")
         return page
 
-    request = body_pb2.ListBodiesRequest(prefix=prefix, page_size=page_size, page_token=page_token)
+    request = body_pb2.ListBodiesRequest(
+        prefix=arguments.text(prefix, "prefix"),
+        page_size=arguments.count(page_size, "page_size"),
+        page_token=page_token,
+    )
     return Call(method_path("BodyService", "ListBodies"), request.SerializeToString(), decode, True)
 
 
 def delete_body(body_id: str, if_revision: int | None) -> Call[Header]:
-    request = body_pb2.DeleteBodyRequest(body_id=body_id, if_revision=if_revision)
-    # As delete_hull.
+    request = body_pb2.DeleteBodyRequest(
+        body_id=arguments.hull_id(body_id, "body_id"), if_revision=arguments.revision(if_revision)
+    )
     return Call(
         method_path("BodyService", "DeleteBody"),
         request.SerializeToString(),
@@ -210,14 +232,12 @@ def watch_hulls(
     prefix: str, hull_id: str | None, with_bodies: bool, after: Header | None
 ) -> Call[HullChanges]:
     request = hull_pb2.WatchHullsRequest(
-        prefix=prefix,
-        hull_id=hull_id or "",
+        prefix=arguments.text(prefix, "prefix"),
+        hull_id="" if hull_id is None else arguments.hull_id(hull_id),
         bodies=with_bodies,
         after_revision=after.revision if after else 0,
         store_id=after.store_id if after else "",
     )
-    for store_id, revision in after.shards if after else ():
-        request.after.add(store_id=store_id, revision=revision)
     return Call(
         method_path("HullService", "WatchHulls"),
         request.SerializeToString(),
@@ -235,23 +255,19 @@ def save_backup() -> Call[bytes]:
 
 
 def check_collision(
-    a: PlacementLike,
-    b: PlacementLike,
-    wanted: Wanted,
-    tolerance: float,
-    method: Method,
-    viewer: Viewer,
+    pair: Placements, wanted: Wanted, tolerance: float, method: Method, viewer: Viewer
 ) -> Call[Collision]:
-    question = (as_placement(a), as_placement(b))
     request = collision_pb2.CheckCollisionRequest(
-        method=collision_pb2.Method.Name(int(method)), tolerance=tolerance, wanted=wanted.message()
+        method=collision_pb2.Method.Name(int(method)),
+        tolerance=arguments.length(tolerance, "tolerance"),
+        wanted=wanted.message(),
     )
-    for placement, target in zip(question, (request.a, request.b)):
-        _put_placement(target, placement.id, placement.pose)
+    for index, pose, target in zip(pair.indices, pair.poses, (request.a, request.b)):
+        _put_placement(target, pair.ids[index], pose)
     return Call(
         method_path("CollisionService", "CheckCollision"),
         request.SerializeToString(),
-        lambda data: collision_messages.decode_collision(data, question, viewer),
+        lambda data: collision_messages.decode_collision(data, pair, viewer),
         True,
     )
 
@@ -264,7 +280,9 @@ def check_collisions(
     method: Method,
 ) -> Call[BatchPart]:
     fixed = collision_pb2.BatchCheckCollisionsRequest(
-        method=collision_pb2.Method.Name(int(method)), wanted=wanted.message(), tolerance=tolerance
+        method=collision_pb2.Method.Name(int(method)),
+        wanted=wanted.message(),
+        tolerance=arguments.length(tolerance, "tolerance"),
     )
     request = (
         MessageWriter()
@@ -289,24 +307,44 @@ class SceneFilter:
     ignored_group_pairs: npt.ArrayLike | None
     movers: int | None
 
-    def put(self, message: Any) -> None:
-        """Into a message with the fields of the same names."""
+    def put(self, message: Any, placements: int) -> None:
+        """Fills the fields of the same names. placements: their number."""
         if self.groups is not None:
-            message.groups.extend(np.asarray(self.groups).reshape(-1).tolist())
+            groups = _group_numbers(self.groups, "groups")
+            if groups.shape != (placements,):
+                raise ValueError(
+                    f"groups has the shape {groups.shape}; there are {placements} placements"
+                )
+            message.groups.extend(groups.tolist())
+        elif self.ignore_same_group or self.ignored_group_pairs is not None:
+            raise ValueError("ignore_same_group and ignored_group_pairs need groups")
         message.ignore_same_group = self.ignore_same_group
         if self.ignored_group_pairs is not None:
-            message.ignored_group_pairs.extend(
-                np.asarray(self.ignored_group_pairs).reshape(-1).tolist()
-            )
+            pairs = _group_numbers(self.ignored_group_pairs, "ignored_group_pairs")
+            if pairs.size and (pairs.ndim != 2 or pairs.shape[1] != 2):
+                raise ValueError(
+                    f"ignored_group_pairs has the shape {pairs.shape}; it takes (k, 2), two groups "
+                    "in each row"
+                )
+            message.ignored_group_pairs.extend(pairs.reshape(-1).tolist())
         if self.movers is not None:
-            message.movers = self.movers
+            message.movers = arguments.count(self.movers, "movers")
+
+
+def _group_numbers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+    array = as_integers(values, name)
+    if array.size and not (array.min() >= 0 and array.max() < 2**32):
+        raise ValueError(f"{name} holds numbers outside 0 to 2^32 - 1")
+    return array
 
 
 def find_collisions(
     placements: Placements, scene: SceneFilter, wanted: Wanted, tolerance: float
 ) -> Call[ScenePart]:
-    fixed = collision_pb2.FindCollisionsRequest(wanted=wanted.message(), tolerance=tolerance)
-    scene.put(fixed)
+    fixed = collision_pb2.FindCollisionsRequest(
+        wanted=wanted.message(), tolerance=arguments.length(tolerance, "tolerance")
+    )
+    scene.put(fixed, len(placements))
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())
     return Call(
         method_path("CollisionService", "FindCollisions"),
@@ -326,7 +364,9 @@ def open_stream(
 ) -> bytes:
     """The first message of StreamCollisions."""
     fixed = collision_pb2.CollisionStreamOpen(
-        wanted=wanted.message(), tolerance=tolerance, only_changes=only_changes
+        wanted=wanted.message(),
+        tolerance=arguments.length(tolerance, "tolerance"),
+        only_changes=only_changes,
     )
     opening = (
         MessageWriter()
@@ -356,8 +396,10 @@ def open_watch(
     clearance: float | None,
 ) -> bytes:
     """The first message of WatchCollisions."""
-    fixed = collision_pb2.CollisionWatchOpen(clearance=clearance)
-    scene.put(fixed)
+    fixed = collision_pb2.CollisionWatchOpen(
+        clearance=arguments.optional_length(clearance, "clearance")
+    )
+    scene.put(fixed, len(placements))
     opening = MessageWriter().raw(fixed.SerializeToString()).message(2, placements.packed())
     if pairs is not None:
         opening.uint32s(3, pairs)
@@ -369,12 +411,14 @@ def open_replacement(hull_id: str, create: bool, if_revision: int | None) -> byt
     return bytes(
         hull_pb2.ReplaceHullRequest(
             open=hull_pb2.ReplaceOpen(
-                hull_id=hull_id, create_if_absent=create, if_revision=if_revision
+                hull_id=arguments.hull_id(hull_id),
+                create_if_absent=create,
+                if_revision=arguments.revision(if_revision),
             )
         ).SerializeToString()
     )
 
 
 def replacement_points(block: MessageWriter) -> bytes:
-    """A later message of ReplaceHull; an empty block says that nothing is missing."""
+    """A later message of ReplaceHull; an empty block completes the replacement."""
     return MessageWriter().message(2, block).finish()

@@ -1,10 +1,11 @@
-"""What a question needs beyond the relation."""
+"""The parts of an answer beyond the relation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
+from hulld import arguments
 from hulld.v1 import collision_pb2
 
 
@@ -26,7 +27,7 @@ class Wanted:
             analysis=self.analysis,
             certificate=self.certificate,
             separation=self.separation,
-            max_error=self.max_error,
+            max_error=arguments.optional_length(self.max_error, "max_error"),
             witness=self.witness,
-            clearance=self.clearance,
+            clearance=arguments.optional_length(self.clearance, "clearance"),
         )

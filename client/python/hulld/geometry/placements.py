@@ -1,15 +1,25 @@
-"""Placements: which thing stands where, packed as it travels."""
+"""Placements: hulls and bodies at poses, packed for the wire."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Union
+from typing import Any, Union
 
 import numpy as np
 import numpy.typing as npt
 
-from hulld.geometry.poses import PackedPoses, Pose, PoseLike, PosesLike, pack_pose, pack_poses
+from hulld import arguments
+from hulld.geometry.poses import (
+    ORTHOGONALITY_TOLERANCE,
+    PackedPoses,
+    Pose,
+    PoseLike,
+    PosesLike,
+    QuaternionOrder,
+    pack_pose,
+    pack_poses,
+)
 from hulld.wire import MessageWriter
 
 _HULL_IDS, _HULLS, _POSES = 1, 2, 3  # fields of PackedPlacements
@@ -17,18 +27,21 @@ _HULL_IDS, _HULLS, _POSES = 1, 2, 3  # fields of PackedPlacements
 
 @dataclass(frozen=True)
 class Placement:
-    """What has this ID, at a pose; without one, where it was built."""
+    """The hull or body with this ID, at a pose; None: the identity."""
 
     id: str
     pose: PoseLike = None
 
+    def __post_init__(self) -> None:
+        arguments.hull_id(self.id, "the ID of a placement")
 
-#: A thing at a pose: its ID, a Placement, or (ID, pose).
+
+#: A hull or body at a pose: its ID, a Placement, or (ID, pose).
 PlacementLike = Union[str, Placement, tuple[str, PoseLike]]
 
 
 def as_placement(placement: PlacementLike) -> Placement:
-    """TypeError: it is none."""
+    """TypeError: not a placement. ValueError: a malformed ID."""
     if isinstance(placement, Placement):
         return placement
     if isinstance(placement, str):
@@ -36,22 +49,22 @@ def as_placement(placement: PlacementLike) -> Placement:
     if isinstance(placement, tuple) and len(placement) == 2 and isinstance(placement[0], str):
         return Placement(*placement)
     raise TypeError(
-        f"{placement!r} is no placement; that is an ID, (ID, pose) or hulld.Placement(ID, pose)"
+        f"{placement!r} is no placement; pass an ID, (ID, pose), or hulld.Placement(ID, pose)"
     )
 
 
 class Placements:
-    """Many placements of few things: each ID once, the poses as one array.
+    """Many placements of few hulls or bodies: each ID once, the poses as one array.
 
-    ids: the distinct IDs. indices: for each placement, which of the ids it places; left out, each
-    ID is placed once, or a single ID as often as there are poses. poses: for each placement, as
-    pack_poses takes them; left out, where built.
+    ids: the distinct IDs. poses: for each placement, as in pack_poses; None: the identity.
+    indices: for each placement, the index of its ID; None: each ID is placed once, or a single ID
+    as often as there are poses. orthogonality_tolerance, quaternion_order: as in pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses
         Placements(["arm", "box"], poses, [0, 1, 1, 1])  # four placements of two hulls
 
-    ValueError: the lists do not fit each other.
+    ValueError: the lists do not fit each other, or hold a malformed ID.
     """
 
     def __init__(
@@ -59,9 +72,20 @@ class Placements:
         ids: str | Sequence[str],
         poses: PosesLike | None = None,
         indices: npt.ArrayLike | None = None,
+        *,
+        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+        quaternion_order: QuaternionOrder = "wxyz",
     ) -> None:
         self.ids: list[str] = [ids] if isinstance(ids, str) else list(ids)
-        packed: PackedPoses | None = None if poses is None else pack_poses(poses)
+        for index, one in enumerate(self.ids):
+            arguments.hull_id(one, f"ids[{index}]")
+        packed: PackedPoses | None = None
+        if poses is not None:
+            packed = pack_poses(
+                poses,
+                orthogonality_tolerance=orthogonality_tolerance,
+                quaternion_order=quaternion_order,
+            )
         if indices is None:
             many = len(self.ids) == 1 and packed is not None
             chosen = (
@@ -79,20 +103,27 @@ class Placements:
         self.poses: PackedPoses = packed
 
     @classmethod
-    def of(cls, placements: PlacementsLike) -> Placements:
-        """The same placements, packed."""
+    def of(
+        cls, placements: PlacementsLike, *, orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE
+    ) -> Placements:
+        """Packs placements."""
         if isinstance(placements, cls):
             return placements
         if isinstance(placements, str):
             raise TypeError(
-                f"{placements!r} is one ID; give a list of placements, or "
+                f"{placements!r} is one ID; pass a list of placements, or "
                 f"Placements({placements!r}, poses)"
             )
         single = [as_placement(placement) for placement in placements]  # type: ignore[union-attr]
         places: dict[str, int] = {}
         indices = [places.setdefault(placement.id, len(places)) for placement in single]
         rows = [placement.pose for placement in single]
-        return cls(list(places), pack_poses(rows), np.array(indices, np.uint32))
+        return cls(
+            list(places),
+            rows,
+            np.array(indices, np.uint32),
+            orthogonality_tolerance=orthogonality_tolerance,
+        )
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -116,24 +147,34 @@ class Placements:
 PlacementsLike = Union[Placements, Iterable[PlacementLike]]
 
 
-def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.uint32]:
-    """`values` as indices below `count`, in their shape. ValueError names the first that is not;
-    TypeError: no integers."""
-    array = np.asarray(values)
+def as_integers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
+    """`values` as an array of integers. TypeError: not integers."""
+    array = arguments.as_array(values, name)
     if array.size == 0:
         return np.empty(array.shape, np.uint32)
     if array.dtype.kind not in "iu":
         raise TypeError(f"{name} holds {array.dtype}, not integers")
+    return array
+
+
+def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.uint32]:
+    """`values` as indices below `count`, in their shape. ValueError names the first that is not;
+    TypeError: not integers."""
+    array = as_integers(values, name)
+    if not array.size:
+        return np.empty(array.shape, np.uint32)
     if not (array.min() >= 0 and array.max() < count):
         at = np.argwhere((array < 0) | (array >= count))[0]
-        place = "".join(f"[{i}]" for i in at)
-        raise ValueError(f"{name}{place} is {array[tuple(at)]}; there are {count}, counted from 0")
+        raise ValueError(
+            f"{name}{arguments.place(tuple(at))} is {array[tuple(at)]}; there are {count}, counted "
+            "from 0"
+        )
     return array.astype(np.uint32, copy=False)
 
 
 def as_pairs(pairs: npt.ArrayLike, count: int) -> npt.NDArray[np.uint32]:
     """m x 2 indices of placements. ValueError: another shape, or an index out of range."""
-    array = np.asarray(pairs)
+    array = arguments.as_array(pairs, "pairs")
     if array.size == 0:
         array = np.empty((0, 2), np.uint32)
     if array.ndim != 2 or array.shape[1] != 2:
@@ -145,5 +186,20 @@ def as_pairs(pairs: npt.ArrayLike, count: int) -> npt.NDArray[np.uint32]:
 
 
 def all_pairs(count: int) -> npt.NDArray[np.uint32]:
-    """Each two of `count` placements once, the lower index first: (m, 2)."""
+    """Every pair of `count` placements once, the lower index first: (m, 2)."""
     return np.stack(np.triu_indices(count, 1), axis=1).astype(np.uint32)
+
+
+def check_update(
+    placements: npt.ArrayLike, poses: PosesLike, count: int, orthogonality_tolerance: float
+) -> tuple[npt.NDArray[np.uint32], PackedPoses]:
+    """The indices of moved placements, of `count`, and their packed poses; errors as in
+    CollisionStream.update."""
+    indices = as_indices(placements, count, "placements").reshape(-1)
+    packed = pack_poses(poses, orthogonality_tolerance=orthogonality_tolerance)
+    if len(packed) != len(indices):
+        raise ValueError(f"there are {len(packed)} poses for {len(indices)} placements")
+    values, counts = np.unique(indices, return_counts=True)
+    if len(values) != len(indices):
+        raise ValueError(f"placements names {values[np.argmax(counts)]} twice; name each once")
+    return indices, packed

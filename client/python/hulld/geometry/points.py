@@ -1,16 +1,17 @@
-"""Points as numpy arrays: what is taken, and in which form it is sent."""
+"""Points as numpy arrays, and their form on the wire."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Union
+from typing import Union
 
 import numpy as np
 import numpy.typing as npt
 
+from hulld.arguments import as_array, as_floats
 from hulld.wire import MessageWriter
 
-#: What a hull takes: n x 3 in the caller's length unit.
+#: n x 3 numbers in the caller's length unit.
 PointsLike = npt.ArrayLike
 Points = Union[npt.NDArray[np.float64], npt.NDArray[np.float32]]
 
@@ -24,10 +25,11 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
     and float32 stay as they are, and so does their memory. float16 and integers are widened. No
     copy is made where none is needed.
 
-    Raises ValueError: another shape; a coordinate that is not finite (names it); numbers that no
-    double holds, such as integers beyond 2^53 or long doubles. TypeError: no numbers.
+    ValueError: another shape; a coordinate that is masked or not finite (the message names it);
+    numbers that no double holds, such as integers beyond 2^53 or long doubles. TypeError: not
+    numbers, such as booleans or complex numbers.
     """
-    array: npt.NDArray[Any] = np.asarray(points)
+    array = as_array(points, name)
     if array.size == 0 and array.ndim < 2:
         array = array.reshape(0, 3)
     if array.ndim == 1 and array.shape[0] == 3:
@@ -43,36 +45,6 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
             f"{name}[np.isfinite({name}).all(axis=1)]"
         )
     return array
-
-
-def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
-    """The same numbers as float64 or float32. ValueError: no double holds one of them, which is
-    named. TypeError: no numbers."""
-    kind, size = array.dtype.kind, array.dtype.itemsize
-    if kind == "f" and size in (4, 8):
-        # The wire is little-endian.
-        return array.astype(array.dtype.newbyteorder("<"), copy=False)
-    if kind == "f" and size == 2:
-        return array.astype(np.float32)
-    if kind not in "biuf":
-        raise TypeError(f"{name} holds {array.dtype}, not numbers")
-    doubles = array.astype(np.float64)
-    # Compared in the type given: a comparison as doubles would round both sides.
-    with np.errstate(invalid="ignore"):
-        same = doubles.astype(array.dtype) == array
-    if kind in "iu":
-        # Beyond the type's range the conversion back means nothing.
-        same &= doubles < 2.0 ** (8 * size - (kind == "i"))
-    if kind == "f":
-        same |= np.isnan(array)
-    if not same.all():
-        at = tuple(int(index) for index in np.argwhere(~same)[0])
-        place = "".join(f"[{index}]" for index in at)
-        raise ValueError(
-            f"{name}{place} is {array[at]}, which no double holds "
-            f"exactly; round it to what you mean, as in {name}.astype(float)"
-        )
-    return doubles
 
 
 def point_block(points: Points) -> MessageWriter:

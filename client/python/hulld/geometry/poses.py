@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Union
+from dataclasses import InitVar, dataclass
+from typing import Any, Literal, Union
 
 import numpy as np
 import numpy.typing as npt
 
-from hulld.geometry.points import as_floats
+from hulld import arguments
 
-#: How far R Rᵀ of a matrix may be from the identity, in its largest entry. It is relative to 1, the
-#: length of a row: within it, a hull of 1 m stands within about a nanometre of where the matrix
-#: would put it. Products of hundreds of rotations in double precision stay far below (observed:
-#: 1e-13), matrices of float32 do not (1e-7).
+#: The default of the largest entry of R Rᵀ - I that a matrix may have. It is relative to 1, the
+#: length of a row: within it, a hull of 1 m stands within about a nanometre of its place by the matrix.
+#: Products of hundreds of rotations in double precision stay far below (observed: 1e-13), matrices
+#: of float32 do not (1e-7).
 ORTHOGONALITY_TOLERANCE = 1e-9
 
 PackedPoses = npt.NDArray[np.float64]
+#: The order of a quaternion's components in arrays. SciPy, ROS, and PyBullet write xyzw.
+QuaternionOrder = Literal["wxyz", "xyzw"]
 
 
 @dataclass(frozen=True)
@@ -25,34 +27,43 @@ class Pose:
     """X_WA, the pose of a hull's frame A in the world W: p_W = R(rotation) p_A + translation.
 
     rotation: quaternion w x y z, finite and not zero; it need not be normalized: q and s q are the
-    same rotation. translation: x y z, the caller's length unit. The pose is the exact rigid motion
-    for these doubles.
+    same rotation. translation: x y z, the caller's length unit. quaternion_order: the order of
+    `rotation` as given; the attribute is always w x y z. The pose is the exact rigid motion for
+    these doubles.
     """
 
     rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    quaternion_order: InitVar[QuaternionOrder] = "wxyz"
 
-    def __post_init__(self) -> None:
-        for name, size in (("rotation", 4), ("translation", 3)):
-            values = tuple(float(value) for value in getattr(self, name))
-            if len(values) != size:
+    def __post_init__(self, quaternion_order: QuaternionOrder) -> None:
+        for name, letters in (("rotation", quaternion_order), ("translation", "xyz")):
+            given = tuple(getattr(self, name))
+            if len(given) != len(letters):
                 raise ValueError(
-                    f"{name} has {len(values)} numbers; it takes {size}, "
-                    f"{'w x y z' if size == 4 else 'x y z'}"
+                    f"{name} has {len(given)} numbers; it takes {len(letters)}, "
+                    f"{' '.join(letters)}"
                 )
+            values = tuple(arguments.number(v, f"{name}[{i}]") for i, v in enumerate(given))
             object.__setattr__(self, name, values)
+        if not any(self.rotation):
+            raise ValueError("rotation is zero; any other quaternion is a rotation")
+        rotation = _reordered(np.array([self.rotation]), quaternion_order)[0].tolist()
+        object.__setattr__(self, "rotation", tuple(rotation))
 
     @classmethod
     def from_matrix(
         cls, matrix: npt.ArrayLike, *, tolerance: float = ORTHOGONALITY_TOLERANCE
     ) -> Pose:
-        """The pose that a 4 x 4 matrix stands for, [R t; 0 0 0 1].
+        """The pose of a 4 x 4 matrix [R t; 0 0 0 1].
 
-        A matrix of doubles is a rotation only up to rounding, so the pose is that of the quaternion
-        nearest by: its matrix differs from R by some units of rounding more than R differs from a
-        rotation. Quarter turns, as in rotations by 90 degrees, are exact. Nothing else is repaired:
-        ValueError where R Rᵀ is farther than `tolerance` from the identity (says how far), where R
-        mirrors, where the last row is not 0 0 0 1, where a number is not finite.
+        A matrix of doubles is a rotation only up to rounding. The pose has the nearest quaternion,
+        whose matrix differs from R by some units of rounding more than R differs from a rotation.
+        Rotations by multiples of 90 degrees are exact. tolerance: the largest entry of R Rᵀ - I
+        that is accepted, orthogonality_tolerance elsewhere.
+
+        ValueError: R Rᵀ is farther from the identity (the message says how far), R mirrors, the
+        last row is not 0 0 0 1, a number is not finite.
         """
         array = _doubles(matrix)
         if array.shape != (4, 4):
@@ -60,40 +71,48 @@ class Pose:
         return cls.from_packed(pack_matrices(array.reshape(1, 4, 4), tolerance=tolerance)[0])
 
     @classmethod
-    def from_packed(cls, numbers: npt.ArrayLike) -> Pose:
-        """The pose of seven numbers, w x y z x y z."""
-        values = [float(value) for value in _doubles(numbers)]
-        if len(values) != 7:
-            raise ValueError(f"a packed pose has seven numbers, not {len(values)}")
-        return cls((values[0], values[1], values[2], values[3]), (values[4], values[5], values[6]))
+    def from_packed(
+        cls, numbers: npt.ArrayLike, *, quaternion_order: QuaternionOrder = "wxyz"
+    ) -> Pose:
+        """The pose of seven numbers, a quaternion and a translation x y z."""
+        values = _doubles(numbers).tolist()
+        if np.shape(values) != (7,):
+            raise ValueError(f"a packed pose has seven numbers, not the shape {np.shape(values)}")
+        a, b, c, d, x, y, z = values
+        return cls((a, b, c, d), (x, y, z), quaternion_order)
 
     def packed(self) -> npt.NDArray[np.float64]:
-        """The seven numbers w x y z x y z, as they travel."""
+        """The seven numbers w x y z x y z."""
         return np.array(self.rotation + self.translation, np.float64)
 
     def matrix(self) -> npt.NDArray[np.float64]:
-        """The 4 x 4 matrix, rounded: for drawing and for other libraries, not to be exact with."""
+        """The 4 x 4 matrix, rounded: for drawing and for other libraries."""
         matrix: npt.NDArray[np.float64] = matrices_of(self.packed().reshape(1, 7))[0]
         return matrix
 
 
-#: A pose: none (where the hull was built), a Pose, 4 x 4, seven numbers w x y z x y z, or a
+#: A pose: None (the identity), a Pose, a 4 x 4 matrix, seven numbers w x y z x y z, or a
 #: translation x y z.
 PoseLike = Union[None, Pose, npt.ArrayLike]
 #: Many poses: n x 4 x 4, n x 7, n x 3, or a sequence of single ones.
 PosesLike = Union[npt.ArrayLike, Sequence[PoseLike]]
 
 
-def _doubles(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def _doubles(values: Any, name: str = "pose") -> npt.NDArray[np.float64]:
     """ValueError: a number that no double holds."""
-    doubles: npt.NDArray[np.float64] = as_floats(np.asarray(values), "pose").astype(
-        np.float64, copy=False
-    )
+    doubles: npt.NDArray[np.float64] = arguments.as_floats(
+        arguments.as_array(values, name), name
+    ).astype(np.float64, copy=False)
     return doubles
 
 
-def pack_pose(pose: PoseLike) -> npt.NDArray[np.float64]:
-    """The seven numbers of one pose. Errors as in pack_poses."""
+def pack_pose(
+    pose: PoseLike,
+    *,
+    orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+    quaternion_order: QuaternionOrder = "wxyz",
+) -> npt.NDArray[np.float64]:
+    """The seven numbers of a pose; arguments and errors as in pack_poses."""
     if pose is None:
         return np.array([1.0, 0, 0, 0, 0, 0, 0])
     if isinstance(pose, Pose):
@@ -104,56 +123,87 @@ def pack_pose(pose: PoseLike) -> npt.NDArray[np.float64]:
             f"a pose of shape {array.shape} is none of (4, 4), a matrix; (7,), a quaternion and a "
             "translation w x y z x y z; (3,), a translation"
         )
-    packed: npt.NDArray[np.float64] = _pack_array(array[np.newaxis])[0]
+    packed: npt.NDArray[np.float64] = _pack_array(
+        array[np.newaxis], orthogonality_tolerance, quaternion_order
+    )[0]
     return packed
 
 
-def pack_poses(poses: PosesLike) -> PackedPoses:
-    """Poses as n x 7 numbers, w x y z x y z in each row, as they travel.
+def pack_poses(
+    poses: PosesLike,
+    *,
+    orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+    quaternion_order: QuaternionOrder = "wxyz",
+) -> PackedPoses:
+    """Poses as n x 7 numbers, w x y z x y z in each row.
 
-    Doubles pass as they are; matrices become quaternions as Pose.from_matrix says. ValueError:
-    another shape, or a matrix that is no rigid motion; it names the pose and says how far off it
-    is.
+    Doubles pass unchanged; matrices become quaternions as in Pose.from_matrix.
+    orthogonality_tolerance: the largest entry of R Rᵀ - I that a matrix may have.
+    quaternion_order: the order of the quaternions in rows of seven numbers; a Pose has its own.
+
+    ValueError names the pose: another shape, a masked or non-finite number, a zero quaternion, a
+    matrix that is no rigid motion.
     """
-    if isinstance(poses, np.ndarray) and poses.dtype != object:
-        return _pack_array(_doubles(poses))
+    if isinstance(poses, (np.ndarray, np.ma.MaskedArray)) and poses.dtype != object:
+        return _pack_array(_doubles(poses, "poses"), orthogonality_tolerance, quaternion_order)
     sequence: Sequence[Any] = list(poses)  # type: ignore[arg-type]
     if not sequence:
         return np.empty((0, 7))
     rows = []
     for index, pose in enumerate(sequence):
         try:
-            rows.append(pack_pose(pose))
-        except ValueError as error:
-            raise ValueError(f"poses[{index}]: {_without_index(str(error))}") from None
+            row = pack_pose(
+                pose,
+                orthogonality_tolerance=orthogonality_tolerance,
+                quaternion_order=quaternion_order,
+            )
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"poses[{index}]: {str(error).removeprefix('poses[0]: ')}") from None
+        rows.append(row)
     return np.stack(rows)
 
 
-def _without_index(message: str) -> str:
-    return message.removeprefix("poses[0]: ")
-
-
-def _pack_array(array: npt.NDArray[np.float64]) -> PackedPoses:
+def _pack_array(
+    array: npt.NDArray[np.float64], tolerance: float, order: QuaternionOrder
+) -> PackedPoses:
     if array.ndim == 3 and array.shape[1:] == (4, 4):
-        return pack_matrices(array)
-    if array.ndim == 2 and array.shape[1] == 7:
-        return np.ascontiguousarray(array)
-    if array.ndim == 2 and array.shape[1] == 3:
+        return pack_matrices(array, tolerance=tolerance)
+    if array.ndim != 2 or array.shape[1] not in (3, 7):
+        raise ValueError(
+            f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions "
+            "and translations w x y z x y z; (n, 3), translations"
+        )
+    finite = np.isfinite(array)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise ValueError(f"poses[{row}]: number {column} is {array[row, column]}")
+    if array.shape[1] == 3:
         packed = np.zeros((len(array), 7))
         packed[:, 0] = 1
         packed[:, 4:] = array
         return packed
-    raise ValueError(
-        f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions and "
-        "translations w x y z x y z; (n, 3), translations"
-    )
+    zero = ~array[:, :4].any(axis=1)
+    if zero.any():
+        raise ValueError(
+            f"poses[{int(np.argmax(zero))}]: the quaternion is zero; any other is a rotation"
+        )
+    return _reordered(array, order)
+
+
+def _reordered(rows: npt.NDArray[np.float64], order: QuaternionOrder) -> npt.NDArray[np.float64]:
+    """The rows, which begin with a quaternion, with w first."""
+    if order == "wxyz":
+        return rows
+    if order != "xyzw":
+        raise ValueError(f'quaternion_order is {order!r}; it takes "wxyz" or "xyzw"')
+    return np.concatenate([rows[:, 3:4], rows[:, :3], rows[:, 4:]], axis=1)
 
 
 def pack_matrices(
     matrices: npt.NDArray[np.float64], *, tolerance: float = ORTHOGONALITY_TOLERANCE
 ) -> PackedPoses:
-    """n x 4 x 4 matrices as n x 7 numbers; checks and errors as in Pose.from_matrix."""
-    _check_matrices(matrices, tolerance)
+    """n x 4 x 4 matrices as n x 7 numbers; errors as in Pose.from_matrix."""
+    _check_matrices(matrices, arguments.length(tolerance, "orthogonality_tolerance"))
     packed = np.empty((len(matrices), 7))
     packed[:, :4] = _quaternions_of(matrices[:, :3, :3])
     packed[:, 4:] = matrices[:, :3, 3]
@@ -174,14 +224,22 @@ def _check_matrices(matrices: npt.NDArray[np.float64], tolerance: float) -> None
     if (index := first(~(off <= tolerance))) is not None:
         raise ValueError(
             f"poses[{index}]: the rotation is not orthogonal: R Rᵀ is off the identity by "
-            f"{off[index]:.3g}, and at most {tolerance:g} is allowed; orthonormalize it yourself, "
-            "or allow more with Pose.from_matrix(..., tolerance=...)"
+            f"{off[index]:.3g}, and at most {tolerance:g} is allowed; orthonormalize it, or accept "
+            f"the deviation with orthogonality_tolerance={_rounded_up(off[index])} "
+            "(Pose.from_matrix: tolerance)"
         )
     if (index := first(np.linalg.det(rotations) < 0)) is not None:
         raise ValueError(
             f"poses[{index}]: the matrix mirrors (its determinant is negative), which no motion "
             "does"
         )
+
+
+def _rounded_up(deviation: float) -> str:
+    """A power of ten of at least `deviation`."""
+    if not 0 < deviation < 1:
+        return "..."
+    return f"1e-{int(-np.log10(deviation)):02d}"
 
 
 def _quaternions_of(rotations: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

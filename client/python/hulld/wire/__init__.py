@@ -1,5 +1,4 @@
-"""Protobuf's wire format for what is large: numpy's buffers as they are, no element touched by
-Python."""
+"""Protobuf's wire format for large fields: numpy's buffers, unchanged."""
 
 from hulld.wire.fields import (
     MessageWriter,

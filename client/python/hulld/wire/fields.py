@@ -1,9 +1,9 @@
-"""Writes and reads the fields of a protobuf message whose arrays are numpy's.
+"""Writes and reads the fields of a protobuf message with numpy arrays.
 
 python-protobuf takes and gives arrays number by number, some 50 ns each. A packed field is the
-array's own bytes behind a tag and a length, so this module puts numpy's buffer there, and finds it
-there again. Small messages stay protobuf's; their bytes can be put into a message that is written
-here, and the other way round.
+array's own bytes behind a tag and a length, so this module writes numpy's buffer there, and reads
+it from there. Small messages are left to protobuf; their bytes can be embedded here, and the other
+way round.
 
 Source: Protocol Buffers, "Encoding". A test compares both directions with protobuf's own.
 """
@@ -43,7 +43,7 @@ def encode_varints(values: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
     size = max(1, -(-int(flat.max(initial=0)).bit_length() // 7))
     if size == 1:
         return flat.astype(np.uint8)
-    # All groups of all numbers; then those that a number does not need are left out.
+    # All groups of all numbers; then unneeded groups are dropped.
     groups = np.empty((flat.size, size), np.uint8)
     kept = np.ones((flat.size, size), np.bool_)
     for group in range(size):
@@ -125,10 +125,10 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
-    """Number, wire type and value of each field, in order. What has a length comes as a view of
+    """Number, wire type, and value of each field, in order. A value with a length is a view of
     `data`.
 
-    Raises WireError where the bytes are cut off or no message.
+    WireError: the bytes are cut off, or no message.
     """
     view = memoryview(data)
     at = 0
@@ -161,22 +161,22 @@ def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
 
 
 def packed_doubles(value: Value) -> npt.NDArray[np.float64]:
-    """What a `repeated double` field holds, packed or a single entry: a view, not a copy."""
+    """The numbers of a `repeated double` field, packed or a single entry: a view, not a copy."""
     if isinstance(value, int) or len(value) % 8:
         raise WireError("a field of doubles does not hold doubles")
     return np.frombuffer(value, "<f8")
 
 
 def packed_floats(value: Value) -> npt.NDArray[np.float32]:
-    """The same for a `repeated float`."""
+    """The numbers of a `repeated float` field, as packed_doubles."""
     if isinstance(value, int) or len(value) % 4:
         raise WireError("a field of floats does not hold floats")
     return np.frombuffer(value, "<f4")
 
 
 def packed_varints(value: Value) -> Unsigned:
-    """What a field of repeated integers, enums or bools holds, packed or a single entry: as uint8,
-    and without a copy, where all are below 128, else as uint64. Cost: some ns each."""
+    """The numbers of a field of repeated integers, enums, or bools, packed or a single entry: as
+    uint8, and without a copy, if all are below 128, else as uint64. Cost: some ns each."""
     if isinstance(value, int):
         return np.array([value], np.uint64)
     data = np.frombuffer(value, np.uint8)
@@ -193,7 +193,7 @@ def packed_varints(value: Value) -> Unsigned:
     longest = int(sizes.max())
     if longest > 10:
         raise WireError("a varint is longer than ten bytes")
-    # Byte by byte of all numbers at once: most are short, so the passes soon concern few.
+    # Byte by byte of all numbers together: most are short, so few remain for later passes.
     out: npt.NDArray[np.uint64] = (data[starts] & np.uint8(0x7F)).astype(np.uint64)
     which = np.arange(out.size)
     for byte in range(1, longest):

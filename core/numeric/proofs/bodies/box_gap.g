@@ -1,11 +1,11 @@
-# The gap between two boxes along axes of either, in units of S = M_X + M_Y + |t|, of which P,
-# (1 - P) Q and (1 - P) (1 - Q) are the parts; one component of each. The entries A, B of the two
-# bodies' rotations err by g and h, and so does R_XY, their product, by k. A centre c and a half
-# width are halves of a sum and a difference of two doubles: one rounding, m.
+# The gap between two boxes along axes of either, in units of S = M_X + M_Y + |t|, with parts P, (1
+# - P) Q and (1 - P) (1 - Q); one component of each. The entries A, B of the two bodies' rotations
+# err by g and h, and their product R_XY by k. A centre c and a half width are halves of a sum and a
+# difference of two doubles: one rounding, m.
 #
 # By hand: an absolute value errs as its argument does, so the gap is proved without them; Eigen may
-# add three products in another order, to the same bound; a component of the exact step is at most
-# 3 (1 - P) + P, as entries are at most 1.
+# add three products in another order, with the same bound; a component of the exact step is at most
+# 3 (1 - P) + P, because entries are at most 1.
 
 entry = fl((A1 + g1) * (B1 + h1) + (A2 + g2) * (B2 + h2) + (A3 + g3) * (B3 + h3));
 exact_entry = A1 * B1 + A2 * B2 + A3 * B3;

@@ -1,11 +1,11 @@
 # A component of R(q) p / |q|^2 + t in double-double arithmetic (double_double.h), in units of the
-# largest component of p plus that of t, of which the parts are P and 1 - P; |q| = 1. An operation
-# errs by d of its result: 3 u^2 a sum, 5 u^2 a product, 17 u^2 a quotient, with 0.01 u^2 for higher
-# powers of u; double_double.h says whose theorems these are.
+# largest component of p plus that of t, with parts P and 1 - P; |q| = 1. An operation errs by d of
+# its result: 3 u^2 for a sum, 5 u^2 for a product, 17 u^2 for a quotient, with 0.01 u^2 for higher
+# powers of u; double_double.h names the theorems.
 #
-# By hand: a numerator n is a sum of four exact products of components of q whose sizes sum to at
-# most 1, added two by two, so it errs by two roundings of sums: 6.1 u^2; the squared norm, a sum of
-# positive terms, by as much of itself, and `inverse` is what its reciprocal errs by.
+# By hand: a numerator n is a sum of four exact products of components of q with sizes that sum to
+# at most 1, added two by two, so it errs by two roundings of sums: 6.1 u^2; the squared norm, a sum
+# of positive terms, by as much of itself; `inverse` is the error of its reciprocal.
 
 v1 = P * x1; v2 = P * x2; v3 = P * x3;
 t = (1 - P) * y;

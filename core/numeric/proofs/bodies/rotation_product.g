@@ -1,9 +1,10 @@
-# As rotation.g, for a q that is the product of two quaternions, each component rounded once (c).
+# Counterpart of rotation.g for a q that is the product of two quaternions, each component rounded
+# once (c).
 #
 # By hand: a component is computed from exact products in double-double arithmetic, so beyond its
-# rounding it errs by less than 64 u^2 |q|, which the slack holds: it moves an entry by less than
-# 2^10 u^2. A sum of positive terms errs as its terms do, so a numerator's half has twice the
-# component's error, and the squared norm, too.
+# rounding it errs by less than 64 u^2 |q|, which the slack covers: it moves an entry by less than
+# 2^10 u^2. A sum of positive terms errs as its terms do, so half of a numerator has twice the
+# component's error, and so does the squared norm.
 
 a = P * x; b = (1 - P) * y;
 exact = a - b;

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld {
-namespace {
+namespace arguments_test {
 
 using std::chrono::milliseconds;
 
@@ -38,5 +38,5 @@ TEST(Arguments, PosesAreThreeOrSevenNumbers) {
   }
 }
 
-}  // namespace
+}  // namespace arguments_test
 }  // namespace hulld

@@ -5,7 +5,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace list_and_delete_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -83,5 +83,5 @@ TEST_F(ListAndDelete, WishesThatContradictEachOtherAreExplained) {
   EXPECT_EQ(Names({"list"}), "arm/1\narm/2\nbox\n");
 }
 
-}  // namespace
+}  // namespace list_and_delete_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// What commands that write do when there is nothing to write, or nothing to write to.
+// Write commands with empty input, or with a missing target.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace safe_writes_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -54,7 +54,7 @@ TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("hold no points"), HasSubstr("hullctl create")));
   EXPECT_FALSE(Exists("new"));
-  // To a hull that is there, nothing may be added.
+  // Adding nothing to an existing hull is allowed.
   Put("h", server::Cube());
   EXPECT_EQ(Ask({"append", "h", empty.path(), "--create"}).code, 0);
 }
@@ -68,11 +68,11 @@ TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoint
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("the limit is 3"));
   EXPECT_FALSE(Exists("new"));
-  // One that was there, though empty, stays.
+  // A previously existing hull stays, though empty.
   Create("mine");
   EXPECT_EQ(Ask({"append", "mine", file.path(), "--create"}).code, 1);
   EXPECT_TRUE(Exists("mine"));
-  // So do points that were taken.
+  // So do accepted points.
   ran = Ask({"append", "some", "--create", "--chunk-points", "2", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(Get("some").hull().vertex_count(), 4U);
@@ -87,5 +87,5 @@ TEST_F(SafeWrites, WhatIsNotThereIsNotToBeCreatedToBeDeleted) {
               AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));
 }
 
-}  // namespace
+}  // namespace safe_writes_test
 }  // namespace hulld

@@ -14,7 +14,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace watch_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -54,7 +54,7 @@ TEST_F(HullctlWatch, TellsOfBodies) {
   EXPECT_THAT(ran.out, HasSubstr("a/body\n"));
 }
 
-// Points that change the hull come until the command has ended.
+// Adds points that change the hull until the command has ended.
 class Growth {
  public:
   explicit Growth(v1::HullService::Stub& stub) {
@@ -152,5 +152,5 @@ TEST_F(HullctlWatch, ExplainsWhatIsWrong) {
   EXPECT_EQ(ran.code, 2);
 }
 
-}  // namespace
+}  // namespace watch_test
 }  // namespace hulld

@@ -7,7 +7,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace completion_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -17,7 +17,7 @@ using ::testing::StartsWith;
 
 class CompletionOnServer : public HullctlOnServer {
  protected:
-  // What is offered for the last word, and the directive at the end.
+  // Returns the candidates for the last word, and the directive at the end.
   std::vector<std::string> Offers(std::vector<std::string> words) {
     words.insert(words.begin(), {kCompleteCommand, "--server", server_->address()});
     const Ran ran = RunTool(words);
@@ -43,7 +43,7 @@ TEST_F(CompletionOnServer, CommandsOptionsAndValuesComeFromTheDeclaration) {
   EXPECT_THAT(Offers({"append", "a", ""}), ElementsAre(":files"));
   EXPECT_THAT(Offers({"mesh", "a", "-o", ""}), ElementsAre(":files"));
   EXPECT_THAT(Offers({"backup", "restore", "f", "--data-dir", ""}), ElementsAre(":directories"));
-  // Nothing hidden, and nothing where no more words fit.
+  // No hidden options, and no candidates if no more words fit.
   EXPECT_THAT(Offers({"__"}), ElementsAre(":"));
   EXPECT_THAT(Offers({"create", "a", ""}), ElementsAre(":"));
   EXPECT_THAT(Offers({"nonsense", "--out"}), ElementsAre("--output", ":"));
@@ -57,7 +57,7 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   EXPECT_THAT(Offers({"check", "box", "arm"}), ElementsAre("arm/1", "arm/2", ":"));
   EXPECT_THAT(Offers({"delete", "box", "b"}), ElementsAre("box", ":"));
   EXPECT_THAT(Offers({"create", ""}), ElementsAre(":"));
-  // When there are many IDs, the parts of their names are offered.
+  // Many IDs are completed by segments.
   for (int i = 0; i < 100; ++i) Create("arm/" + std::to_string(i) + "/hand");
   EXPECT_THAT(Offers({"get", "arm/9"}).size(), 12U);
   const std::vector<std::string> parts = Offers({"list", "a"});
@@ -95,5 +95,5 @@ TEST(CompletionScript, CallsTheProgramThatIsTyped) {
   EXPECT_THAT(other.err, HasSubstr("\"csh\" is none of bash, zsh, fish"));
 }
 
-}  // namespace
+}  // namespace completion_test
 }  // namespace hulld

@@ -1,9 +1,9 @@
 #!/bin/bash
-# hullctl as people have it: completed by a real shell, or on a terminal that asks and is asked.
+# hullctl in its real environment: completed by a real shell, or prompting on a terminal.
 #
 #   shell_test.sh PROGRAMS bash|zsh|fish|terminal
 #
-# PROGRAMS: the directory of hulld and hullctl. Exit code 77: there is no such shell here.
+# PROGRAMS: the directory of hulld and hullctl. Exit code 77: the shell is not installed.
 set -uo pipefail
 
 programs=$(cd "$1" && pwd) || exit 2
@@ -31,7 +31,7 @@ hullctl create box >/dev/null
 echo "0 0 0" >points.xyz
 
 failures=0
-# expect LINE WANTED GOT: the words that are offered for a line.
+# expect LINE WANTED GOT: compares the candidates for a line.
 expect() {
   [[ $2 == "$3" ]] && return 0
   echo "FAILED: $1"
@@ -40,7 +40,7 @@ expect() {
   failures=$((failures + 1))
 }
 
-# Lines, and what is offered for their last words.
+# Lines, and the candidates for their last words.
 cases() {
   expect "hullctl che" "check" "$(offers 'hullctl che')"
   expect "hullctl get a" "arm/left" "$(offers 'hullctl get a')"
@@ -60,7 +60,7 @@ case $kind in
       echo "${COMPREPLY[*]}"
     }
     cases
-    # Bash replaces only what follows the "=" or ":".
+    # Bash replaces only the part after the "=" or ":".
     expect "hullctl list --output=w" "wide" "$(offers 'hullctl list --output=w')"
     expect "an alias" "arm/left" "$(offers 'h get a')"
     expect "an assignment in front" "arm/left" "$(offers 'HULLCTL_CONTEXT=here hullctl get a')"
@@ -74,12 +74,12 @@ case $kind in
     expect "hullctl list --output=w" "--output=wide" "$(offers 'hullctl list --output=w')"
     ;;
   zsh)
-    # A terminal of zsh's own, where a tab completes the line and a key prints what it is then.
+    # A zsh pseudo-terminal: a tab completes the line and a key prints the result.
     cat >offers.zsh <<'EOF'
 zmodload zsh/zpty
 zpty -b shell zsh -f -i
 zpty -w shell 'PS1=; autoload -U compinit; compinit -D; source <(hullctl completion zsh); unsetopt beep'
-# Its text, which the terminal echoes, must not look like what it prints.
+# The terminal echoes this text, so it must not resemble the output.
 zpty -w shell 'show() { print -r -- "<""<$BUFFER>"">"; BUFFER=; zle accept-line }; zle -N show; bindkey "^X" show'
 zpty -w shell 'print READ''Y'
 zpty -r shell answer '*READY*'
@@ -92,13 +92,13 @@ EOF
       local line
       line=$(timeout 20 zsh -f offers.zsh "$1")
       line=${line% }
-      # What was not completed was not offered.
+      # A line without completion had no candidates.
       [[ $line == "$1" ]] || echo "${line##* }"
     }
     cases
     ;;
   terminal)
-    # on_terminal INPUT COMMAND: what it prints there.
+    # on_terminal INPUT COMMAND: the output on a terminal.
     on_terminal() { printf '%b' "$1" | timeout 20 script -qec "$2" /dev/null | tr -d '\r'; }
     contains() { [[ $3 == *"$2"* ]] || expect "$1" "...$2..." "$3"; }
     contains "the question before a delete" "Delete 1 hull (arm/left)? [y/N]" \

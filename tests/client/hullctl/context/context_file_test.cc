@@ -11,7 +11,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace context_file_test {
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -91,7 +91,7 @@ TEST_F(Contexts, AFileIsReadBackAsItWasWritten) {
   ASSERT_EQ(stat(ContextFilePath().c_str(), &info), 0);
   EXPECT_EQ(info.st_mode & 0777, 0600u);
   ASSERT_TRUE(WriteContextFile({}).ok());
-  // Nothing but the file is left in its folder.
+  // Only the file remains in its folder.
   int entries = 0;
   for (const auto& entry : std::filesystem::directory_iterator(
            std::filesystem::path(ContextFilePath()).parent_path())) {
@@ -118,10 +118,10 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
   EXPECT_THAT(problem(R"({"contexts":{"a b":{"server":"a:1"}}})"), HasSubstr("a name is up to"));
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","tls":"yes"}}})"),
               HasSubstr("tls is not a true or false"));
-  // A token does not belong there, and is not repeated.
+  // A token does not belong in this file, and is not repeated in errors.
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","token":"hunter2"}}})"),
               AllOf(HasSubstr("\"token\", which is no setting"), Not(HasSubstr("hunter2"))));
-  // Commands that talk to no server do not mind.
+  // Commands without a server ignore the error.
   EXPECT_EQ(RunTool({"generate", "cube", "1"}).code, 0);
   Write(R"({"contexts":{"a":{"server":"nowhere"}},"current":"a"})");
   EXPECT_THAT(RunTool({"list"}).err,
@@ -189,5 +189,5 @@ TEST_F(Contexts, WhatCannotWorkIsNotAdded) {
   EXPECT_TRUE(ReadContextFile()->contexts.empty());
 }
 
-}  // namespace
+}  // namespace context_file_test
 }  // namespace hulld

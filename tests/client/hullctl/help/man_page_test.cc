@@ -11,7 +11,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace man_page_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -72,5 +72,5 @@ TEST(ManPage, EveryCommandHasOne) {
   std::filesystem::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace man_page_test
 }  // namespace hulld

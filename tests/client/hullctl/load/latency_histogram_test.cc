@@ -7,7 +7,7 @@
 #include <random>
 
 namespace hulld {
-namespace {
+namespace latency_histogram_test {
 
 using std::chrono::nanoseconds;
 
@@ -73,5 +73,5 @@ TEST(LatencyHistogram, EmptyHasNoRows) {
   EXPECT_EQ(LatencyHistogram().Percentile(0.5).count(), 0);
 }
 
-}  // namespace
+}  // namespace latency_histogram_test
 }  // namespace hulld

@@ -7,7 +7,7 @@
 #include <thread>
 
 namespace hulld {
-namespace {
+namespace load_test {
 
 using std::chrono::milliseconds;
 
@@ -53,7 +53,7 @@ TEST(Load, FailuresAreCountedByCodeAndNotAmongLatencies) {
   EXPECT_EQ(result.failures.at(absl::StatusCode::kNotFound).count, 1U);
 }
 
-// Request 0 takes 100 ms; those behind it were due long before they are sent.
+// Request 0 takes 100 ms; later ones are overdue long before they are sent.
 TEST(Load, WithARateLatencyCountsFromWhenTheRequestWasDue) {
   const auto ask = [](std::optional<double> rate) {
     const LoadRequest client = [](uint64_t i) -> absl::StatusOr<uint64_t> {
@@ -87,5 +87,5 @@ TEST(Load, RequestsThatWereDueAndNeverSentAreCounted) {
   EXPECT_EQ(result.missed, 39U);
 }
 
-}  // namespace
+}  // namespace load_test
 }  // namespace hulld

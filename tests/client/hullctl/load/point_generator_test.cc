@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace hulld {
-namespace {
+namespace point_generator_test {
 
 using Point = std::array<double, 3>;
 
@@ -140,5 +140,5 @@ TEST(PointGenerator, AnotherSeedGivesOtherPoints) {
   EXPECT_NE(Generate(options), first);
 }
 
-}  // namespace
+}  // namespace point_generator_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// hullctl append --split, how much larger hulls are, and cover, against the real server.
+// hullctl append --split, the excess volume of hulls, and cover, against the real server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace parts_test {
 
 using testing::HasSubstr;
 
-// A box as OBJ, its vertices counted on from `first`.
+// Returns a box as OBJ with vertices numbered from `first`.
 std::string Box(const std::string& name, double x, double y, double dx, double dy, int first) {
   std::string text = "o " + name + "\n";
   for (int corner = 0; corner < 8; ++corner) {
@@ -41,7 +41,7 @@ TEST_F(HullctlParts, AppendSaysHowMuchLargerTheHullIs) {
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("volume     1.643 times that of the mesh\n"));
   EXPECT_THAT(ran.err, HasSubstr("warning: the hull l has 1.643 times the volume of its mesh"));
-  // Points of elsewhere are in it now, too.
+  // It now also contains points from elsewhere.
   ran = Ask({"append", "l", bracket_.path()});
   EXPECT_THAT(ran.out, testing::Not(HasSubstr("volume")));
   const TempFile open("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
@@ -59,7 +59,7 @@ TEST_F(HullctlParts, SplitMakesAHullOfEachPart) {
   EXPECT_THAT(ran.out, HasSubstr("1 times that of the mesh"));
   EXPECT_EQ(ran.err, "");
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "l/back\nl/foot\n");
-  // The boxes share corners, so they hang together.
+  // The boxes share corners, so they are connected.
   ran = Ask(
       {"append", "k", bracket_.path(), "--split", "components", "--create", "--output", "name"});
   EXPECT_EQ(ran.out, "k/component-1\nk\n");
@@ -75,13 +75,13 @@ TEST_F(HullctlParts, SplitMakesABodyOfTheParts) {
   EXPECT_THAT(ran.out, HasSubstr("\nbody l created at revision "));
   EXPECT_THAT(ran.out, HasSubstr(", 2 pieces\n"));
   EXPECT_EQ(Ask({"body", "get", "l", "--output", "name"}).out, "l/foot\nl/back\n");
-  // Again: the body stays as it is.
+  // Repeated: the body stays unchanged.
   const std::string before = Ask({"body", "get", "l"}).out;
   ran = Ask(split);
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("\nbody l has them already, at revision "));
   EXPECT_EQ(Ask({"body", "get", "l"}).out, before);
-  // A part that it lacks comes behind; one that was moved stays where it is.
+  // A missing part is appended; a moved one keeps its pose.
   ASSERT_EQ(Ask({"body", "put", "l", "l/back@0,0,9"}).code, 0);
   EXPECT_THAT(Ask(split).out, HasSubstr("\nbody l extended at revision "));
   EXPECT_THAT(AskJson({"body", "get", "l"}).out, HasSubstr("\"z\":9"));
@@ -117,7 +117,7 @@ TEST_F(HullctlParts, CoverTakesTheBodyAtItsPoses) {
   ASSERT_EQ(Ask({"append", "l", bracket_.path(), "--split", "names", "--create"}).code, 0);
   Ran ran = Ask({"cover", "l", bracket_.path()});
   EXPECT_EQ(ran.out, "ENCLOSED: each of the 24 triangles is in the hulls together (exact)\n");
-  // Moved by the smallest step, it encloses the mesh no more.
+  // Moved by the smallest step, it no longer encloses the mesh.
   ASSERT_EQ(Ask({"body", "put", "moved", "l/foot@0,0,5e-324", "l/back"}).code, 0);
   EXPECT_EQ(Ask({"cover", "moved", bracket_.path(), "--output", "name"}).out, "OUTSIDE\n");
   ASSERT_EQ(Ask({"body", "put", "half", "l/foot", "nail"}).code, 0);
@@ -142,5 +142,5 @@ TEST_F(HullctlParts, CoverTellsWhatSticksOut) {
   EXPECT_EQ(Ask({"cover", "nowhere", bracket_.path()}).code, 1);
 }
 
-}  // namespace
+}  // namespace parts_test
 }  // namespace hulld

@@ -10,7 +10,7 @@
 #include "tests/client/hullctl/xml_check.h"
 
 namespace hulld {
-namespace {
+namespace scene_svg_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -82,7 +82,7 @@ TEST(SceneSvg, DrawsAnyMagnitude) {
     }
     const std::string svg = RenderSceneSvg({Points(corners)}, UpAxis::kZ);
     ExpectGood(svg);
-    // The same picture at every scale.
+    // The picture is equal at every scale.
     for (auto& corner : corners) {
       for (double& coordinate : corner) coordinate = coordinate > 0 ? 1 : -1;
     }
@@ -118,7 +118,7 @@ TEST(SceneSvg, TheUpAxisPointsUp) {
       heights.push_back(std::stod(svg.substr(space + 1)));
     }
     ASSERT_EQ(heights.size(), 2u);
-    // Farther, that is drawn first, is the foot: the camera looks down. SVG counts from the top.
+    // The foot is farther away and drawn first: the camera looks down. SVG counts from the top.
     EXPECT_GT(heights[0], heights[1] + 200);
   }
 }
@@ -157,5 +157,5 @@ TEST(GroupedDigits, SeparatesThousands) {
   EXPECT_EQ(GroupedDigits(1234567), "1,234,567");
 }
 
-}  // namespace
+}  // namespace scene_svg_test
 }  // namespace hulld

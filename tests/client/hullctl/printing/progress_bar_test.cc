@@ -8,7 +8,7 @@
 #include "client/hullctl/printing/painter.h"
 
 namespace hulld {
-namespace {
+namespace progress_bar_test {
 
 TEST(ProgressBar, ShowsShareAmountRateAndTimeLeft) {
   EXPECT_EQ(ProgressText({50, 100, 1200, "points"}, 3),
@@ -54,5 +54,5 @@ TEST(Painter, ColoursAreForTerminalsThatWantThem) {
   EXPECT_EQ(VisibleWidth("\x1b[31mxm\x1b[0m y"), 4U);
 }
 
-}  // namespace
+}  // namespace progress_bar_test
 }  // namespace hulld

@@ -6,7 +6,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace robot_command_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -42,7 +42,7 @@ TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
   EXPECT_THAT(ran.out, HasSubstr("# 1 pairs; 2 left out by being adjacent\n"));
   EXPECT_THAT(ran.out, HasSubstr("a\tc\tSEPARATED\t0.9"));
   EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 0 overlapping 0 failed 0\n"));
-  // The hulls are gone again.
+  // The temporary hulls are deleted.
   EXPECT_EQ(Hulls(), "");
   ran = Robot({"--adjacent"});
   EXPECT_THAT(ran.out, HasSubstr("a\tb\tTOUCHING\t0"));
@@ -74,7 +74,7 @@ TEST_F(HullctlRobot, ATrajectoryTellsContactsAndTheFirst) {
   EXPECT_EQ(Hulls(), "");
 }
 
-// More waypoints than one message takes.
+// More waypoints than one message holds.
 TEST_F(HullctlRobot, LongTrajectoriesGoInSeveralMessages) {
   std::string text = "j\n";
   for (int i = 0; i < 5000; ++i) text += i == 4321 ? "-2\n" : "0\n";
@@ -120,6 +120,154 @@ TEST_F(HullctlRobot, AcmWritesWhatCheckReads) {
   EXPECT_EQ(Hulls(), "");
 }
 
+// b is attached to a through a link without shapes.
+constexpr char kBareUrdf[] = R"(<robot name="bare">
+  <link name="a"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <link name="frame"/>
+  <link name="b"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <link name="c"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <joint name="i" type="fixed"><parent link="a"/><child link="frame"/></joint>
+  <joint name="j" type="fixed"><parent link="frame"/><child link="b"/><origin xyz="0.5 0 0"/></joint>
+  <joint name="k" type="fixed"><parent link="b"/><child link="c"/><origin xyz="5 0 0"/></joint>
+</robot>)";
+
+TEST_F(HullctlRobot, PairsLeftOutThroughLinksWithoutShapesAreCounted) {
+  const TempFile bare("bare.urdf", kBareUrdf);
+  const Ran ran = Ask({"robot", "check", bare.path()});
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pairs; 2 left out by being adjacent, 1 of them joined "
+                                 "through links without shapes\n"));
+  EXPECT_THAT(Ask({"robot", "check", bare.path(), "--adjacent"}).out,
+              HasSubstr("# 3 pairs\na\tb\tOVERLAPPING"));
+}
+
+TEST_F(HullctlRobot, AdjacentIsHintedAtOnlyWhereItHelps) {
+  const std::string link =
+      "<collision><geometry><box size=\"1 1 1\"/></geometry></collision></link>";
+  const TempFile two("two.urdf", "<robot name=\"r\"><link name=\"a\">" + link +
+                                     "<link name=\"b\">" + link +
+                                     "<joint name=\"i\" type=\"fixed\"><parent link=\"a\"/><child "
+                                     "link=\"b\"/></joint></robot>");
+  const TempFile one("one.urdf", "<robot name=\"r\"><link name=\"a\">" + link + "</robot>");
+  const TempFile srdf("two.srdf",
+                      "<robot name=\"r\"><disable_collisions link1=\"a\" link2=\"b\"/></robot>");
+  const auto error = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"robot", "check"});
+    const Ran ran = Ask(more);
+    EXPECT_EQ(ran.code, 2);
+    return ran.err;
+  };
+  EXPECT_THAT(error({two.path()}), HasSubstr("--adjacent asks about adjacent ones, too"));
+  EXPECT_THAT(error({two.path(), "--srdf", srdf.path()}),
+              HasSubstr("two.srdf disables all of them"));
+  EXPECT_THAT(error({two.path(), "--srdf", srdf.path()}), Not(HasSubstr("--adjacent")));
+  EXPECT_THAT(error({two.path(), "--adjacent", "--ignore", "a,b"}),
+              HasSubstr("--ignore leaves all of them out"));
+  EXPECT_THAT(error({one.path()}), HasSubstr("two links with shapes, or --scene, make one"));
+  EXPECT_THAT(error({one.path()}), Not(HasSubstr("--adjacent")));
+}
+
+// A box on wheels and a free-floating crate.
+constexpr char kLooseUrdf[] = R"(<robot name="loose">
+  <link name="world"/>
+  <link name="cart"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <link name="crate"><collision><geometry><box size="1 1 1"/></geometry></collision></link>
+  <joint name="wheels" type="planar"><parent link="world"/><child link="cart"/><axis xyz="0 0 1"/></joint>
+  <joint name="free" type="floating"><parent link="world"/><child link="crate"/></joint>
+</robot>)";
+
+TEST_F(HullctlRobot, PlanarAndFloatingJointsTakeValues) {
+  const TempFile loose("loose.urdf", kLooseUrdf);
+  Ran ran = Ask({"robot", "check", loose.path(), "--joint", "free=1,0,0"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pairs\ncrate\tcart\tTOUCHING\t0"));
+  ran = Ask({"robot", "check", loose.path(), "--joint", "wheels=3,0,1.5707963267948966", "--joint",
+             "free=1,0,0,0,5.5,0,0"});
+  EXPECT_THAT(ran.out, HasSubstr("crate\tcart\tSEPARATED\t1."));
+  ran = Ask({"robot", "check", loose.path(), "--joint", "wheels/x=-1", "--joint", "free/rot_z=1"});
+  EXPECT_THAT(ran.out, HasSubstr("crate\tcart\tTOUCHING\t0"));
+  const TempFile path("path.csv", "wheels/x,free/trans_z\n0,3\n0,1\n4,0\n");
+  ran = Ask({"robot", "check", loose.path(), "--joints", path.path()});
+  EXPECT_THAT(ran.out, HasSubstr("2\tENTER\tcrate\tcart\tTOUCHING"));
+  for (const char* wrong :
+       {"wheels=1,2", "free=1", "free=0,0,0,0,1,2,3", "free/rot_w=0", "fre=1"}) {
+    ran = Ask({"robot", "check", loose.path(), "--joint", wrong});
+    EXPECT_EQ(ran.code, 2) << wrong;
+    EXPECT_THAT(ran.err, HasSubstr("--joint: ")) << wrong;
+  }
+  // The crate's position is unbounded, so samples cannot show that it never collides.
+  ran = Ask({"robot", "acm", loose.path(), "--samples", "5"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, Not(HasSubstr("disable_collisions")));
+}
+
+// Returns a box from `x` to x + 1 as OBJ with vertices numbered from `first`.
+std::string BoxObj(const std::string& keyword, double x, int first) {
+  std::string text = keyword + "\n";
+  for (int corner = 0; corner < 8; ++corner) {
+    text += "v " + std::to_string(x + corner % 2) + " " + std::to_string(corner / 2 % 2) + " " +
+            std::to_string(corner / 4) + "\n";
+  }
+  for (const char* face : {"0462", "1375", "0154", "2673", "0231", "4576"}) {
+    text += "f";
+    for (const char* corner = face; *corner != '\0'; ++corner) {
+      text += " " + std::to_string(*corner - '0' + first);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+class MeshRobot : public HullctlRobot {
+ protected:
+  // A post between two boxes of a single mesh, scaled by 1/2.
+  Ran Check(const std::string& obj, std::vector<std::string> more = {}) {
+    const TempFile mesh("gap.obj", obj);
+    const TempFile urdf(
+        "gap.urdf",
+        "<robot name=\"r\"><link name=\"gap\"><collision><geometry><mesh filename=\"" +
+            mesh.path() +
+            "\" scale=\"0.5 0.5 0.5\"/></geometry></collision></link><link "
+            "name=\"post\"><collision>"
+            "<origin xyz=\"1.5 0 0\"/><geometry><box size=\"0.5 9 "
+            "9\"/></geometry></collision></link>"
+            "<joint name=\"j\" type=\"fixed\"><parent link=\"gap\"/><child link=\"post\"/></joint>"
+            "</robot>");
+    more.insert(more.begin(), {"robot", "check", urdf.path(), "--adjacent"});
+    return Ask(more);
+  }
+};
+
+TEST_F(MeshRobot, ConvexPartsOfAFileArePieces) {
+  for (const char* keyword : {"o convex_", "g hull_"}) {
+    const std::string obj =
+        BoxObj(keyword + std::string("0"), 0, 1) + BoxObj(keyword + std::string("1"), 5, 9);
+    Ran ran = Check(obj);
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_EQ(ran.err, "");
+    EXPECT_THAT(ran.out, HasSubstr("# gap: 2 pieces of "));
+    EXPECT_THAT(ran.out, HasSubstr("gap/1\tpost\tSEPARATED\t0.7"));
+    EXPECT_THAT(ran.out, HasSubstr("gap/2\tpost\tSEPARATED\t0.7"));
+    ran = Check(obj, {"--split", "none"});
+    EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tOVERLAPPING"));
+    EXPECT_THAT(ran.err, HasSubstr("warning: the hull of gap has 3 times the volume of its mesh"));
+  }
+}
+
+TEST_F(MeshRobot, OtherPartsArePiecesWhereAskedFor) {
+  // An object with two components, and another object.
+  const std::string obj =
+      BoxObj("o both", 0, 1) + BoxObj("# still both", 5, 9) + BoxObj("o far", 20, 17);
+  Ran ran = Check(obj);
+  EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tOVERLAPPING"));
+  EXPECT_THAT(ran.err, HasSubstr("use a convex decomposition of the mesh, or --split"));
+  ran = Check(obj, {"--split", "names"});
+  EXPECT_THAT(ran.out, HasSubstr("# gap: 2 pieces of "));
+  EXPECT_THAT(ran.out, HasSubstr("gap/1\tpost\tOVERLAPPING"));
+  ran = Check(obj, {"--split", "components"});
+  EXPECT_THAT(ran.out, HasSubstr("# gap: 3 pieces of "));
+  EXPECT_THAT(ran.out, Not(HasSubstr("OVERLAPPING\t")));
+}
+
 TEST_F(HullctlRobot, ErrorsNameFileAndLine) {
   const TempFile mesh("m.urdf",
                       "<robot name=\"m\">\n<link name=\"l\">\n<collision><geometry><mesh "
@@ -130,5 +278,5 @@ TEST_F(HullctlRobot, ErrorsNameFileAndLine) {
   EXPECT_EQ(Ask({"robot", "check", mesh.path(), "--package", "p"}).code, 2);
 }
 
-}  // namespace
+}  // namespace robot_command_test
 }  // namespace hulld

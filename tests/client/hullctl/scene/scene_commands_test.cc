@@ -6,7 +6,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace {
+namespace scene_commands_test {
 
 using testing::HasSubstr;
 
@@ -36,7 +36,7 @@ TEST_F(HullctlScene, ApplyMakesTheServerMatchTheFile) {
   ran = Ask({"scene", "apply", cell_.path()});
   EXPECT_EQ(ran.out,
             "+ cell/part\tcreated\n+ cell/table\tcreated\n# 0 hulls are as the file has them\n");
-  // Again there is nothing to do; the hulls keep their revisions.
+  // A repeated apply has nothing to do; the hulls keep their revisions.
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path()});
   EXPECT_EQ(ran.out, "# 2 hulls are as the file has them\n");
@@ -55,7 +55,7 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
             "# 1 hulls are as the file has them\n");
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--dry-run"});
   EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tto delete\n"));
-  // Without a terminal nobody can be asked.
+  // Without a terminal no prompt is possible.
   ASSERT_EQ(Ask({"append", "cell/table", far.path()}).code, 0);
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path(), "--prune"});
@@ -67,11 +67,11 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
             "~ cell/table\treplaced\n- cell/stray\tdeleted\n"
             "# 1 hulls are as the file has them\n");
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell/part\ncell/table\n");
-  // Where there is nothing to delete, there is nothing to ask.
+  // Without deletions no prompt is needed.
   EXPECT_EQ(Ask({"scene", "apply", cell_.path(), "--prune"}).code, 0);
 }
 
-// "cell-3" begins the names of another cell, too.
+// "cell-3" is a prefix of another cell's names, too.
 TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
   for (const char* id : {"cell-3/stray", "cell-30/stray", "cell-3stray"}) Put(id, server::Cube());
   const std::string before = Ask({"list", "--output", "name"}).out;
@@ -142,7 +142,7 @@ TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
   Ran ran = Ask({"scene", "apply", cell_.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("+ cell/cube\tcreated\n+ cell/ell\tbody created\n"));
-  // Again nothing is put: the body keeps its revision.
+  // A repeated apply puts nothing: the body keeps its revision.
   const std::string before = Ask({"body", "get", "cell/ell"}).out;
   EXPECT_THAT(before, HasSubstr("cell/cube  1.5,1,0"));
   EXPECT_EQ(Ask({"scene", "apply", cell_.path()}).out,
@@ -239,5 +239,29 @@ TEST_F(HullctlScene, AMissingFileNamesItsPlace) {
   EXPECT_THAT(ran.err, HasSubstr("nowhere.stl"));
 }
 
-}  // namespace
+class SceneUnits : public HullctlOnServer {};
+
+// Each coordinate is rounded one time: 3 in is the double nearest to 0.0762 m, as is that text.
+TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMetres) {
+  const struct {
+    const char* unit;
+    const char* length;
+    const char* metres;
+  } cases[] = {{"in", "3", "0.0762"},    {"in", "0.1", "0.00254"}, {"ft", "11", "3.3528"},
+               {"ft", "0.7", "0.21336"}, {"mm", "0.3", "0.0003"},  {"cm", "2.3", "0.023"},
+               {"0.0254", "3", "0.0762"}};
+  for (const auto& [unit, length, metres] : cases) {
+    const TempFile part("part.xyz", "0 0 0\n" + std::string(length) + " 0 0\n0 1 0\n0 0 1\n");
+    const TempFile scene("cell.yaml", "prefix: cell/\nhulls:\n  part: {file: " + part.path() +
+                                          ", scale: " + unit + "}\n  wall: {points: [[" + metres +
+                                          ", 0, 0], [9, 0, 0], [9, 1, 0], [9, 0, 1]]}\n"
+                                          "place:\n  part: {hull: part}\n  wall: {hull: wall}\n"
+                                          "ask: {pairs: [[part, wall]]}\n");
+    EXPECT_EQ(Ask({"scene", "apply", scene.path()}).code, 0);
+    EXPECT_THAT(Ask({"scene", "check", scene.path()}).out, HasSubstr("part\twall\tTOUCHING"))
+        << length << unit;
+  }
+}
+
+}  // namespace scene_commands_test
 }  // namespace hulld

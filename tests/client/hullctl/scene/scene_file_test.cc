@@ -6,7 +6,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace scene_file_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -26,7 +26,7 @@ std::string Error(const std::string& content) {
   return std::string(scene.status().message().data(), scene.status().message().size());
 }
 
-// The pairs of a scene, or what is wrong with them.
+// Returns the pairs of a scene; fails the test on an error.
 std::vector<uint32_t> Pairs(const Scene& scene) {
   const auto pairs = PairsOf(scene, "FILE");
   EXPECT_TRUE(pairs.ok()) << pairs.status();
@@ -75,7 +75,7 @@ TEST(SceneFile, JsonIsOneOfThreeMessages) {
   ASSERT_TRUE(find.ok()) << find.status();
   EXPECT_EQ(find->request.wanted().clearance(), 0.5);
   EXPECT_EQ(find->request.tolerance(), 2);
-  // Braces and names inside of texts count for nothing.
+  // Braces and names inside strings are ignored.
   const auto odd = Read(R"({"placements":[{"hullId":"\"}{pairs\":["}]})");
   ASSERT_TRUE(odd.ok()) << odd.status();
   EXPECT_EQ(*odd->HullOf(0), "\"}{pairs\":[");
@@ -159,5 +159,5 @@ TEST(SceneFile, TooManyPairsAreRefusedBeforeTheyAreMade) {
               HasSubstr("more than 16777216 pairs"));
 }
 
-}  // namespace
+}  // namespace scene_file_test
 }  // namespace hulld

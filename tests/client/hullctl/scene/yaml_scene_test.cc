@@ -6,7 +6,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace yaml_scene_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -45,7 +45,7 @@ std::string ErrorOf(const std::string& text) {
   return std::string(scene.status().message().data(), scene.status().message().size());
 }
 
-// The names of the pairs that are asked about.
+// Returns the names of the queried pairs.
 std::vector<std::string> PairsIn(const std::string& text, BodyForm form = BodyForm::kPieces) {
   const auto scene = ToScene(Parse(text), "cell.yaml", form);
   EXPECT_TRUE(scene.ok()) << scene.status();
@@ -65,7 +65,7 @@ TEST(YamlScene, DefinitionsAreRead) {
   EXPECT_THAT(std::vector<double>(scene.hulls[0].xyz.begin(), scene.hulls[0].xyz.begin() + 3),
               ElementsAre(-1, -0.5, -0.25));
   EXPECT_EQ(scene.hulls[2].file, "folder/part.xyz");
-  EXPECT_EQ(scene.hulls[2].scale.Apply(7), 7.0 / 100);
+  EXPECT_EQ(scene.hulls[2].scale.Apply(7), 0.07);
   EXPECT_EQ(scene.hulls[2].where, "folder/cell.yaml:7:9");
   ASSERT_EQ(scene.bodies.size(), 1u);
   EXPECT_EQ(scene.bodies[0].pieces[0].name, "wedge");
@@ -82,7 +82,7 @@ TEST(YamlScene, BodiesArePlacedWhole) {
   EXPECT_EQ(scene->PlacementOf(2).hull_id(), "cell/corner");
   EXPECT_EQ(scene->PlacementOf(2).pose().translation().x(), 10);
   EXPECT_THAT(PairsIn(kCell, BodyForm::kWhole), ElementsAre("wall right", "left right"));
-  // What decided is named as the file names it; -1 and what the file does not know are not.
+  // The deciding piece is named as in the file; -1 and pieces unknown to the file are not.
   EXPECT_THAT(scene->NamesOfPieces(2, 3, {1, 2}), ElementsAre("wedge-2", "spider"));
   EXPECT_THAT(scene->NamesOfPieces(0, 3, {-1, 3}), ElementsAre("", ""));
 }
@@ -117,7 +117,7 @@ TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h, group: g}, b: {hull: h, group: g}, "
                              "c: {hull: h}}"),
               ElementsAre("a c", "b c"));
-  // One of a group is singled out, and still is of the group.
+  // A member excluded by name still belongs to its group.
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h, group: g}, b: {hull: h, group: g}, "
                              "c: {hull: h}}\nignore: [[a, c]]"),
               ElementsAre("b c"));
@@ -192,5 +192,5 @@ TEST(YamlScene, TheOneReaderTakesIt) {
   EXPECT_THAT(ReadScene(bad_source->get()).status().ToString(), HasSubstr("cell.yaml:4:7: "));
 }
 
-}  // namespace
+}  // namespace yaml_scene_test
 }  // namespace hulld

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld {
-namespace {
+namespace word_splitting_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -40,5 +40,5 @@ TEST(WordSplitting, TheLastWordIsTheOneAtTheCursor) {
   EXPECT_THAT(SplitUnfinished("append a 'my f"), ElementsAre("append", "a", "my f"));
 }
 
-}  // namespace
+}  // namespace word_splitting_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-// What becomes of a page's edits while the server is slow.
+// A page's edits while the server is slow.
 #include "client/hullctl/view/edit_feed.h"
 
 #include <absl/strings/str_cat.h>
@@ -13,11 +13,11 @@
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
-namespace {
+namespace edit_feed_test {
 
 using ::testing::HasSubstr;
 
-// A page that remembers what it is sent.
+// A page that records messages.
 class Page : public PageChannel {
  public:
   bool SendText(std::string json) override {
@@ -53,7 +53,7 @@ class EditFeedTest : public ::testing::Test {
   EditFeedTest() {
     hulld_.PutHull("h", {});
     hulld_.PutHull("other", {});
-    // The first change waits for Release, and with it all behind it.
+    // The first change blocks until Release, and with it all later ones.
     StreamScript hold;
     hold.hold_acks = true;
     hulld_.ScriptStreams({hold});
@@ -100,5 +100,5 @@ TEST_F(EditFeedTest, SaysWhatItHasNoRoomFor) {
               HasSubstr(absl::StrCat("other: ", 3 * (many.size() / 3), " appended")));
 }
 
-}  // namespace
+}  // namespace edit_feed_test
 }  // namespace hulld

@@ -1,4 +1,4 @@
-"""Makes the pictures of the viewer that client/README.md shows.
+"""Renders the pictures of the viewer in client/README.md.
 
     /usr/bin/python3 pictures.py BIN_DIRECTORY OUTPUT_DIRECTORY
 """
@@ -12,7 +12,7 @@ viewing.skip_unless_browser()
 
 
 def take(hulld, target, scene, width, height, dark=False, before="true"):
-    """One scene of the demo at rest; `before` is run in the page first."""
+    """Renders a scene of the demo at rest, after running `before` in the page."""
     viewer = hulld.view("--demo", "--scene", scene)
     browser = viewing.Browser(width, height, dark)
     try:

@@ -9,7 +9,7 @@
 #include <string>
 
 namespace hulld {
-namespace {
+namespace protocol_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -23,7 +23,7 @@ uint32_t LengthOf(const std::string& frame) {
 
 std::string HeadOf(const std::string& frame) { return frame.substr(4, LengthOf(frame)); }
 
-// What follows the head, from a multiple of eight bytes on.
+// Returns the body after the head, which starts at a multiple of eight bytes.
 std::string BodyOf(const std::string& frame) {
   return frame.substr((4 + LengthOf(frame) + 7) / 8 * 8);
 }
@@ -156,12 +156,12 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
       json, HasSubstr(R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0]})"));
 }
 
-// Bytes that are not UTF-8 would end the connection of the page.
+// Invalid UTF-8 would end the connection of the page.
 TEST(Protocol, NamesOfFilesAreUtf8) {
   EXPECT_EQ(ShownName("/a/b/h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj"),
             "h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj");
   EXPECT_EQ(ShownName("h\xfclle.obj"), "h?lle.obj");
-  // Too long for its value, half of a pair, beyond the last, cut off.
+  // Overlong, half of a surrogate pair, beyond the last code point, truncated.
   EXPECT_EQ(ShownName("\xc0\xaf"), "??");
   EXPECT_EQ(ShownName("\xed\xa0\x80"), "???");
   EXPECT_EQ(ShownName("\xf5\x80\x80\x80"), "????");
@@ -173,5 +173,5 @@ TEST(Protocol, NumbersThatJsonHasNotBecomeNull) {
   EXPECT_EQ(NumbersJson(numbers, 3), "[null,null,2]");
 }
 
-}  // namespace
+}  // namespace protocol_test
 }  // namespace hulld

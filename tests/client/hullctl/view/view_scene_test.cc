@@ -6,7 +6,7 @@
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
-namespace {
+namespace view_scene_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -25,7 +25,7 @@ TEST(ViewScene, TakesEachFormatOfAScene) {
     EXPECT_EQ(scene.objects[1].hull_id, "cube");
     EXPECT_THAT(scene.objects[1].pose, ElementsAre(1, 0, 0, 0, 1, 2, 3));
     EXPECT_EQ(scene.objects[1].name, file == &text ? "right" : "cube");
-    // Placements are the page's to move; the rules are the file's.
+    // The page moves placements; the rules come from the file.
     EXPECT_EQ(scene.rules.placements_size() + scene.rules.packed_placements().hulls_size(), 0);
     EXPECT_EQ(scene.rules.groups_size(), file == &json ? 2 : 0);
   }
@@ -50,5 +50,5 @@ TEST(ViewScene, ABodyOfASceneIsOneObject) {
   EXPECT_EQ(scene.objects[1].hull_id, "cell/leg");
 }
 
-}  // namespace
+}  // namespace view_scene_test
 }  // namespace hulld

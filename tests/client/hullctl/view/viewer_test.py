@@ -1,4 +1,4 @@
-"""The viewer's page in a real browser: what it shows is what the server says.
+"""Tests of the viewer's page in a real browser: it shows the server's answers.
 
     /usr/bin/python3 viewer_test.py BIN_DIRECTORY [TEST...]
 """
@@ -25,7 +25,7 @@ AT_REST = "hulldViewer.model.answer?.rest && hulldViewer.model.answer.update ===
 
 
 class ViewerTest(unittest.TestCase):
-    """One server and one browser for all; each test has a viewer of its own."""
+    """One server and one browser for all tests; each test has its own viewer."""
 
     @classmethod
     def setUpClass(cls):
@@ -52,7 +52,7 @@ class ViewerTest(unittest.TestCase):
         viewer = self.hulld.view(*arguments)
 
         def leave():
-            # The page would complain that hullctl has ended.
+            # The page would report that hullctl has ended.
             self.browser.driver.get("about:blank")
             self.assertEqual(viewer.stop(), 0, viewer.said)
 
@@ -64,7 +64,7 @@ class ViewerTest(unittest.TestCase):
         return self.browser.driver.find_element(By.ID, "canvas")
 
     def pixels(self):
-        """The canvas as drawn: how many colours, and the part that is not ground."""
+        """Returns the number of colours of the canvas, and the part that is not ground."""
         self.browser.wait("!hulldViewer.stage.waiting")
         return self.browser.js("""(() => {
           const {stage} = hulldViewer;
@@ -85,7 +85,7 @@ class ViewerTest(unittest.TestCase):
         ActionChains(self.browser.driver).send_keys(*keys).perform()
 
     def assert_answers_as_api(self):
-        """At rest the page says, to the last bit, what the command that it shows says."""
+        """Asserts that the page at rest agrees bit by bit with the command that it shows."""
         self.browser.wait(AT_REST)
         command = shlex.split(self.browser.text("#command"))
         self.assertEqual(command[:2], ["hullctl", "check"])
@@ -150,7 +150,7 @@ class ViewerTest(unittest.TestCase):
             drawn["+".join(shown)] = self.pixels()["drawn"]
         self.assertGreater(drawn["points"], 0.001)
         self.assertGreater(drawn["mesh"], drawn["points"])
-        # A hull hides the gaps of its mesh.
+        # A hull covers the gaps of its mesh.
         self.assertGreater(drawn["hull"], 1.3 * drawn["mesh"])
         self.assertGreater(drawn["mesh+hull+edges"], 0.98 * drawn["hull"])
         self.browser.js("hulldViewer.model.select(0)")
@@ -177,10 +177,10 @@ class ViewerTest(unittest.TestCase):
         self.browser.wait("arguments[0].some((v, i) => v !== hulldViewer.model.objects[1].pose[i])",
                           before)
         self.assert_answers_as_api()
-        # While it moved, answers came too.
+        # Answers also arrived during the motion.
         self.assertGreater(self.browser.js(
             "live.filter((m) => m.type === 'answer' && !m.rest).length"), 0)
-        # A move leaves the rotation as it was, bit for bit.
+        # A move preserves the rotation, bit for bit.
         self.assertEqual(self.browser.js("hulldViewer.model.objects[1].pose.slice(0, 4)"),
                          [1, 0, 0, 0])
 
@@ -203,7 +203,7 @@ class ViewerTest(unittest.TestCase):
         answer = self.assert_answers_as_api()
         self.assertEqual(answer["relation"], "RELATION_TOUCHING")
         self.browser.wait("document.querySelector('#collision-count').textContent === '1 pair collides'")
-        # By the smallest step of a double they are apart.
+        # Moved by the smallest step of a double, they are apart.
         field = self.browser.driver.find_element(By.CSS_SELECTOR, "[data-pose='4']")
         field.clear()
         field.send_keys("-0.9999999999999999", Keys.TAB)
@@ -229,13 +229,13 @@ class ViewerTest(unittest.TestCase):
         self.hulld.hullctl("body", "put", "room/stool", "box", "box@4,0,0", "box@1,0,0,1,2,4,0")
         self.addCleanup(self.hulld.hullctl, "body", "delete", "room/stool")
         self.view("room/right", "room/stool")
-        # The row of the body, and those of its pieces.
+        # The row of the body, and the rows of its pieces.
         self.assertEqual(self.browser.js("hulldViewer.model.objects.map(({name}) => name)"),
                          ["room/right", "room/stool"])
         self.assertEqual(self.browser.js("[...document.querySelectorAll('#tree .piece .name')]"
                                          ".map((row) => row.textContent)"),
                          ["0: box", "1: box", "2: box"])
-        # The third is turned a quarter, about its middle.
+        # The third is rotated by a quarter turn about its center.
         shape = "hulldViewer.model.hullOf(hulldViewer.model.objects[1])."
         self.assertEqual(self.browser.js(f"[{shape}low, {shape}high, {shape}vertexCount]"),
                          [[-1, -1, -1], [5, 5, 1], 24])
@@ -245,7 +245,7 @@ class ViewerTest(unittest.TestCase):
         self.drag_handle(-110, 40)
         self.browser.wait("hulldViewer.model.objects[1].pose.some((v, i) => v !== [1,0,0,0,0,0,0][i])")
         self.assert_answers_as_api()
-        # Numbers that say which piece decides, with marks where that piece stands.
+        # Values that show the deciding piece, with marks at its position.
         for x, decider in (("-2.5", 1), ("2.5", 0)):
             field = self.browser.driver.find_element(By.CSS_SELECTOR, "[data-pose='4']")
             field.clear()
@@ -281,13 +281,13 @@ class ViewerTest(unittest.TestCase):
         self.browser.wait("document.querySelector('#tree').textContent.includes('missing')")
         shape = "hulldViewer.model.hullOf(hulldViewer.model.objects[0])"
         self.browser.wait(f"{shape}.vertexCount === 16")
-        # It grows at both places, and the piece that it lacked comes.
+        # It grows at both places, and the missing piece appears.
         self.hulld.add("leg", ["0.5 0.5 -2"])
         self.browser.wait(f"{shape}.vertexCount === 18 && {shape}.low[2] === -2")
         self.hulld.add_box("lid", size=1.0, low=(0.0, 0.0, 0.0))
         self.browser.wait(f"{shape}.vertexCount === 26")
         self.browser.wait("!document.querySelector('#tree').textContent.includes('missing')")
-        # Put anew, of hulls of which the viewer has never heard.
+        # Put again, with hulls unknown to the viewer.
         self.hulld.add_box("other", size=1.0, low=(7.0, 0.0, 0.0))
         self.hulld.hullctl("body", "put", "pair", "other")
         self.browser.wait(f"{shape}.low[0] === 7 && {shape}.vertexCount === 8")
@@ -326,7 +326,7 @@ class ViewerTest(unittest.TestCase):
         self.drag_handle(60, 20)
         self.assert_answers_as_api()
 
-    # --- What hulls do ---
+    # --- Changes of hulls ---
 
     def test_hulls_grow_appear_and_go(self):
         self.hulld.add_box("live/a", size=1.0, low=(0.0, 0.0, 0.0))
@@ -338,7 +338,7 @@ class ViewerTest(unittest.TestCase):
         self.hulld.add_box("live/b", size=1.0, low=(5.0, 0.0, 0.0))
         self.browser.wait("[...document.querySelectorAll('.row')].some((r) => r.textContent.includes('b'))"
                           " && hulldViewer.model.hulls.get('live/b')?.vertexCount === 8")
-        # They collide once one grows into the other, without anybody moving.
+        # They collide after one grows into the other, without any motion.
         self.hulld.add("live/a", ["5.5 0.5 0.5"])
         self.browser.wait("document.querySelector('#collision-count').textContent === '1 pair collides'")
         self.hulld.hullctl("delete", "live/b")
@@ -354,7 +354,7 @@ class ViewerTest(unittest.TestCase):
                         "  return frame.call(this, now); })(hulldViewer.stage.frame))")
         self.hulld.add("flash", ["0 0 5"])
         self.browser.wait("globalThis.flashes === 1")
-        # They fade, and then nothing is drawn any more.
+        # They fade, and then disappear.
         self.browser.wait("!hulldViewer.stage.waiting && "
                           "hulldViewer.views.get(0).group.children.every((part) => !part.userData.end)")
 
@@ -419,7 +419,7 @@ class ViewerTest(unittest.TestCase):
         self.browser.js("(() => { const slider = document.querySelector('#tolerance');"
                         " slider.value = 60; slider.dispatchEvent(new Event('input')); })()")
         self.browser.wait("hulldViewer.shell.group.children.length === 1")
-        # How far each vertex of the sphere was moved away from its middle, in tolerances.
+        # Distance that each vertex of the sphere was moved from its center, in tolerances.
         least, most = self.browser.js("""(() => {
           const {model, shell} = hulldViewer;
           const {xyz, centre} = model.hulls.get('many');
@@ -516,7 +516,7 @@ class ViewerTest(unittest.TestCase):
             {"hullId": "far/here", "pose": {"translation": {"x": 1e9 + 2.5, "y": -1e9, "z": 1e9}}}]}
         pathlib.Path(self.hulld.directory, "far.json").write_text(json.dumps(scene))
         self.view("far.json")
-        # What goes to the GPU is near 0, where float has its digits.
+        # GPU coordinates are near 0, where float is precise.
         positions = self.browser.js(
             "[...hulldViewer.views.values()].map((view) => view.group.position.toArray())")
         self.assertEqual(positions, [[-1.25, 0, 0], [1.25, 0, 0]])
@@ -547,7 +547,7 @@ class ViewerTest(unittest.TestCase):
         self.assertGreater(self.pixels()["drawn"], 0.03)
         self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
         self.assertAlmostEqual(float(self.browser.fact("separation")), 1)
-        # It may fetch nothing, and asks for nothing.
+        # It is not permitted to fetch anything, and requests nothing.
         self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
                                          ".filter(({name}) => !name.startsWith('data:')).length"), 0)
         self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
@@ -595,7 +595,7 @@ class ViewerTest(unittest.TestCase):
         self.hulld.add_box("edited")
         self.view("edited")
         self.assertFalse(self.browser.js("Boolean(document.querySelector('#edit-points'))"))
-        # Nor can a page that tries.
+        # A page that tries is refused as well.
         self.browser.js("hulldViewer.connection.send("
                         "{type: 'edit', action: 'delete', hullId: 'edited', points: []})")
         self.browser.wait("document.querySelector('#message').textContent.includes('--edit')")
@@ -612,7 +612,7 @@ class ViewerTest(unittest.TestCase):
         self.browser.wait(
             "document.querySelector('#edit-result').textContent.includes('2 appended, 1 outside')")
         self.assertEqual(self.hulld.json("get", "edited")["hull"]["vertexCount"], "9")
-        # The first press asks.
+        # The first press asks for confirmation.
         delete = self.browser.driver.find_element(By.ID, "edit-delete")
         delete.click()
         self.assertIn("Really delete edited", delete.text)
@@ -632,14 +632,14 @@ class ViewerTest(unittest.TestCase):
         answer = self.hulld.json("check", "room/left", "room/right", "--tolerance", tolerance)
         self.assertEqual(answer["relation"],
                          self.browser.js("hulldViewer.model.answer.tolerant.relation"))
-        # The exact answer stays beside it.
+        # The exact answer remains visible.
         self.assert_answers_as_api()
 
     def test_address_lets_one_browser_in_once(self):
         viewer = self.hulld.view("box")
         self.addCleanup(viewer.stop)
         self.browser.open(viewer.address)
-        # The token has gone from the address, and scripts cannot read the cookie.
+        # The token is removed from the address, and scripts cannot read the cookie.
         self.assertNotIn("token", self.browser.driver.current_url)
         self.assertEqual(self.browser.js("document.cookie"), "")
         port = viewer.address.split(":")[2].split("/")[0]

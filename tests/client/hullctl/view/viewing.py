@@ -1,6 +1,6 @@
 """A hulld, a `hullctl view` and a browser, for tests of the viewer.
 
-Everything runs on free ports and in a directory of its own, and ends with it.
+Everything runs on free ports and in a temporary directory, and is cleaned up at the end.
 """
 
 import json
@@ -27,7 +27,7 @@ except ImportError:
 
 
 def skip_unless_browser():
-    """Ends the program with SKIPPED where there is no browser to test in."""
+    """Ends the program with SKIPPED if no browser is installed."""
     missing = [name for name, there in [("chromium", CHROMIUM), ("chromium-driver", DRIVER),
                                         ("python3-selenium", webdriver)] if not there]
     if missing:
@@ -36,7 +36,7 @@ def skip_unless_browser():
 
 
 class Process:
-    """A child whose output is read line by line, until it says what is waited for."""
+    """A child process with output that is read line by line up to an awaited text."""
 
     def __init__(self, arguments, directory):
         self.child = subprocess.Popen(arguments, cwd=directory, stdout=subprocess.PIPE,
@@ -60,7 +60,7 @@ class Process:
 
 
 class Hulld:
-    """A server in memory, and hullctl for it."""
+    """An in-memory server, and hullctl for it."""
 
     def __init__(self, programs):
         self.programs = pathlib.Path(programs)
@@ -105,7 +105,7 @@ class Browser:
     def __init__(self, width=1440, height=900, dark=False, calm=True):
         options = Options()
         options.binary_location = CHROMIUM
-        # Motion is for people; without it a state is reached at once.
+        # Disables animation, so that states are reached immediately.
         for argument in ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader",
                          "--disable-dev-shm-usage", "--hide-scrollbars",
                          f"--window-size={width},{height}"]:
@@ -120,12 +120,12 @@ class Browser:
         self.resize(width, height)
 
     def resize(self, width, height):
-        """The page, to the pixel: a window has a least width."""
+        """Sets the exact page size in pixels: windows have a minimum width."""
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": width, "height": height, "deviceScaleFactor": 1, "mobile": False})
 
     def open(self, address):
-        """Opens the viewer and waits until it shows all that there is."""
+        """Opens the viewer and waits until it shows everything."""
         self.driver.get(address)
         self.wait("document.body.dataset.fitted")
 
@@ -142,13 +142,13 @@ class Browser:
         return self.js("document.querySelector(arguments[0])?.textContent ?? ''", selector)
 
     def fact(self, name):
-        """The value beside a name in the answer's table."""
+        """Returns the value of a name in the answer's table."""
         return self.js(
             "[...document.querySelectorAll('#answer-facts dt')]"
             ".find((dt) => dt.textContent === arguments[0])?.nextElementSibling.textContent", name)
 
     def problems(self):
-        """What the browser's console complains about."""
+        """Returns the errors of the browser's console."""
         return [entry["message"] for entry in self.driver.get_log("browser")
                 if entry["level"] in ("SEVERE", "WARNING") and "GPU stall" not in entry["message"]
                 and "GL Driver Message" not in entry["message"]]
@@ -158,5 +158,5 @@ class Browser:
 
 
 def bin_directory():
-    """The directory of hulld and hullctl: the first argument, which is taken off."""
+    """Removes and returns the first argument, the directory of hulld and hullctl."""
     return os.path.abspath(sys.argv.pop(1))

@@ -11,7 +11,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace degenerate_hull_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kLatticeSide = 16;
@@ -21,7 +21,7 @@ constexpr int kLatticeSide = 50;
 constexpr int kLargeRounds = 60;
 #endif
 
-// A cube's 8 vertices, 12 edges and 6 squares.
+// Expects a cube's 8 vertices, 12 edges, and 6 squares.
 void ExpectBox(const Hull& hull) {
   EXPECT_EQ(hull.dimension(), 3);
   EXPECT_EQ(hull.vertices().size(), 8u);
@@ -148,7 +148,7 @@ TEST(DegenerateHull, NeedleKeepsItsFourLongEdges) {
   EXPECT_TRUE(AuditContainment(hull, needle).ok());
 }
 
-// Faces that are planes but for rounding: some points stand out, and each decision counts.
+// Faces that are planar up to rounding: some points stand out, and each decision counts.
 TEST(DegenerateHull, JitteredCubeFacesPassTheAudit) {
   Random random(205);
   std::vector<Vector> points;
@@ -245,8 +245,8 @@ TEST(DegenerateHull, PowersOfTwoKeepTheFacetsOfABall) {
   }
 }
 
-// The same with another power of two on each axis, from needles to pancakes far beyond the range of
-// any rounding, for sets large enough for whatever a builder does to large sets.
+// Scaling by a separate power of two on each axis, from needles to pancakes far beyond the range
+// of any rounding, for sets large enough for every stage of the builder.
 TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
   const uint64_t seed = TestSeed(210);
   Random random(seed);
@@ -257,8 +257,8 @@ TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
     if (round % 3 == 2) points = RandomOnSphere(random, 2500, 1);
     for (Vector& p : points) p = (p * 0x1p30).array().round() * 0x1p-30;
     oracle::ConvexHull expected = ToOracle(BuildHull(points));
-    // Each axis its own power within one range, or all about the same: cubes of about 2^-350
-    // underflow by part, so that filters see some of the truth.
+    // Each axis has its own power within one range, or all have similar ones: cubes of about 2^-350
+    // underflow partially, so that filters see some of the values.
     const int spans[][2] = {{-60, 60}, {-1000, 1000}, {-370, -330}, {-352, -350}};
     const auto [low, high] = spans[round % 4];
     Vector scale;
@@ -272,8 +272,8 @@ TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
   }
 }
 
-// Canonical order however the x of the vertices lie: on a sphere, in two planes, near one end, on
-// either side of nothing, and so far apart that their distance is no double.
+// Snapshots have canonical order for any distribution of the vertices' x: on a sphere, in two
+// planes, near one end, on either side of zero, and so far apart that their distance is no double.
 TEST(DegenerateHull, SnapshotsAreCanonicalHoweverXIsSpread) {
   Random random(209);
   const std::vector<Vector> sphere = RandomOnSphere(random, 300, 1);
@@ -298,8 +298,8 @@ TEST(DegenerateHull, SnapshotsAreCanonicalHoweverXIsSpread) {
   }
 }
 
-// Streams whose first blocks say little about the last: clusters far apart, growing shells, flat
-// starts. Any split into blocks gives the hull of one block.
+// Streams with first blocks unlike the last: clusters far apart, growing shells, flat starts. Any
+// split into blocks gives the hull of a single block.
 TEST(DegenerateHull, StreamsOfUnlikeBlocksEqualOneBlock) {
   const uint64_t seed = TestSeed(211);
   Random random(seed);
@@ -353,5 +353,5 @@ TEST(DegenerateHull, MeshAtOtherScalesPassesTheAudit) {
   }
 }
 
-}  // namespace
+}  // namespace degenerate_hull_test
 }  // namespace hulld

@@ -17,7 +17,7 @@
 #include "tests/oracle/cgal_hull.h"
 
 namespace hulld {
-namespace {
+namespace extreme_hull_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kPoints = 300;
@@ -32,7 +32,7 @@ constexpr int kSmallRounds = 6;
 constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 
-// Exact tests of a point against a facet that a test may ask for.
+// Maximum number of exact point-facet tests in a test.
 constexpr size_t kContainmentTests = 400000;
 
 Hull BuildOneByOne(const std::vector<Vector>& points) {
@@ -52,7 +52,7 @@ Hull BuildInRandomBlocks(Random& random, std::span<const Vector> rest) {
   return builder.Snapshot();
 }
 
-// Whether CGAL's floating-point filters are valid for the points: see CgalExtremePoints.
+// Returns true if CGAL's floating-point filters are valid for the points: see CgalExtremePoints.
 bool InRangeOfCgal(const std::vector<Vector>& points) {
   return std::all_of(points.begin(), points.end(), [](const Vector& p) {
     return std::all_of(p.begin(), p.end(), [](double x) {
@@ -61,8 +61,8 @@ bool InRangeOfCgal(const std::vector<Vector>& points) {
   });
 }
 
-// The hull in one block, audited, holding the points (a sample of them where they are many), and
-// equal to CGAL's where that is there and valid.
+// Builds the hull in one block, audits it, and checks that it contains the points (a sample if
+// many) and equals CGAL's hull if available and valid.
 Hull BuildChecked(const std::vector<Vector>& points) {
   const Hull hull = BuildHull(points);
   const absl::Status audit = AuditHull(hull);
@@ -114,7 +114,7 @@ TEST_P(ExtremeHull, FewPointsMatchBruteForce) {
 INSTANTIATE_TEST_SUITE_P(Extremes, ExtremeHull,
                          testing::ValuesIn(Extremes().begin(), Extremes().end()), NameOf);
 
-// The clouds that are there for the sake of exact arithmetic reach it.
+// Clouds designed for exact arithmetic reach it.
 class ExactlyDecidedHull : public testing::TestWithParam<Extreme> {};
 
 TEST_P(ExactlyDecidedHull, CountsTheSignsBeyondDoubles) {
@@ -202,7 +202,7 @@ TEST(ExtremeCoordinates, CubesOfTheLeastAndTheLargestDoubleHaveSixSquares) {
   }
 }
 
-// Each apex sees every side of the cone below it: the order that costs most.
+// Each apex sees every side of the cone below it: the most expensive order.
 TEST(ExtremeOrders, LastOfTheRisingApexesRemains) {
   for (const Extreme& extreme : Extremes()) {
     if (extreme.facets_one_by_one == nullptr) continue;
@@ -212,5 +212,5 @@ TEST(ExtremeOrders, LastOfTheRisingApexesRemains) {
   }
 }
 
-}  // namespace
+}  // namespace extreme_hull_test
 }  // namespace hulld

@@ -19,7 +19,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace hull_builder_test {
 
 using testing::HasSubstr;
 
@@ -86,7 +86,7 @@ TEST(HullBuilder, MatchesBruteForceOnDegenerateSets) {
   for (int count : dimensions) EXPECT_GT(count, kRounds / 50);
 }
 
-// Rounded lattices are all but degenerate: signs that a filter cannot tell.
+// Rounded lattices are nearly degenerate: filters cannot decide their signs.
 TEST(HullBuilder, MatchesBruteForceOnNearlyDegenerateSets) {
   const uint64_t seed = TestSeed(102);
   Random random(seed);
@@ -109,7 +109,8 @@ TEST(HullBuilder, MatchesBruteForceOnNearlyDegenerateSets) {
   }
 }
 
-// The same in planes that doubles hold exactly: x = c, y = c, z = c, x = y or z = x.
+// Nearly degenerate sets in planes that doubles represent exactly: x = c, y = c, z = c, x = y or z
+// = x.
 TEST(HullBuilder, MatchesBruteForceOnNearlyDegeneratePolygons) {
   const uint64_t seed = TestSeed(112);
   Random random(seed);
@@ -135,8 +136,8 @@ TEST(HullBuilder, MatchesBruteForceOnNearlyDegeneratePolygons) {
   }
 }
 
-// Rounded multiples of one vector, in a plane that doubles hold: slivers whose corners are decided
-// by the rounding alone.
+// Rounded multiples of a vector, in an exactly represented plane: slivers with corners decided by
+// rounding alone.
 TEST(HullBuilder, MatchesBruteForceOnRoundedLinesInAPlane) {
   const uint64_t seed = TestSeed(114);
   Random random(seed);
@@ -161,8 +162,8 @@ TEST(HullBuilder, MatchesBruteForceOnRoundedLinesInAPlane) {
   EXPECT_GT(spread, kRounds / 10);
 }
 
-// Convexity is invariant under translation: a lattice of units in the last place about 2^e is as
-// good as one of units, at every exponent, up to where an exact stage gives way to the next.
+// Convexity is invariant under translation: a lattice of units in the last place about 2^e is
+// equivalent to one of units, at every exponent, up to the boundary between exact stages.
 TEST(HullBuilder, LatticesOfLastPlacesKeepTheFacets) {
   const uint64_t seed = TestSeed(113);
   Random random(seed);
@@ -186,7 +187,7 @@ TEST(HullBuilder, LatticesOfLastPlacesKeepTheFacets) {
   }
 }
 
-// Convexity is affine: a power of two on each axis changes no facet, whatever the exponents.
+// Convexity is affine: a power of two on each axis changes no facet, for any exponents.
 TEST(HullBuilder, PowersOfTwoOnEachAxisKeepTheFacets) {
   const uint64_t seed = TestSeed(103);
   Random random(seed);
@@ -273,7 +274,7 @@ TEST(HullBuilder, DimensionsGrowIntoEachOther) {
   EXPECT_EQ(builder.dimension(), 3);
 }
 
-// The counts of a block as hull_builder.h defines them, from snapshots before and after it.
+// Returns the counts of a block as defined by hull_builder.h, from snapshots before and after it.
 PointCounts ExpectedCounts(const Hull& before, const Hull& after, std::span<const Vector> block) {
   using Key = std::tuple<double, double, double>;
   const auto key = [](const Vector& p) { return Key(p.x(), p.y(), p.z()); };
@@ -331,7 +332,7 @@ TEST(HullBuilder, NegativeZeroIsStoredAsZero) {
   }
 }
 
-// What is not finite is refused by its index and coordinate, at any place of a block.
+// A non-finite value is refused by its index and coordinate, anywhere in a block.
 TEST(HullBuilder, RefusesNonFinitePointsAndChangesNothing) {
   Random random(108);
   HullBuilder builder;
@@ -378,7 +379,7 @@ TEST(HullBuilder, VertexLimitRefusesTheBlockAndChangesNothing) {
   limits.max_vertices = 100;
   EXPECT_TRUE(builder.Add(std::span(sphere).subspan(60), limits).ok());
   EXPECT_TRUE(SameBits(builder.Snapshot(), BuildHull(sphere)));
-  // Only the hull after the block counts: a cube round it has eight vertices.
+  // Only the hull after the block counts: a cube around it has eight vertices.
   limits.max_vertices = 8;
   EXPECT_TRUE(builder.Add(Shifted(LatticeCube(2, 4), Vector(-2, -2, -2)), limits).ok());
   EXPECT_EQ(builder.vertex_count(), 8u);
@@ -428,7 +429,7 @@ TEST(HullBuilder, CancellationChangesNothingWheneverItComes) {
   EXPECT_TRUE(SameBits(builder.Snapshot(), BuildHull(Concatenated(first, block))));
 }
 
-// What a block did before it was refused is undone, whichever stages it went through.
+// A refused block is undone, in any combination of stages.
 TEST(HullBuilder, RefusedBlocksAreUndoneInEveryStage) {
   const uint64_t seed = TestSeed(113);
   Random random(seed);
@@ -468,7 +469,7 @@ TEST(HullBuilder, RefusedBlocksAreUndoneInEveryStage) {
   for (int from = 0; from < 4; ++from) EXPECT_GT(reached[from][3], 0) << from;
 }
 
-// A map of directions that was measured within a block that is undone would reject too much.
+// A direction map measured within an undone block would reject too much.
 TEST(HullBuilder, RefusedBlocksLeaveNoMap) {
   Random random(114);
   HullBuilder builder;
@@ -499,7 +500,7 @@ TEST(HullBuilder, RefusedBlocksLeaveNoMap) {
   }
 }
 
-// A stop that is noticed while the order of insertion is chosen leaves no points out.
+// A stop noticed during the choice of the insertion order omits no points.
 TEST(HullBuilder, NoBlockEndsWellAfterAStop) {
   for (const Extreme& extreme : Extremes()) {
     const std::vector<Vector> points = extreme.make(600);
@@ -521,8 +522,8 @@ TEST(HullBuilder, NoBlockEndsWellAfterAStop) {
   }
 }
 
-// A snapshot asks once in 1024 steps of each pass, so none of them is long without asking, and ends
-// wherever it is told to.
+// A snapshot polls every 1024 steps of each pass, so that no pass runs long without polling, and
+// stops at any poll.
 void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
   HullBuilder builder;
   ASSERT_TRUE(builder.Add(points).ok());
@@ -537,7 +538,7 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
     int asked = 0;
     const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
     EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled) << stopped.status();
-    // Told once, it does not ask again.
+    // After a stop it does not poll again.
     EXPECT_EQ(asked, last);
   }
   EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
@@ -576,7 +577,7 @@ TEST(HullBuilder, NewVerticesAreThoseThatTheLastBlockBrought) {
       const PointCounts counts = builder.Add(points).value();
       const std::vector<Vector> fresh = builder.NewVertices();
       ASSERT_EQ(fresh.size(), counts.outside) << "seed " << seed << " round " << round;
-      // Each once, and neither a former one nor one that is missing.
+      // Each exactly one time, with no former and no missing vertex.
       const auto after = SetOf(builder.Vertices());
       std::set<std::tuple<double, double, double>> expected;
       std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
@@ -637,5 +638,5 @@ TEST(Hull, KnowsItsLargestCoordinate) {
   EXPECT_EQ(BuildHull(points).max_abs_coordinate(), 7);
 }
 
-}  // namespace
+}  // namespace hull_builder_test
 }  // namespace hulld

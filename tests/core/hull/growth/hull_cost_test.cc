@@ -19,9 +19,9 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace hull_cost_test {
 
-// What a hull costs, counted: work and memory, never time.
+// Cost of hulls in counted work and memory, never time.
 
 struct NamedPoints {
   const char* name;
@@ -39,16 +39,15 @@ std::vector<Vector> SortedVertices(const HullBuilder& builder) {
   return {hull.vertices().begin(), hull.vertices().end()};
 }
 
-// Shells that each hide the one before.
+// Shells that each hide the previous one.
 std::vector<Vector> GrowingShells(Random& random, size_t n) {
   std::vector<Vector> points = RandomOnSphere(random, n, 1);
   for (size_t i = 0; i < n; ++i) points[i] *= 1 + std::floor(static_cast<double>(i) / 500) / 4;
   return points;
 }
 
-// When points are inserted one after another, none does much more than its share of the
-// housekeeping: beyond the triangles that it removes and creates, its work grows like the square of
-// a logarithm.
+// With points inserted one by one, none does much more than its share of the housekeeping: besides
+// the triangles that it removes and creates, its work grows like the square of a logarithm.
 TEST(HullCost, NoSinglePointStalls) {
   const uint64_t seed = TestSeed(501);
   Random random(seed);
@@ -67,13 +66,13 @@ TEST(HullCost, NoSinglePointStalls) {
       ASSERT_LE(static_cast<double>(steps), 4 * log * log)
           << stream.name << " point " << i << " seed " << seed;
     }
-    // The counter counts.
+    // The counter works.
     EXPECT_GT(before, builder.vertex_count()) << stream.name;
   }
 }
 
-// Most points of a ball are inside, and the map of directions rejects them, however they come: few
-// look for their place by walking over the surface.
+// Most points of a ball are inside, and the direction map rejects them in any order: few locate
+// themselves by walking over the surface.
 TEST(HullCost, InsidePointsAreRejectedWithoutAWalk) {
   const uint64_t seed = TestSeed(509);
   Random random(seed);
@@ -88,8 +87,8 @@ TEST(HullCost, InsidePointsAreRejectedWithoutAWalk) {
   }
 }
 
-// What a depth camera sees, row by row from above, that looks at a wall and a table before it: all
-// points lie along two planes, with noise, and hardly any inside.
+// Simulates a depth camera's rows, from the top, of a wall and a table in front of it: all points
+// lie along two planes, with noise, and hardly any inside.
 std::vector<Vector> DepthFrame(Random& random, int width, int height) {
   std::vector<Vector> points;
   for (int v = 0; v < height; ++v) {
@@ -105,8 +104,8 @@ std::vector<Vector> DepthFrame(Random& random, int width, int height) {
   return points;
 }
 
-// Each block of a frame lies beside those before it, and is flat. The map of directions follows
-// them, whichever way they lie: few points look for their place by walking.
+// Each block of a frame is flat and adjacent to the previous ones. The direction map follows them
+// in any orientation: few points locate themselves by walking.
 TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
   const uint64_t seed = TestSeed(510);
   Random random(seed);
@@ -130,7 +129,7 @@ TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
   }
 }
 
-// What a block keeps so as to be undone depends on what it changes, not on the hull that it meets.
+// A block's undo record depends on its changes, not on the size of the hull.
 TEST(HullCost, UndoingCostsWhatChanges) {
   const uint64_t seed = TestSeed(507);
   Random random(seed);
@@ -150,29 +149,28 @@ TEST(HullCost, UndoingCostsWhatChanges) {
     // Each equals a vertex.
     ASSERT_TRUE(builder.Add(std::span(sphere).first(2000), limits).ok());
     EXPECT_LE(builder.undo_bytes(), 2000 * 48u) << "seed " << seed;
-    // Refused in the end, after all were added.
+    // Refused at the end, after all were added.
     const std::vector<Vector> outside = RandomOnSphere(random, 2000, 1.0 + 0.1 / vertices);
     EXPECT_TRUE(absl::IsResourceExhausted(builder.Add(outside, limits).status()));
     of_outside.push_back(builder.undo_bytes());
     EXPECT_EQ(builder.vertex_count(), sphere.size());
   }
   for (const size_t bytes : of_inside) EXPECT_LE(bytes, 10000u) << "seed " << seed;
-  // Six triangles round each, and as many beyond them.
+  // Six triangles around each, and as many beyond them.
   for (const size_t bytes : of_outside) {
     EXPECT_GT(bytes, 2000 * 100u) << "seed " << seed;
     EXPECT_LE(bytes, 2000 * 16 * 80u) << "seed " << seed;
   }
 }
 
-// Exact signs of all stages that one thread has decided.
+// Returns the exact signs of all stages decided by this thread.
 uint64_t SignsSoFar() {
   const OrientationCounts counts = ThreadOrientationCounts();
   return counts.filter + counts.nearest_filter + counts.fixed_point + counts.expansion +
          counts.integer;
 }
 
-// Two polygons of n corners in parallel planes, which are tilted, exactly: n from -n/2 to n/2 on a
-// parabola.
+// Two polygons of n corners in parallel planes, tilted exactly: n from -n/2 to n/2 on a parabola.
 std::vector<Vector> ParabolaPrism(int n) {
   std::vector<Vector> points;
   for (double i = -n / 2; i < n - n / 2; ++i) {  // NOLINT: exact
@@ -184,7 +182,7 @@ std::vector<Vector> ParabolaPrism(int n) {
   return points;
 }
 
-// Facets of many corners grow at one side: no point costs as much as its facet has corners.
+// Facets with many corners grow at one side: no point costs as much as its facet has corners.
 TEST(HullCost, FacetsOfManyCornersTakeNoQuadraticTime) {
   const uint64_t seed = TestSeed(508);
   for (const bool one_by_one : {false, true}) {
@@ -210,10 +208,10 @@ TEST(HullCost, FacetsOfManyCornersTakeNoQuadraticTime) {
   }
 }
 
-// What exact signs cost, and steps of walks, in units of about 10 ns.
+// Cost of exact signs and steps of walks, in units of about 10 ns.
 struct SignCost {
   double all;
-  // By expansions and integers of any size: signs, not units.
+  // By expansions and integers of any size: a count, not units.
   uint64_t wide;
 };
 
@@ -237,7 +235,7 @@ HullBuilder BuiltOneByOne(std::span<const Vector> points) {
   return builder;
 }
 
-// Whatever the cloud, a block costs not much more than its points do one by one, and few signs take
+// For any cloud, a block costs little more than its points individually, and few signs take
 // expansions or integers of any size.
 TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
   for (const Extreme& extreme : Extremes()) {
@@ -250,7 +248,7 @@ TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
       const auto count = static_cast<double>(points.size());
       EXPECT_LE(block.all, 2 * one_by_one.all + 4 * count) << extreme.name << " " << n;
 #ifdef NDEBUG
-      // Otherwise the surface is checked after every change, whose signs are counted, too.
+      // Otherwise the surface is checked after every change, which adds to the signs counted.
       EXPECT_LE(static_cast<double>(block.wide), 0.5 * count) << extreme.name << " " << n;
       EXPECT_LE(static_cast<double>(one_by_one.wide), count) << extreme.name << " " << n;
 #endif
@@ -258,7 +256,7 @@ TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
   }
 }
 
-// What the server holds of a hull that grew and is asked about, at rest. Bytes for each vertex.
+// Returns the server's memory for a hull at rest that grew and was queried, in bytes per vertex.
 double AskedBytes(const HullBuilder& builder) {
   LiveHull live(builder.Vertices(), builder.dimension());
   live.Prepare(live.Now());
@@ -266,7 +264,7 @@ double AskedBytes(const HullBuilder& builder) {
          static_cast<double>(builder.vertex_count());
 }
 
-// Expects what is promised from 1000 vertices on.
+// Expects the bounds promised from 1000 vertices on.
 void ExpectSmall(const HullBuilder& builder, const char* name) {
   const auto vertices = static_cast<double>(builder.vertex_count());
   ASSERT_GE(vertices, 1000) << name;
@@ -288,7 +286,7 @@ void ExpectSmall(const HullBuilder& builder, const char* name) {
   EXPECT_GE(built, 24 + 2 * 64 - 1) << name;
 }
 
-// Inside points are not kept, and what is kept is small.
+// Inside points are not kept, and the rest is small.
 TEST(HullCost, MemoryIsBoundedByTheVertices) {
   const uint64_t seed = TestSeed(503);
   Random random(seed);
@@ -304,14 +302,14 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
   }
 }
 
-// Vertices of meshes lie unevenly, so that many belong to few directions.
+// Vertices of meshes are unevenly distributed, so that many belong to few directions.
 TEST(HullCost, MemoryOfMeshesIsBoundedByTheVertices) {
   size_t seen = 0;
   for (const char* name : {"stanford-bunny.obj", "rocker-arm.obj"}) {
     const std::optional<std::vector<Vector>> points = MeshVertices(name);
     if (!points) continue;
     const HullBuilder builder = BuiltAtOnce(*points);
-    // Some other mesh may stand in for one that is not there.
+    // Another mesh may replace a missing one.
     if (builder.vertex_count() < 1000) continue;
     ++seen;
     ExpectSmall(builder, name);
@@ -320,10 +318,10 @@ TEST(HullCost, MemoryOfMeshesIsBoundedByTheVertices) {
   if (seen == 0) GTEST_SKIP() << "no mesh of 1000 vertices in HULLD_DATA";
 }
 
-// Scenes hold many small hulls. What they hold whatever their size weighs more for each vertex.
+// Scenes contain many small hulls. Their constant overhead weighs more per vertex.
 TEST(HullCost, MemoryOfSmallHullsIsSmall) {
   Random random(TestSeed(504));
-  // The two of a LiveHull: a mutex takes 40 bytes on x86-64, and 48 on 64-bit ARM.
+  // A LiveHull has two: a mutex takes 40 bytes on x86-64, and 48 on 64-bit ARM.
   const double mutexes = 2 * (static_cast<double>(sizeof(std::mutex)) - 40);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700 + mutexes / 8);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 24, 1))), 650);
@@ -340,5 +338,5 @@ TEST(HullCost, MemoryOfFlatHullsIsCounted) {
   EXPECT_GE(builder.MemoryBytes(), empty + circle.size() * (24 + 48));
 }
 
-}  // namespace
+}  // namespace hull_cost_test
 }  // namespace hulld

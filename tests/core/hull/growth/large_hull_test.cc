@@ -9,9 +9,9 @@
 #include "tests/oracle/cgal_hull.h"
 
 namespace hulld {
-namespace {
+namespace large_hull_test {
 
-// Big inputs against CGAL's exact hull. Each test skips where CGAL is not there.
+// Large inputs against CGAL's exact hull. Skipped without CGAL.
 class LargeHull : public testing::Test {
  protected:
   void SetUp() override {
@@ -79,7 +79,7 @@ TEST_F(LargeHull, NearlyFlatSetsMatchCgal) {
                      "a few ulps of room");
 }
 
-// Points just outside and just inside facets that many others hide.
+// Points just outside and just inside facets that many other points hide.
 TEST_F(LargeHull, ShellsOneLastPlaceApartMatchCgal) {
   const uint64_t seed = TestSeed(304);
   Random random(seed);
@@ -112,5 +112,5 @@ TEST_F(LargeHull, MeshesMatchCgal) {
   }
 }
 
-}  // namespace
+}  // namespace large_hull_test
 }  // namespace hulld

@@ -23,7 +23,7 @@
 #include "tests/oracle/brute_force_hausdorff.h"
 
 namespace hulld {
-namespace {
+namespace inside_search_test {
 
 std::vector<Vector> OnEllipsoid(int n, const Vector& radii) {
   std::mt19937_64 random(31);
@@ -36,7 +36,7 @@ std::vector<Vector> OnEllipsoid(int n, const Vector& radii) {
   return points;
 }
 
-// A cube whose corners are balls.
+// A cube with balls as corners.
 std::vector<Vector> OnRoundedCube(int n) {
   std::vector<Vector> points = OnEllipsoid(n, Vector(0.1, 0.1, 0.1));
   for (Vector& p : points) {
@@ -54,7 +54,7 @@ std::vector<Vector> OnPrism(int n) {
   return points;
 }
 
-// Each vertex of such a hull may see all that are lower.
+// Each vertex of such a hull may see all lower ones.
 std::vector<Vector> OnMomentCurve(int n) {
   std::vector<Vector> points;
   for (int i = 0; i < n; ++i) {
@@ -105,12 +105,12 @@ TEST(InsideSearch, IsNeverWorseThanFarthestFirst) {
       better += search.best().error < order.ErrorAt(most) ? 1 : 0;
     }
   }
-  // Observed: 34.
+  // **Observed**: 34.
   EXPECT_GT(better, 20);
 }
 
-// By the oracle's exact arithmetic, the bound of any start is true, and so is that of what is
-// chosen from there.
+// In the oracle's exact arithmetic, the bound of any start is true, and so is the bound of the
+// subset chosen from it.
 TEST(VertexSubset, StartsWithAnyVertices) {
   Random random(TestSeed(41));
   const Hull full = BuildHull(RandomOnSphere(random, 18, 3.0));
@@ -163,7 +163,7 @@ TEST(Relaxation, SpreadsWhatIsCrowded) {
   const std::vector<Vector> unit_points = scale.ToUnit(full.vertices());
   StopPoll poll;
   Relaxation relaxation(full, unit_points, poll);
-  // Many of the vertices on one half of the sphere, and few of the others.
+  // Many of the vertices on one half of the sphere, and few on the other.
   std::vector<uint32_t> chosen;
   for (uint32_t i = 0; i < full.vertices().size(); ++i) {
     if (i % (full.vertices()[i].x() < 0 ? 10 : 80) == 0) chosen.push_back(i);
@@ -198,5 +198,5 @@ TEST(Relaxation, HasNoSolidToMoveInAPlane) {
   EXPECT_FALSE(relaxation.Move(top).has_value());
 }
 
-}  // namespace
+}  // namespace inside_search_test
 }  // namespace hulld

@@ -21,7 +21,7 @@
 #include "tests/oracle/brute_force_hausdorff.h"
 
 namespace hulld {
-namespace {
+namespace simplify_test {
 
 // Exact audits take the square of this.
 #ifdef HULLD_SANITIZED
@@ -32,7 +32,7 @@ constexpr int kLargeSphere = 5000;
 
 Hull HullOf(const std::vector<Vector>& points) { return BuildHull(points); }
 
-// Checks a simplification by the oracle's exact arithmetic: it is nested, and its error is true.
+// Expects a nested simplification with a true error, by the oracle's exact arithmetic.
 void ExpectTrue(const Hull& full, const absl::StatusOr<SimplifiedHull>& simple, bool is_inside) {
   ASSERT_TRUE(simple.ok()) << simple.status();
   const auto of_full = ToOracle(full.vertices());
@@ -64,7 +64,7 @@ double Support(const Hull& hull, const Vector& n) {
 }
 
 // The Hausdorff distance of nested convex sets is the largest difference of their support
-// functions; over some directions that is a lower bound.
+// functions; sampling some directions gives a lower bound.
 double LeastHausdorffDistance(const Hull& inner, const Hull& outer) {
   double most = 0;
   for (const Vector& n : Sphere(3000, 99)) {
@@ -91,7 +91,7 @@ TEST_P(Simplify, InsideIsASubsetWithinItsProvenError) {
     EXPECT_TRUE(IsSubset(inside->hull, full));
     const double least = LeastHausdorffDistance(inside->hull, full);
     EXPECT_GE(inside->error, least * (1 - 1e-12));
-    // Some directions tell little of a slender shape.
+    // Sampled directions are weak for slender shapes.
     if (radii.minCoeff() > 0.1) {
       EXPECT_LE(inside->error, 2 * least);
     }
@@ -171,7 +171,7 @@ TEST(SimplifyTarget, StopsWhenAsked) {
   EXPECT_TRUE(absl::IsCancelled(SimplifyOutside(full, target).status()));
 }
 
-// At whatever poll the caller says stop, that is what comes of it.
+// A stop at any poll ends the call with the caller's status.
 TEST(SimplifyTarget, StopsAtEveryStage) {
   const Hull full = HullOf(Sphere(3000, 7));
   for (const SimplifyTarget& limits : {SimplifyTarget{0, 0.02, {}}, SimplifyTarget{200, 0, {}}}) {
@@ -228,7 +228,7 @@ TEST(SimplifyExtremes, EveryScaleIsEnclosed) {
   }
 }
 
-// With both limits, max_vertices holds always, and max_error whenever the method can.
+// With both limits, max_vertices holds always, and max_error whenever the method can achieve it.
 TEST(SimplifyTarget, BothLimitsHoldWhereTheyCan) {
   const Hull full = HullOf(Sphere(300, 8));
   for (const auto simplify : {SimplifyInside, SimplifyOutside}) {
@@ -243,7 +243,7 @@ TEST(SimplifyTarget, BothLimitsHoldWhereTheyCan) {
           EXPECT_LE(both->error, max_error) << max_vertices;
           EXPECT_LE(count, most->hull.vertices().size());
         } else {
-          // As near as the vertices allow, not merely as near as the box.
+          // As close as the vertices allow, not merely as close as the box.
           EXPECT_LE(both->error, most->error) << max_vertices << " " << max_error;
         }
         if (max_vertices >= 300) {
@@ -330,7 +330,7 @@ TEST(SimplifyOutside, PolygonsAreEnclosedInThinPrisms) {
   EXPECT_TRUE(AuditContainment(outside->hull, full.vertices()).ok());
 }
 
-// Every kind of limit, on hulls of all sorts of points: at most about 20 vertices, for the oracle.
+// All kinds of limits, on hulls of any points: at most about 20 vertices, for the oracle.
 void ExpectTrueForAllTargets(const Hull& full) {
   const double size = full.max_abs_coordinate();
   for (const double max_error : {0.0, size / 3, size / 50}) {
@@ -406,7 +406,7 @@ TEST(SimplifyOracle, DistancesBeyondTheLargestDoubleAreInfinite) {
   EXPECT_TRUE(std::isinf(SimplifyInside(HullOf(corners), {4, 0, {}})->error) || has_infinite);
 }
 
-// Subnormal hulls: no error is rounded to nothing.
+// Subnormal hulls: no error is rounded to zero.
 TEST(SimplifyOracle, SubnormalHullsAreNestedWithinTheirErrors) {
   Random random(TestSeed(24));
   for (int k = 0; k < 8; ++k) {
@@ -414,10 +414,10 @@ TEST(SimplifyOracle, SubnormalHullsAreNestedWithinTheirErrors) {
   }
 }
 
-// The best polytopes of n vertices in the unit sphere err by 2.418 / n in the limit (Schneider
-// 1987; Gruber 1993: half the covering density of the plane, 2 pi / sqrt(27), over pi, times the
-// area, 4 pi), and so do the best round it of n facets. No method needs fewer; farthest first alone
-// needs 1.7 times as many (observed).
+// The best polytopes of n vertices in the unit sphere err by 2.418 / n in the limit
+// (Schneider 1987; Gruber 1993: half the covering density of the plane, 2 pi / sqrt(27), over pi,
+// times the area, 4 pi), and so do the best circumscribed ones of n facets. No method needs fewer.
+// **Observed**: farthest first alone needs 1.7 times as many.
 constexpr double kFewestTimesError = 2.418;
 
 TEST(SimplifyQuality, SpheresNeedAtMostHalfMoreThanTheFewestVertices) {
@@ -439,7 +439,7 @@ TEST(SimplifyQuality, SpheresErrAtMostHalfMoreThanTheLeast) {
   }
 }
 
-// How far the hull is from the hull of those of its vertices that `chosen` has as bits.
+// Returns the distance of the hull from the hull of the vertices selected by the bits of `chosen`.
 double ErrorOfSubset(const Hull& full, unsigned chosen) {
   std::vector<Vector> kept;
   for (size_t i = 0; i < full.vertices().size(); ++i) {
@@ -457,8 +457,8 @@ double ErrorOfSubset(const Hull& full, unsigned chosen) {
   return error;
 }
 
-// By trying all subsets of small hulls: 1.1 times as many vertices as the best choice, 1.8 times at
-// worst (observed, hulls of 9 to 16 vertices).
+// Tries all subsets of small hulls. **Observed**, hulls of 9 to 16 vertices: 1.1 times as many
+// vertices as the best choice, 1.8 times at worst.
 TEST(SimplifyQuality, SmallHullsNeedFewMoreVerticesThanTheBestSubset) {
   constexpr int kVertices = 9;
   double needed = 0;
@@ -481,9 +481,9 @@ TEST(SimplifyQuality, SmallHullsNeedFewMoreVerticesThanTheBestSubset) {
     }
   }
   EXPECT_LT(needed, 1.2 * fewest);
-  // A choice that is better than the best would show that the best was not found.
+  // A choice better than the best would show that the best was not found.
   EXPECT_GE(needed, fewest);
 }
 
-}  // namespace
+}  // namespace simplify_test
 }  // namespace hulld

@@ -10,7 +10,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace chunked_vector_test {
 
 using Elements = ChunkedVector<int>;
 
@@ -20,7 +20,7 @@ std::vector<int> Contents(const Elements& vector) {
   return contents;
 }
 
-// Changes both in the same way, at random.
+// Applies the same random changes to both.
 void Change(Random& random, int changes, Elements& vector, std::vector<int>& expected) {
   for (int i = 0; i < changes; ++i) {
     const int kind = random.Below(8);
@@ -37,7 +37,7 @@ void Change(Random& random, int changes, Elements& vector, std::vector<int>& exp
   }
 }
 
-// The sizes go past where the first chunk grows and where further chunks begin.
+// The sizes pass the growth of the first chunk and the start of further chunks.
 TEST(ChunkedVector, UndoBringsBackWhatWasThere) {
   const uint64_t seed = TestSeed(601);
   Random random(seed);
@@ -52,7 +52,7 @@ TEST(ChunkedVector, UndoBringsBackWhatWasThere) {
       EXPECT_EQ(Contents(vector), expected) << before << " " << changes << " seed " << seed;
       vector.Undo();
       EXPECT_EQ(Contents(vector), kept) << before << " " << changes << " seed " << seed;
-      // Nothing of the journal is left.
+      // The journal is empty.
       expected = kept;
       vector.StartJournal();
       Change(random, changes, vector, expected);
@@ -81,5 +81,5 @@ TEST(ChunkedVector, FewElementsTakeLittleMemory) {
   EXPECT_GE(vector.MemoryBytes(), 512 * sizeof(int));
 }
 
-}  // namespace
+}  // namespace chunked_vector_test
 }  // namespace hulld

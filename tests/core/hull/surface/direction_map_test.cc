@@ -12,7 +12,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace direction_map_test {
 
 using Gauge = std::function<double(const Vector&)>;
 
@@ -26,7 +26,7 @@ MapFrame FrameOfPlate(const Vector& center) {
   return MapFrame(center, kPlate * kPlate.transpose());
 }
 
-// A map in `frame` of the set with the given gauge about its center.
+// Returns a map in `frame` of the set with the given gauge about its center.
 DirectionMap MapOf(const Gauge& gauge, const MapFrame& frame, int resolution) {
   DirectionMap map(frame, resolution);
   double least = INFINITY;
@@ -61,7 +61,7 @@ size_t SurvivorCount(const DirectionMap& map, const std::vector<Vector>& points)
   return survivors.size();
 }
 
-// Points in random directions at a gauge about the center.
+// Returns points in random directions at a gauge about the center.
 std::vector<Vector> PointsAt(const Gauge& gauge, const Vector& center, double value, int n) {
   Random random(TestSeed(521));
   std::vector<Vector> points;
@@ -81,7 +81,7 @@ TEST(DirectionMap, FollowsPlanesExactly) {
   }
 }
 
-// What is rejected is inside, and what is kept is near the surface: by less than the square of a
+// Rejected points are inside, and kept ones are near the surface: by less than the square of a
 // cell's diagonal, 2 sqrt(2) / n, times half the largest curvature, 1, of the gauge.
 TEST(DirectionMap, FollowsCurvesToTheSecondOrder) {
   const Vector center(-1, 2, 0.5);
@@ -93,7 +93,7 @@ TEST(DirectionMap, FollowsCurvesToTheSecondOrder) {
   }
 }
 
-// The plate is an octahedron in its frame. Without one, most of its cells straddle an edge.
+// The plate is an octahedron in its frame. Without a frame, most of its cells straddle an edge.
 TEST(DirectionMap, FramesMakeFlatSetsRound) {
   const Vector center(0.25, -3, 10);
   const auto points_at = [&](double value) {
@@ -120,7 +120,7 @@ TEST(DirectionMap, RoundSetsNeedNoFrame) {
   }
 }
 
-// At any scale. A set without any thickness has none.
+// At any scale. A set without any thickness has no frame.
 TEST(DirectionMap, FramesUndoThemselves) {
   const Vector center(1, 1, 1);
   const Vector direction(0.25, -1, 0.5);
@@ -153,7 +153,7 @@ TEST(DirectionMap, KeepsWhatItCannotMeasure) {
   const std::vector<Vector> far = {Vector::Constant(1e308), Vector(-1.7e308, 0, 1),
                                    Vector(0, 0, 1e302), Vector(1, 1, 1)};
   EXPECT_EQ(SurvivorCount(map, far), far.size());
-  // In a frame, an infinite difference times zero, or less another, is not a number.
+  // In a frame, an infinite difference times zero, or minus another, is NaN.
   constexpr double kMost = std::numeric_limits<double>::max();
   std::vector<Vector> overflowing;
   for (const double x : {-kMost, 0.0, kMost}) {
@@ -162,7 +162,7 @@ TEST(DirectionMap, KeepsWhatItCannotMeasure) {
     }
   }
   for (const Vector& center : {Vector(0, 0, 0), Vector(1e305, -1e305, 1e305)}) {
-    // So large that its map is of use round either center.
+    // So large that its map is useful around either center.
     const Gauge large = [](const Vector& d) { return PlateGauge(d) / 1e302; };
     const DirectionMap plate = MapOf(large, FrameOfPlate(center), 8);
     EXPECT_EQ(SurvivorCount(plate, PointsAt(large, center, 0.1, 100)), 0u);
@@ -174,7 +174,7 @@ TEST(DirectionMap, KeepsWhatItCannotMeasure) {
   EXPECT_EQ(SurvivorCount(slender, PointsAt(needle, Vector::Zero(), 0.01, 100)), 100u);
 }
 
-// Compares which points are kept by either path.
+// Expects that both paths keep the same points.
 void ExpectSamePoints(const DirectionMap& map, const std::vector<Vector>& points) {
   const SimdPath before = CurrentSimdPath();
   std::vector<uint32_t> fast;
@@ -201,5 +201,5 @@ TEST(DirectionMap, SimdPathsKeepTheSamePoints) {
   ExpectSamePoints(MapOf(PlateGauge, FrameOfPlate(center), 20), points);
 }
 
-}  // namespace
+}  // namespace direction_map_test
 }  // namespace hulld

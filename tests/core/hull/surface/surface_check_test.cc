@@ -14,7 +14,7 @@
 
 namespace hulld {
 
-// Writes into a surface what no insertion would.
+// Writes values into a surface that no insertion would.
 class SurfaceTestPeer {
  public:
   static SurfaceTriangle& Triangle(Surface& surface, TriangleId id) {
@@ -23,7 +23,7 @@ class SurfaceTestPeer {
   static void CountOneMore(Surface& surface) { ++surface.alive_; }
 };
 
-namespace {
+namespace surface_check_test {
 
 // A hull of points on a sphere, so that vertex i is points[i].
 class SurfaceCheck : public testing::Test {
@@ -100,7 +100,7 @@ TEST_F(SurfaceCheck, FindsANeighbourThatDoesNotExist) {
 }
 
 TEST_F(SurfaceCheck, FindsALinkThatIsNotMutual) {
-  // The neighbour of a neighbour links to some triangle that is not beyond the edge.
+  // The neighbor of a neighbor links to a triangle that is not beyond the edge.
   const TriangleId neighbour = Triangle(0).neighbours[0];
   for (TriangleId& link : Triangle(neighbour).neighbours) {
     if (link == 0) link = neighbour;
@@ -123,7 +123,7 @@ TEST_F(SurfaceCheck, FindsATriangleTurnedInsideOut) {
 TEST_F(SurfaceCheck, FindsAVertexThatIsGone) {
   VertexTable without = vertices_;
   without.Remove(Triangle(0).corners[2]);
-  // Otherwise the counts tell.
+  // Otherwise the counts reveal it.
   without.Add({9, 9, 9});
   without.Remove(without.Add({8, 8, 8}));
   EXPECT_STREQ(Defect(without), "a rounded plane misses a corner");
@@ -149,7 +149,7 @@ TEST_F(SurfaceCheck, FindsWrongCounts) {
   EXPECT_STREQ(Defect(), "IDs are neither alive nor free");
 }
 
-// Turns the diagonal of two neighbours: all links are right, and the edge is a dent.
+// Flips the diagonal of two neighbors: all links are right, and the edge is a dent.
 TEST_F(SurfaceCheck, FindsADent) {
   const TriangleId f = 0;
   const TriangleId g = Triangle(f).neighbours[0];
@@ -162,7 +162,7 @@ TEST_F(SurfaceCheck, FindsADent) {
     std::rotate(of_g.begin(), of_g.begin() + 1, of_g.end());
   }
   const VertexId d = bad[2];
-  // a b c and b a d become d c a and c d b; the planes are left to the one that has them.
+  // a b c and b a d become d c a and c d b; the planes stay with their triangles.
   const auto relink = [&](TriangleId at, TriangleId from, TriangleId to) {
     for (TriangleId& link : Triangle(at).neighbours) {
       if (link == from) link = to;
@@ -211,5 +211,5 @@ TEST_F(SurfaceCheck, EndsTheProcessAtTheInsertionThatBreaksTheSurface) {
 }
 #endif
 
-}  // namespace
+}  // namespace surface_check_test
 }  // namespace hulld

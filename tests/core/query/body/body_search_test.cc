@@ -16,7 +16,7 @@
 #include "tests/core/query/body/rational_world.h"
 
 namespace hulld {
-namespace {
+namespace body_search_test {
 
 using testing::HasSubstr;
 
@@ -43,7 +43,7 @@ TEST(BodySearch, RelationIsTheStrongestOfAllPairsOfPieces) {
     OwnBody a, b;
     Fill(random, random.Between(1, 12), &a);
     Fill(random, random.Between(1, 12), &b);
-    // Those of one turn meet as lattices do.
+    // Bodies with equal rotations meet as lattices do.
     Pose X_WA = At(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
     X_WA.q = {2, 1, 0, 1};
     Pose X_WB = X_WA;
@@ -136,7 +136,7 @@ TEST(BodySearch, SeparationIsTheLeastOfAllPairs) {
       EXPECT_EQ(answer->answer.separation->value, least) << round;
       EXPECT_LE(answer->answer.separation->bound, 1e-10);
       ++relations[static_cast<size_t>(answer->answer.relation)];
-      // No sum is near the clearances that are asked about.
+      // No sum is near the queried clearances.
       if (std::abs(least - clearance) > 1e-9) {
         EXPECT_EQ(answer->answer.within_clearance, least <= clearance);
       }
@@ -168,13 +168,13 @@ TEST(BodySearch, FewNearPairsOfManyPiecesAreAllThatIsAskedAbout) {
   EXPECT_EQ(touching->answer.relation, Relation::kTouching);
   EXPECT_EQ(counts.pairs, 100u);
   EXPECT_LT(counts.boxes, 30000u);
-  // One look tells grids that are apart.
+  // One test decides grids that are apart.
   const auto apart =
       CheckBodies(grid.Placed(At(0, 0, 0)), grid.Placed(At(40, 0, 0)), QueryOptions(), &counts);
   EXPECT_EQ(apart->answer.relation, Relation::kSeparated);
   EXPECT_EQ(counts.boxes, 1u);
   EXPECT_EQ(counts.pairs, 0u);
-  // A turned grid, and the nearest pair of a million.
+  // A rotated grid, and the nearest pair of a million.
   Pose between = At(45, 0, 0);
   between.q = {3, 0, 0, 1};
   QueryOptions options;
@@ -223,7 +223,7 @@ TEST(BodySearch, WithoutPointsABodyIsSeparatedFromAll) {
   }
 }
 
-// What the relation of pieces is, and that of their union is not.
+// The relation is that of the pieces, not of their union.
 TEST(BodySearch, ASeamBelongsToThePieces) {
   OwnBody block, sheet;
   block.Add(LatticeCube(2, 1), At(0, 0, 0));
@@ -308,5 +308,5 @@ TEST(BodySearch, CoordinatesBeyondTheRangeOfBoxesAreAskedAboutAllTheSame) {
       Relation::kOverlapping);
 }
 
-}  // namespace
+}  // namespace body_search_test
 }  // namespace hulld

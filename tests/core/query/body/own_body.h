@@ -33,7 +33,7 @@ struct OwnBody {
   PlacedBody Placed(const Pose& X_WB) const { return PlacedBody(*query, X_WB); }
 };
 
-// Hulls of a few lattice points each, some turned, some empty.
+// Adds hulls of a few lattice points each, some rotated, some empty.
 inline void Fill(Random& random, int pieces, OwnBody* body) {
   for (int i = 0; i < pieces; ++i) {
     Pose pose = At(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
@@ -44,7 +44,7 @@ inline void Fill(Random& random, int pieces, OwnBody* body) {
   body->Finish();
 }
 
-// Cubes of side 1 whose corners are `spacing` apart.
+// Adds cubes of side 1 with corners `spacing` apart.
 inline void FillGrid(int side, double spacing, OwnBody* body) {
   for (int x = 0; x < side; ++x) {
     for (int y = 0; y < side; ++y) {

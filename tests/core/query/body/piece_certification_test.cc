@@ -16,7 +16,7 @@
 #include "tests/core/query/body/rational_world.h"
 
 namespace hulld {
-namespace {
+namespace piece_certification_test {
 
 using testing::HasSubstr;
 
@@ -26,7 +26,7 @@ QueryOptions Certified() {
   return options;
 }
 
-// Whether the least boxes of both along the axes have a common point.
+// Returns true if the minimal axis-aligned boxes of both intersect.
 bool DoBoxesMeet(const oracle::WorldPoints& world) {
   if (world.a.empty() || world.b.empty()) return false;
   for (int k = 0; k < 3; ++k) {
@@ -40,7 +40,7 @@ bool DoBoxesMeet(const oracle::WorldPoints& world) {
 
 oracle::Relation ForOracle(Relation relation) { return static_cast<oracle::Relation>(relation); }
 
-// Pieces that are large for how far apart they are, so that many boxes meet.
+// Adds pieces large relative to their distances, so that many boxes meet.
 void FillLarge(Random& random, int pieces, OwnBody* body) {
   for (int i = 0; i < pieces; ++i) {
     Pose pose = At(random.Between(-4, 4), random.Between(-3, 3), 0);
@@ -56,7 +56,7 @@ struct Proven {
   size_t settled = 0;
 };
 
-// Checks by rational numbers alone that the certificates prove the relation.
+// Expects that the certificates prove the relation, by rational numbers alone.
 void ExpectProof(const OwnBody& a, const Pose& X_WA, const OwnBody& b, const Pose& X_WB,
                  const BodyAnswer& answer, Proven* proven) {
   EXPECT_FALSE(answer.answer.certificate.has_value());
@@ -107,10 +107,10 @@ TEST(PieceCertification, ProvesEveryRelation) {
     X_WA.q = {2, 1, 0, 1};
     Pose X_WB = X_WA;
     if (round % 4 == 0) X_WB.q = {1, 0.1, 1, 0};
-    // Those of one pose meet as lattices do.
+    // Bodies with equal poses meet as lattices do.
     if (round % 3 != 0) X_WB.t += Vector(random.Between(-4, 4), random.Between(-4, 4), 0);
     QueryOptions options = Certified();
-    // Beside the least separation, whose pair is found otherwise.
+    // Also with the least separation; its pair is found differently.
     options.want_separation = round % 2 == 0;
     const auto answer = CheckBodies(a.Placed(X_WA), b.Placed(X_WB), options);
     ASSERT_TRUE(answer.ok()) << answer.status();
@@ -123,13 +123,13 @@ TEST(PieceCertification, ProvesEveryRelation) {
   EXPECT_GT(proven.settled, 200u);
 }
 
-// Where floating point does not reach, boxes are all of space or far too large: then pairs are
-// certified rather than left out.
+// When floating point overflows, boxes cover all of space or are far too large: then pairs are
+// certified instead of omitted.
 TEST(PieceCertification, RoundingLeavesNoPairOut) {
   Proven proven;
   for (const double scale : {1e-310, 1e-160, 1e-30, 1.0, 1e150, 1e306}) {
     OwnBody a, b;
-    // Large translations that cancel, about hulls far below their rounding.
+    // Large translations that cancel, for hulls far below their rounding.
     const double far = scale * 1e15;
     const bool cancels = scale < 1e290;
     a.Add(Scaled(LatticeCube(2, 1), scale), cancels ? At(far, far, 0) : Pose());
@@ -149,8 +149,8 @@ TEST(PieceCertification, RoundingLeavesNoPairOut) {
   EXPECT_GT(proven.certificates, 10u);
 }
 
-// Two cubes that share a face, far from the origin of their bodies, which are as far from that of
-// the world: the poses are the same, but their products are rounded otherwise.
+// Two cubes that share a face, far from the origins of their bodies, which are as far from the
+// world's: the poses are equal, but their products round differently.
 TEST(PieceCertification, TranslationsThatCancelLeaveNoPairOut) {
   Random random(TestSeed(5));
   Proven proven;
@@ -238,5 +238,5 @@ TEST(PieceCertification, StopsWhenToldSo) {
   }
 }
 
-}  // namespace
+}  // namespace piece_certification_test
 }  // namespace hulld

@@ -12,13 +12,13 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/oracle/brute_force_relation.h"
 
-// Poses and their products in rational numbers, by the definition and nothing else.
+// Poses and their products in rational numbers, directly from the definition.
 namespace hulld {
 
 using Rational = boost::multiprecision::number<boost::multiprecision::cpp_rational::backend_type,
                                                boost::multiprecision::et_off>;
 using RationalPoint = std::array<Rational, 3>;
-// The last pose first: p_W = poses[0] (poses[1] p).
+// Outermost pose first: p_W = poses[0] (poses[1] p).
 using PoseChain = std::vector<Pose>;
 
 // R(q) / |q|^2.
@@ -50,7 +50,8 @@ inline RationalPoint Placed(const PoseChain& poses, RationalPoint p) {
   return p;
 }
 
-// Two hulls at products of poses in the world, at one common scale that makes integers of all.
+// Returns two hulls at products of poses in the world, at a common scale that makes all coordinates
+// integers.
 inline oracle::WorldPoints RationalWorld(const Hull& a, const PoseChain& poses_a, const Hull& b,
                                          const PoseChain& poses_b) {
   using boost::multiprecision::denominator;
@@ -74,7 +75,7 @@ inline oracle::WorldPoints RationalWorld(const Hull& a, const PoseChain& poses_a
   return world;
 }
 
-// The relation of two hulls at products of poses, by the oracle of integers.
+// Returns the relation of two hulls at products of poses, by the integer oracle.
 inline Relation RationalRelation(const Hull& a, const PoseChain& poses_a, const Hull& b,
                                  const PoseChain& poses_b) {
   const oracle::WorldPoints world = RationalWorld(a, poses_a, b, poses_b);

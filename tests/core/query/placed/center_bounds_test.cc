@@ -15,14 +15,14 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace center_bounds_test {
 
 struct NamedHull {
   std::string name;
   Hull hull;
 };
 
-// Round ones and boxes, needles and plates, far from the origin and at the ends of the range, with
+// Round hulls and boxes, needles and plates, far from the origin and at the ends of the range, with
 // few vertices and many.
 std::vector<NamedHull> Solids(Random& random) {
   std::vector<NamedHull> solids;
@@ -46,7 +46,7 @@ std::vector<NamedHull> Solids(Random& random) {
   return solids;
 }
 
-// Corners of the cube map's cells among them, where bounds are met closely.
+// Includes corners of the cube map's cells, where bounds are nearly tight.
 std::vector<Vector> Directions(Random& random) {
   std::vector<Vector> directions = LatticeCubeSurface(5);
   for (Vector& n : directions) n -= Vector(2, 2, 2);
@@ -114,8 +114,7 @@ TEST(CenterBounds, RoundHullsAreBoundedClosely) {
   }
 }
 
-// Cells are made when they are first needed, by whichever thread: what they hold depends on
-// neither.
+// Cells are made lazily by any thread: their contents depend on neither thread nor order.
 TEST(CenterBounds, CellsAreTheSameInWhateverOrderTheyAreMade) {
   const uint64_t seed = TestSeed(907);
   Random random(seed);
@@ -188,7 +187,7 @@ TEST(CenterBounds, FlatHullsHaveNone) {
   }
 }
 
-// Its six extreme vertices are corners of one facet.
+// Its six extreme vertices are corners of a single facet.
 TEST(CenterBounds, CentersOnTheBoundaryHaveNoGauge) {
   const Hull hull = BuildHull(std::vector<Vector>{Vector(12, -6, -6), Vector(-6, 12, -6),
                                                   Vector(-6, -6, 12), Vector(1, 1, 1)});
@@ -201,7 +200,7 @@ TEST(CenterBounds, CentersOnTheBoundaryHaveNoGauge) {
   }
 }
 
-// The relation alone, which the bounds may settle, against what the search finds with evidence.
+// The relation alone, which the bounds may decide, against the search's result with evidence.
 TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
   const uint64_t seed = TestSeed(904);
   Random random(seed);
@@ -235,7 +234,7 @@ TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
   EXPECT_GT(settled[1], 300);
 }
 
-// Centres in one place, and hulls that touch along the line of their centres.
+// Coincident centers, and hulls that touch along the line of their centers.
 TEST(CenterBounds, LimitsOfTheLineOfCentres) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const QueryHull query_hull(cube);
@@ -257,5 +256,5 @@ TEST(CenterBounds, LimitsOfTheLineOfCentres) {
   }
 }
 
-}  // namespace
+}  // namespace center_bounds_test
 }  // namespace hulld

@@ -17,7 +17,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace live_hull_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kPoints = 60;
@@ -25,7 +25,7 @@ constexpr int kPoints = 60;
 constexpr int kPoints = 250;
 #endif
 
-// A hull that grows beside its builder.
+// A hull that grows together with its builder.
 struct Growing {
   HullBuilder builder;
   LiveHull live;
@@ -44,14 +44,14 @@ Pose RandomPose(Random& random, const Vector& t) {
   return pose;
 }
 
-// The size that a cloud has, so that a probe of that size is put where it counts.
+// Returns the size of a cloud, to place a probe of that size where it matters.
 double SizeOf(const std::vector<Vector>& points) {
   double size = 0;
   for (const Vector& p : points) size = std::max(size, p.cwiseAbs().maxCoeff());
   return size;
 }
 
-// Asks about the version and about a fresh canonical hull, and counts the relations.
+// Queries the version and a fresh canonical hull, and counts the relations.
 class Comparison {
  public:
   explicit Comparison(const Hull& probe) : probe_(probe), query_probe_(probe) {}
@@ -86,7 +86,7 @@ class Comparison {
   int counts_[4] = {};
 };
 
-// All extreme clouds, point by point, prepared now and then.
+// All extreme clouds, point by point, prepared occasionally.
 TEST(LiveHull, EveryStepAnswersAsAFreshHull) {
   const uint64_t seed = TestSeed(941);
   Random random(seed);
@@ -124,7 +124,7 @@ TEST(LiveHull, EveryStepAnswersAsAFreshHull) {
   EXPECT_GT(counts[static_cast<int>(Relation::kOverlapping)], 100);
 }
 
-// Old versions stay what they were while the hull grows and is prepared.
+// Old versions stay unchanged while the hull grows and is prepared.
 TEST(LiveHull, MarksKeepTheirMoment) {
   Random random(TestSeed(942));
   Growing growing;
@@ -187,8 +187,8 @@ TEST(LiveHull, EmptyHullsAreSeparatedFromAll) {
   EXPECT_FALSE(live.WantsPreparing(live.Now(), 1000000));
 }
 
-// A hull that nobody asks about is never prepared; one that is asked about is, once the questions
-// have scanned as much as preparing costs.
+// A hull without queries is never prepared; a queried hull is prepared after the queries have
+// scanned as much as preparation costs.
 TEST(LiveHull, QuestionsPayForPreparing) {
   Random random(TestSeed(944));
   Growing growing;
@@ -214,8 +214,8 @@ TEST(LiveHull, QuestionsPayForPreparing) {
   EXPECT_FALSE(growing.live.WantsPreparing(growing.mark, 1000000));
 }
 
-// One point a step and a question after each, counted in operations: points that questions scan
-// and that merges move.
+// One point per step and a query after each, counted in operations: points that queries scan and
+// that merges move.
 TEST(LiveHull, WorkAStepIsPolylogarithmic) {
   Random random(TestSeed(945));
   const Hull probe = BuildHull(RandomOnSphere(random, 20, 1));
@@ -249,7 +249,7 @@ TEST(LiveHull, WorkAStepIsPolylogarithmic) {
   }
 }
 
-// One thread grows the hull, one prepares it, two ask.
+// One thread grows the hull, one prepares it, two query it.
 TEST(LiveHull, ThreadsDoNotWaitForEachOther) {
   Growing growing;
   {
@@ -300,5 +300,5 @@ TEST(LiveHull, ThreadsDoNotWaitForEachOther) {
   EXPECT_TRUE(SameBits(BuildHull(growing.live.PointsAt(growing.mark)), growing.builder.Snapshot()));
 }
 
-}  // namespace
+}  // namespace live_hull_test
 }  // namespace hulld

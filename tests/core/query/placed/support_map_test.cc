@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,7 +16,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace support_map_test {
 
 #ifdef HULLD_SANITIZED
 constexpr int kDirections = 300;
@@ -27,8 +29,30 @@ struct NamedSet {
   std::vector<Vector> points;
 };
 
-// Sets of every shape, more points than are scanned: round, flat, oblong, far from the origin, with
-// points inside, and nearly flat caps.
+// Corners of a regular polygon, of a prism over it, or of a cone.
+std::vector<Vector> OnCircles(int corners, std::span<const double> heights,
+                              std::span<const Vector> others = {}) {
+  std::vector<Vector> points(others.begin(), others.end());
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2 * M_PI * i / corners;
+    for (const double height : heights) {
+      points.emplace_back(std::cos(angle), std::sin(angle), height);
+    }
+  }
+  return points;
+}
+
+// Sets along curves: cells of directions list many of their points at any cell size.
+std::vector<NamedSet> CurvedSets(int corners) {
+  const Vector apex(0, 0, 2);
+  return {{"polygon", OnCircles(corners, std::array{0.0})},
+          {"prism", OnCircles(corners / 2, std::array{-1.0, 1.0})},
+          {"slab", OnCircles(corners / 2, std::array{-1e-9, 1e-9})},
+          {"cone", OnCircles(corners, std::array{0.0}, std::span(&apex, 1))}};
+}
+
+// Sets of every shape, with more points than are scanned: round, flat, oblong, far from the origin,
+// with points inside, and nearly flat caps.
 std::vector<NamedSet> Sets(Random& random) {
   std::vector<NamedSet> sets;
   sets.push_back({"few", RandomOnSphere(random, 12, 1)});
@@ -43,6 +67,10 @@ std::vector<NamedSet> Sets(Random& random) {
   std::vector<Vector> polygon = RandomOnSphere(random, 300, 1);
   for (Vector& p : polygon) p.z() = 0;
   sets.push_back({"polygon", polygon});
+  for (NamedSet& curved : CurvedSets(20000)) {
+    curved.name = "large " + curved.name;
+    sets.push_back(std::move(curved));
+  }
   std::vector<Vector> tilted;
   for (const Vector& p : polygon) tilted.emplace_back(p.x(), p.y(), p.x() + 2 * p.y());
   sets.push_back({"tilted polygon", tilted});
@@ -113,7 +141,7 @@ TEST(SupportMap, FindsTheFarthestPointOfAnySet) {
   }
 }
 
-// Ties are exact where coordinates and directions are small integers: all points of a face.
+// Ties are exact if coordinates and directions are small integers: all points of a face.
 TEST(SupportMap, CandidatesHoldAllThatAreExactlyFarthest) {
   Random random(TestSeed(932));
   std::vector<Vector> lattice = LatticeCube(9, 1);
@@ -140,7 +168,7 @@ TEST(SupportMap, CandidatesHoldAllThatAreExactlyFarthest) {
   }
 }
 
-// A direction that differs by up to the error: what is farthest along the other is a candidate.
+// A direction that differs by up to the error: the farthest point along it is a candidate.
 TEST(SupportMap, CandidatesHoldWhatIsFarthestAlongDirectionsNearby) {
   Random random(TestSeed(933));
   for (const NamedSet& set : Sets(random)) {
@@ -200,7 +228,7 @@ TEST(SupportMap, EveryInstructionSetGivesTheSameBits) {
   UseSimdPath(best);
 }
 
-// At coordinates where products would overflow or vanish all points are scanned.
+// At coordinates where products would overflow or vanish, all points are scanned.
 TEST(SupportMap, ExtremeCoordinatesAreScanned) {
   Random random(TestSeed(936));
   for (const double scale : {0x1p1000, 0x1p-1000}) {
@@ -214,5 +242,18 @@ TEST(SupportMap, ExtremeCoordinatesAreScanned) {
   }
 }
 
-}  // namespace
+// A map of V points takes O(V) memory for every set: sixteen times as many points take at most
+// about sixteen times as much.
+TEST(SupportMap, MemoryIsLinearForPointsAlongCurves) {
+  const std::vector<NamedSet> small = CurvedSets(4000);
+  const std::vector<NamedSet> large = CurvedSets(64000);
+  for (size_t i = 0; i < small.size(); ++i) {
+    const double few = static_cast<double>(SupportMap(small[i].points).MemoryBytes());
+    const double many = static_cast<double>(SupportMap(large[i].points).MemoryBytes());
+    EXPECT_LT(many, 24 * few) << large[i].name;
+    EXPECT_LT(many, 600.0 * 64000) << large[i].name;
+  }
+}
+
+}  // namespace support_map_test
 }  // namespace hulld

@@ -16,7 +16,7 @@
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {
-namespace {
+namespace scene_test {
 
 struct Scene {
   std::deque<Hull> hulls;
@@ -24,7 +24,7 @@ struct Scene {
   std::vector<PlacedHull> placements;
 };
 
-// Hulls of all dimensions, an empty one among them, on a lattice where many touch.
+// Hulls of all dimensions, including an empty one, on a lattice where many touch.
 Scene MakeScene(uint64_t seed, int placements, int side) {
   Random random(TestSeed(seed));
   Scene scene;
@@ -100,7 +100,7 @@ TEST(Scene, GroupsAndMoversLeaveOutTheirPairs) {
   const Scene scene = MakeScene(822, 300, 9);
   std::vector<uint32_t> groups;
   for (uint32_t i = 0; i < 300; ++i) groups.push_back(i * i % 7);
-  // A pair named twice, or both ways, counts once.
+  // A pair named twice, or in both orders, counts as one.
   const std::vector<GroupPair> ignored = {{0, 0}, {1, 2}, {2, 1}, {4, 4}, {9, 1}};
   const auto is_ignored = [&](uint32_t a, uint32_t b) {
     for (const auto& [first, second] : ignored) {
@@ -152,7 +152,7 @@ TEST(Scene, CancellationEndsTheSearch) {
   EXPECT_LT(emitted, all);
 }
 
-// Every pair collides: what waits between two calls of emit must not grow with the scene.
+// Every pair collides: the backlog between two calls of emit must not grow with the scene.
 TEST(Scene, AnswersAreEmittedInBoundedPartsWhateverCollides) {
   constexpr uint32_t kPlacements = 1000;
   Random random(TestSeed(826));
@@ -246,5 +246,5 @@ TEST(Scene, BoxesHoldTheirHullsAtEveryScale) {
   }
 }
 
-}  // namespace
+}  // namespace scene_test
 }  // namespace hulld

@@ -14,7 +14,7 @@
 #include "tests/core/query/body/rational_world.h"
 
 namespace hulld {
-namespace {
+namespace pose_product_test {
 
 Pose RandomPose(Random& random, double length) {
   Pose pose;
@@ -46,7 +46,7 @@ Relation RelationOf(const Hull& a, const PoseChain& X_WA, const Hull& b, const P
   EXPECT_TRUE(answer.ok() && mirrored.ok());
   EXPECT_EQ(answer->relation, mirrored->relation);
   EXPECT_EQ(answer->rung, mirrored->rung);
-  // What needs the exact pair agrees.
+  // Results that need the exact pair agree.
   QueryOptions everything;
   everything.want_axis = true;
   everything.want_separation = true;
@@ -110,9 +110,9 @@ TEST(PoseProduct, TwoTranslationsAddUpExactly) {
   EXPECT_EQ(product.translation_error(), 0);
 }
 
-// Two cubes that share a face in the frame of a body that is turned: in the world hardly a corner
-// of them is a double, and the least step of one of them, far below the rounding of the product,
-// separates them or makes them overlap.
+// Two cubes that share a face in the frame of a rotated body: in the world hardly any of their
+// corners is a double. The least step of a cube, far below the rounding of the product, separates
+// them or makes them overlap.
 TEST(PoseProduct, ContactIsThatOfTheUnroundedProduct) {
   Random random(TestSeed(3));
   const Hull cube = BuildHull(LatticeCube(2, 1));
@@ -167,7 +167,7 @@ TEST(PoseProduct, WideProductsAreExactToo) {
     Pose inner = RandomPose(random, 0);
     inner.t = Vector(0, 0, 0);
     if (round % 2 == 0) body.q[1] *= 0x1p-80;
-    // The same turn for both pieces: one cube stands on the other's face.
+    // Both pieces have one rotation: one cube stands on the other's face.
     Pose top = inner;
     const Hull shifted = BuildHull(Shifted(LatticeCube(2, 1), Vector(1, 0.5, 0)));
     ASSERT_EQ(RelationOf(cube, {body, inner}, shifted, {body, top}), Relation::kTouching);
@@ -199,5 +199,5 @@ TEST(PoseProduct, ExtremesOfScaleAreDecidedAsRationalNumbersAre) {
   }
 }
 
-}  // namespace
+}  // namespace pose_product_test
 }  // namespace hulld

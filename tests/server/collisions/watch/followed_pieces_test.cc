@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld::server {
-namespace {
+namespace followed_pieces_test {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -24,7 +24,7 @@ TEST(FollowedPieces, ComeAndGoWithTheLastBodyThatHasThem) {
   EXPECT_THAT(pieces.BodiesOf("b"), ElementsAre(1));
 }
 
-// In one round, whichever body comes first.
+// In one round, for either order of the bodies.
 TEST(FollowedPieces, WhatOneBodyGivesToAnotherIsFollowedAllTheWhile) {
   for (const bool giver_first : {true, false}) {
     FollowedPieces pieces;
@@ -44,5 +44,5 @@ TEST(FollowedPieces, WhatOneBodyGivesToAnotherIsFollowedAllTheWhile) {
   }
 }
 
-}  // namespace
+}  // namespace followed_pieces_test
 }  // namespace hulld::server

@@ -15,16 +15,9 @@ std::unique_ptr<grpc::ClientContext> NewContext() {
   return context;
 }
 
-uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_id) {
-  for (const v1::ShardRevision& shard : header.shards()) {
-    if (shard.store_id() == store_id) return shard.revision();
-  }
-  return header.revision();
-}
-
 void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen) {
   seen.store_id = version.store_id();
-  seen.store_revision = RevisionOf(header, version.store_id());
+  seen.store_revision = header.revision();
   seen.create_revision = version.create_revision();
   seen.revision = version.revision();
 }

@@ -13,17 +13,14 @@
 
 namespace hulld::server {
 
-// The context of a call, with a deadline long after any of these calls ends, so that a defect ends
-// as a failure and not as a hang.
+// Returns a context with a deadline far beyond any of these calls, so that a defect fails instead
+// of hanging.
 std::unique_ptr<grpc::ClientContext> NewContext();
-
-// The revision of the store with this ID, where there are several.
-uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_id);
 
 void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen);
 
-// The hull that the message of an error says a piece of a body lacks; empty: it is about another
-// thing.
+// Returns the hull that a body's piece lacks, parsed from an error message; empty if the message is
+// about something else.
 std::string MissingPiece(const std::string& said);
 
 }  // namespace hulld::server

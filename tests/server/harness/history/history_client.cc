@@ -45,18 +45,13 @@ void TakeAck(const v1::AppendAck& ack, Operation& operation) {
   operation.duplicate = ack.counts().duplicate();
 }
 
-// Which point of the cloud this is; -1 when none.
+// Returns the number of this point in the cloud, or -1.
 int NumberOf(const double* xyz) {
   const Coordinates& cloud = HistoryCloud();
   for (int i = 0; i < kCloudSize; ++i) {
     if (std::equal(xyz, xyz + 3, cloud.data() + 3 * i)) return i;
   }
   return -1;
-}
-
-// Whether an error is about this hull.
-bool IsAbout(const grpc::Status& status, const std::string& hull_id) {
-  return status.error_message().find("hull \"" + hull_id + "\"") != std::string::npos;
 }
 
 }  // namespace
@@ -122,73 +117,30 @@ bool HistoryClient::End(const std::string& hull_id, Operation& operation,
   operation.outcome = OutcomeOf(status);
   const bool read = IsRead(operation);
   if (operation.outcome == Outcome::kUnknown) {
-    // The incarnation is gone: what it did, it did before this answer.
+    // The incarnation is gone: all its effects precede this answer.
     const bool gone = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
     if (gone) operation.returned = history_.Tick();
-    // Every revision that is asked for was told by an answer.
+    // Every revision requested comes from an earlier answer.
     EXPECT_FALSE(read && gone) << "hull " << hull_id << ": " << status.error_message();
-    // A read that was not answered says nothing.
+    // An unanswered read carries no information.
     if (!read) history_.Record(hull_id, operation);
     return status.error_code() != grpc::StatusCode::UNAVAILABLE;
   }
   operation.returned = history_.Tick();
   history_.Record(hull_id, operation);
-  if (operation.outcome == Outcome::kOk) {
-    revisions_[hull_id] = operation.revision;
-    if (tells_stores_) stores_[hull_id] = operation.store_id;
-  }
+  if (operation.outcome == Outcome::kOk) revisions_[hull_id] = operation.revision;
   return true;
 }
 
-bool HistoryClient::EndPart(Kind kind, const Operation& whole, const Seen& seen,
-                            const grpc::Status& status) {
-  Operation part = whole;
-  part.kind = kind;
-  part.others.clear();
-  part.pieces.clear();
-  part.create_revision = seen.create_revision;
-  part.revision = seen.revision;
-  part.store_revision = seen.store_revision;
-  part.at_least_revision = seen.at_least_revision;
-  part.store_id = seen.store_id;
-  return End(seen.hull_id, part, status);
-}
-
-void HistoryClient::ChooseRevisions(v1::Freshness& freshness) {
-  if (!tells_stores_) {
-    freshness.set_at_least_revision(last_header_.revision());
-    freshness.set_store_id(last_header_.store_id());
-    return;
-  }
-  for (const auto& [store_id, revision] : store_revisions_) {
-    if (Below(3) == 0) continue;
-    v1::ShardRevision* const least = freshness.add_at_least();
-    least->set_store_id(store_id);
-    least->set_revision(revision);
-  }
-}
-
-uint64_t HistoryClient::LeastFor(const std::string& hull_id, const v1::Freshness& freshness) const {
-  if (!tells_stores_) return freshness.at_least_revision();
-  const auto store = stores_.find(hull_id);
-  if (store == stores_.end()) return 0;
-  for (const v1::ShardRevision& least : freshness.at_least()) {
-    if (least.store_id() == store->second) return least.revision();
-  }
-  return 0;
-}
-
-void HistoryClient::ChooseFreshness(const std::string& hull_id, Operation& operation,
-                                    v1::Freshness& freshness) {
+void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshness) {
   constexpr int kMostMilliseconds = 50;
   if (!any_freshness_) return;
-  bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
+  const bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
   const bool is_bounded = Below(2) == 0;
   if (is_at_least) {
-    ChooseRevisions(freshness);
-    // No condition at all is the strongest.
-    is_at_least = freshness.at_least_revision() > 0 || freshness.at_least_size() > 0;
-    operation.at_least_revision = LeastFor(hull_id, freshness);
+    freshness.set_at_least_revision(last_header_.revision());
+    freshness.set_store_id(last_header_.store_id());
+    operation.at_least_revision = last_header_.revision();
   }
   if (is_bounded) {
     const int nanos = 1'000'000 * (1 + Below(kMostMilliseconds));
@@ -199,24 +151,16 @@ void HistoryClient::ChooseFreshness(const std::string& hull_id, Operation& opera
   }
 }
 
-void HistoryClient::ChooseFreshnessOfSeveral(const std::string& hull_id, Operation& operation,
-                                             v1::Freshness& freshness) {
-  if (any_freshness_ && Below(2) == 0) ChooseFreshness(hull_id, operation, freshness);
+void HistoryClient::ChooseFreshnessOfSeveral(Operation& operation, v1::Freshness& freshness) {
+  if (any_freshness_ && Below(2) == 0) ChooseFreshness(operation, freshness);
 }
 
-void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation,
-                               const std::string& store_id) {
-  operation.store_revision = RevisionOf(header, store_id);
-  if (tells_stores_) operation.store_id = store_id.empty() ? header.store_id() : store_id;
+void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation) {
+  operation.store_revision = header.revision();
+  operation.store_id = header.store_id();
   operation.staleness = static_cast<uint64_t>(1'000'000'000 * header.staleness().seconds() +
                                               header.staleness().nanos());
   if (header.revision() > 0) last_header_ = header;
-  const auto note = [this](const auto& told) {
-    uint64_t& revision = store_revisions_[told.store_id()];
-    revision = std::max(revision, told.revision());
-  };
-  if (header.revision() > 0) note(header);
-  for (const v1::ShardRevision& shard : header.shards()) note(shard);
 }
 
 std::optional<uint64_t> HistoryClient::SomeRevision(const std::string& hull_id) {
@@ -281,7 +225,7 @@ bool HistoryClient::Append(const std::string& hull_id) {
   operation.sequence = stream->next_sequence;
   operation.if_revision = SomeRevision(hull_id);
   const Coordinates xyz = SomePoints(1 + Below(3), operation);
-  // Now and then a chunk is sent again, as a client does that lost an ack.
+  // Occasionally resends a chunk, as a client does that lost an ack.
   if (operation.sequence > 1 && Below(8) == 0) --operation.sequence;
   const std::optional<v1::AppendAck> ack =
       stream->appender->Append(operation.sequence, xyz, operation.if_revision);
@@ -320,7 +264,7 @@ bool HistoryClient::AppendAtOnce(const std::string& hull_id) {
       for (; next < sent.size(); ++next) answered = End(hull_id, sent[next], status);
       return answered;
     }
-    // One acknowledgement may be of several chunks.
+    // One ack may cover several chunks.
     const size_t first = next;
     while (next < sent.size() && sent[next].sequence <= ack->sequence()) ++next;
     if (next == first) {
@@ -371,7 +315,7 @@ bool HistoryClient::Replace(const std::string& hull_id) {
   if (cancelled) context->TryCancel();
   const grpc::Status status = writer->Finish();
   if (cut_short) {
-    // No operation: whatever it did would be seen, and not be explained.
+    // Not recorded: any effect would be visible and unexplained.
     EXPECT_FALSE(status.ok()) << "a stream that was cut short replaced hull " << hull_id;
     return status.error_code() != grpc::StatusCode::UNAVAILABLE;
   }
@@ -408,7 +352,7 @@ bool HistoryClient::Get(const std::string& hull_id) {
   v1::GetHullRequest request;
   v1::GetHullResponse response;
   request.set_hull_id(hull_id);
-  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
+  ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = hulls_->GetHull(NewContext().get(), request, &response);
   TakeRecord(response.hull(), operation);
   TakeHeader(response.header(), operation);
@@ -419,7 +363,7 @@ bool HistoryClient::Mesh(const std::string& hull_id) {
   Operation operation = Begin(Kind::kMesh);
   v1::GetHullMeshRequest request;
   request.set_hull_id(hull_id);
-  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
+  ChooseFreshness(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = hulls_->GetHullMesh(context.get(), request);
   v1::GetHullMeshResponse part;
@@ -446,10 +390,10 @@ bool HistoryClient::Probe(const std::string& hull_id) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
-  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
+  ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.revision = response.hull_a().revision();
-  TakeHeader(response.header(), operation, response.hull_a().store_id());
+  TakeHeader(response.header(), operation);
   operation.touching = response.relation() == v1::RELATION_TOUCHING;
   return End(hull_id, operation, status);
 }
@@ -460,25 +404,14 @@ bool HistoryClient::Pair(const std::string& hull_id, const std::string& other) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(other);
-  ChooseFreshnessOfSeveral(hull_id, operation, *request.mutable_freshness());
-  Seen seen{.hull_id = other, .at_least_revision = LeastFor(other, request.freshness())};
+  ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
+  Seen seen{.hull_id = other, .at_least_revision = request.freshness().at_least_revision()};
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.create_revision = response.hull_a().create_revision();
   operation.revision = response.hull_a().revision();
-  TakeHeader(response.header(), operation, response.hull_a().store_id());
+  TakeHeader(response.header(), operation);
   TakeVersion(response.hull_b(), response.header(), seen);
-  if (operation.max_staleness == 0 || (status.ok() && operation.store_id == seen.store_id)) {
-    operation.others = {seen};
-    return End(hull_id, operation, status);
-  }
-  // Each of the two is as fresh as it must be, and they need not have been together.
-  if (!status.ok()) {
-    if (IsAbout(status, other)) return EndPart(Kind::kVersion, operation, seen, status);
-    operation.kind = Kind::kVersion;
-    return End(hull_id, operation, status);
-  }
-  EndPart(Kind::kVersion, operation, seen, status);
-  operation.kind = Kind::kVersion;
+  operation.others = {seen};
   return End(hull_id, operation, status);
 }
 
@@ -526,7 +459,7 @@ bool HistoryClient::GetBody(const std::string& body_id) {
   v1::GetBodyRequest request;
   v1::GetBodyResponse response;
   request.set_body_id(body_id);
-  ChooseFreshness(body_id, operation, *request.mutable_freshness());
+  ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = bodies_->GetBody(NewContext().get(), request, &response);
   operation.create_revision = response.body().create_revision();
   operation.revision = response.body().revision();
@@ -543,24 +476,21 @@ bool HistoryClient::Ask(const std::string& body_id) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(body_id);
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
-  ChooseFreshnessOfSeveral(body_id, operation, *request.mutable_freshness());
-  const bool is_of_one_instant = operation.max_staleness == 0;
-  // A certificate names the hulls of all pieces; without, they are looked up in another way.
-  operation.tells_pieces = !is_of_one_instant || Below(2) == 0;
+  ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
+  // A certificate names the hulls of all pieces; without one, the server looks them up differently.
+  operation.tells_pieces = Below(2) == 0;
   request.mutable_wanted()->set_certificate(operation.tells_pieces);
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.create_revision = response.hull_a().create_revision();
   operation.revision = response.hull_a().revision();
   operation.touching = response.relation() == v1::RELATION_TOUCHING;
-  TakeHeader(response.header(), operation, response.hull_a().store_id());
+  TakeHeader(response.header(), operation);
   if (operation.touching) operation.deciding = response.piece_a().hull().hull_id();
-  std::vector<Seen> elsewhere;
   const auto take = [&](const v1::HullVersion& version) {
     Seen seen{.hull_id = version.hull_id(),
-              .at_least_revision = LeastFor(version.hull_id(), request.freshness())};
+              .at_least_revision = request.freshness().at_least_revision()};
     TakeVersion(version, response.header(), seen);
-    const bool is_together = is_of_one_instant || version.store_id() == operation.store_id;
-    (is_together ? operation.others : elsewhere).push_back(seen);
+    operation.others.push_back(seen);
   };
   if (operation.tells_pieces) {
     for (const v1::HullVersion& version : response.piece_hulls()) {
@@ -573,19 +503,7 @@ bool HistoryClient::Ask(const std::string& body_id) {
   }
   if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
     operation.missing = MissingPiece(status.error_message());
-    if (!is_of_one_instant && !operation.missing.empty()) {
-      const Seen seen{.hull_id = operation.missing,
-                      .at_least_revision = LeastFor(operation.missing, request.freshness())};
-      return EndPart(Kind::kVersion, operation, seen, status);
-    }
   }
-  // A hull of another store was as it is said to be at an instant of its own.
-  for (const Seen& seen : elsewhere) {
-    const bool touches = operation.touching && seen.hull_id == operation.deciding;
-    const bool is_probed = touches || !operation.touching;
-    EndPart(is_probed ? Kind::kProbe : Kind::kVersion, operation, seen, status);
-  }
-  operation.is_part = !elsewhere.empty();
   return End(body_id, operation, status);
 }
 

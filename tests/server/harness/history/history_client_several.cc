@@ -1,4 +1,4 @@
-// What clients of histories ask about several hulls and bodies at once.
+// Queries of history clients about several hulls and bodies.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,22 +18,22 @@ namespace {
 using Kind = Operation::Kind;
 
 constexpr int kProbes = 4;
-// More than a list of the hulls of a history has.
+// More pages than any list of a history's hulls has.
 constexpr int kMostPages = 20;
 
 const double* PointAt(int point) { return HistoryCloud().data() + 3 * point; }
 
-// Whether the server was there to answer.
+// Returns true if the server was available.
 bool IsAnswered(const grpc::Status& status) {
-  // Every revision that is asked for was told by an answer.
+  // Every revision requested comes from an earlier answer.
   EXPECT_NE(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << status.error_message();
   return status.error_code() != grpc::StatusCode::UNAVAILABLE;
 }
 
 }  // namespace
 
-// Hulls and bodies, each where it is, with kProbeHull at each of these points of the cloud.
-// Placements are the former, then the latter.
+// Hulls and bodies at the identity pose, with kProbeHull at each of these points of the cloud.
+// Placements: hulls and bodies first, then probes.
 struct HistoryClient::Asked {
   static Asked Make(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies,
                     std::mt19937_64& random) {
@@ -64,15 +64,14 @@ struct HistoryClient::Asked {
     }
   }
   size_t pairs() const { return ids.size() * points.size(); }
-  bool is_body(size_t i) const { return i >= hulls; }
 
-  // Those of hulls first.
+  // Hulls first.
   std::vector<std::string> ids;
   size_t hulls = 0;
   std::vector<int> points;
 };
 
-// What was answered so far.
+// Answers received so far.
 struct HistoryClient::Told {
   template <typename Message>
   void TakeTable(const Message& message) {
@@ -90,7 +89,7 @@ struct HistoryClient::Told {
   v1::ResponseHeader header;
   std::vector<v1::HullVersion> hulls;
   std::map<uint32_t, v1::PlacementProblem> problems;
-  // For each pair, whether it touches; nullopt: it has no answer.
+  // By pair: true if it touches; nullopt if unanswered.
   std::vector<std::optional<bool>> touching;
 };
 
@@ -109,7 +108,7 @@ struct HistoryClient::CollisionStream {
 struct HistoryClient::Page {
   grpc::Status status;
   v1::ResponseHeader header;
-  // Without stores.
+  // Without store IDs.
   std::vector<Seen> rows;
   std::string next_token;
 };
@@ -123,31 +122,19 @@ bool HistoryClient::CallSeveralAtRandom(const std::vector<std::string>& hulls,
   return choice < 10 || bodies.empty() ? ListHulls(hulls) : ListBodies(bodies);
 }
 
-void HistoryClient::TellStoreOf(const v1::ResponseHeader& header, Seen& seen) const {
-  if (header.shards().empty()) {
-    seen.store_id = header.store_id();
-  } else if (const auto store = stores_.find(seen.hull_id); store != stores_.end()) {
-    seen.store_id = store->second;
-  } else {
-    return;
-  }
-  seen.store_revision = RevisionOf(header, seen.store_id);
-}
-
 std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
-                                        const v1::Freshness& freshness, bool is_of_one_instant) {
-  const bool tells_pieces = is_of_one_instant || told.header.shards().empty();
+                                        const v1::Freshness& freshness) {
   std::vector<Seen> all;
   for (uint32_t i = 0; i < asked.ids.size(); ++i) {
-    Seen seen{.hull_id = asked.ids[i], .at_least_revision = LeastFor(asked.ids[i], freshness)};
+    Seen seen{.hull_id = asked.ids[i], .at_least_revision = freshness.at_least_revision()};
     const auto problem = told.problems.find(i);
     if (problem != told.problems.end()) {
-      // What cannot be read at the moment says nothing.
+      // A temporary read failure carries no information.
       if (problem->second.code() != static_cast<int>(grpc::StatusCode::NOT_FOUND)) continue;
       seen.missing_piece = MissingPiece(problem->second.message());
       seen.is_missing = seen.missing_piece.empty();
-      if (!seen.is_missing && !tells_pieces) continue;
-      TellStoreOf(told.header, seen);
+      seen.store_id = told.header.store_id();
+      seen.store_revision = told.header.revision();
       all.push_back(seen);
       continue;
     }
@@ -159,8 +146,6 @@ std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
     for (size_t k = 0; k < asked.points.size(); ++k) {
       const std::optional<bool> touching = told.touching[i * asked.points.size() + k];
       seen.lacks_answer |= !touching.has_value();
-      // The hulls of pieces may be of another instant.
-      if (asked.is_body(i) && !tells_pieces) continue;
       const PointSet point = PointSet{1} << asked.points[k];
       seen.probed |= point;
       if (touching.value_or(false)) seen.touched |= point;
@@ -172,42 +157,18 @@ std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
 
 void HistoryClient::RecordAsked(const Operation& operation, const Asked& asked, const Told& told,
                                 const v1::Freshness& freshness) {
-  const bool is_of_one_instant = operation.max_staleness == 0;
-  RecordSeveral(operation, told.header, SeenIn(asked, told, freshness, is_of_one_instant),
-                is_of_one_instant);
+  RecordSeveral(operation, told.header, SeenIn(asked, told, freshness));
 }
 
 void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader& header,
-                                  std::vector<Seen> seen, bool is_of_one_instant) {
+                                  std::vector<Seen> seen) {
   operation.outcome = Operation::Outcome::kOk;
   operation.returned = history_.Tick();
-  // By store. What is of one instant is one part, under any.
-  std::map<std::string, std::vector<Seen>> parts;
-  const bool is_whole = is_of_one_instant || header.shards().empty();
-  for (Seen& each : seen) {
-    if (is_whole) {
-      parts[""].push_back(std::move(each));
-      continue;
-    }
-    // The store of what is missing may be unknown.
-    if (each.store_id.empty()) continue;
-    parts[each.store_id].push_back(std::move(each));
-  }
-  for (auto& [store_id, part] : parts) {
-    // The operation itself is of the store of the first.
-    const auto known =
-        std::ranges::find_if(part, [](const Seen& each) { return !each.store_id.empty(); });
-    if (known != part.end()) std::iter_swap(part.begin(), known);
-    const Seen& first = part.front();
-    TakeHeader(header, operation, first.store_id);
-    if (first.store_id.empty()) operation.store_revision = 0;
-    operation.at_least_revision = first.store_id.empty() ? 0 : first.at_least_revision;
-    for (const Seen& each : part) {
-      if (!each.store_id.empty()) stores_[each.hull_id] = each.store_id;
-    }
-    operation.others = part;
-    history_.Record(first.hull_id, operation);
-  }
+  if (seen.empty()) return;
+  TakeHeader(header, operation);
+  operation.at_least_revision = seen.front().at_least_revision;
+  operation.others = std::move(seen);
+  history_.Record(operation.others.front().hull_id, operation);
 }
 
 bool HistoryClient::Batch(const std::vector<std::string>& hulls,
@@ -217,7 +178,7 @@ bool HistoryClient::Batch(const std::vector<std::string>& hulls,
   v1::BatchCheckCollisionsRequest request;
   asked.AddPlacements(request);
   asked.AddPairs(request);
-  ChooseFreshnessOfSeveral(hulls.front(), operation, *request.mutable_freshness());
+  ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->BatchCheckCollisions(context.get(), request);
   Told told;
@@ -245,11 +206,11 @@ bool HistoryClient::Scene(const std::vector<std::string>& hulls,
     request.add_groups(i < static_cast<int>(asked.ids.size()) ? 0 : 1);
   }
   request.set_ignore_same_group(true);
-  ChooseFreshnessOfSeveral(hulls.front(), operation, *request.mutable_freshness());
+  ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->FindCollisions(context.get(), request);
   Told told;
-  // Those that are not told of do not touch.
+  // Pairs not reported do not touch.
   told.touching.assign(asked.pairs(), false);
   v1::FindCollisionsResponse message;
   while (reader->Read(&message)) {
@@ -275,7 +236,7 @@ v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::st
     CollisionStream& stream = *collision_stream_;
     stream.asked = Asked::Make(hulls, bodies, random_);
     stream.told.touching.resize(stream.asked.pairs());
-    ChooseFreshnessOfSeveral(hulls.front(), operation, stream.freshness);
+    ChooseFreshnessOfSeveral(operation, stream.freshness);
     stream.max_staleness = operation.max_staleness;
     stream.asked.AddPlacements(*request.mutable_open());
     stream.asked.AddPairs(*request.mutable_open());
@@ -293,7 +254,7 @@ v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::st
     update.add_placements(static_cast<uint32_t>(stream.asked.ids.size() + probe));
     const double* at = PointAt(stream.asked.points[probe]);
     for (const double number : {1.0, 0.0, 0.0, 0.0, at[0], at[1], at[2]}) update.add_poses(number);
-    // Its pairs are answered again.
+    // Its pairs will be answered again.
     for (size_t i = 0; i < stream.asked.ids.size(); ++i) {
       stream.told.touching[i * kProbes + probe] = std::nullopt;
     }
@@ -326,14 +287,15 @@ bool HistoryClient::AskStream(const std::vector<std::string>& hulls,
   return true;
 }
 
-// A page tells of all IDs after those of the page before, up to its last; the last page, of all.
+// A page covers all IDs after the previous page up to its own last ID; the last page covers the
+// rest.
 bool HistoryClient::List(
     std::vector<std::string> ids,
     const std::function<Page(const v1::Freshness&, int page_size, const std::string& token)>& ask) {
   std::ranges::sort(ids);
   v1::Freshness freshness;
   Operation chosen;
-  ChooseFreshness(ids.front(), chosen, freshness);
+  ChooseFreshness(chosen, freshness);
   const int page_size = Below(2);
   std::string token;
   std::string after;
@@ -354,13 +316,14 @@ bool HistoryClient::List(
       } else {
         seen.is_missing = true;
       }
-      seen.at_least_revision = LeastFor(id, freshness);
-      TellStoreOf(page.header, seen);
+      seen.at_least_revision = freshness.at_least_revision();
+      seen.store_id = page.header.store_id();
+      seen.store_revision = page.header.revision();
       all.push_back(seen);
     }
     EXPECT_TRUE(row == page.rows.end())
         << "a list after " << after << " tells of " << row->hull_id << ", which is not next";
-    RecordSeveral(operation, page.header, std::move(all), false);
+    RecordSeveral(operation, page.header, std::move(all));
     if (is_last) return true;
     token = page.next_token;
     if (!page.rows.empty()) after = page.rows.back().hull_id;

@@ -47,7 +47,7 @@ std::string Describe(const Operation& operation) {
   }
   if (operation.kind == Kind::kAsk) {
     absl::StrAppend(&text, ", point ", operation.probe, operation.touching ? " touched" : " apart",
-                    operation.is_part ? ", a part" : "", ", missing ", operation.missing);
+                    ", missing ", operation.missing);
   }
   if (operation.if_revision) absl::StrAppend(&text, ", if_revision ", *operation.if_revision);
   if (operation.kind == Kind::kAppend || operation.kind == Kind::kOpen) {
@@ -63,28 +63,28 @@ std::string Describe(const Operation& operation) {
   return text;
 }
 
-// Whether it is of several hulls and bodies.
+// Returns true if the operation concerns several hulls or bodies.
 bool IsJoint(const Operation& operation) {
   return operation.kind == Kind::kPair || operation.kind == Kind::kAsk ||
          operation.kind == Kind::kBatch;
 }
 
-// From when on a call may have taken effect.
+// Returns the earliest time at which a call may have taken effect.
 uint64_t EarliestOf(const Operation& operation) {
-  // An answer that there is no hull does not say of when it is.
+  // A "not found" answer does not state its age.
   const std::optional<uint64_t> back =
       operation.outcome == Outcome::kOk ? operation.staleness : operation.max_staleness;
   if (!back.has_value() || *back > operation.invoked) return 0;
   return operation.invoked - *back;
 }
 
-// The revision of the store at which an answered operation changed the hull; 0: it did not, or one
-// cannot tell.
+// Returns the store revision at which an answered operation changed the hull; 0 if it changed
+// nothing or the answer does not say.
 uint64_t ChangedAt(const Operation& operation) {
   if (operation.outcome != Outcome::kOk) return 0;
   switch (operation.kind) {
     case Kind::kAppend:
-      // When several chunks were told of together, any of them may have changed it.
+      // If one ack covers several chunks, any of them may have changed the hull.
       if (operation.is_untold || operation.is_told_with_others) return 0;
       return operation.already_applied || operation.outside == 0 ? 0 : operation.revision;
     case Kind::kDelete:
@@ -99,7 +99,7 @@ uint64_t ChangedAt(const Operation& operation) {
   }
 }
 
-// What is wrong with what an answer says of its own freshness.
+// Returns the inconsistency in an answer's own freshness, or empty.
 std::string FreshnessFault(const Operation& operation) {
   if (!IsRead(operation) || operation.outcome != Outcome::kOk) return "";
   if (operation.max_staleness.has_value() && operation.staleness > *operation.max_staleness) {
@@ -116,7 +116,7 @@ std::string FreshnessFault(const Operation& operation) {
       return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
                           other.hull_id, " tells of a later one: ", Describe(operation));
     }
-    // The store of what is missing may be unknown.
+    // The store of a missing object may be unknown.
     const bool is_there = !other.is_missing && other.missing_piece.empty();
     if (other.store_revision == 0 && !is_there) continue;
     if (other.store_revision >= other.at_least_revision) continue;
@@ -127,10 +127,10 @@ std::string FreshnessFault(const Operation& operation) {
   return "";
 }
 
-// How many operations before those that cannot be explained a fault shows.
+// Number of operations shown before the unexplained ones.
 constexpr size_t kReported = 40;
 
-// Depth-first search for an order, over the operations sorted by invocation.
+// Depth-first search for a linearization, over operations sorted by invocation.
 class OrderSearch {
  public:
   explicit OrderSearch(const std::map<std::string, std::vector<Operation>>& operations) {
@@ -158,7 +158,7 @@ class OrderSearch {
     return found;
   }
 
-  // The longest order found, and what could not follow it.
+  // Returns the longest order found and the operations that could not follow it.
   std::string Fault() const {
     std::string fault = absl::StrCat("no order explains more than ", best_count_, " of ", required_,
                                      " answers; the hull was then ", KeyOf(best_state_),
@@ -175,11 +175,11 @@ class OrderSearch {
   }
 
  private:
-  // An operation, and its hull by number.
+  // An operation and the number of its hull.
   struct Placed : Operation {
     size_t hull = 0;
   };
-  // The state of each hull.
+  // State of each hull.
   using State = std::vector<SpecifiedHull>;
 
   static std::string KeyOf(const State& state) {
@@ -188,18 +188,18 @@ class OrderSearch {
     return key;
   }
 
-  // A state of the hulls on the way to an order of all operations.
+  // A state of the hulls on a partial order of the operations.
   struct Node {
     State state;
-    // Operations so far that were answered.
+    // Answered operations so far.
     size_t count = 0;
-    // When the latest operation so far was invoked.
+    // Latest invocation so far.
     uint64_t latest = 0;
     std::vector<size_t> candidates;
     size_t next = 0;
-    // The candidate that led to the next node.
+    // Candidate that led to the next node.
     std::optional<size_t> taken;
-    // first_left_ and last_done_ before this.
+    // Previous first_left_ and last_done_.
     size_t first_before = 0;
     size_t last_before = 0;
   };
@@ -208,13 +208,14 @@ class OrderSearch {
     return hulls_.emplace(hull_id, hulls_.size()).first->second;
   }
 
-  // Whether an operation without an answer can no longer take effect, because one that was invoked
+  // Returns true if an unanswered operation can no longer take effect, because an operation invoked
   // after its end, at tick `latest`, has.
   bool IsTooLate(size_t i, uint64_t latest) const {
     return IsOptional(operations_[i]) && operations_[i].returned < latest;
   }
 
-  // The operations that may come next: those invoked before any other that is left returned.
+  // Returns the operations that may come next: those invoked before any other remaining operation
+  // returned.
   std::vector<size_t> Candidates(uint64_t latest) const {
     std::vector<size_t> candidates;
     uint64_t first_return = UINT64_MAX;
@@ -226,7 +227,8 @@ class OrderSearch {
         first_return = std::min(first_return, operations_[i].returned);
       }
     }
-    // What returned first most likely took effect first; what was lost most likely never did.
+    // Operations that returned first most likely took effect first; lost ones most likely never
+    // did.
     std::stable_sort(candidates.begin(), candidates.end(), [this](size_t a, size_t b) {
       const auto rank = [this](size_t i) {
         return std::pair(IsOptional(operations_[i]), operations_[i].returned);
@@ -236,8 +238,8 @@ class OrderSearch {
     return candidates;
   }
 
-  // Whether a read comes after all changes that it must hold, and a change after those to the same
-  // store that have lesser revisions.
+  // Returns true if a read follows all changes that it must contain, and a change follows all
+  // changes of the same store with lower revisions.
   bool HoldsAll(size_t i) const {
     const Placed& operation = operations_[i];
     const bool is_read = IsRead(operation);
@@ -262,7 +264,7 @@ class OrderSearch {
     return true;
   }
 
-  // Whether the hulls may answer so; if they may, the state is what they are after that.
+  // Applies an operation to `state`. Returns false if the hulls may not answer so.
   bool StepAll(State& state, const Placed& operation) const {
     if (!IsJoint(operation)) return Step(state[operation.hull], operation);
     return StepJoint(
@@ -270,8 +272,8 @@ class OrderSearch {
         [&](const std::string& hull_id) -> SpecifiedHull& { return state[hulls_.at(hull_id)]; });
   }
 
-  // Whether a candidate may come next without regard to the others: it is a read that fits, after
-  // which the state is the same, and no call without an answer is too late because of it.
+  // Returns true if the candidate may come next without branching: a read that fits, leaves the
+  // state unchanged, and makes no unanswered call too late.
   bool StandsInNobodysWay(size_t i, const Node& node) const {
     const Placed& read = operations_[i];
     if (!IsRead(read) || !HoldsAll(i)) return false;
@@ -285,14 +287,14 @@ class OrderSearch {
 
   std::string Key(const State& state) const {
     std::string key = absl::StrCat(KeyOf(state), ";", first_left_);
-    // Beyond the first that is left, only what has been done matters.
+    // Beyond the first remaining operation, only completed ones matter.
     for (size_t i = first_left_; i < operations_.size() && i <= last_done_; ++i) {
       if (done_[i]) absl::StrAppend(&key, ",", i);
     }
     return key;
   }
 
-  // Puts a state at the end of the path, with what may come next. Returns whether it explains all.
+  // Appends a state to the path, with its candidates. Returns true if it explains everything.
   bool Enter(State state, size_t count, uint64_t latest) {
     if (count == required_) return true;
     Node node{std::move(state), count, latest, {}, 0, std::nullopt, first_left_, last_done_};
@@ -318,8 +320,8 @@ class OrderSearch {
     return false;
   }
 
-  // Tries the next candidate of the last state of the path, or leaves it when there is none.
-  // Returns whether all is explained then.
+  // Tries the next candidate of the path's last state, or pops the state if it has none. Returns
+  // true if everything is explained.
   bool TryNext() {
     Node& last = path_.back();
     if (last.taken.has_value()) {
@@ -349,7 +351,7 @@ class OrderSearch {
   size_t required_ = 0;
   size_t first_left_ = 0;
   size_t last_done_ = 0;
-  // Not the call stack: a history may be longer than that is deep.
+  // An explicit stack: a history may be longer than the call stack allows.
   std::vector<Node> path_;
   std::unordered_set<std::string> seen_;
   size_t best_count_ = 0;
@@ -358,9 +360,9 @@ class OrderSearch {
   std::vector<bool> best_done_;
 };
 
-// What is wrong with the store's revisions across all hulls.
+// Returns the inconsistency in the store's revisions across all hulls, or empty.
 std::string StoreRevisionFault(const HullHistory& history, const std::string& store_id) {
-  std::vector<std::pair<uint64_t, uint64_t>> returned;  // when, and the revision told
+  std::vector<std::pair<uint64_t, uint64_t>> returned;  // time and revision
   std::vector<std::pair<uint64_t, uint64_t>> invoked;
   std::map<uint64_t, std::string> changes;
   for (const auto& [hull_id, operations] : history.operations()) {

@@ -11,35 +11,35 @@
 
 namespace hulld::server {
 
-// A set of points by number, of a cloud of at most 64 points that all are extreme: a hull of any of
-// them has exactly these as vertices.
+// A set of points of a cloud, by number. The cloud has at most 64 points, all extreme: a hull of
+// any subset has exactly that subset as vertices.
 using PointSet = uint64_t;
 
-// What an answer about several says of a hull beside the first; in a batch, of any hull.
+// The part of a joint answer about one hull: for a pair or body, any hull except the first; for a
+// batch, every hull.
 struct Seen {
   std::string hull_id;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
-  // The store of this hull and its revisions, as in Operation.
+  // The hull's store and its revisions, as in Operation.
   std::string store_id = {};
   uint64_t store_revision = 0;
   uint64_t at_least_revision = 0;
 
-  // The following are for batches only. There is no such hull, or body.
+  // Batches only, from here on. The hull or body does not exist.
   bool is_missing = false;
-  // The hull that a piece of it lacks; empty: none.
+  // The hull that one of its pieces lacks; empty if none.
   std::string missing_piece = {};
-  // It is there, and an answer about it is missing.
+  // It exists, but its answer is missing.
   bool lacks_answer = false;
-  // Points of the cloud that were asked about, and those of them that it touches.
+  // Points of the cloud that were queried, and the subset that it touches.
   PointSet probed = 0;
   PointSet touched = 0;
-  // How many vertices, or pieces, it has.
+  // Number of vertices or pieces.
   std::optional<uint64_t> size = {};
 };
 
-// One call on one hull or body, as its client saw it. Where an answer about several is not of one
-// instant, each part of it is an operation of its own.
+// One call on one or several hulls or bodies, as its client saw it.
 struct Operation {
   enum class Kind {
     kCreate,
@@ -49,59 +49,59 @@ struct Operation {
     kDelete,
     kGet,
     kMesh,
-    kProbe,    // CheckCollision with one point of the cloud
-    kPair,     // CheckCollision with another hull of the history
-    kVersion,  // what an answer about several says of this hull, or body, alone
-    kPut,      // of a body
+    kProbe,  // CheckCollision with one point of the cloud
+    kPair,   // CheckCollision with another hull of the history
+    kPut,    // of a body
     kGetBody,
     kAsk,    // CheckCollision of a body with one point of the cloud
-    kBatch,  // what a batch, a scene, an answer of a collision stream, or a page of a list, or its
-             // part of one store, says of each of `others`
+    kBatch,  // a batch, scene, collision stream answer, or list page; its parts are in `others`
   };
   enum class Outcome {
     kOk,
     kNotFound,
     kAlreadyExists,
     kAborted,
-    kUnknown,  // no answer: the call may have taken effect, now, later or never
+    kUnknown,  // no answer: the call may take effect at any time or never
   };
 
   Kind kind = Kind::kGet;
   Outcome outcome = Outcome::kUnknown;
-  // Times of the history's clock: the call took effect between the two, if it did.
+  // Ticks of the history's clock. The call took effect between them, if at all.
   uint64_t invoked = 0;
   uint64_t returned = UINT64_MAX;
 
-  // What was asked.
-  // Create, open: keeps a hull that exists. Open, replace: makes one that does not.
+  // Request fields.
+  //
+  // Create, open: keeps an existing hull. Open, replace: creates a missing one.
   bool if_absent = false;
-  // A replace with 0: the hull must not exist.
+  // Replace with 0: the hull must not exist.
   std::optional<uint64_t> if_revision;
   std::string writer;
   uint64_t sequence = 0;
-  // Append: that of the stream, as its opening said.
+  // Append: the incarnation given when the stream opened.
   uint64_t incarnation = 0;
-  // Append: acknowledged with chunks after it, so that nobody told what it did alone; and with
-  // chunks before it, so that counts, and whether it was applied already, are of all.
+  // Append. is_untold: one ack covered this chunk and later ones, so its own effect is unknown.
+  // is_told_with_others: the ack covered earlier chunks too, so its counts and its already-applied
+  // flag are of all of them.
   bool is_untold = false;
   bool is_told_with_others = false;
-  // Append, replace: how many points were sent; and which, without repetition.
+  // Append, replace: the number of points sent, and the distinct points.
   uint64_t sent = 0;
   PointSet points = 0;
   int probe = 0;
-  // For a read that may be answered from the past: from how long ago at most, in nanoseconds, or
-  // from any time; and not before this revision of the store.
+  // Bounds of a stale read: its maximum age in nanoseconds (nullopt: any age), and the minimum
+  // revision of the store.
   std::optional<uint64_t> max_staleness = 0;
   uint64_t at_least_revision = 0;
 
-  // Put, and what GetBody answers: the hull of each piece, in order.
+  // Put, and the answer of GetBody: the hull of each piece, in order.
   std::vector<std::string> pieces;
 
-  // What was answered.
+  // Answer fields.
   uint64_t store_revision = 0;
-  // Whose that is, where hulls are spread over several stores.
+  // The store of this revision.
   std::string store_id;
-  // How old the state that was answered from may be, in nanoseconds.
+  // Maximum age of the state that the answer is from, in nanoseconds.
   uint64_t staleness = 0;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
@@ -113,31 +113,29 @@ struct Operation {
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
-  // Pair: the other hull. Ask: hulls of pieces. Batch: all that it says; the operation is recorded
-  // under the first, and its own revisions are none.
+  // Pair: the other hull. Ask: the hulls of pieces. Batch: the whole answer; the operation is
+  // recorded under the first and has no revisions of its own.
   std::vector<Seen> others;
-  // Ask: `pieces` names the hulls of all pieces, each once.
+  // Ask: `pieces` names the hull of each piece exactly once.
   bool tells_pieces = false;
-  // Ask, when touching: the hull of the piece that decided.
+  // Ask, if touching: the hull of the deciding piece.
   std::string deciding;
-  // Ask that found nothing: the hull that a piece lacks; empty: it is the body that is missing.
+  // Ask, if not found: the hull that a piece lacks; empty if the body is missing.
   std::string missing;
-  // Ask: `others` has only those pieces that are in the body's store, so that nothing follows from
-  // whether it touches.
-  bool is_part = false;
 };
 
-// What clients did to hulls, by hull ID. Thread-safe while it is recorded.
+// Operations of all clients, by hull ID. Recording is thread-safe.
 class HullHistory {
  public:
-  // The time, in nanoseconds by the monotonic clock of the machine, which is later than all before.
+  // Returns the time in nanoseconds of the machine's monotonic clock, strictly later than all
+  // before.
   uint64_t Tick();
-  // Requires that invoked and returned are ticks of this clock, in this order, or that returned is
+  // Requires: invoked and returned are ticks of this clock, in this order, or returned is
   // UINT64_MAX.
   void Record(const std::string& hull_id, const Operation& operation);
 
-  // Says that the server that was called so far is gone: what it has not answered took effect
-  // before now or never. No call may be running.
+  // Declares the server gone: its unanswered calls took effect before now or never do. Requires: no
+  // call is running.
   void Settle();
 
   const std::map<std::string, std::vector<Operation>>& operations() const { return operations_; }
@@ -149,31 +147,29 @@ class HullHistory {
   std::map<std::string, std::vector<Operation>> operations_;
 };
 
-// Whether the operations on one hull are linearizable: whether there is an order that agrees with
-// real time in which a hull that does one thing at a time, as hull.proto says, would have answered
-// the same. Empty when there is one; otherwise what could not be explained.
+// Returns empty if the operations on one hull are linearizable: if an order that agrees with real
+// time exists in which a sequential hull, as specified by hull.proto, gives the same answers.
+// Otherwise returns the unexplained part.
 //
-// A read that may be answered from the past took effect between its answer and as long before its
-// call as that says, which is no longer than was asked for, and after every change up to the
-// revision that it asked for. Whatever it asked for, an answer holds every change up to the
-// revision of the store that it names.
+// A stale read takes effect after its call minus the staleness that it reports, which is at most
+// the requested bound, before its answer, and after every change up to the requested revision. In
+// any case an answer contains every change up to the store revision that it names.
 //
-// The store's revision is shared by all hulls, so that of a change is taken from the answer and
-// must be greater than all before. Search with memory of the states seen; a read that fits and
-// tells nothing new is taken at once, as it stands in the way of nothing. Source: Wing and Gong
-// 1993, Testing and Verifying Concurrent Objects; Lowe 2017, Testing for Linearizability.
+// All hulls share the store's revision, so that of a change is taken from the answer and must
+// exceed all before. The search remembers visited states; a read that fits and adds no information
+// is taken immediately. Source: Wing and Gong 1993, Testing and Verifying Concurrent Objects; Lowe
+// 2017, Testing for Linearizability.
 std::string LinearizabilityFault(std::vector<Operation> operations);
 
-// The same for several hulls and bodies together, by ID: there must be one order for all of them,
-// so that both hulls of a pair, and a body and the hulls of its pieces, were as an answer says at
-// one instant. In it, changes to one store come in the order of its revisions.
+// As LinearizabilityFault, for several hulls and bodies by ID. One order must explain all of them,
+// so that both hulls of a pair, or a body and the hulls of its pieces, had the answered states at
+// one instant. Changes to one store follow the order of its revisions.
 std::string JointLinearizabilityFault(
     const std::map<std::string, std::vector<Operation>>& operations);
 
-// The same for every hull, or for all together where several were asked about at once, and that
-// revisions of the store, which all hulls share, never fall from one call to a later one, as far as
-// that may not be answered from the past, and that no two changes have the same; of each store by
-// itself.
+// Checks every hull, or all jointly if a query concerned several. Also checks, per store, that
+// revisions never decrease from one call to a later one (except in stale reads), and that no two
+// changes share a revision.
 std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server

@@ -33,7 +33,7 @@ bool AgreeOnIncarnation(SpecifiedHull& state, uint64_t create_revision) {
   return state.create_revision == create_revision;
 }
 
-// Whether an answer may say that the hull is at this revision; from then on it is.
+// Fixes the hull's revision to the answered one. Returns false if they contradict.
 bool Agree(SpecifiedHull& state, uint64_t revision) {
   if (state.revision_known) return state.revision == revision;
   if (revision <= state.revision) return false;
@@ -43,8 +43,8 @@ bool Agree(SpecifiedHull& state, uint64_t revision) {
   return true;
 }
 
-// A change that was answered with this revision, or, when that was not told, had a later one than
-// before.
+// Applies a change with this revision, or, if the answer did not contain it, with an unknown later
+// one. Returns false if impossible.
 bool Advance(SpecifiedHull& state, const Operation& operation, uint64_t revision) {
   if (operation.outcome == Outcome::kUnknown || operation.is_untold) {
     state.revision_known = false;
@@ -56,7 +56,7 @@ bool Advance(SpecifiedHull& state, const Operation& operation, uint64_t revision
   return true;
 }
 
-// A new incarnation, of no points, in the place of whatever there was.
+// Starts a new, empty incarnation that replaces any existing one.
 bool Create(SpecifiedHull& state, const Operation& operation) {
   const uint64_t revision = state.revision;
   const bool known = state.revision_known;
@@ -70,13 +70,13 @@ bool Create(SpecifiedHull& state, const Operation& operation) {
   return true;
 }
 
-// Whether the condition may have failed. A lost answer leaves open which revision it is.
+// Returns true if the condition may have failed. After a lost answer the revision is unknown.
 bool Mismatch(const SpecifiedHull& state, const Operation& operation) {
   if (!operation.if_revision) return false;
   return !state.revision_known || *operation.if_revision != state.revision;
 }
 
-// Whether the condition may have held.
+// Returns true if the condition may have held.
 bool Match(const SpecifiedHull& state, const Operation& operation) {
   if (!operation.if_revision) return true;
   return state.revision_known ? *operation.if_revision == state.revision
@@ -103,7 +103,7 @@ bool StepCreateOrOpen(SpecifiedHull& state, const Operation& operation) {
     default:
       return false;
   }
-  // The opening of a stream does not say whether it created the hull; that there was none does.
+  // The opening of a stream does not report creation, so the absence of the hull decides.
   if (open ? operation.if_absent && !state.exists : operation.created) {
     return !state.exists && Create(state, operation) && SameCounts(state, operation) &&
            operation.revision == operation.create_revision && operation.last_sequence == 0;
@@ -149,7 +149,7 @@ bool StepAppend(SpecifiedHull& state, const Operation& operation) {
          operation.duplicate == operation.sent - outside;
 }
 
-// One change, in which the hull is never without the new points or with others.
+// One atomic change: the hull always has either the old or the new points.
 bool StepReplace(SpecifiedHull& state, const Operation& operation) {
   const bool absent_fits = operation.if_revision.value_or(0) == 0;
   switch (operation.outcome) {
@@ -175,7 +175,7 @@ bool StepReplace(SpecifiedHull& state, const Operation& operation) {
          SameCounts(state, operation);
 }
 
-// All pieces at once. One that there was keeps its incarnation.
+// Puts all pieces at once. An existing body keeps its incarnation.
 bool StepPut(SpecifiedHull& state, const Operation& operation) {
   const bool absent_fits = operation.if_revision.value_or(0) == 0;
   if (operation.outcome == Outcome::kAborted) {
@@ -219,8 +219,6 @@ bool StepRead(SpecifiedHull& state, const Operation& operation) {
       return AgreeOnIncarnation(state, operation.create_revision) && SameCounts(state, operation);
     case Kind::kMesh:
       return operation.points == state.points;
-    case Kind::kVersion:
-      return AgreeOnIncarnation(state, operation.create_revision);
     case Kind::kGetBody:
       return AgreeOnIncarnation(state, operation.create_revision) &&
              operation.pieces == state.pieces;
@@ -261,7 +259,6 @@ bool StepAsk(SpecifiedHull& body, const Operation& operation, const FindSpecifie
     if (!HasPiece(body, seen.hull_id)) return false;
     if (!AgreeOnVersion(find(seen.hull_id), seen.create_revision, seen.revision)) return false;
   }
-  if (operation.is_part) return true;
   bool touching = false;
   for (const std::string& piece : body.pieces) {
     if (!find(piece).exists) return false;
@@ -272,7 +269,7 @@ bool StepAsk(SpecifiedHull& body, const Operation& operation, const FindSpecifie
          (HasPiece(body, operation.deciding) && Has(find(operation.deciding), operation.probe));
 }
 
-// The points of a hull, or of all pieces of a body; nullopt: a piece lacks its hull.
+// Returns the points of a hull, or of all pieces of a body; nullopt if a piece lacks its hull.
 std::optional<PointSet> PointsOf(const SpecifiedHull& state, const FindSpecified& find) {
   PointSet points = state.points;
   for (const std::string& piece : state.pieces) {
@@ -319,7 +316,6 @@ bool Step(SpecifiedHull& state, const Operation& operation) {
     case Kind::kGet:
     case Kind::kMesh:
     case Kind::kProbe:
-    case Kind::kVersion:
     case Kind::kGetBody:
       return StepRead(state, operation);
     case Kind::kPut:
@@ -356,7 +352,6 @@ bool IsRead(const Operation& operation) {
     case Kind::kMesh:
     case Kind::kProbe:
     case Kind::kPair:
-    case Kind::kVersion:
     case Kind::kGetBody:
     case Kind::kAsk:
     case Kind::kBatch:

@@ -6,10 +6,10 @@
 
 #include "tests/server/harness/history/hull_history.h"
 
-// Operations of histories that tests make up.
+// Hand-written operations for tests of the history checks.
 namespace hulld::server {
 
-// An answered one, of a hull that was created at this revision, too.
+// An answered operation on a hull that was created at this revision.
 inline Operation Answered(Operation::Kind kind, uint64_t invoked, uint64_t returned,
                           uint64_t revision) {
   Operation operation;
@@ -21,8 +21,7 @@ inline Operation Answered(Operation::Kind kind, uint64_t invoked, uint64_t retur
   return operation;
 }
 
-// The hull of these points, once each, in the place of one that there was or, at revision 1, of
-// none.
+// Replaces a hull with these distinct points; at revision 1, creates it.
 inline Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision,
                            PointSet points) {
   Operation operation = Answered(Operation::Kind::kReplace, invoked, returned, revision);

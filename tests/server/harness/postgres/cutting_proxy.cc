@@ -34,7 +34,7 @@ bool SendAll(int socket, std::string_view bytes) {
   return true;
 }
 
-// Appends what is there; false at the end.
+// Appends the available bytes. Returns false at the end of the stream.
 bool Receive(int socket, std::string* bytes) {
   char buffer[65536];
   const ssize_t received = recv(socket, buffer, sizeof buffer, 0);
@@ -43,8 +43,8 @@ bool Receive(int socket, std::string* bytes) {
   return true;
 }
 
-// The size of the message that `bytes` starts with: a letter, if it has one, and a length that
-// counts itself. None while that is not complete.
+// Returns the size of the message at the start of `bytes`: an optional letter, and a length that
+// includes itself. nullopt if incomplete.
 std::optional<size_t> MessageSize(std::string_view bytes, bool has_letter) {
   const size_t start = has_letter ? 1 : 0;
   if (bytes.size() < start + 4) return std::nullopt;
@@ -54,15 +54,15 @@ std::optional<size_t> MessageSize(std::string_view bytes, bool has_letter) {
   return bytes.size() < start + length ? std::nullopt : std::optional<size_t>(start + length);
 }
 
-// Ends what is sent in one piece.
+// Sync: ends a piece.
 constexpr char kEndOfPiece = 'S';
 
-// Whether a client's message is of the extended protocol, of which pieces are made.
+// Returns true for messages of the extended protocol, which form pieces.
 bool IsOfPiece(std::string_view message) {
   return std::string_view("PBDECHS").find(message.front()) != std::string_view::npos;
 }
 
-// Whether a client's message asks for this statement by its text.
+// Returns true if a client's message parses a statement with this text.
 bool Asks(std::string_view message, std::string_view text) {
   const std::string parsed = std::string(1, '\0').append(text).append(1, '\0');
   return message.front() == 'P' && message.find(parsed) != std::string_view::npos;
@@ -75,7 +75,7 @@ struct CuttingProxy::Connection {
   int server = -1;
   bool started = false;
   bool holding = false;
-  // What came of one piece, and what it asks for.
+  // Messages of the current piece, and the statements that it contains.
   std::string piece;
   bool begins = false;
   bool commits = false;
@@ -228,7 +228,7 @@ bool CuttingProxy::CutsHere(Cut cut) {
   return true;
 }
 
-// message: a simple query, whose text ends with a zero byte.
+// message: a simple query; its text ends with a zero byte.
 void CuttingProxy::NoteQuery(Connection& connection, std::string& message) {
   constexpr size_t kStart = 5;
   const std::string text = message.substr(kStart, message.size() - kStart - 1);
@@ -239,14 +239,14 @@ void CuttingProxy::NoteQuery(Connection& connection, std::string& message) {
   if (refuses_to_listen_) message[kStart] = 'X';
 }
 
-// Whether what the server sends is kept from the client.
+// Returns true if the server's answer is withheld from the client.
 bool CuttingProxy::NoteAnswer(const Connection& connection, size_t bytes) {
   const std::lock_guard lock(mutex_);
   answered_bytes_ += bytes;
   return deaf_ && connection.listens;
 }
 
-// False: the connection is to be cut.
+// Returns false to cut the connection.
 bool CuttingProxy::PassRequests(Connection& connection) {
   std::string& bytes = connection.requests;
   while (const std::optional<size_t> size = MessageSize(bytes, connection.started)) {
@@ -269,7 +269,7 @@ bool CuttingProxy::PassRequest(Connection& connection, const std::string& messag
   return SendAll(connection.server, message);
 }
 
-// What comes in it decides whether a piece is held, so it is kept until its end.
+// The contents decide if a piece is held, so it is buffered until its end.
 bool CuttingProxy::PassPiece(Connection& connection, const std::string& message) {
   connection.piece += message;
   connection.begins = connection.begins || Asks(message, "BEGIN");
@@ -321,7 +321,7 @@ void CuttingProxy::Deliver() {
   }
   if (server < 0) std::abort();
   SendAll(server, held);
-  // The answer to the message that ended it: ready for the next.
+  // Reads up to the answer to its last message: ReadyForQuery.
   std::string answers;
   while (Receive(server, &answers)) {
     bool is_ready = false;

@@ -12,55 +12,54 @@
 
 namespace hulld::server {
 
-// Stands between hulld and PostgreSQL as a network does, and fails where a test says. It reads the
-// messages of PostgreSQL's protocol as they pass.
+// A proxy between hulld and PostgreSQL that injects network faults. It parses the messages of
+// PostgreSQL's protocol as they pass.
 class CuttingProxy {
  public:
-  // What happens to the next transaction that comes, once.
+  // Fault of the next transaction only.
   enum class Cut {
     kNone,
-    // The connection is cut when COMMIT is asked for, before it is passed on.
+    // Cuts the connection at COMMIT, before forwarding it.
     kBeforeCommit,
-    // PostgreSQL commits, and the connection is cut before its answer is passed on.
+    // PostgreSQL commits; the connection is cut before its answer is forwarded.
     kAfterCommit,
-    // The connection to hulld is cut, and what is sent in one piece with BEGIN is delivered by
-    // Deliver.
+    // Cuts the connection to hulld. Deliver forwards the piece that contains BEGIN.
     kHold,
-    // The same of what is sent in one piece with COMMIT and without BEGIN.
+    // As kHold, for the piece that contains COMMIT and no BEGIN.
     kHoldCommit,
   };
 
-  // socket_directory: that of the server.
+  // socket_directory: the server's.
   explicit CuttingProxy(const std::string& socket_directory);
   CuttingProxy(const CuttingProxy&) = delete;
   CuttingProxy& operator=(const CuttingProxy&) = delete;
   ~CuttingProxy();
 
-  // The host that reaches it.
+  // Host for connections through the proxy.
   const std::string& directory() const { return directory_; }
 
   void CutNext(Cut cut);
-  // Down: all connections are cut, and new ones at once.
+  // While down, cuts all connections and rejects new ones.
   void SetDown(bool down);
-  // Down from the next cut on.
+  // Goes down at the next cut.
   void GoDownWithCut();
   // Cuts so far.
   int cuts();
-  // Cuts the connections that asked to LISTEN, once; or keeps from them, as long as it is set, all
-  // that the server sends, as a network does that lost a connection and tells nobody.
+  // CutListeners cuts the current connections that issued LISTEN. SetDeaf withholds everything the
+  // server sends to them, as a network does that silently lost a connection.
   void CutListeners();
   void SetDeaf(bool deaf);
-  // Every piece of what the server answers comes this much later.
+  // Delays every piece of the server's answers.
   void SetDelay(std::chrono::milliseconds delay);
-  // From now on LISTEN is a statement that the server does not know.
+  // Replaces LISTEN by a statement that the server rejects, from now on.
   void RefuseToListen();
-  // What the server has answered so far, in bytes, and how often it was asked for this text.
+  // Bytes that the server has sent so far, and the number of queries with this text.
   uint64_t answered_bytes();
   int Asked(const std::string& text);
-  // What was held arrives at the server; returns when that has ended the connection or answered
-  // all.
+  // Delivers the held piece to the server. Returns after the server has answered all of it or
+  // closed the connection.
   void Deliver();
-  // The same as soon as something is held; if nothing was held after `longest`, holding ends.
+  // Waits for a held piece, then delivers it. Stops holding if none arrives within `longest`.
   void DeliverOnceHeld(std::chrono::milliseconds longest);
 
  private:
@@ -92,7 +91,7 @@ class CuttingProxy {
   bool refuses_to_listen_ = false;
   int cuts_ = 0;
   uint64_t answered_bytes_ = 0;
-  // Simple queries, by their text.
+  // Simple queries, by text.
   std::map<std::string, int> asked_;
   std::string held_;
   int held_server_ = -1;

@@ -18,7 +18,8 @@
 namespace hulld::server {
 namespace {
 
-// Between questions of a client that was not answered, and how many it asks: for a minute.
+// Pause between the polling reads of a client with an unanswered call, and their maximum number:
+// one minute.
 constexpr std::chrono::milliseconds kPause(5);
 constexpr int kMostQuestions = 12'000;
 constexpr std::chrono::milliseconds kWhile(200);
@@ -31,14 +32,8 @@ void ManyServersTest::SetUp() {
 
 ManyServersTest::Server::Server(const std::string& program, const std::string& conninfo_file) {
   const std::vector<std::string> words = {
-      "--listen",
-      "127.0.0.1:0",
-      "--store",
-      "postgres",
-      conninfo_file.ends_with(".shards") ? "--postgres-shards" : "--postgres-conninfo-file",
-      conninfo_file,
-      "--postgres-servers",
-      "many"};
+      "--listen",    "127.0.0.1:0",        "--store", "postgres", "--postgres-conninfo-file",
+      conninfo_file, "--postgres-servers", "many"};
   process = program.empty() ? std::make_unique<Process>(words)
                             : std::make_unique<Process>(program, words);
 }
@@ -109,18 +104,13 @@ std::shared_ptr<grpc::Channel> ManyServersTest::Connect(size_t server) {
   return grpc::CreateCustomChannel(addresses_[server], grpc::InsecureChannelCredentials(), own);
 }
 
-void ManyServersTest::SetUp(HistoryClient& client, const Calls& calls) {
-  if (calls.pairs) client.TellStores();
-  if (calls.any_freshness) client.ReadAtAnyFreshness();
-}
-
 void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& history,
                            const std::function<void()>& answered) {
   std::mt19937_64 random(100 * calls.seed + number);
   const size_t name = calls.share_writers ? number % (kClients / 2) : number;
   HistoryClient client(Connect(number % servers_.size()), history, absl::StrCat("client-", name),
                        100 * calls.seed + number);
-  SetUp(client, calls);
+  if (calls.any_freshness) client.ReadAtAnyFreshness();
   const auto move_on = [&] { client.Connect(Connect(random() % servers_.size())); };
   for (int call = 0; call < calls.each; ++call) {
     const std::string& hull = calls.hulls[call % 3 == 0 ? 0 : 1];
@@ -134,7 +124,7 @@ void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& histo
         : is_pair ? client.Pair(calls.hulls[0], calls.hulls[1])
                   : client.CallAtRandom(hull);
     if (!is_answered) {
-      // Questions alone, so that the history holds few changes of which nobody knows.
+      // Polls with reads only, so that the history holds few changes of unknown outcome.
       int questions = 0;
       do {
         if (++questions == kMostQuestions) {
@@ -152,7 +142,7 @@ void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& histo
 
 void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
                           HullHistory& history) {
-  // No server goes back behind this, so the probe is never missing.
+  // No server reads an older state than this, so the probe always exists.
   for (size_t i = 0; i < servers_.size(); ++i) {
     HistoryClient(Connect(i), history, "probe", 0).MakeProbe();
   }
@@ -165,7 +155,7 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
         ++made;
         made.notify_one();
       });
-      // Nobody waits for more of it.
+      // All clients have ended; wake every waiter.
       if (++ended == kClients) {
         made = kClients * static_cast<size_t>(calls.each);
         made.notify_one();
@@ -181,7 +171,6 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
   for (std::thread& client : clients) client.join();
   for (size_t i = 0; i < servers_.size(); ++i) {
     HistoryClient last(Connect(i), history, "last", i);
-    if (calls.pairs) last.TellStores();
     for (const std::string& body : calls.bodies) {
       EXPECT_TRUE(last.GetBody(body)) << "server " << i << " does not answer, seed " << calls.seed;
       EXPECT_TRUE(last.Ask(body)) << "server " << i << " does not answer, seed " << calls.seed;

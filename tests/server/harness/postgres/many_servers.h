@@ -18,8 +18,7 @@
 
 namespace hulld::server {
 
-// Processes that are active at once over one PostgreSQL database, and clients that go from one to
-// another.
+// Several active processes over one PostgreSQL database, and clients that switch between them.
 class ManyServersTest : public ::testing::Test {
  protected:
   static constexpr size_t kServers = 3;
@@ -28,60 +27,59 @@ class ManyServersTest : public ::testing::Test {
   // Skips the test without PostgreSQL.
   void SetUp() override;
 
-  // The program that is started from now on, in the place of hulld.
+  // Starts this program instead of hulld from now on.
   void UseProgram(const std::string& program) { program_ = program; }
-  // Ends the servers that there were, and starts one for each file with a connection string, one
-  // after the other, or all at once. A file whose name ends in ".shards" names several databases.
+  // Stops the running servers, and starts one for each file with a connection string, sequentially
+  // (Begin) or concurrently (BeginAtOnce).
   void Begin(const std::vector<std::string>& conninfo_files);
   void BeginAtOnce(const std::vector<std::string>& conninfo_files);
-  // kServers over an empty database of the shared cluster.
+  // Starts kServers over an empty database of the shared cluster.
   void Begin();
 
   Process& server(size_t i) { return *servers_[i]->process; }
   std::string address(size_t i);
-  // A new process in the place of one, which is killed if it still runs.
+  // Replaces a server by a new process, killing it if it still runs.
   void Replace(size_t i);
-  // A connection of its own.
+  // Returns a new connection.
   std::shared_ptr<grpc::Channel> Connect(size_t server);
 
-  // How kClients call.
+  // Parameters of the calls of kClients.
   struct Calls {
     // Answered calls of each client.
     int each = 80;
     uint64_t seed = 0;
-    // Clients with numbers that differ by half of kClients write under the same ID.
+    // If true, clients with numbers that differ by half of kClients share a writer ID.
     bool share_writers = false;
-    // Two, which are called about.
+    // The two hulls that are called.
     std::vector<std::string> hulls = {"shared/a", "shared/b"};
-    // Clients ask how they stand to each other, too. They are in two shards.
+    // Adds queries about the pair.
     bool pairs = false;
-    // Bodies of these hulls, which are put, deleted, read and asked about, too.
+    // Bodies made of these hulls, which are also put, deleted, read, and queried.
     std::vector<std::string> bodies = {};
-    // With pairs: also about all hulls and bodies at once, by batches, scenes, collision streams
-    // and lists.
+    // Adds batches, scenes, collision streams, and lists about all hulls and bodies.
     bool several = false;
-    // Reads are of any freshness.
+    // Reads use any freshness.
     bool any_freshness = false;
   };
   using Fault = std::function<void()>;
-  // Clients call at random, each another server now and then, and one that is not answered goes on
-  // when a server answers a question. The faults come one after the other, evenly spread over the
-  // calls. At the end every server is asked about every hull.
+  // Runs clients that call at random and sometimes switch servers; one with an unanswered call
+  // continues when a server answers a read. The faults occur in order, evenly spread over the
+  // calls. Finally queries every server about every hull.
   void Run(const Calls& calls, const std::vector<Fault>& faults, HullHistory& history);
-  // That a change is not answered for a while, as its database is out of reach: the creation of a
-  // hull that is none of any history.
+  // Expects that a change gets no answer for a while because the database is unreachable. The
+  // change creates a hull outside of any history.
   void ExpectNoAnswer(size_t server, const std::string& hull_id = "unanswered");
-  // That the history is linearizable, and the seed and what the servers said if not.
+  // Expects a linearizable history; on failure reports the seed and the servers' logs.
   void ExpectLinearizable(const HullHistory& history, uint64_t seed);
 
  private:
-  // A process, and a thread that reads what it says, or it would wait for that.
+  // A process, and a thread that drains its output, so that it never blocks on it.
   struct Server {
     // program: empty for hulld.
     Server(const std::string& program, const std::string& conninfo_file);
     ~Server();
 
-    // It must come to listen.
+    // Waits for the server to listen, which must happen.
     void AwaitListening();
 
     std::unique_ptr<Process> process;
@@ -89,8 +87,6 @@ class ManyServersTest : public ::testing::Test {
     std::thread reader;
   };
 
-  // As the calls say.
-  void SetUp(HistoryClient& client, const Calls& calls);
   void Call(size_t client, const Calls& calls, HullHistory& history,
             const std::function<void()>& answered);
 

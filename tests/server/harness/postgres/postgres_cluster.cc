@@ -26,9 +26,9 @@ namespace hulld::server {
 namespace {
 
 constexpr char kAdminPassword[] = "Wort-des-Verwalters-3c";
-// Several times what all clusters of a few tests at once hold, so that they do not fill it.
+// Several times the size of all clusters of a few concurrent tests, so that they do not fill it.
 constexpr uintmax_t kSpaceInMemory = uintmax_t{2} << 30;
-// Far more than a standby takes to follow.
+// Far more attempts than a standby needs to catch up.
 constexpr int kMostAttempts = 10'000;
 
 [[noreturn]] void Fail(const std::string& what) {
@@ -36,12 +36,12 @@ constexpr int kMostAttempts = 10'000;
   std::abort();
 }
 
-// The options of initdb, wherever the data are.
+// Options of initdb, independent of the data directory.
 constexpr const char* kInitialOptions[] = {
     "-U",        "postgres",         "--auth=scram-sha-256", "--locale=C", "--encoding=UTF8",
     "--no-sync", "--no-instructions"};
 
-// Where the newest server's programs are; empty: nowhere.
+// Returns the directory of the newest server's programs; empty if none is installed.
 std::string ProgramDirectory() {
   std::vector<std::string> found;
   std::error_code error;
@@ -53,7 +53,8 @@ std::string ProgramDirectory() {
   return found.empty() ? "" : std::ranges::max(found);
 }
 
-// The arguments that run a program as a user who may run PostgreSQL, and end it with us.
+// Returns arguments that run a program as a user permitted to run PostgreSQL, and end it with this
+// process.
 std::vector<std::string> AsServer(std::vector<std::string> arguments) {
   std::vector<std::string> all = {"setpriv", "--pdeathsig", "QUIT"};
   if (geteuid() == 0) {
@@ -68,7 +69,7 @@ std::vector<std::string> AsServer(std::vector<std::string> arguments) {
   return all;
 }
 
-// What it prints goes to a file.
+// The program's output goes to a file.
 pid_t Spawn(std::vector<std::string> arguments, const std::string& log) {
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
@@ -91,7 +92,7 @@ std::string Contents(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// It must succeed.
+// Requires: the program succeeds.
 void RunToEnd(std::vector<std::string> arguments, const std::string& log) {
   const pid_t pid = Spawn(std::move(arguments), log);
   int status = 0;
@@ -117,12 +118,12 @@ void PostgresCluster::GiveToServer(const std::string& path) {
 }
 
 void PostgresCluster::MakeDirectory() {
-  // Each cluster has two thousand files. To make them takes ext4 a second of CPU once as many were
-  // deleted in the last seconds, which is what test after test does; in memory it takes nothing.
+  // Each cluster has two thousand files. Creating them on ext4 takes a second of CPU if as many
+  // were deleted in the preceding seconds, which consecutive tests do. In memory it takes no time.
   std::error_code error;
   const auto in_memory = std::filesystem::space("/dev/shm", error);
   const bool fits = !error && in_memory.available >= kSpaceInMemory;
-  // Short, as a socket's path holds 107 characters.
+  // Kept short: a socket path holds at most 107 characters.
   std::string name = absl::StrCat(fits ? "/dev/shm" : "/tmp", "/hulld-postgres-XXXXXX");
   directory_ = mkdtemp(name.data());
   GiveToServer(directory_);
@@ -153,7 +154,7 @@ void PostgresCluster::MakeData() {
     return;
   }
   InitializeData({});
-  // Whole, or not there: another program may look for it now. The first one that is whole stays.
+  // Renamed atomically: another program may look for it concurrently. The first complete copy wins.
   const fs::path copy = absl::StrCat(kept.string(), ".", getpid());
   std::error_code error;
   fs::copy(data, copy, fs::copy_options::recursive, error);
@@ -187,7 +188,7 @@ void PostgresCluster::Follow(PostgresCluster& primary) {
                      "--no-sync", "--dbname", conninfo}),
            directory_ + "/basebackup.log");
   Start();
-  // After the copy, which is not to wait for a standby when it is promoted.
+  // Set after the copy, which must not wait for a standby when promoted.
   primary.Ask("postgres", "ALTER SYSTEM SET synchronous_standby_names = 'standby'");
   primary.Ask("postgres", "SELECT pg_reload_conf()");
   const std::string is_followed = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'";
@@ -221,7 +222,7 @@ void PostgresCluster::Start() {
       if (PQping(conninfo.c_str()) == PQPING_OK) return;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    // Processes of one that was killed may still be there.
+    // Processes of a killed server may still exist.
     if (Contents(log).find("shared memory block") == std::string::npos) Fail(Contents(log));
   }
 }
@@ -254,7 +255,7 @@ void PostgresCluster::KillAll() {
 }
 
 void PostgresCluster::Suspend() {
-  // First the one that would make more of them.
+  // Stops the parent first, so that it starts no more children.
   kill(server_, SIGSTOP);
   for (const pid_t child : Children()) kill(child, SIGSTOP);
 }

@@ -9,27 +9,27 @@
 
 namespace hulld::server {
 
-// A PostgreSQL server with a data directory of its own, in memory (/dev/shm) or, where that is
-// small, in /tmp, on a unix socket there and nowhere else. It ends with the test. As it refuses to
-// run as root, it then runs as the user postgres. What fails here ends the test program.
+// A PostgreSQL server with its own data directory, in memory (/dev/shm) or, if that is too small,
+// in /tmp. It listens only on a unix socket there and ends with the test. Under root it runs as the
+// user postgres, as PostgreSQL refuses root. Any failure ends the test program.
 class PostgresCluster {
  public:
-  // Whether PostgreSQL's server is installed; tests are skipped without it.
+  // Returns true if PostgreSQL's server is installed. Tests are skipped without it.
   static bool IsInstalled();
-  // What skipped tests say.
+  // Message of skipped tests.
   static constexpr char kMissing[] = "PostgreSQL is not installed (Debian: postgresql-15)";
 
-  // Made at first use.
+  // Created at first use.
   static PostgresCluster& Shared();
 
   PostgresCluster() : PostgresCluster(WalIn{}) {}
-  // Keeps its log in a directory of its own, which belongs to the server (GiveToServer) and is
-  // empty, in segments of 1 MiB.
+  // Keeps its log in 1 MiB segments in an empty directory that belongs to the server
+  // (GiveToServer).
   struct WalIn {
     std::string directory;
   };
   explicit PostgresCluster(const WalIn& wal);
-  // A standby of `primary`, which has to live on.
+  // A standby of `primary`, which must outlive it.
   struct StandbyOf {
     PostgresCluster& primary;
   };
@@ -38,48 +38,49 @@ class PostgresCluster {
   PostgresCluster& operator=(const PostgresCluster&) = delete;
   ~PostgresCluster();
 
-  // An empty database that belongs to the role hulld; returns its name.
+  // Creates an empty database owned by the role hulld; returns its name.
   std::string MakeDatabase(const std::string& tablespace = "pg_default");
-  // A connection string for the role hulld, which is no superuser. host: that of a proxy; empty:
-  // that of the server itself.
+  // Returns a connection string for the role hulld, which is no superuser. host: a proxy's; empty:
+  // the server's own.
   std::string Conninfo(const std::string& database, const std::string& host = "") const;
-  // In a file of ours, as --postgres-conninfo-file wants it; it goes with this. host: as above, or
-  // several, separated by commas.
+  // Writes the connection string to a file for --postgres-conninfo-file, deleted with this object.
+  // host: as above, or several, separated by commas.
   std::string WriteConninfo(const std::string& database, const std::string& host = "");
   const std::string& socket_directory() const { return directory_; }
   static constexpr char kPassword[] = "Wort-der-Rolle-7f";
 
-  // Runs statements as a superuser; the first column of the rows of the last.
+  // Runs statements as a superuser; returns the first column of the last one's rows.
   std::vector<std::string> Ask(const std::string& database, const std::string& sql) const;
 
-  // Locks a table, which has to be there: until what is returned ends, who looks into it waits.
+  // Locks an existing table until the returned handle is destroyed; its readers wait.
   std::shared_ptr<void> HoldTable(const std::string& database, const std::string& table) const;
 
-  // Waits until it answers.
+  // Starts the server and waits until it answers.
   void Start();
-  // Copies `primary` in the place of all that is here, and follows it as its synchronous standby:
-  // from then on what is committed there is on both.
+  // Replaces all local data by a copy of `primary` and follows it as its synchronous standby: every
+  // later commit is on both.
   void Follow(PostgresCluster& primary);
-  // A standby goes on by itself, and takes changes.
+  // Promotes a standby to an independent primary.
   void Promote();
-  // All its processes at once, as pg_ctl stop -m immediate, which asks nobody and saves nothing.
+  // Stops all processes immediately without saving, as pg_ctl stop -m immediate.
   void StopImmediately();
-  // kill -9 of the server's first process; the others follow.
+  // Sends SIGKILL to the server's first process; its children exit too.
   void Kill();
-  // kill -9 of all its processes, as when its machine is gone.
+  // Sends SIGKILL to all processes, as if the machine failed.
   void KillAll();
-  // SIGSTOP and SIGCONT of all its processes.
+  // Send SIGSTOP and SIGCONT to all processes.
   void Suspend();
   void Resume();
 
-  // Lets the user who runs PostgreSQL write what is at this path.
+  // Gives the user who runs PostgreSQL write access to this path.
   static void GiveToServer(const std::string& path);
 
  private:
   void MakeDirectory();
   void InitializeData(const std::vector<std::string>& options);
-  // As initdb makes it, kept in the build folder: a copy takes a seventh of its time, and hundreds
-  // of tests need one. All clusters of a build have one system identifier.
+  // Copies the data directory that initdb makes, cached in the build folder: a copy takes a seventh
+  // of the time, and hundreds of tests need one. All clusters of a build have one system
+  // identifier.
   void MakeData();
   std::vector<pid_t> Children() const;
   void WaitForEnd();

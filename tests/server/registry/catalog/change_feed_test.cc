@@ -1,4 +1,4 @@
-// What a registry tells its watches.
+// Tests of the events that a registry sends to its watches.
 #include "server/registry/catalog/change_feed.h"
 
 #include <gmock/gmock.h>
@@ -12,7 +12,7 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace change_feed_test {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
@@ -23,7 +23,7 @@ std::string Text(const HullChange& change) {
          change.record.hull_id;
 }
 
-// A watch that is told what there is when it asks.
+// A watch that collects events on request.
 class Watcher {
  public:
   Watcher(Registry& registry, const WatchTarget& target, const WatchStart& start)
@@ -40,7 +40,7 @@ class Watcher {
     registry_.CloseWatch(watch_);
   }
 
-  // The next piece that tells something; waits for it.
+  // Waits for the next non-empty piece and returns it.
   WatchPiece Next() {
     while (true) {
       AwaitTurn();
@@ -48,7 +48,7 @@ class Watcher {
       if (!piece.changes.empty() || piece.synced || piece.anew) return piece;
     }
   }
-  // All that there is to tell now, piece by piece.
+  // Returns all pending events, piece by piece.
   std::vector<std::string> All() {
     std::vector<std::string> texts;
     bool waits = false;
@@ -56,7 +56,7 @@ class Watcher {
       const std::lock_guard lock(mutex_);
       waits = waits_;
     }
-    // What changed before this call made it due; on_ready may still be on its way.
+    // Earlier changes made it due; on_ready may still be in flight.
     if (waits) registry_.NudgeWatch(watch_);
     AwaitTurn();
     while (true) {
@@ -67,7 +67,7 @@ class Watcher {
       if (piece.synced) texts.push_back("synced");
     }
   }
-  // Waits until there is something to tell, or the watch is called for another reason.
+  // Waits until an event is pending or the watch is called for another reason.
   void Await() {
     AwaitTurn();
     Take();
@@ -88,7 +88,7 @@ class Watcher {
   }
   WatchPiece Take() {
     {
-      // on_ready may come before TakeChanges returns.
+      // on_ready may run before TakeChanges returns.
       const std::lock_guard lock(mutex_);
       waits_ = true;
     }
@@ -119,7 +119,7 @@ using DurableChangeFeedTest = StoreTest;
 class ChangeFeedTest : public ::testing::Test {
  protected:
   Registry& registry() { return hulls_->registry(); }
-  // What resumes a watch that is at the store's revision now.
+  // Resumes a watch that is at the store's current revision.
   WatchStart Resume() { return {true, registry().Sizes().store_revision, registry().store().id()}; }
   void Replace(const std::string& id) {
     Replacement replacement;
@@ -128,7 +128,7 @@ class ChangeFeedTest : public ::testing::Test {
     ASSERT_TRUE(replacement.builder->Add(CubeCorners(0, 7)).ok());
     ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
   }
-  // Puts a body of one piece, whose hull need not exist.
+  // Puts a single-piece body; its hull need not exist.
   void PutBody(const std::string& id) {
     std::promise<absl::Status> done;
     registry().PutBody({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,
@@ -180,7 +180,7 @@ TEST_F(ChangeFeedTest, EachChangeWakesAWatchThatWaits) {
   }
 }
 
-// Whatever happened to a hull since it was told of is one event.
+// All changes of a hull since its last event coalesce into one event.
 TEST_F(ChangeFeedTest, CoalescesWhatHappenedToAHull) {
   for (const char* id : {"kept", "gone", "reborn", "replaced"}) {
     ASSERT_TRUE(hulls_->Create(id).ok());
@@ -256,7 +256,8 @@ TEST_F(ChangeFeedTest, TellsOfBodiesWhereTheyAreAskedFor) {
   EXPECT_THAT(hulls.All(), IsEmpty());
   EXPECT_THAT(both.All(), ElementsAre("changed body c", "deleted body a"));
   EXPECT_THAT(one.All(), ElementsAre("changed body c"));
-  // What came and went is not told; what is a hull where a body was is another incarnation.
+  // A body created and deleted between two events sends none. A hull in the place of a body is
+  // another incarnation.
   PutBody("e");
   DeleteBody("e");
   DeleteBody("c");
@@ -264,7 +265,7 @@ TEST_F(ChangeFeedTest, TellsOfBodiesWhereTheyAreAskedFor) {
   EXPECT_THAT(hulls.All(), ElementsAre("created c"));
   EXPECT_THAT(both.All(), ElementsAre("replaced c"));
   EXPECT_THAT(one.All(), ElementsAre("replaced c"));
-  // And the other way round.
+  // And in the opposite direction.
   ASSERT_TRUE(hulls_->Delete("d").ok());
   PutBody("d");
   EXPECT_THAT(hulls.All(), ElementsAre("deleted d"));
@@ -281,7 +282,7 @@ TEST_F(ChangeFeedTest, WhatIsWatchedAlsoComesAndGoes) {
   WatchTarget target = Hull("a");
   target.varies = true;
   Watcher watch(registry(), target, {});
-  // It does not share what is kept with those that watch the same at first.
+  // It does not share state with other watches of the same ID.
   Watcher other(registry(), Hull("a"), {});
   const std::vector<std::string> b = {"b"};
   watch.Also(b, {});
@@ -344,8 +345,8 @@ TEST_F(DurableChangeFeedTest, StartsAnewAfterARestartUnlessNothingHadChanged) {
   EXPECT_THAT(watcher.All(), ElementsAre("synced"));
 }
 
-// More hulls than fit a piece change at once: what is new is not told apart until the watch has
-// caught up.
+// More hulls change at the same time than fit a piece: new hulls are not distinguished until the
+// watch has caught up.
 TEST_F(ChangeFeedTest, TellsManyChangesInPieces) {
   Watcher watcher(registry(), Prefix(""), kFromTheStart);
   watcher.All();
@@ -374,7 +375,7 @@ TEST_F(ChangeFeedTest, KeepsNothingOfWhatAllWereTold) {
   quick.All();
   const uint64_t held = registry().Cache().bytes;
   EXPECT_GE(held, before + 1000 * 100);
-  // Only hulls count, not changes.
+  // The limit counts hulls, not changes.
   for (int i = 0; i < 1000; ++i) {
     ASSERT_TRUE(hulls_->Put("h7", {Vector(i, 0, 0), Vector(0, i, 1)}).ok());
   }
@@ -418,5 +419,5 @@ TEST_F(ChangeFeedTest, EndsWhenTheServerDrains) {
   EXPECT_TRUE(absl::IsUnavailable(late.AwaitEnd()));
 }
 
-}  // namespace
+}  // namespace change_feed_test
 }  // namespace hulld::server

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld::server {
-namespace {
+namespace hull_state_test {
 
 using Life = HullState::Life;
 using Work = HullState::Work;
@@ -102,7 +102,7 @@ TEST(HullState, ARefusalTellsTheThreadThatBuildsOnIt) {
   EXPECT_TRUE(state.quiet());
 }
 
-// It finds the builder dropped, and starts from what is committed.
+// It finds the builder dropped, and starts from the committed state.
 TEST(HullState, ARefusalDoesNotConcernAThreadThatHasNotBegun) {
   HullState state = Growing();
   state.Schedule();
@@ -144,12 +144,12 @@ TEST(HullState, WhatOthersDoTellsTheThreadThatBuilds) {
   EXPECT_FALSE(state.EndWork());
   EXPECT_EQ(state.life(), Life::kPresent);
 
-  // It has not begun, and finds the new version.
+  // It has not started, and finds the new version.
   state.Schedule();
   state.Supersede();
   EXPECT_EQ(state.work(), Work::kScheduled);
 
-  // It has not begun, and finds nothing.
+  // It has not started, and finds no hull.
   state.Vanish();
   EXPECT_TRUE(state.gone());
   EXPECT_TRUE(state.EndWork());
@@ -208,5 +208,5 @@ TEST(HullStateDeathTest, DamageHasOneCause) {
   EXPECT_DEATH(Gone().Damage(absl::DataLossError("damaged")), "check failed");
 }
 
-}  // namespace
+}  // namespace hull_state_test
 }  // namespace hulld::server

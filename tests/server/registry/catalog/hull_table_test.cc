@@ -8,7 +8,7 @@
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
-namespace {
+namespace hull_table_test {
 
 StoredHull Stored(const std::string& id, uint64_t revision) {
   StoredHull hull;
@@ -25,7 +25,7 @@ StoredHull Stored(const std::string& id, uint64_t revision) {
 
 class HullTableTest : public ::testing::Test {
  protected:
-  // Once round, and a step more.
+  // One full turn and one more step.
   void GoRound() {
     for (size_t i = 0; i <= table_.size(); ++i) table_.RestSome();
   }
@@ -69,7 +69,7 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
   EXPECT_EQ(again->low, Vector(1, 2, 3));
 }
 
-// Each of these would be lost.
+// Putting it to rest would lose each of these.
 TEST_F(HullTableTest, WhatIsInUseStaysAwake) {
   const auto expect_awake_while = [&](const char* what, auto begin, auto end) {
     table_.AddResting(Stored("x", 3));
@@ -124,7 +124,7 @@ TEST_F(HullTableTest, TheHandGoesRoundAnyNumberOfHulls) {
   for (int i = 0; i < 37; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
 }
 
-// Sanitizers have allocators of their own.
+// Sanitizers have their own allocators.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST_F(HullTableTest, AHullAtRestTakesLessThan300Bytes) {
   constexpr int kHulls = 20000;
@@ -136,5 +136,5 @@ TEST_F(HullTableTest, AHullAtRestTakesLessThan300Bytes) {
 }
 #endif
 
-}  // namespace
+}  // namespace hull_table_test
 }  // namespace hulld::server

@@ -1,4 +1,4 @@
-// What another server makes of a hull that is in memory here.
+// Tests of changes by a peer server to a hull in memory.
 #include "server/registry/catalog/registered_hull.h"
 
 #include <gmock/gmock.h>
@@ -12,13 +12,13 @@
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace registered_hull_test {
 
 using ::testing::ElementsAre;
 
 class SupersededHull : public ::testing::Test {
  protected:
-  // The unit cube as of revision 5: a base of revision 3 with six corners, and two deltas.
+  // The unit cube at revision 5: a base of revision 3 with six corners, and two deltas.
   static StoredHull Cube() {
     StoredHull stored;
     stored.record.hull_id = "h";
@@ -29,7 +29,7 @@ class SupersededHull : public ::testing::Test {
     stored.layout = {.base_revision = 3, .base_vertices = 6, .delta_count = 2, .delta_vertices = 2};
     return stored;
   }
-  // The same with one delta more.
+  // The cube with one more delta.
   static StoredHull Grown(uint64_t points = 1) {
     StoredHull stored = Cube();
     stored.record.revision = 9;
@@ -91,7 +91,7 @@ TEST_F(SupersededHull, WithoutGrowthItGoes) {
   EXPECT_EQ(hull_.committed, Grown());
   EXPECT_FALSE(hull_.IsReady());
   EXPECT_FALSE(hull_.Describe().has_box);
-  // It went before what it grew by came.
+  // The hull was deleted before its growth arrived.
   EXPECT_FALSE(Supersede(Grown(2), &growth_));
   EXPECT_FALSE(hull_.IsReady());
 }
@@ -120,7 +120,7 @@ TEST_F(SupersededHull, ABuilderIsKeptWithWhatItLacksUnlessThatIsMuch) {
   EXPECT_EQ(ServedPoints(), 9 + many.size());
 }
 
-// What it appends is in no version that anyone is given.
+// No reader receives a version that contains its appended points.
 TEST_F(SupersededHull, AThreadThatBuildsLosesWhatItAppended) {
   hull_.state.Schedule();
   hull_.state.StartBuilding();
@@ -144,7 +144,7 @@ TEST_F(SupersededHull, WhatCameIsCountedAndIsNoReasonToKeepTheHull) {
   const std::vector<Vector> many = SpherePoints(1000, 2);
   EXPECT_TRUE(Supersede(Grown(many.size()), &many));
   EXPECT_GE(budget_.Statistics().bytes, before + many.size() * sizeof(Vector));
-  // It leaves room for less than what came.
+  // Leaves less room than the growth needs.
   const MemoryCharge charge(budget_, MemoryUse::kReading, (1 << 30) - (16 << 10));
   Locked locked(mutex_);
   budget_.Evict(locked);
@@ -152,5 +152,5 @@ TEST_F(SupersededHull, WhatCameIsCountedAndIsNoReasonToKeepTheHull) {
   EXPECT_NE(used_later.live, nullptr);
 }
 
-}  // namespace
+}  // namespace registered_hull_test
 }  // namespace hulld::server

@@ -19,12 +19,12 @@
 #include "server/store/memory_store.h"
 
 namespace hulld::server {
-namespace {
+namespace committer_test {
 
 using ::testing::ElementsAre;
 using ::testing::SizeIs;
 
-// Keeps the revisions of each batch. A test can hold the next commit, and decide how it ends.
+// Records the revisions of each batch. A test can block the next commit and choose its outcome.
 class GatedStore : public MemoryStore {
  public:
   absl::Status Commit(std::span<Change* const> changes) override {
@@ -54,7 +54,7 @@ class GatedStore : public MemoryStore {
     std::promise<void> entered;
     std::promise<absl::Status> outcome;
   };
-  // Holds the next Commit.
+  // Blocks the next Commit.
   void Close(Gate& gate) {
     const std::lock_guard lock(mutex_);
     gate_ = &gate;
@@ -80,7 +80,7 @@ class GatedStore : public MemoryStore {
   std::vector<std::vector<uint64_t>> batches_;
 };
 
-// Another server changes some IDs at the next commit.
+// A peer server changes some IDs at the next commit.
 class SharedStore : public GatedStore {
  public:
   bool is_shared() const override { return true; }
@@ -108,20 +108,11 @@ class SharedStore : public GatedStore {
     return growth;
   }
 
-  absl::Status HoldOthers() override { return can_hold; }
-  bool ReleaseOthers() override {
-    ++releases;
-    return keeps_hold;
-  }
-
-  absl::Status can_hold;
-  std::atomic<bool> keeps_hold = true;
-  std::atomic<int> releases = 0;
   OtherChanges others;
   OtherChanges found_by_follow;
   std::atomic<int> follows = 0;
   std::atomic<int> starts = 0;
-  // Called while a question is sent; may be empty.
+  // Called while a request is sent; may be empty.
   std::function<void()> on_start;
   absl::Status can_follow;
 };
@@ -135,7 +126,7 @@ class CommitterTest : public ::testing::Test {
     change.revision = revision;
     return change;
   }
-  // Notes how the change ends.
+  // Records the outcome of the change.
   std::future<void> Submit(uint64_t revision) {
     Locked locked(order_);
     return SubmitLocked(locked, revision);
@@ -198,7 +189,7 @@ TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
   }
 }
 
-// The thread that waits has its turn before the batch has ended, unless it is refused.
+// A waiting thread runs before the batch has ended, unless the batch is refused.
 TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
   for (const absl::Status& outcome : {absl::OkStatus(), absl::UnavailableError("no disk")}) {
     outcomes_.clear();
@@ -221,7 +212,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
     constexpr uint64_t kMany = 3 * Committer::kMostPerHold;
     for (uint64_t revision = 3; revision < kMany; ++revision) Submit(revision);
     std::future<void> last = Submit(kMany);
-    // A refusal takes all with it, as if they were one batch; otherwise 1 is a batch of its own.
+    // A refusal takes all of them, as if they were one batch; otherwise 1 is a separate batch.
     gate.outcome.set_value(outcome);
     last.wait();
     passer.join();
@@ -233,7 +224,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
   }
 }
 
-// What is submitted once everything is undone does not build on what was refused.
+// Changes submitted after the rollback do not build on the refused ones.
 TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   GatedStore::Gate gate;
   store_.Close(gate);
@@ -303,8 +294,8 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
   EXPECT_EQ(ended, 3);
 }
 
-// Those of the batch and those that wait, the latest first, before Others is told; what is kept
-// follows.
+// Superseded changes of the batch and of the queue are refused, latest first, before the
+// callback for peer changes runs; the kept ones follow.
 TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
   SharedStore store;
   FairMutex order;
@@ -345,7 +336,7 @@ TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
                                   "b1 kept", "last1 kept"));
 }
 
-// What was perhaps committed comes back as if another server had done it: it was not superseded.
+// A change that may have been committed returns as a peer change: it was not superseded.
 TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
   SharedStore store;
   FairMutex order;
@@ -395,7 +386,7 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
-// A caller that comes while a question is on its way waits for the next one, and so does a change.
+// A caller or a change that arrives while a request is in flight waits for the next one.
 TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
   SharedStore store;
   FairMutex order;
@@ -426,7 +417,7 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
       committed.set_value();
     });
   };
-  // The committer's thread may not have begun to wait yet: then it asks itself.
+  // The committer's thread may not be waiting yet: then it sends the request itself.
   constexpr int kMostTries = 100'000;
   for (int i = 0; i < kMostTries && store.starts == 0; ++i) {
     std::promise<void> told;
@@ -445,12 +436,12 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
   const std::lock_guard lock(order);
   ASSERT_THAT(events, SizeIs(3));
   EXPECT_THAT(events[0], ::testing::StartsWith("first"));
-  // A commit asks as well.
+  // A commit also sends a request.
   EXPECT_THAT(events[1], ::testing::StartsWith("committed"));
   EXPECT_THAT(events[2], ::testing::StartsWith("later"));
 }
 
-// Others is told what hulls grew by where that was wanted and could be had.
+// The peer-change callback receives the growth of hulls where it was requested and available.
 TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
   SharedStore store;
   FairMutex order;
@@ -483,57 +474,9 @@ TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
     return std::exchange(events, {});
   };
   EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted grew"));
-  // What could not be asked is not asked again at once.
+  // A failed request is not immediately retried.
   store.can_follow = absl::UnavailableError("no database");
   EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted changed"));
-}
-
-TEST(Committer, AHoldLastedIfTheStoreSaysSoAtItsEnd) {
-  SharedStore store;
-  FairMutex order;
-  Committer committer(store, order);
-  committer.SetOthers([](Locked&, const OtherChanges&) {});
-  const auto hold = [&] {
-    const auto made = std::make_shared<CommitHold>();
-    const Locked locked(order);
-    committer.Hold(locked, made);
-    return made;
-  };
-  const auto kept = hold();
-  ASSERT_TRUE(kept->Await({}).ok());
-  // What is submitted meanwhile waits.
-  std::promise<void> committed;
-  {
-    const Locked locked(order);
-    committer.Submit(locked, Change(), [&](Locked&, const absl::Status& status, const Change&) {
-      EXPECT_TRUE(status.ok()) << status;
-      committed.set_value();
-    });
-  }
-  EXPECT_TRUE(store.batches().empty());
-  EXPECT_EQ(store.releases, 0);
-  EXPECT_TRUE(kept->End());
-  committed.get_future().get();
-  EXPECT_EQ(store.releases, 1);
-
-  store.keeps_hold = false;
-  const auto lost = hold();
-  ASSERT_TRUE(lost->Await({}).ok());
-  lost->Extend();
-  EXPECT_FALSE(lost->End());
-  EXPECT_EQ(store.releases, 2);
-  store.keeps_hold = true;
-
-  // One that takes too long is over by itself.
-  const auto forgotten = hold();
-  ASSERT_TRUE(forgotten->Await({}).ok());
-  while (store.releases < 3) std::this_thread::yield();
-  EXPECT_FALSE(forgotten->End());
-  EXPECT_EQ(committer.Statistics().holds, 3);
-
-  store.can_hold = absl::UnavailableError("no database");
-  EXPECT_TRUE(absl::IsUnavailable(hold()->Await({})));
-  EXPECT_EQ(store.releases, 3);
 }
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
@@ -549,5 +492,5 @@ TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
       "check failed");
 }
 
-}  // namespace
+}  // namespace committer_test
 }  // namespace hulld::server

@@ -11,14 +11,14 @@
 #include <vector>
 
 namespace hulld::server {
-namespace {
+namespace memory_budget_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class MemoryBudgetTest : public ::testing::Test {
  protected:
-  // Holds bytes, some of which are in use and stay.
+  // Holds bytes, some in use and not evictable.
   struct Owner {
     Owner(MemoryBudgetTest& test, int owner_number, uint64_t in_use_bytes = 0)
         : number(owner_number), in_use(in_use_bytes), account(test.budget_, [this, &test](Locked&) {
@@ -44,7 +44,7 @@ class MemoryBudgetTest : public ::testing::Test {
 
   FairMutex owners_;
   MemoryBudget budget_{100, 40, owners_};
-  // The numbers of the owners that were asked to let go, in order.
+  // Numbers of the owners asked to evict, in order.
   std::vector<int> asked_;
 };
 
@@ -94,7 +94,7 @@ TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
   EXPECT_THAT(asked_, ElementsAre(1, 2));
   EXPECT_EQ(bytes(), 60);
   EXPECT_EQ(budget_.Statistics().evictions, 1);
-  // It grew since it was counted.
+  // It has grown since it was counted.
   busy.in_use = 110;
   MemoryCharge charge(budget_, MemoryUse::kReading, 50);
   Evict();
@@ -105,7 +105,7 @@ TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
   EXPECT_EQ(bytes(), 50);
 }
 
-// One that cannot let go is asked again after all others, and a few at a time.
+// An owner that cannot evict is asked again only after all other owners; each eviction asks a few.
 TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
   std::vector<std::unique_ptr<Owner>> owners;
   for (int i = 0; i < 200; ++i) {
@@ -153,7 +153,7 @@ TEST_F(MemoryBudgetTest, APartIsHeldForReadersWhileOneHoldsIt) {
     EXPECT_EQ(reading(), 30);
     part->SetBytes(40);
     EXPECT_EQ(reading(), 40);
-    // A writer needs what readers hold, too.
+    // A writer also needs memory held by readers.
     owner.account.Set(5, true);
     EXPECT_EQ(reading(), 0);
     EXPECT_EQ(writing(), 45);
@@ -184,5 +184,5 @@ TEST(MemoryBudgetDeathTest, AnEvictionWithoutTheMutexOfTheOwnersEndsTheProcess) 
   EXPECT_DEATH(budget.Evict(locked), "check failed");
 }
 
-}  // namespace
+}  // namespace memory_budget_test
 }  // namespace hulld::server

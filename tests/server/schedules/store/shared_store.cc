@@ -44,7 +44,7 @@ absl::Status SharedStore::End(const char* what, const absl::Status& status) {
   return status;
 }
 
-// Not of one moment.
+// Not an atomic snapshot.
 absl::Status SharedStore::ForEachHull(const StoredHullVisitor& visit) {
   std::string last;
   while (true) {
@@ -72,7 +72,7 @@ absl::StatusOr<std::vector<Vector>> SharedStore::LoadVertices(const StoredHull& 
     return absl::UnavailableError("the database does not answer");
   }
   const SimulatedStore::Kept* const kept = Find(hull.record);
-  // A base takes the place of all that was before.
+  // A base replaces everything before it.
   if (kept == nullptr || kept->stored.layout.base_revision != hull.layout.base_revision) {
     scheduler.Note("database: finds another hull than that of revision", hull.record.revision);
     return Moved();
@@ -104,7 +104,7 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
   return sequence;
 }
 
-// What others did since this knew of it, up to now.
+// Records the peer changes since its last known revision.
 void SharedStore::NoteOthers() {
   known_.revision = database_.ledger_.revision();
   known_.totals = database_.totals();
@@ -147,7 +147,7 @@ void SharedStore::StartFollow() {
 absl::Status SharedStore::Follow() {
   Begin("database: is asked what others did since change", known_.seen);
   absl::Status status;
-  // A server that cannot ask when it starts ends.
+  // A server that cannot reach the database at its start ends.
   if (std::exchange(has_followed_, true) && Dice().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     status = absl::UnavailableError("the database does not answer");
@@ -170,7 +170,7 @@ absl::Status SharedStore::Commit(std::span<Change* const> changes) {
   return End("database: has committed up to revision, change", status);
 }
 
-// From the turn to its end nobody else commits, so this is one step.
+// No peer commits during the turn, so this is one step.
 absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
   const StoreFaults& faults = database_.faults_;
   const auto refuse = [&](absl::Status status) {

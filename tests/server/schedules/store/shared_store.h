@@ -12,9 +12,9 @@
 
 namespace hulld::server {
 
-// What one of several servers has of a SimulatedStore, which then is the database that they share:
-// it works as Store says of a store that is shared. Others may go on before and after each call.
-// The database outlives it.
+// A server's view of a SimulatedStore that several servers share as their database. It behaves as
+// Store specifies for shared stores. Other threads may run before and after each call. The database
+// outlives it.
 class SharedStore : public Store {
  public:
   explicit SharedStore(SimulatedStore& database);
@@ -27,7 +27,7 @@ class SharedStore : public Store {
   bool is_shared() const override { return true; }
   uint64_t revision() const override { return known_.revision; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  // There are none, unless records are found.
+  // Without record lookup no bodies exist.
   absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
@@ -56,23 +56,23 @@ class SharedStore : public Store {
   void NoteEnd(bool failed);
   absl::Status CommitInTurn(std::span<Change* const> changes);
   void TellTheOthers();
-  // What is kept of a hull, if it is the one of the record.
+  // Returns the stored data of a hull if it matches the record, or null.
   const SimulatedStore::Kept* Find(const HullRecord& record) const;
 
-  // What this knows of the database.
+  // This server's knowledge of the database.
   struct Known {
-    // Its changes.
+    // Database changes seen.
     size_t seen = 0;
     uint64_t revision = 0;
     // As of that revision.
     StoreTotals totals = {};
-    // That nobody took yet.
+    // Peer changes not yet taken.
     OtherChanges others = {};
   };
 
   SimulatedStore& database_;
   Known known_;
-  // What is on its way to Follow: what was known when it was asked for.
+  // The state captured when a pending Follow started.
   std::optional<Known> started_;
   // Guarded by the database's mutex.
   std::function<void()> on_others_;

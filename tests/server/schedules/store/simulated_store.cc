@@ -144,7 +144,7 @@ absl::Status SimulatedStore::Commit(std::span<Change* const> changes) {
   return status;
 }
 
-// OK where the batch is not refused.
+// Returns OK if the batch is not refused.
 absl::Status SimulatedStore::RefuseBatch(std::span<const Change* const> changes) {
   const auto leave_unknown = [&] {
     ++counts_.unknown;

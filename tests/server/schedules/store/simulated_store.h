@@ -16,28 +16,29 @@ namespace hulld::server {
 
 class SharedStore;
 
-// How often something fails: once in this many calls; 0: never.
+// Fault frequencies: one in this many calls; 0: never.
 struct StoreFaults {
-  // A batch is refused and nothing is left of it; it may be so, or not, until Recover succeeds.
+  // A batch is refused without effect (refused), or with an unknown effect until Recover succeeds
+  // (unknown).
   uint32_t refused = 0;
   uint32_t unknown = 0;
   // The disk is full: RESOURCE_EXHAUSTED.
   uint32_t full = 0;
   uint32_t recover = 0;
-  // Points, or a sequence, cannot be read now.
+  // Points or a sequence are temporarily unreadable.
   uint32_t read = 0;
-  // Points are found to be damaged, and stay so.
+  // Points are permanently damaged.
   uint32_t damage = 0;
-  // The process is killed at this batch, from 1; 0: at none.
+  // The process is killed at this batch, counted from 1; 0: never.
   uint32_t killed_at_batch = 0;
 };
 
-// A store that works as Store says and as the durable one does, with faults that the schedule
-// chooses. Others may go on before and after each call. It keeps what it should in a Ledger, which
-// checks every change. It outlives the process that was killed: Reopen.
+// A store that behaves as Store specifies and as the durable one, with faults chosen by the
+// schedule. Other threads may run before and after each call. It records its contents in a Ledger,
+// which checks every change. It survives a killed process: Reopen.
 class SimulatedStore : public Store {
  public:
-  // How often each happened.
+  // Number of occurrences of each event.
   struct Counts {
     uint64_t batches = 0;
     uint64_t refused = 0;
@@ -50,7 +51,7 @@ class SimulatedStore : public Store {
     uint64_t failed_lookups = 0;
     uint64_t kills = 0;
     uint64_t revived = 0;
-    // Changes that another server's superseded (SharedStore).
+    // Changes superseded by another server's (SharedStore).
     uint64_t superseded = 0;
   };
 
@@ -75,12 +76,12 @@ class SimulatedStore : public Store {
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override;
 
-  // Before it is used.
+  // Call before use.
   void SetFindsRecords(bool finds_records) { finds_records_ = finds_records; }
   Ledger& ledger() { return ledger_; }
   const Counts& counts() const { return counts_; }
-  // Failures that calls may have been answered with by now; and with them one that they may yet.
-  // One lookup of a record may answer many calls, also such as come while it is under way.
+  // Failures that may have been reported to calls by now; the second also counts one still in
+  // progress. One record lookup may answer many calls, including calls that arrive while it runs.
   uint64_t answered_failures() const {
     return failed() - (is_failing_ ? 1 : 0) - failing_servers_ - counts_.failed_lookups;
   }
@@ -90,28 +91,27 @@ class SimulatedStore : public Store {
   bool has_damage() const { return !damaged_.empty(); }
   bool was_killed() const { return is_dead_; }
 
-  // What the next process finds. faults: from now on.
+  // Opens the contents for the next process. faults: from now on.
   void Reopen(const StoreFaults& faults);
 
  private:
-  // As which several servers have it.
+  // The store as seen by several servers.
   friend class SharedStore;
 
-  // What is kept of a hull.
+  // Stored data of a hull.
   struct Kept {
     StoredHull stored;
-    // Each with the revision that brought it.
+    // Each with the revision that added it.
     std::vector<std::pair<uint64_t, Vector>> vertices;
     std::map<std::string, uint64_t> sequences;
   };
 
-  // A change that was kept: which hull or body it changed, at which revision, and whether an
-  // incarnation ended then.
+  // A stored change: its hull or body, its revision, and the incarnation that it ended, if any.
   struct Logged {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
-    // When that incarnation began, and whether it was a body's.
+    // First revision of that incarnation; and true if it was a body's.
     uint64_t former_began = 0;
     bool former_was_body = false;
   };
@@ -126,7 +126,7 @@ class SimulatedStore : public Store {
   Counts counts_;
   std::map<std::string, Kept> hulls_;
   std::map<std::string, StoredBody> bodies_;
-  // What the next process may find.
+  // Changes of unknown outcome, which the next process may find.
   std::vector<Change> unknown_;
   // Incarnations, by their first revisions.
   std::set<uint64_t> damaged_;
@@ -136,8 +136,8 @@ class SimulatedStore : public Store {
   bool is_dead_ = false;
 
   std::vector<Logged> log_;
-  // For SharedStore: how many servers' last batch failed; and all of the servers, guarded by the
-  // mutex.
+  // For SharedStore: the number of servers with a failed last batch; and all servers, guarded by
+  // the mutex.
   uint64_t failing_servers_ = 0;
   Mutex servers_mutex_;
   std::vector<SharedStore*> servers_;

@@ -32,7 +32,7 @@ extern "C" int eventfd_read(int fd, eventfd_t* value) {
 }
 
 namespace hulld::server {
-namespace {
+namespace batch_notices_test {
 
 // The end comes between a look at whether it has come and the taking back of what wakes. A thread
 // that misses it waits until the test is ended from outside.
@@ -61,5 +61,5 @@ TEST(BatchNotices, EndAlsoWhileTheyTakeBackWhatWokeThem) {
   EXPECT_EQ(heard, 7);
 }
 
-}  // namespace
+}  // namespace batch_notices_test
 }  // namespace hulld::server

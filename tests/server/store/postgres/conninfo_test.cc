@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace hulld::server {
-namespace {
+namespace conninfo_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -44,5 +44,5 @@ TEST(Conninfo, NoErrorQuotesAPassword) {
   EXPECT_EQ(Conninfo::Parse(" \n").status().code(), absl::StatusCode::kInvalidArgument);
 }
 
-}  // namespace
+}  // namespace conninfo_test
 }  // namespace hulld::server

@@ -9,7 +9,7 @@
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_claim_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -187,5 +187,5 @@ TEST_F(PostgresClaim, WhatTheTablesTakeIsKnownAndWhatIsFreeIsNot) {
   EXPECT_FALSE(disk->free_bytes.has_value());
 }
 
-}  // namespace
+}  // namespace postgres_claim_test
 }  // namespace hulld::server

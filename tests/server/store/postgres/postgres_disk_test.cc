@@ -1,63 +1,18 @@
 // The disk of the database is full: that of its tables, or that of its log.
 #include <absl/strings/str_cat.h>
-#include <fcntl.h>
-#include <sys/mount.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "tests/server/harness/small_disk.h"
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_disk_test {
 
 using ::testing::HasSubstr;
-
-// A file system of its own that can be filled, where this process may mount one.
-class SmallDisk {
- public:
-  explicit SmallDisk(int mebibytes) {
-    std::string name = "/tmp/hulld-disk-XXXXXX";
-    path_ = mkdtemp(name.data());
-    is_mounted_ = mount("none", path_.c_str(), "tmpfs", 0,
-                        absl::StrCat("size=", mebibytes, "m").c_str()) == 0;
-    mkdir(directory().c_str(), 0700);
-    PostgresCluster::GiveToServer(directory());
-    chmod(path_.c_str(), 0755);
-  }
-  SmallDisk(const SmallDisk&) = delete;
-  SmallDisk& operator=(const SmallDisk&) = delete;
-  ~SmallDisk() {
-    if (is_mounted_) umount2(path_.c_str(), MNT_DETACH);
-    std::filesystem::remove_all(path_);
-  }
-
-  bool is_mounted() const { return is_mounted_; }
-  // Empty, and the server's.
-  std::string directory() const { return path_ + "/server"; }
-  // Leaves no room.
-  void Fill() const {
-    const int file = open(filler().c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
-    const std::vector<char> block(4096);
-    while (write(file, block.data(), block.size()) > 0) {
-    }
-    close(file);
-  }
-  void Free() const { std::filesystem::remove(filler()); }
-
-  static constexpr char kNoMount[] = "nothing may be mounted here";
-
- private:
-  std::string filler() const { return path_ + "/filler"; }
-
-  std::string path_;
-  bool is_mounted_ = false;
-};
 
 // For one server, and for several.
 class PostgresDisk : public ::testing::TestWithParam<bool> {
@@ -66,6 +21,11 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
 
   // A database whose log is on one small disk, and whose tablespace "small" is on another.
   struct Machine {
+    Machine() {
+      for (const SmallDisk* disk : {&log, &tables})
+        PostgresCluster::GiveToServer(disk->directory());
+    }
+
     SmallDisk log{128};
     SmallDisk tables{64};
     std::unique_ptr<PostgresCluster> cluster;
@@ -197,5 +157,5 @@ TEST_P(PostgresDisk, ALogThatDoesNotFitLosesNothing) {
   EndServers();
 }
 
-}  // namespace
+}  // namespace postgres_disk_test
 }  // namespace hulld::server

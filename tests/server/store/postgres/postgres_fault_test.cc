@@ -8,7 +8,7 @@
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_fault_test {
 
 using ::testing::HasSubstr;
 using Cut = CuttingProxy::Cut;
@@ -196,5 +196,5 @@ TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
   EXPECT_EQ(ReceivedAnew("h"), 9);
 }
 
-}  // namespace
+}  // namespace postgres_fault_test
 }  // namespace hulld::server

@@ -11,7 +11,7 @@
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_follow_test {
 
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
@@ -414,5 +414,5 @@ TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
   EXPECT_EQ(proxy_->Asked("LISTEN hulld_batches"), 1);
 }
 
-}  // namespace
+}  // namespace postgres_follow_test
 }  // namespace hulld::server

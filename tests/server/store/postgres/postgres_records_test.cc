@@ -18,7 +18,7 @@
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_records_test {
 
 class PostgresRecords : public PostgresTest {
  protected:
@@ -151,12 +151,6 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
     Ask("ALTER TABLE IF EXISTS hulld.changes DROP COLUMN began, DROP COLUMN body_began");
     Ask("UPDATE hulld.store SET format = 1");
     const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
-    // A server that is refused leaves it to those that are active.
-    options_.slots = "0-511";
-    EXPECT_TRUE(absl::IsFailedPrecondition(Open().status()));
-    options_.slots.clear();
-    EXPECT_EQ(Ask("SELECT format FROM hulld.store").front(), "1");
-    EXPECT_EQ(Ask("SELECT epoch FROM hulld.store").front(), epoch);
     Start();
     EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
     EXPECT_EQ(hulls_->registry().Sizes().vertex_count, 16);
@@ -464,5 +458,5 @@ TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
   EXPECT_EQ(told(before, true), (Events{{"c", false}, {"a", true}, {"b", true}}));
 }
 
-}  // namespace
+}  // namespace postgres_records_test
 }  // namespace hulld::server

@@ -13,7 +13,7 @@
 #include "tests/server/store/postgres/postgres_fixture.h"
 
 namespace hulld::server {
-namespace {
+namespace postgres_shared_test {
 
 using ::testing::HasSubstr;
 using Cut = CuttingProxy::Cut;
@@ -691,5 +691,5 @@ TEST_F(PostgresShared, WhoIsTooFarBehindEnds) {
   EXPECT_TRUE(ended);
 }
 
-}  // namespace
+}  // namespace postgres_shared_test
 }  // namespace hulld::server

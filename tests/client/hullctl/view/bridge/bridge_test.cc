@@ -1,4 +1,4 @@
-// The bridge over real connections, spoken to byte by byte as browsers and attackers do.
+// The bridge over real connections, with raw bytes as sent by browsers and attackers.
 #include "client/hullctl/view/bridge/bridge.h"
 
 #include <arpa/inet.h>
@@ -17,7 +17,7 @@
 #include "client/hullctl/view/bridge/page_html.h"
 
 namespace hulld {
-namespace {
+namespace bridge_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -40,13 +40,13 @@ class Socket {
   void Send(const std::string& bytes) {
     static_cast<void>(send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL));
   }
-  // All until the other side closes.
+  // Reads until the peer closes.
   std::string ReadAll() {
     while (ReadSome()) {
     }
     return received_;
   }
-  // Until the text has come; false when the other side closed before.
+  // Reads until the text arrives. Returns false if the peer closed before.
   bool ReadUntil(const std::string& text) {
     while (received_.find(text) == std::string::npos) {
       if (!ReadSome()) return false;
@@ -98,7 +98,7 @@ class BridgeTest : public ::testing::Test {
     return socket.ReadAll();
   }
 
-  // Comes in by the address; returns the header Cookie.
+  // Exchanges the token address for a session; returns the Cookie header.
   std::string ComeIn() {
     const std::string address = bridge_->Address();
     const std::string answer = Ask(address.substr(address.find("/?")));
@@ -119,7 +119,8 @@ class BridgeTest : public ::testing::Test {
   std::string host_;
 };
 
-// A text frame of a client that announces `size` bytes, masked with zeros (RFC 6455, section 5.2).
+// Returns a client's text frame that announces `size` bytes, masked with zeros (RFC 6455, section
+// 5.2).
 std::string TextFrame(const std::string& text, uint64_t size) {
   const int length_bytes = size < 126 ? 0 : size < 65536 ? 2 : 8;
   const uint64_t code = length_bytes == 0 ? size : length_bytes == 2 ? 126 : 127;
@@ -194,7 +195,7 @@ TEST_F(BridgeTest, MessagesBeyondTheLimitEndTheConnection) {
   ASSERT_TRUE(page.ReadUntil("HTTP/1.1 101"));
   page.Send(TextFrame(std::string(900, 'x'), 900));
   ASSERT_TRUE(page.ReadUntil("echo x"));
-  // What is announced alone is too much; nothing of it needs to come.
+  // The announced size alone exceeds the limit, before any payload arrives.
   page.Send(TextFrame("", uint64_t{1} << 40));
   EXPECT_FALSE(page.ReadUntil("never said"));
 }
@@ -205,16 +206,33 @@ TEST_F(BridgeTest, RequestsBeyondTheLimitsAreDropped) {
   EXPECT_EQ(socket.ReadAll(), "");
 }
 
-TEST_F(BridgeTest, ConnectionsBeyondTheLimitAreClosed) {
+TEST_F(BridgeTest, IdleConnectionsMakeRoomForThePage) {
   BridgeOptions options;
   options.max_connections = 2;
   Start(std::move(options));
-  // Two that were accepted: they have an answer, and stay open.
+  Socket silent(bridge_->port());
+  Socket unfinished(bridge_->port());
+  unfinished.Send("GET / HT");
   std::vector<std::unique_ptr<Socket>> open;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 4; ++i) {
     open.push_back(std::make_unique<Socket>(bridge_->port()));
     open.back()->Send("GET / HTTP/1.1\r\nHost: " + host_ + "\r\n\r\n");
     ASSERT_TRUE(open.back()->ReadUntil("\r\n\r\n"));
+  }
+  EXPECT_EQ(silent.ReadAll(), "");
+  EXPECT_EQ(unfinished.ReadAll(), "");
+}
+
+TEST_F(BridgeTest, PagesBeyondTheLimitAreClosed) {
+  BridgeOptions options;
+  options.max_connections = 2;
+  Start(std::move(options));
+  const std::string cookie = ComeIn();
+  std::vector<std::unique_ptr<Socket>> pages;
+  for (int i = 0; i < 2; ++i) {
+    pages.push_back(std::make_unique<Socket>(bridge_->port()));
+    pages.back()->Send(UpgradeRequest(cookie, "http://" + host_));
+    ASSERT_TRUE(pages.back()->ReadUntil("HTTP/1.1 101"));
   }
   Socket third(bridge_->port());
   EXPECT_EQ(third.ReadAll(), "");
@@ -239,19 +257,19 @@ TEST_F(BridgeTest, EndsWhilePagesAreOpen) {
 TEST(StandalonePage, HoldsAllThatItNeeds) {
   const std::string recording = "{\"note\":\"</script><script>alert(1)\"}";
   const std::string page = StandalonePage(recording);
-  // The page is too long to print it when it is wrong.
+  // The page is too long to print on failure.
   const auto holds = [&page](const char* text) { return page.find(text) != std::string::npos; };
   EXPECT_TRUE(holds("default-src 'none'"));
   EXPECT_TRUE(holds("id=\"recording\""));
   EXPECT_FALSE(holds("<script src="));
   EXPECT_FALSE(holds("<link"));
-  // Data cannot end the script that it stands in.
+  // Data cannot terminate the enclosing script element.
   EXPECT_FALSE(holds("</script><script>alert"));
-  // A picture is the same page without its panels.
+  // A picture is the page without its panels.
   EXPECT_TRUE(holds("\n<body>\n"));
   const std::string picture = PicturePage(recording, {800, 600});
   EXPECT_NE(picture.find("\n<body class=\"picture\" style=\"--width: 800px"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace bridge_test
 }  // namespace hulld

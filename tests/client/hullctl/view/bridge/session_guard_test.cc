@@ -6,7 +6,7 @@
 #include <string>
 
 namespace hulld {
-namespace {
+namespace session_guard_test {
 
 using ::testing::HasSubstr;
 using Verdict = SessionGuard::Verdict;
@@ -34,7 +34,7 @@ TEST(SessionGuard, TokenIsExchangedOnceForTheCookie) {
   EXPECT_EQ(again.verdict, Verdict::kRefuse);
   EXPECT_EQ(again.http_status, 403);
   EXPECT_THAT(again.reason, HasSubstr("worked once"));
-  // A browser that is in comes in again, as by the back button.
+  // A browser with a session uses the address again, as by the back button.
   EXPECT_EQ(guard.Judge(Page("/?token=token", kCookie)).verdict, Verdict::kExchange);
 }
 
@@ -44,7 +44,7 @@ TEST(SessionGuard, OtherTokensLetNobodyInAndDoNotUseUpTheRightOne) {
                              "/?token=session", "/?tok"}) {
     EXPECT_EQ(guard.Judge(Page(target)).verdict, Verdict::kRefuse) << target;
   }
-  // A preview of a link must not use it up.
+  // A link preview must not consume it.
   PageRequest head = Page("/?token=token");
   head.method = "HEAD";
   EXPECT_EQ(guard.Judge(head).verdict, Verdict::kRefuse);
@@ -65,7 +65,7 @@ TEST(SessionGuard, NothingIsServedWithoutTheCookie) {
   }
 }
 
-// A name that an attacker points at 127.0.0.1 arrives as Host.
+// An attacker's name that resolves to 127.0.0.1 arrives as Host.
 TEST(SessionGuard, HostMustBeThisAddress) {
   SessionGuard guard = TestGuard();
   for (const char* host : {"", "127.0.0.1", "localhost", "127.0.0.1:4712", "evil.example:4711",
@@ -88,7 +88,7 @@ TEST(SessionGuard, WebSocketNeedsTheOriginOfThePage) {
     EXPECT_EQ(guard.Judge(Upgrade(origin)).http_status, 403) << origin;
   }
   EXPECT_EQ(guard.Judge(Upgrade(kOrigin, "")).http_status, 403);
-  // Nor does another site read a file with the user's cookie.
+  // Another site cannot read a file with the user's cookie either.
   PageRequest foreign = Page("/", kCookie);
   foreign.origin = "http://evil.example";
   EXPECT_EQ(guard.Judge(foreign).http_status, 403);
@@ -113,5 +113,5 @@ TEST(SessionGuard, SecretsAreNewEachTime) {
   EXPECT_EQ(a->Address().size(), std::string("http://127.0.0.1:1/?token=").size() + 64);
 }
 
-}  // namespace
+}  // namespace session_guard_test
 }  // namespace hulld

@@ -12,15 +12,15 @@
 #include "core/base/check.h"
 #include "tests/server/schedules/scheduler.h"
 
-// In the place of the header of this name, for sources whose interleavings are explored: what
-// threads wait with belongs to the scheduler of the schedule that runs. As far as they go, the
-// types are used as those of the standard library.
+// Replaces the header of this name in sources whose interleavings are explored: all blocking goes
+// through the scheduler of the running schedule. The types implement a subset of their standard
+// library counterparts.
 namespace hulld::server {
 
-// Not recursive. The first thread to run once it is free gets it.
+// Not recursive. When released, goes to the first thread that runs.
 class Mutex {
  public:
-  // where: where the mutex is made, by which steps name it.
+  // where: the place of construction, by which steps name the mutex.
   explicit Mutex(const std::source_location& where = std::source_location::current())
       : where_(where) {}
   Mutex(const Mutex&) = delete;
@@ -116,7 +116,7 @@ class ConditionVariable {
             },
             &holds};
   }
-  // Nobody goes on between letting go of the mutex and waiting.
+  // Releasing the mutex and starting to wait are one atomic step.
   template <typename Lock>
   std::cv_status Wait(Lock& lock, int64_t deadline, const Scheduler::Condition& condition,
                       const Location& where) {
@@ -127,7 +127,7 @@ class ConditionVariable {
   }
 };
 
-// Ends the process if it is destroyed before it is joined, as std::thread does.
+// Ends the process if destroyed before it is joined, as std::thread does.
 class Thread {
  public:
   Thread() = default;

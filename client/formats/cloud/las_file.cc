@@ -1,0 +1,151 @@
+// LAS 1.0 to 1.4 (ASPRS, 2019), uncompressed: a binary header, then one record per point, which
+// starts with three 32-bit integers. A coordinate is integer * scale + offset over the reals, with
+// the doubles of the header, with a single rounding. Most readers also round the product, and may
+// err by a unit in the last place of the larger summand.
+#include <absl/strings/str_cat.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "client/formats/binary_scalar.h"
+#include "client/formats/point_file.h"
+
+namespace hulld {
+namespace {
+
+// Header sizes of LAS 1.0 to 1.2, and of 1.4, in bytes.
+constexpr size_t kLasHeaderBytes = 227;
+constexpr size_t kHeader14Bytes = 375;
+// Record sizes of point formats 0 to 10, in bytes; extra bytes may follow.
+constexpr uint16_t kRecordBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+
+struct Header {
+  uint64_t first_point = 0;
+  uint64_t point_count = 0;
+  // LAS 1.4; other records may follow the points.
+  bool has_extended_count = false;
+  uint64_t record_bytes = 0;
+  std::array<double, 3> scale = {};
+  std::array<double, 3> offset = {};
+};
+
+template <typename Scalar>
+Scalar Load(const std::vector<unsigned char>& bytes, size_t at) {
+  Scalar value;
+  std::memcpy(&value, bytes.data() + at, sizeof(value));
+  return value;
+}
+
+// Reads the number of points. LAS 1.4 has a 64-bit field; the 32-bit field is then 0 or equal.
+absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* bytes, Header* header) {
+  header->point_count = Load<uint32_t>(*bytes, 107);
+  if (Load<uint8_t>(*bytes, 25) < 4) return absl::OkStatus();
+  bytes->resize(kHeader14Bytes);
+  if (const uint16_t size = Load<uint16_t>(*bytes, 94); size < kHeader14Bytes) {
+    return source->ErrorAtByte(
+        absl::StrCat("a header of LAS 1.4 takes ", kHeader14Bytes, " bytes, not ", size));
+  }
+  if (!source->Read(bytes->data() + kLasHeaderBytes, kHeader14Bytes - kLasHeaderBytes)) {
+    return source->Truncated("within the header of LAS 1.4");
+  }
+  const uint64_t count = Load<uint64_t>(*bytes, 247);
+  if (header->point_count != 0 && header->point_count != count) {
+    return source->ErrorAtByte(absl::StrCat("the header declares ", header->point_count,
+                                            " points in its old field and ", count,
+                                            " in that of LAS 1.4; the file is damaged"));
+  }
+  header->point_count = count;
+  header->has_extended_count = true;
+  return absl::OkStatus();
+}
+
+absl::Status ReadTransform(const ByteSource& source, const std::vector<unsigned char>& bytes,
+                           Header* header) {
+  for (size_t axis = 0; axis < 3; ++axis) {
+    header->scale[axis] = Load<double>(bytes, 131 + 8 * axis);
+    header->offset[axis] = Load<double>(bytes, 155 + 8 * axis);
+    if (std::isfinite(header->scale[axis]) && std::isfinite(header->offset[axis]) &&
+        header->scale[axis] != 0) {
+      continue;
+    }
+    return source.ErrorAtByte(absl::StrCat("the scale of ", std::string(1, "xyz"[axis]),
+                                           " must be finite and not 0, and its offset finite"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status ReadHeader(ByteSource* source, Header* header) {
+  std::vector<unsigned char> bytes(kLasHeaderBytes);
+  if (!source->Read(bytes.data(), 4) || std::memcmp(bytes.data(), "LASF", 4) != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(source->name(), ": byte 0: a LAS file starts with LASF"));
+  }
+  if (!source->Read(bytes.data() + 4, kLasHeaderBytes - 4))
+    return source->Truncated("within the header");
+  const int major = bytes[24];
+  const int minor = bytes[25];
+  if (major != 1 || minor > 4) {
+    return source->ErrorAtByte(
+        absl::StrCat("LAS ", major, ".", minor, " is not supported; known are 1.0 to 1.4"));
+  }
+  const int format = bytes[104];
+  if (format >= 64) {
+    return source->ErrorAtByte(
+        "the points are compressed (LAZ); decompress the file first, as with laszip -i IN.laz -o "
+        "OUT.las");
+  }
+  header->record_bytes = Load<uint16_t>(bytes, 105);
+  if (format > 10) {
+    return source->ErrorAtByte(
+        absl::StrCat("point format ", format, " is unknown; known are 0 to 10"));
+  }
+  if (header->record_bytes < kRecordBytes[format]) {
+    return source->ErrorAtByte(absl::StrCat("a record of point format ", format, " takes ",
+                                            kRecordBytes[format], " bytes, not ",
+                                            header->record_bytes));
+  }
+  header->first_point = Load<uint32_t>(bytes, 96);
+  absl::Status status = ReadTransform(*source, bytes, header);
+  if (status.ok()) status = ReadPointCount(source, &bytes, header);
+  if (status.ok() && header->first_point < source->offset()) {
+    status = source->ErrorAtByte(
+        absl::StrCat("the points start at byte ", header->first_point, ", within the header"));
+  }
+  return status;
+}
+
+}  // namespace
+
+absl::Status ReadLas(ByteSource* source, PointCollector* points) {
+  Header header;
+  if (absl::Status status = ReadHeader(source, &header); !status.ok()) return status;
+  if (!source->Skip(header.first_point - source->offset())) {
+    return source->Truncated(absl::StrCat("before the points at byte ", header.first_point));
+  }
+  uint64_t at = source->offset();
+  const auto error_at = [&](const std::string& message) {
+    return absl::InvalidArgumentError(absl::StrCat(source->name(), ": byte ", at, ": ", message));
+  };
+  std::vector<unsigned char> record(header.record_bytes);
+  for (uint64_t i = 0; i < header.point_count; ++i) {
+    at = source->offset();
+    if (!source->Read(record.data(), record.size())) {
+      return source->Truncated(absl::StrCat("after ", i, " of ", header.point_count, " points"));
+    }
+    std::array<double, 3> xyz;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      xyz[axis] = std::fma(LoadScalar(ScalarType::kInt32, record.data() + 4 * axis, false),
+                           header.scale[axis], header.offset[axis]);
+    }
+    absl::Status status = points->Add(xyz[0], xyz[1], xyz[2], error_at);
+    if (!status.ok()) return status;
+  }
+  // An interrupted writer leaves the count at 0.
+  if (header.point_count > 0 || header.has_extended_count || !source->Skip(1))
+    return absl::OkStatus();
+  return error_at("the header declares no points, but more bytes follow; is the file complete?");
+}
+
+}  // namespace hulld

@@ -1,0 +1,81 @@
+"""gRPC's channel, opened by the first call, and its end in forked processes."""
+
+from __future__ import annotations
+
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Any
+
+from hulld.connection import Connection
+from hulld.errors import FailedPreconditionError
+
+
+class Channel:
+    """A channel that opens at the first call. gRPC, which takes most of the time of `import hulld`
+    otherwise, is imported then."""
+
+    def __init__(self, connection: Connection, opener: Callable[[Connection, Any], Any]) -> None:
+        """opener: makes gRPC's channel of the connection and its PEM files."""
+        self._connection = connection
+        self._opener = opener
+        self._pem_files = connection.pem_files()
+        self._lock = threading.Lock()
+        self._channel: Any = None
+        self._closed = False
+        self._calls: dict[str, Any] = {}
+
+    def get(self) -> Any:
+        """gRPC's channel. FailedPreconditionError: it is closed, or as in check_process."""
+        check_process()
+        with self._lock:
+            if self._closed:
+                raise FailedPreconditionError("the client is closed; make another one")
+            if self._channel is None:
+                self._channel = self._opener(self._connection, self._pem_files)
+                _open_channels.add(self)
+            return self._channel
+
+    def call(self, kind: str, method: str) -> Any:
+        """gRPC's callable of a method; kind: as in "unary_unary"."""
+        channel = self.get()
+        return self._calls.get(method) or self._calls.setdefault(
+            method, getattr(channel, kind)(method)
+        )
+
+    def close(self) -> Any:
+        """Closes the channel. Returns gRPC's result, which asyncio awaits; None: nothing to do."""
+        self._closed = True
+        if self._channel is None or _is_forked:
+            return None
+        _open_channels.discard(self)
+        return self._channel.close()
+
+
+_open_channels: weakref.WeakSet[Channel] = weakref.WeakSet()
+_is_forked = False
+
+
+def _note_fork() -> None:
+    global _is_forked
+    _is_forked = _is_forked or len(_open_channels) > 0
+
+
+os.register_at_fork(after_in_child=_note_fork)
+
+
+def check_process() -> None:
+    """FailedPreconditionError: the parent of this process had connections when it forked. gRPC's
+    threads are missing in the child: calls would hang or fail at random, with new clients, too."""
+    if _is_forked:
+        raise FailedPreconditionError(
+            f"process {os.getpid()} was forked while its parent had an open hulld client, which "
+            'gRPC does not support; start processes by multiprocessing\'s "spawn" or '
+            '"forkserver" method, or close every client before the fork'
+        )
+
+
+def is_forked() -> bool:
+    """True if check_process raises."""
+    return _is_forked

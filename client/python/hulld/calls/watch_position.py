@@ -1,0 +1,27 @@
+"""The position of a watch of hulls over all its connections."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from hulld.answers.hulls import Header, HullChanges
+
+
+class WatchPosition:
+    """The header up to which changes were received."""
+
+    def __init__(self, after: Header | None) -> None:
+        self.after = after
+        self.connected = False
+        self._has_events = False
+
+    def take(self, changes: HullChanges, first: bool) -> HullChanges:
+        """Advances the position. first: of its connection. A call that resumed no position starts
+        with the full state, without deletions in between, which the message then states."""
+        resumed = self.after is not None and self.after.revision > 0
+        if first and self._has_events and not resumed:
+            changes = dataclasses.replace(changes, anew=True)
+        self.connected = True
+        self._has_events = self._has_events or bool(changes.events)
+        self.after = changes.header
+        return changes

@@ -1,0 +1,300 @@
+#include "server/network/connection_acceptor.h"
+
+#include <absl/status/status.h>
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "server/network/guarded_reads.h"
+#include "server/process/descriptors.h"
+
+namespace hulld::server {
+namespace {
+
+// Descriptors reserved for the store and everything else: this many, or a quarter of the limit if
+// it is low. A store has some hundreds of files.
+constexpr uint64_t kReservedDescriptors = 256;
+// gRPC's descriptor and the duplicate.
+constexpr uint64_t kDescriptorsOfConnection = 2;
+constexpr int kBacklog = 4096;
+// Connections accepted before ended ones are handled.
+constexpr int kMostAtOnce = 64;
+// Pause if even the reserve descriptor does not help.
+constexpr int kPauseMilliseconds = 50;
+// As set by gRPC with its keepalive: a peer that does not acknowledge for this long is gone.
+constexpr int kUserTimeoutMs = 20'000;
+
+// Event keys: connections use their ID, other events these.
+constexpr uint64_t kWake = 0;
+constexpr uint64_t kFirstListener = uint64_t{1} << 62;
+
+bool IsOutOfDescriptors(int error) {
+  return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
+}
+
+Descriptor OpenReserve() { return Descriptor(open("/dev/null", O_RDONLY | O_CLOEXEC)); }
+
+void Register(const Descriptor& epoll, int descriptor, uint32_t events, uint64_t id) {
+  epoll_event event = {};
+  event.events = events;
+  event.data.u64 = id;
+  epoll_ctl(epoll.number(), EPOLL_CTL_ADD, descriptor, &event);
+}
+
+void SetOption(int socket, int level, int option, int value) {
+  setsockopt(socket, level, option, &value, sizeof value);
+}
+
+// Returns a listening socket, or an invalid one.
+Descriptor ListenAt(const sockaddr* name, socklen_t size, bool both_families) {
+  Descriptor socket(::socket(name->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (socket.number() < 0) return Descriptor();
+  if (name->sa_family != AF_UNIX) SetOption(socket.number(), SOL_SOCKET, SO_REUSEADDR, 1);
+  if (name->sa_family == AF_INET6) {
+    SetOption(socket.number(), IPPROTO_IPV6, IPV6_V6ONLY, both_families ? 0 : 1);
+  }
+  if (bind(socket.number(), name, size) != 0) return Descriptor();
+  return listen(socket.number(), kBacklog) == 0 ? std::move(socket) : Descriptor();
+}
+
+int PortOf(const Descriptor& socket) {
+  sockaddr_storage name = {};
+  socklen_t size = sizeof name;
+  getsockname(socket.number(), reinterpret_cast<sockaddr*>(&name), &size);
+  const auto peer = PeerAddress::FromSocket(name);
+  return peer.has_value() ? peer->port : 0;
+}
+
+void SetPort(sockaddr* name, int port) {
+  const in_port_t number = htons(static_cast<uint16_t>(port));
+  if (name->sa_family == AF_INET) reinterpret_cast<sockaddr_in*>(name)->sin_port = number;
+  if (name->sa_family == AF_INET6) reinterpret_cast<sockaddr_in6*>(name)->sin6_port = number;
+}
+
+bool IsWildcard(const std::string& host) { return host == "0.0.0.0" || host == "::"; }
+
+}  // namespace
+
+Descriptor::~Descriptor() {
+  if (number_ >= 0) close(number_);
+}
+
+absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> ConnectionAcceptor::Listen(
+    const ListenAddress& address, ConnectionTable& table, Metrics& metrics) {
+  std::unique_ptr<ConnectionAcceptor> acceptor(new ConnectionAcceptor(address, table, metrics));
+  const absl::Status bound = address.is_unix() ? acceptor->BindUnix() : acceptor->Bind();
+  if (!bound.ok()) return bound;
+  return acceptor;
+}
+
+ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionTable& table,
+                                       Metrics& metrics)
+    : address_(address),
+      table_(table),
+      epoll_(epoll_create1(EPOLL_CLOEXEC)),
+      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      reserve_(OpenReserve()),
+      accepted_(
+          metrics.AddCounter("hulld_connections_accepted_total", "Connections accepted.", {})),
+      failures_(metrics.AddCounter("hulld_accept_failures_total",
+                                   "Connections that could not be accepted.", {})),
+      refused_descriptors_(metrics.AddCounter(
+          "hulld_connections_refused_total",
+          "Connections closed at once, by the limit that they met.", {{"limit", "descriptors"}})),
+      refused_total_(metrics.AddCounter("hulld_connections_refused_total", "",
+                                        {{"limit", "max-connections"}})),
+      refused_network_(metrics.AddCounter("hulld_connections_refused_total", "",
+                                          {{"limit", "max-connections-per-address"}})),
+      closed_idle_(metrics.AddCounter("hulld_connections_closed_total",
+                                      "Connections that the server closed, by reason.",
+                                      {{"reason", "idle"}})) {
+  const uint64_t most = MostDescriptors();
+  const uint64_t reserved = std::min(kReservedDescriptors, most / 4);
+  first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMostGuardedDescriptors));
+  first_refused_ =
+      static_cast<int>(std::min<uint64_t>(most - reserved / 2, kMostGuardedDescriptors));
+  table_.LimitTo(
+      std::max<size_t>(1, static_cast<size_t>(first_reserved_) / kDescriptorsOfConnection));
+  Register(epoll_, wake_.number(), EPOLLIN, kWake);
+}
+
+absl::Status ConnectionAcceptor::BindUnix() {
+  sockaddr_un name = {};
+  name.sun_family = AF_UNIX;
+  std::memcpy(name.sun_path, address_.path.c_str(), address_.path.size() + 1);
+  struct stat left = {};
+  // A killed server leaves its socket behind.
+  if (lstat(name.sun_path, &left) == 0 && S_ISSOCK(left.st_mode)) unlink(name.sun_path);
+  Descriptor socket = ListenAt(reinterpret_cast<const sockaddr*>(&name), sizeof name, false);
+  if (socket.number() < 0) return ExplainBindFailure(address_);
+  listeners_.push_back(std::move(socket));
+  return absl::OkStatus();
+}
+
+absl::Status ConnectionAcceptor::Bind() {
+  const bool is_wildcard = IsWildcard(address_.host);
+  addrinfo hints = {};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE;
+  // One IPv6 socket serves both families, if the system has IPv6.
+  for (const char* const host : {is_wildcard ? "::" : address_.host.c_str(), "0.0.0.0"}) {
+    addrinfo* found = nullptr;
+    if (getaddrinfo(host, address_.port.c_str(), &hints, &found) == 0) {
+      for (addrinfo* info = found; info != nullptr; info = info->ai_next) {
+        // All sockets share the port of the first.
+        if (!listeners_.empty()) SetPort(info->ai_addr, port_);
+        Descriptor socket = ListenAt(info->ai_addr, info->ai_addrlen, is_wildcard);
+        if (socket.number() < 0) continue;
+        if (listeners_.empty()) port_ = PortOf(socket);
+        listeners_.push_back(std::move(socket));
+      }
+      freeaddrinfo(found);
+    }
+    if (!listeners_.empty() || !is_wildcard) break;
+  }
+  return listeners_.empty() ? ExplainBindFailure(address_) : absl::OkStatus();
+}
+
+ConnectionAcceptor::~ConnectionAcceptor() {
+  Stop();
+  while (!connections_.empty()) End(connections_.begin()->first);
+}
+
+void ConnectionAcceptor::Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc,
+                               const FrameLimits* frames) {
+  grpc_ = std::move(grpc);
+  if (frames != nullptr) frames_ = *frames;
+  for (size_t i = 0; i < listeners_.size(); ++i) {
+    Register(epoll_, listeners_[i].number(), EPOLLIN, kFirstListener + i);
+  }
+  thread_ = std::thread([this] { Run(); });
+}
+
+void ConnectionAcceptor::Stop() {
+  if (listeners_.empty()) return;
+  stopping_ = true;
+  eventfd_write(wake_.number(), 1);
+  if (thread_.joinable()) thread_.join();
+  listeners_.clear();
+  if (address_.is_unix()) unlink(address_.path.c_str());
+}
+
+void ConnectionAcceptor::Run() {
+  while (!stopping_) {
+    std::array<epoll_event, 256> events;
+    const int count = epoll_wait(epoll_.number(), events.data(), events.size(), -1);
+    // Handles ended connections first, because they make room.
+    for (int i = 0; i < count; ++i) {
+      const uint64_t id = events[i].data.u64;
+      if (id != kWake && id < kFirstListener && (events[i].events & EPOLLHUP) != 0) End(id);
+    }
+    bool pause = false;
+    for (int i = 0; i < count && !stopping_; ++i) {
+      const uint64_t id = events[i].data.u64;
+      if (id >= kFirstListener) pause |= !AcceptFrom(listeners_[id - kFirstListener].number());
+    }
+    pollfd wake = {.fd = wake_.number(), .events = POLLIN, .revents = 0};
+    if (pause) poll(&wake, 1, kPauseMilliseconds);
+  }
+}
+
+bool ConnectionAcceptor::AcceptFrom(int listener) {
+  for (int i = 0; i < kMostAtOnce; ++i) {
+    sockaddr_storage name = {};
+    socklen_t size = sizeof name;
+    Descriptor socket(
+        accept4(listener, reinterpret_cast<sockaddr*>(&name), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    if (socket.number() >= 0) {
+      accepted_.Increment();
+      Admit(std::move(socket), name);
+      continue;
+    }
+    const int error = errno;
+    if (error == EAGAIN || error == EWOULDBLOCK) return true;
+    failures_.Increment();
+    if (IsOutOfDescriptors(error)) return RefuseWithReserve(listener);
+    // ECONNABORTED and network errors concern a single connection.
+  }
+  return true;
+}
+
+bool ConnectionAcceptor::RefuseWithReserve(int listener) {
+  Shut(table_.Evict());
+  reserve_ = Descriptor();
+  Descriptor refused(accept4(listener, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  const bool drained = refused.number() >= 0;
+  if (drained) refused_descriptors_.Increment();
+  refused = Descriptor();
+  reserve_ = OpenReserve();
+  return drained;
+}
+
+void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) {
+  Descriptor duplicate(fcntl(socket.number(), F_DUPFD_CLOEXEC, 0));
+  const int highest = std::max(socket.number(), duplicate.number());
+  if (highest >= first_reserved_ || duplicate.number() < 0) {
+    // The new connection uses reserved descriptors until gRPC closes the evicted one.
+    const uint64_t evicted = table_.Evict();
+    Shut(evicted);
+    if (evicted == 0 || duplicate.number() < 0 || highest >= first_refused_) {
+      return refused_descriptors_.Increment();
+    }
+  }
+  const uint64_t id = ++last_id_;
+  const std::optional<PeerAddress> peer = PeerAddress::FromSocket(name);
+  const ConnectionTable::Outcome outcome = table_.Add(id, peer);
+  switch (outcome.refusal) {
+    case ConnectionTable::Refusal::kTotal:
+      return refused_total_.Increment();
+    case ConnectionTable::Refusal::kNetwork:
+      return refused_network_.Increment();
+    case ConnectionTable::Refusal::kNone:
+      break;
+  }
+  Shut(outcome.evicted);
+  if (peer.has_value()) {
+    SetOption(socket.number(), IPPROTO_TCP, TCP_NODELAY, 1);
+    SetOption(socket.number(), IPPROTO_TCP, TCP_USER_TIMEOUT, kUserTimeoutMs);
+  }
+  if (frames_.has_value()) GuardReads(socket.number(), id, *frames_);
+  const int watched = duplicate.number();
+  connections_.emplace(id, Connection{std::move(duplicate), socket.number()});
+  // Reports one event when both directions are shut down, as gRPC does before it closes a
+  // connection.
+  Register(epoll_, watched, EPOLLET, id);
+  grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
+  parameters.fd = socket.Release();
+  grpc_->HandleNewConnection(&parameters);
+}
+
+void ConnectionAcceptor::Shut(uint64_t id) {
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return;
+  closed_idle_.Increment();
+  // gRPC reads the end of the connection and closes its descriptor.
+  shutdown(found->second.descriptor.number(), SHUT_RDWR);
+  End(id);
+}
+
+void ConnectionAcceptor::End(uint64_t id) {
+  table_.Remove(id);
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return;
+  Unguard(found->second.guarded, id);
+  connections_.erase(found);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,123 @@
+#ifndef HULLD_SERVER_NETWORK_CONNECTION_ACCEPTOR_H_
+#define HULLD_SERVER_NETWORK_CONNECTION_ACCEPTOR_H_
+
+#include <absl/status/statusor.h>
+#include <grpcpp/server_builder.h>
+#include <prometheus/counter.h>
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/network/connection_table.h"
+#include "server/network/frame_guard.h"
+#include "server/process/listen_address.h"
+#include "server/process/metrics.h"
+
+namespace hulld::server {
+
+// A descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  ~Descriptor();
+  int number() const { return number_; }
+  // Releases the ownership.
+  int Release() { return std::exchange(number_, -1); }
+
+ private:
+  int number_;
+};
+
+// Accepts connections within the limits of a table and passes them to gRPC. gRPC's own listener
+// stops accepting permanently after descriptors run out (CVE-2023-4785). Runs one thread that never
+// stops accepting: connections above a limit are accepted and closed immediately, so that the
+// backlog drains.
+//
+// gRPC owns the accepted connections; this keeps a duplicate of each descriptor to detect the end
+// of the connection and to shut it down.
+class ConnectionAcceptor {
+ public:
+  // Listens at the address; port 0 picks a free one. TCP: on every address of the host name; a
+  // wildcard means IPv4 and IPv6. Accepts nothing before Start. The table and the metrics must
+  // outlive this. UNAVAILABLE: it cannot be bound.
+  static absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> Listen(const ListenAddress& address,
+                                                                    ConnectionTable& table,
+                                                                    Metrics& metrics);
+  ConnectionAcceptor(const ConnectionAcceptor&) = delete;
+  ConnectionAcceptor& operator=(const ConnectionAcceptor&) = delete;
+  ~ConnectionAcceptor();
+
+  // The bound port; 0 for a unix socket.
+  int port() const { return port_; }
+
+  // frames: limits of unencrypted connections; null if connections are encrypted.
+  void Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc,
+             const FrameLimits* frames);
+
+  // Stops listening; returns when no more connections will be passed to gRPC. Open connections
+  // continue.
+  void Stop();
+
+ private:
+  struct Connection {
+    // The duplicate.
+    Descriptor descriptor;
+    // Number of gRPC's descriptor.
+    int guarded;
+  };
+
+  ConnectionAcceptor(const ListenAddress& address, ConnectionTable& table, Metrics& metrics);
+
+  absl::Status Bind();
+  absl::Status BindUnix();
+  void Run();
+  // Accepts pending connections, a few per call. Returns false to pause.
+  bool AcceptFrom(int listener);
+  // Accepts a connection with the reserve descriptor and closes it.
+  bool RefuseWithReserve(int listener);
+  void Admit(Descriptor socket, const sockaddr_storage& name);
+  void Shut(uint64_t id);
+  void End(uint64_t id);
+
+  const ListenAddress address_;
+  ConnectionTable& table_;
+  int port_ = 0;
+  // First descriptor number reserved for everything except connections. The system assigns the
+  // lowest free number, so a higher one shows that all below are open.
+  int first_reserved_;
+  // A connection that replaces an evicted one may use a reserved descriptor below this number.
+  int first_refused_;
+  std::vector<Descriptor> listeners_;
+  Descriptor epoll_;
+  Descriptor wake_;
+  Descriptor reserve_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_;
+  std::optional<FrameLimits> frames_;
+  uint64_t last_id_ = 0;
+  std::map<uint64_t, Connection> connections_;
+  std::atomic<bool> stopping_ = false;
+  std::thread thread_;
+
+  prometheus::Counter& accepted_;
+  prometheus::Counter& failures_;
+  prometheus::Counter& refused_descriptors_;
+  prometheus::Counter& refused_total_;
+  prometheus::Counter& refused_network_;
+  prometheus::Counter& closed_idle_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_NETWORK_CONNECTION_ACCEPTOR_H_

@@ -1,0 +1,198 @@
+#include "server/network/frame_guard.h"
+
+#include <algorithm>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr std::string_view kPreface = "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
+
+// RFC 9113, section 6.
+enum FrameType : uint8_t {
+  kData = 0,
+  kHeaders = 1,
+  kResetStream = 3,
+  kWindowUpdate = 8,
+  kContinuation = 9,
+};
+constexpr uint8_t kEndStream = 0x1;
+constexpr uint8_t kPadded = 0x8;
+
+}  // namespace
+
+const char* FrameGuard::Name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAllowed:
+      return "allowed";
+    case Verdict::kNotHttp2:
+      return "not_http2";
+    case Verdict::kHeaderBlock:
+      return "header_block";
+    case Verdict::kLargeHeaders:
+      return "large_headers";
+    case Verdict::kControlFrames:
+      return "control_frames";
+    case Verdict::kHalfOpenStreams:
+      return "half_open_streams";
+  }
+  HULLD_UNREACHABLE();
+}
+
+FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open,
+                       Clock::time_point now)
+    : limits_(limits),
+      all_half_open_(all_half_open),
+      preface_left_(kPreface.size()),
+      refilled_(now),
+      control_{limits.control_frames},
+      large_headers_{limits.large_header_bytes} {}
+
+FrameGuard::~FrameGuard() { all_half_open_ -= half_open_.size(); }
+
+bool FrameGuard::Bucket::Take(double count) {
+  tokens -= count;
+  return tokens >= 0;
+}
+
+void FrameGuard::Refill(Clock::time_point now) {
+  const double passed = std::chrono::duration<double>(now - refilled_).count();
+  refilled_ = now;
+  control_.tokens = std::min(limits_.control_frames,
+                             control_.tokens + passed * limits_.control_frames_per_second);
+  large_headers_.tokens =
+      std::min(limits_.large_header_bytes,
+               large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
+}
+
+FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point now) {
+  Refill(now);
+  while (!bytes.empty()) {
+    size_t taken = 0;
+    if (preface_left_ > 0) {
+      taken = std::min(preface_left_, bytes.size());
+      const std::string_view expected = kPreface.substr(kPreface.size() - preface_left_, taken);
+      if (bytes.substr(0, taken) != expected) return Verdict::kNotHttp2;
+      preface_left_ -= taken;
+    } else if (payload_left_ > 0) {
+      taken = std::min(payload_left_, bytes.size());
+      if (data_stream_ != 0) TakeData(bytes.substr(0, taken));
+      payload_left_ -= taken;
+    } else {
+      taken = std::min(kFrameHeaderBytes - header_bytes_, bytes.size());
+      std::copy_n(bytes.begin(), taken, header_.begin() + header_bytes_);
+      header_bytes_ += taken;
+      if (header_bytes_ == kFrameHeaderBytes) {
+        header_bytes_ = 0;
+        if (const Verdict verdict = BeginFrame(); verdict != Verdict::kAllowed) return verdict;
+      }
+    }
+    bytes.remove_prefix(taken);
+  }
+  // Checked per read rather than per frame: a client writes headers and message together, so a
+  // connection that leaves streams half-open between two reads is unusual.
+  return !half_open_.empty() && all_half_open_ > limits_.all_half_open_streams
+             ? Verdict::kHalfOpenStreams
+             : Verdict::kAllowed;
+}
+
+FrameGuard::Verdict FrameGuard::BeginFrame() {
+  payload_left_ = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
+  data_stream_ = 0;
+  const uint8_t flags = header_[4];
+  const uint32_t stream = uint32_t{header_[5] & 0x7fu} << 24 | uint32_t{header_[6]} << 16 |
+                          uint32_t{header_[7]} << 8 | header_[8];
+  switch (header_[3]) {
+    case kData:
+      return BeginData(stream, flags);
+    case kHeaders:
+      block_bytes_ = 0;
+      return BeginHeaders(stream, (flags & kEndStream) != 0);
+    case kContinuation:
+      if (const Verdict verdict = AddHeaderBytes(); verdict != Verdict::kAllowed) return verdict;
+      return CountControlFrame();
+    case kResetStream:
+      if (const auto found = Find(stream); found != half_open_.end()) Close(found);
+      return CountControlFrame();
+    case kWindowUpdate:
+      // One for every few KiB that the client reads.
+      return Verdict::kAllowed;
+    default:
+      return CountControlFrame();
+  }
+}
+
+FrameGuard::Verdict FrameGuard::BeginHeaders(uint32_t stream, bool ends) {
+  if (const Verdict verdict = AddHeaderBytes(); verdict != Verdict::kAllowed) return verdict;
+  if (stream <= last_stream_) {
+    // Trailers.
+    if (const auto found = Find(stream); ends && found != half_open_.end()) Close(found);
+    return CountControlFrame();
+  }
+  last_stream_ = stream;
+  if (ends) return Verdict::kAllowed;
+  if (half_open_.size() >= limits_.half_open_streams) return Verdict::kHalfOpenStreams;
+  half_open_.push_back({.stream = stream});
+  ++all_half_open_;
+  return Verdict::kAllowed;
+}
+
+FrameGuard::Verdict FrameGuard::BeginData(uint32_t stream, uint8_t flags) {
+  const auto found = Find(stream);
+  const bool ends = (flags & kEndStream) != 0;
+  const bool is_padded = (flags & kPadded) != 0;
+  if (found != half_open_.end()) {
+    if (ends) {
+      Close(found);
+    } else if (!is_padded) {
+      data_stream_ = stream;
+    }
+  }
+  return is_padded || (payload_left_ == 0 && !ends) ? CountControlFrame() : Verdict::kAllowed;
+}
+
+void FrameGuard::TakeData(std::string_view bytes) {
+  const auto found = Find(data_stream_);
+  if (found == half_open_.end()) return;
+  HalfOpen& message = *found;
+  // The prefix: a compression flag, then four bytes of length.
+  while (message.prefix_left > 0 && !bytes.empty()) {
+    if (message.prefix_left < kPrefixBytes) {
+      message.length = message.length << 8 | static_cast<uint8_t>(bytes.front());
+    }
+    bytes.remove_prefix(1);
+    if (--message.prefix_left == 0) message.left = message.length;
+  }
+  if (message.prefix_left > 0) return;
+  message.left -= std::min<uint64_t>(message.left, bytes.size());
+  if (message.left == 0) Close(found);
+}
+
+FrameGuard::Verdict FrameGuard::AddHeaderBytes() {
+  const auto beyond = [](size_t bytes) {
+    return static_cast<double>(bytes - std::min(bytes, FrameLimits::kUsualHeaderBytes));
+  };
+  const double before = beyond(block_bytes_);
+  block_bytes_ += payload_left_;
+  if (block_bytes_ > limits_.header_block_bytes) return Verdict::kHeaderBlock;
+  return large_headers_.Take(beyond(block_bytes_) - before) ? Verdict::kAllowed
+                                                            : Verdict::kLargeHeaders;
+}
+
+FrameGuard::Verdict FrameGuard::CountControlFrame() {
+  return control_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
+}
+
+std::vector<FrameGuard::HalfOpen>::iterator FrameGuard::Find(uint32_t stream) {
+  return std::find_if(half_open_.begin(), half_open_.end(),
+                      [stream](const HalfOpen& open) { return open.stream == stream; });
+}
+
+void FrameGuard::Close(std::vector<HalfOpen>::iterator stream) {
+  *stream = half_open_.back();
+  half_open_.pop_back();
+  --all_half_open_;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,102 @@
+#include "server/network/guarded_reads.h"
+
+#include <dlfcn.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+namespace {
+
+// Guard of the connection at one descriptor. Slots are never freed, because a read may be in flight
+// when its connection ends.
+struct Slot {
+  // 0 without a guarded connection; read first, without the mutex.
+  std::atomic<uint64_t> connection = 0;
+  std::mutex mutex;
+  // Guarded by the mutex.
+  std::optional<FrameGuard> guard;
+};
+
+std::array<std::atomic<Slot*>, kMostGuardedDescriptors> slots;
+std::atomic<size_t> half_open_streams = 0;
+std::array<std::atomic<uint64_t>, FrameGuard::kVerdictCount> closed;
+
+Slot* SlotOf(int descriptor) {
+  if (descriptor < 0 || descriptor >= kMostGuardedDescriptors) return nullptr;
+  return slots[static_cast<size_t>(descriptor)].load(std::memory_order_acquire);
+}
+
+// Returns false if the connection must be closed.
+bool Inspect(Slot& slot, const msghdr& message, size_t bytes) {
+  const std::lock_guard lock(slot.mutex);
+  if (!slot.guard.has_value()) return true;
+  const auto now = FrameGuard::Clock::now();
+  for (size_t i = 0; i < message.msg_iovlen && bytes > 0; ++i) {
+    const iovec& part = message.msg_iov[i];
+    const size_t size = std::min(bytes, part.iov_len);
+    const auto verdict = slot.guard->Take({static_cast<const char*>(part.iov_base), size}, now);
+    if (verdict != FrameGuard::Verdict::kAllowed) {
+      ++closed[static_cast<size_t>(verdict)];
+      slot.guard.reset();
+      return false;
+    }
+    bytes -= size;
+  }
+  return true;
+}
+
+}  // namespace
+
+void GuardReads(int descriptor, uint64_t connection, const FrameLimits& limits) {
+  HULLD_CHECK(descriptor >= 0 && descriptor < kMostGuardedDescriptors && connection != 0);
+  std::atomic<Slot*>& place = slots[static_cast<size_t>(descriptor)];
+  Slot* slot = place.load(std::memory_order_acquire);
+  if (slot == nullptr) {
+    auto made = std::make_unique<Slot>();
+    if (place.compare_exchange_strong(slot, made.get())) slot = made.release();
+  }
+  const std::lock_guard lock(slot->mutex);
+  slot->guard.emplace(limits, half_open_streams, FrameGuard::Clock::now());
+  slot->connection = connection;
+}
+
+void Unguard(int descriptor, uint64_t connection) {
+  Slot* const slot = SlotOf(descriptor);
+  if (slot == nullptr) return;
+  const std::lock_guard lock(slot->mutex);
+  if (slot->connection != connection) return;
+  slot->connection = 0;
+  slot->guard.reset();
+}
+
+std::array<uint64_t, FrameGuard::kVerdictCount> ClosedByGuard() {
+  std::array<uint64_t, FrameGuard::kVerdictCount> counts{};
+  std::copy(closed.begin(), closed.end(), counts.begin());
+  return counts;
+}
+
+size_t HalfOpenStreams() { return half_open_streams; }
+
+}  // namespace hulld::server
+
+// Replaces the C library's function; guarded_reads.h explains the reason.
+extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
+  using Function = ssize_t (*)(int, msghdr*, int);
+  static const auto next = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "recvmsg"));
+  const ssize_t bytes = next(descriptor, message, flags);
+  if (bytes <= 0) return bytes;
+  hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
+  if (slot == nullptr || slot->connection == 0) return bytes;
+  if (hulld::server::Inspect(*slot, *message, static_cast<size_t>(bytes))) return bytes;
+  shutdown(descriptor, SHUT_RDWR);
+  errno = ECONNRESET;
+  return -1;
+}

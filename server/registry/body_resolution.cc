@@ -1,0 +1,221 @@
+#include "server/registry/body_resolution.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/contract/error_info.h"
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+using Bodies = std::vector<std::shared_ptr<const Body>>;
+
+// Returns the first piece with this hull.
+size_t PieceWith(const Body& body, size_t hull) {
+  size_t piece = 0;
+  while (body.pieces()[piece].hull != hull) ++piece;
+  return piece;
+}
+
+absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause) {
+  const size_t piece = PieceWith(body, hull);
+  const std::string& body_id = body.record().body_id;
+  const std::string& hull_id = body.hull_ids()[hull];
+  if (!absl::IsNotFound(cause)) {
+    return Prefixed(absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": "), cause);
+  }
+  return WithReason(
+      absl::NotFoundError(absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ",
+                                       cause.message(), "; create it, or put the body without it")),
+      v1::ERROR_REASON_PIECE_NOT_FOUND,
+      {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
+}
+
+// Returns the resolved hull of an ID.
+using FindHull = std::function<const absl::StatusOr<HullView>&(const std::string&)>;
+
+absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<const Body>& body,
+                                   const PlacedLookup& lookup, const FindHull& find_hull) {
+  if (!body->damage().ok()) return body->damage();
+  if (absl::Status s = CheckPiecePrefix(*body, lookup.prefix); !s.ok()) return s;
+  constexpr size_t kPerHull = sizeof(HullView) + sizeof(const QueryHull*) + 2 * sizeof(uint64_t);
+  MemoryCharge charge(
+      registry.memory(), MemoryUse::kReading,
+      body->pieces().size() * sizeof(BodyPiece) + body->hull_ids().size() * kPerHull);
+  if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  std::vector<HullView> hulls;
+  std::vector<const QueryHull*> query_hulls;
+  std::vector<uint64_t> revisions;
+  for (size_t k = 0; k < body->hull_ids().size(); ++k) {
+    const absl::StatusOr<HullView>& hull = find_hull(body->hull_ids()[k]);
+    if (!hull.ok()) return WhyNoPiece(*body, k, hull.status());
+    hulls.push_back(*hull);
+    query_hulls.push_back(lookup.canonical ? &hull->served->canonical_query_hull()
+                                           : &hull->served->query_hull());
+    revisions.push_back(hull->record.create_revision);
+    revisions.push_back(hull->record.revision);
+  }
+  std::vector<BodyPiece> pieces;
+  pieces.reserve(body->pieces().size());
+  for (const StoredPiece& piece : body->pieces()) {
+    pieces.push_back({query_hulls[piece.hull], piece.X_BP});
+  }
+  auto boxes = body->BoxesOf(pieces, std::move(revisions));
+  HullRecord record;
+  record.hull_id = body->record().body_id;
+  record.create_revision = body->record().create_revision;
+  record.revision = body->record().revision;
+  return HullView{record, nullptr,
+                  std::make_shared<const ServedBody>(ServedBody{
+                      body, std::move(hulls), QueryBody(std::move(pieces), std::move(boxes)),
+                      std::move(charge)})};
+}
+
+// Builds canonical snapshots of the resolved hulls. CANCELLED: should_stop returned true.
+absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& should_stop,
+                           std::vector<absl::StatusOr<HullView>>& hulls) {
+  for (absl::StatusOr<HullView>& hull : hulls) {
+    if (!hull.ok()) continue;
+    const absl::Status made = registry.Canonical(*hull, should_stop).status();
+    if (absl::IsCancelled(made)) return made;
+    if (!made.ok()) hull = made;
+  }
+  return absl::OkStatus();
+}
+
+ReadPlan PlanOf(const PlacedLookup& lookup) {
+  return lookup.canonical ? ReadPlan{.freshness = lookup.plan.freshness} : lookup.plan;
+}
+
+// Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
+// subsequent hull lookup reports their errors. CANCELLED, RESOURCE_EXHAUSTED: as FindBodies.
+absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
+                                   const std::function<bool()>& should_stop) {
+  if (!registry.has_bodies()) return Bodies();
+  FoundBodies found = registry.FindBodies(ids, should_stop);
+  if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
+  if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
+    return Bodies();
+  }
+  return std::move(found.bodies);
+}
+
+// A body that was read again is a different object. Damaged bodies compare by identity only.
+bool IsSameBody(const std::shared_ptr<const Body>& a, const std::shared_ptr<const Body>& b) {
+  if (a == b) return true;
+  return a != nullptr && b != nullptr && a->record().revision == b->record().revision &&
+         a->damage().code() == b->damage().code();
+}
+
+}  // namespace
+
+bool KnownPlaced::AreBodies(const Bodies& bodies) const {
+  return std::ranges::equal(bodies, bodies_, IsSameBody);
+}
+
+void KnownPlaced::SetBodies(std::span<const std::string> ids, Bodies bodies) {
+  if (AreBodies(bodies)) return;
+  bodies_ = std::move(bodies);
+  hull_ids_.clear();
+  index_of_.clear();
+  hulls_ = {};
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    if (bodies_[i] == nullptr) AddHull(ids[i]);
+  }
+  for (const auto& body : bodies_) {
+    if (body == nullptr) continue;
+    for (const std::string& id : body->hull_ids()) AddHull(id);
+  }
+}
+
+void KnownPlaced::AddHull(const std::string& id) {
+  if (index_of_.emplace(id, hull_ids_.size()).second) hull_ids_.push_back(id);
+}
+
+size_t KnownPlaced::BodyBytes() const {
+  // Two copies of the ID and a map node.
+  constexpr size_t kPerHull = 2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownHulls::kBytesEach;
+  size_t bytes = bodies_.capacity() * sizeof(bodies_[0]) + hull_ids_.size() * kPerHull;
+  for (const std::string& id : hull_ids_) bytes += 2 * id.capacity();
+  return bytes;
+}
+
+absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
+  for (size_t hull = 0; hull < body.hull_ids().size(); ++hull) {
+    if (body.hull_ids()[hull].starts_with(prefix)) continue;
+    return WithReason(
+        absl::PermissionDeniedError(absl::StrCat(
+            QuotedBody(body.record().body_id), ": the hull of piece ", PieceWith(body, hull),
+            " is outside of \"", prefix, "\", which the token is limited to; use another token")),
+        v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", prefix}});
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
+                                       const PlacedLookup& lookup,
+                                       const std::function<bool()>& should_stop) {
+  KnownPlaced known;
+  return RefreshPlaced(registry, ids, known, lookup, should_stop);
+}
+
+// Looks up the bodies before and after the hulls. If both lookups agree, the bodies were current
+// throughout, including at the revision of the hulls.
+absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
+                                       KnownPlaced& known, const PlacedLookup& lookup,
+                                       const std::function<bool()>& should_stop) {
+  absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop);
+  absl::StatusOr<Resolved> hulls;
+  do {
+    if (!bodies.ok()) return bodies.status();
+    known.SetBodies(ids, *std::move(bodies));
+    hulls =
+        registry.Refresh(known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids,
+                         known.hulls_, should_stop, PlanOf(lookup));
+    if (!hulls.ok()) return hulls;
+    bodies = BodiesAmong(registry, ids, should_stop);
+  } while (!bodies.ok() || !known.AreBodies(*bodies));
+  // The resolved snapshots are immutable, so building may take long.
+  if (lookup.canonical) {
+    if (absl::Status s = MakeCanonical(registry, should_stop, hulls->hulls); !s.ok()) return s;
+  }
+  if (!known.has_bodies()) return hulls;
+  const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
+    return hulls->hulls[known.index_of_.at(id)];
+  };
+  Resolved resolved;
+  resolved.store_revision = hulls->store_revision;
+  resolved.staleness = hulls->staleness;
+  resolved.hulls.reserve(ids.size());
+  for (size_t i = 0; i < ids.size(); ++i) {
+    resolved.hulls.push_back(known.bodies_[i] == nullptr
+                                 ? find_hull(ids[i])
+                                 : ServeBody(registry, known.bodies_[i], lookup, find_hull));
+  }
+  return resolved;
+}
+
+std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
+                                         const PlacedLookup& lookup) {
+  if (registry.has_bodies()) {
+    const std::optional<FoundBodies> found = registry.TryFindBodies(ids);
+    if (!found.has_value()) return std::nullopt;
+    const auto is_none = [](const auto& body) { return body == nullptr; };
+    if (!std::ranges::all_of(found->bodies, is_none)) return std::nullopt;
+  }
+  std::optional<Resolved> resolved = registry.TryResolve(ids, PlanOf(lookup));
+  if (!resolved.has_value()) return resolved;
+  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
+    // A body may have been put under the ID since the lookup of bodies.
+    if (absl::IsNotFound(hull.status()) && registry.has_bodies()) return std::nullopt;
+    if (!lookup.canonical || !hull.ok()) continue;
+    if (!hull->served->has_canonical_query_hull()) return std::nullopt;
+  }
+  return resolved;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,86 @@
+#include "server/registry/waiting_calls.h"
+
+#include <iterator>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/contract/stopped_call.h"
+
+namespace hulld::server {
+
+WaitingCalls::Wait::Done WaitingCalls::Wait::Take() {
+  const std::lock_guard lock(mutex_);
+  if (done_ == nullptr) return nullptr;
+  --calls_.count_;
+  should_stop_ = nullptr;
+  return std::exchange(done_, nullptr);
+}
+
+void WaitingCalls::Wait::Tell(const absl::Status& status) {
+  if (const Done done = Take(); done != nullptr) done(status);
+}
+
+bool WaitingCalls::Wait::Withdraw() { return Take() != nullptr; }
+
+// The state that should_stop reads lives until the wait is over, so it is called under the mutex.
+bool WaitingCalls::Wait::EndIfStopped() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (done_ == nullptr) return false;
+    if (!Stopped(should_stop_)) return true;
+  }
+  Tell(Cancelled());
+  return false;
+}
+
+WaitingCalls::~WaitingCalls() {
+  HULLD_CHECK(count() == 0);
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+std::shared_ptr<WaitingCalls::Wait> WaitingCalls::Add(
+    std::function<bool()> should_stop, std::function<void(const absl::Status&)> done) {
+  const std::shared_ptr<Wait> wait(new Wait(*this, std::move(should_stop), std::move(done)));
+  ++count_;
+  bool was_empty = false;
+  {
+    const std::lock_guard lock(mutex_);
+    was_empty = waits_.empty();
+    waits_.push_back(wait);
+  }
+  // The thread polls without a notification if other waits exist.
+  if (was_empty) changed_.notify_one();
+  return wait;
+}
+
+bool WaitingCalls::AwaitFresh(Registry& registry, const Freshness& freshness,
+                              std::function<bool()> should_stop,
+                              std::function<void(const absl::Status&)> done) {
+  if (!registry.store().is_shared()) return false;
+  const std::shared_ptr<Wait> wait = Add(std::move(should_stop), std::move(done));
+  const bool asks =
+      registry.StartFresh(freshness, [wait](const absl::Status& status) { wait->Tell(status); });
+  // If the wait is already over, it was cancelled and `done` was called.
+  return asks || !wait->Withdraw();
+}
+
+void WaitingCalls::Run() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return ending_ || !waits_.empty(); });
+    changed_.wait_for(lock, kStopPoll, [this] { return ending_; });
+    if (ending_) return;
+    std::vector<std::shared_ptr<Wait>> looked_at = std::exchange(waits_, {});
+    lock.unlock();
+    std::erase_if(looked_at, [](const auto& wait) { return !wait->EndIfStopped(); });
+    lock.lock();
+    std::move(looked_at.begin(), looked_at.end(), std::back_inserter(waits_));
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,37 @@
+#ifndef HULLD_SERVER_STORE_FILES_DISK_RESERVE_H_
+#define HULLD_SERVER_STORE_FILES_DISK_RESERVE_H_
+
+#include <rocksdb/file_system.h>
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace hulld::server {
+
+// A file that only takes room, so that there is some to give up when the disk is full. One thread
+// at a time.
+class DiskReserve {
+ public:
+  // files must outlive this.
+  DiskReserve(rocksdb::FileSystem& files, std::string path, uint64_t bytes)
+      : files_(files), path_(std::move(path)), bytes_(bytes) {}
+
+  // Makes the file unless it is there. An error: there is no file. Cost: one allocation of the file
+  // system, or writing `bytes` where it has none.
+  rocksdb::IOStatus Ensure();
+  // Returns true if there was a file.
+  bool Release();
+  // True from a successful Ensure until Release.
+  bool is_made() const { return is_made_; }
+
+ private:
+  rocksdb::FileSystem& files_;
+  const std::string path_;
+  const uint64_t bytes_;
+  bool is_made_ = false;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_FILES_DISK_RESERVE_H_

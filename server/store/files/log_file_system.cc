@@ -1,0 +1,258 @@
+#include "server/store/files/log_file_system.h"
+
+#include <spdlog/spdlog.h>
+#include <zlib.h>
+
+#include <utility>
+
+namespace hulld::server {
+
+using rocksdb::IODebugContext;
+using rocksdb::IOOptions;
+using rocksdb::IOStatus;
+
+// Any file that is written; its syncs are watched.
+class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
+ public:
+  File(LogFileSystem& system, std::unique_ptr<rocksdb::FSWritableFile> file)
+      : FSWritableFileOwnerWrapper(std::move(file)), system_(system) {}
+
+  IOStatus Sync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSWritableFileOwnerWrapper::Sync(options, debug));
+  }
+  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSWritableFileOwnerWrapper::Fsync(options, debug));
+  }
+
+ protected:
+  LogFileSystem& system_;
+};
+
+class LogFileSystem::Directory : public rocksdb::FSDirectoryWrapper {
+ public:
+  Directory(LogFileSystem& system, std::unique_ptr<rocksdb::FSDirectory> directory)
+      : FSDirectoryWrapper(std::move(directory)), system_(system) {}
+
+  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSDirectoryWrapper::Fsync(options, debug));
+  }
+  IOStatus FsyncWithDirOptions(const IOOptions& options, IODebugContext* debug,
+                               const rocksdb::DirFsyncOptions& directory) override {
+    return system_.NoteSync(FSDirectoryWrapper::FsyncWithDirOptions(options, debug, directory));
+  }
+
+ private:
+  LogFileSystem& system_;
+};
+
+class LogFileSystem::Log : public File {
+ public:
+  Log(LogFileSystem& system, std::string name, std::unique_ptr<rocksdb::FSWritableFile> file)
+      : File(system, std::move(file)), name_(std::move(name)) {
+    const std::lock_guard lock(system_.mutex_);
+    system_.logs_[name_] = {{}, {}, this};
+  }
+  ~Log() override {
+    const std::lock_guard lock(system_.mutex_);
+    const auto log = system_.logs_.find(name_);
+    if (log != system_.logs_.end() && log->second.open == this) log->second.open = nullptr;
+  }
+
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
+    const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, debug);
+    return Note(data, status);
+  }
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
+    const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, info, debug);
+    return Note(data, status);
+  }
+
+  // Through the file that is open: when RocksDB closes it, it sets the size that it believes in.
+  IOStatus CutTo(uint64_t size) {
+    is_cut_ = true;
+    IOStatus cut = FSWritableFileOwnerWrapper::Truncate(size, IOOptions(), nullptr);
+    // Not that of this class, which refuses: the file is cut.
+    // NOLINTNEXTLINE(bugprone-parent-virtual-call)
+    if (cut.ok()) cut = FSWritableFileOwnerWrapper::Sync(IOOptions(), nullptr);
+    return cut;
+  }
+
+ private:
+  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was cut after an error"); }
+
+  // A failed call may have written any part of this; none of it gets committed.
+  IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
+    const std::lock_guard lock(system_.mutex_);
+    LogMark::Synced& written = system_.logs_[name_].written;
+    written.size += data.size();
+    written.crc32 = static_cast<uint32_t>(
+        crc32_z(written.crc32, reinterpret_cast<const Bytef*>(data.data()), data.size()));
+    return status;
+  }
+
+  const std::string name_;
+  std::atomic<bool> is_cut_ = false;
+};
+
+IOStatus LogFileSystem::NoteSync(const IOStatus& status) {
+  if (!status.ok()) ++failed_syncs_;
+  return status;
+}
+
+bool LogFileSystem::IsLog(const std::string& name) const {
+  return name.starts_with(directory_ + "/") && name.ends_with(".log");
+}
+
+void LogFileSystem::NoteCommitted() {
+  for (const auto& [name, log] : logs_) {
+    const std::optional<uint64_t> number = LogNumber(name);
+    if (number.has_value() && log.committed.size > 0) mark_.logs[*number] = log.committed;
+  }
+}
+
+// A mark that could not be written stays a lower bound. Logged once for each row of failures.
+void LogFileSystem::WriteMark() {
+  mark_changed_ = true;
+  const IOStatus written = mark_file_->Write(mark_);
+  if (!std::exchange(mark_fails_, !written.ok()) && !written.ok()) {
+    spdlog::error("cannot write the mark of the log, which lags behind now: {}",
+                  written.ToString());
+  }
+}
+
+void LogFileSystem::Commit(uint64_t revision, bool is_synced) {
+  const std::lock_guard lock(mutex_);
+  for (auto& [name, log] : logs_) log.committed = log.written;
+  if (!is_synced || mark_file_ == nullptr) return;
+  mark_.revision = revision;
+  NoteCommitted();
+  WriteMark();
+}
+
+IOStatus LogFileSystem::SyncMark() {
+  std::shared_ptr<LogMarkFile> file;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(mark_changed_, false)) return IOStatus::OK();
+    file = mark_file_;
+  }
+  const IOStatus synced = file->Sync();
+  if (!synced.ok()) {
+    const std::lock_guard lock(mutex_);
+    mark_changed_ = true;
+  }
+  return synced;
+}
+
+IOStatus LogFileSystem::ResumeMark(const std::string& path, LogMark mark) {
+  std::unique_ptr<LogMarkFile> file;
+  const IOStatus opened = LogMarkFile::Open(*target(), path, mark, false, &file);
+  if (!opened.ok()) return opened;
+  const std::lock_guard lock(mutex_);
+  mark_ = std::move(mark);
+  mark_file_ = std::move(file);
+  return opened;
+}
+
+IOStatus LogFileSystem::StartMark(const std::string& path, uint64_t revision) {
+  const std::lock_guard lock(mutex_);
+  mark_ = {revision, {}};
+  NoteCommitted();
+  std::unique_ptr<LogMarkFile> file;
+  const IOStatus opened = LogMarkFile::Open(*target(), path, mark_, true, &file);
+  if (opened.ok()) mark_file_ = std::move(file);
+  return opened;
+}
+
+bool LogFileSystem::keeps_mark() const {
+  const std::lock_guard lock(mutex_);
+  return mark_file_ != nullptr;
+}
+
+IOStatus LogFileSystem::CutUncommitted() {
+  const std::lock_guard lock(mutex_);
+  for (auto& [name, log] : logs_) {
+    if (log.committed == log.written) continue;
+    const IOStatus cut = log.open != nullptr ? log.open->CutTo(log.committed.size) : Cut(name, log);
+    if (!cut.ok()) return cut;
+    log.written = log.committed;
+  }
+  return IOStatus::OK();
+}
+
+// One that is closed.
+IOStatus LogFileSystem::Cut(const std::string& name, const LogState& log) {
+  std::unique_ptr<rocksdb::FSWritableFile> file;
+  IOStatus cut = ReopenWritableFile(name, rocksdb::FileOptions(), &file, nullptr);
+  if (cut.ok()) cut = file->Truncate(log.committed.size, IOOptions(), nullptr);
+  if (cut.ok()) cut = file->Sync(IOOptions(), nullptr);
+  if (cut.ok()) cut = file->Close(IOOptions(), nullptr);
+  return cut;
+}
+
+IOStatus LogFileSystem::NewWritableFile(const std::string& name,
+                                        const rocksdb::FileOptions& options,
+                                        std::unique_ptr<rocksdb::FSWritableFile>* result,
+                                        IODebugContext* debug) {
+  const IOStatus opened = FileSystemWrapper::NewWritableFile(name, options, result, debug);
+  if (!opened.ok()) return opened;
+  if (!IsLog(name)) {
+    *result = std::make_unique<File>(*this, std::move(*result));
+    return opened;
+  }
+  *result = std::make_unique<Log>(*this, name, std::move(*result));
+  return opened;
+}
+
+IOStatus LogFileSystem::NewDirectory(const std::string& name, const IOOptions& options,
+                                     std::unique_ptr<rocksdb::FSDirectory>* result,
+                                     IODebugContext* debug) {
+  const IOStatus opened = FileSystemWrapper::NewDirectory(name, options, result, debug);
+  if (opened.ok()) *result = std::make_unique<Directory>(*this, std::move(*result));
+  return opened;
+}
+
+// The mark is on disk before the log is gone.
+IOStatus LogFileSystem::Forget(const std::string& name) {
+  {
+    const std::lock_guard lock(mutex_);
+    logs_.erase(name);
+    const std::optional<uint64_t> number = LogNumber(name);
+    if (!number.has_value() || mark_.logs.erase(*number) == 0 || mark_file_ == nullptr) {
+      return IOStatus::OK();
+    }
+    WriteMark();
+  }
+  return SyncMark();
+}
+
+IOStatus LogFileSystem::DeleteFile(const std::string& name, const IOOptions& options,
+                                   IODebugContext* debug) {
+  if (IsLog(name)) {
+    if (IOStatus forgotten = Forget(name); !forgotten.ok()) return forgotten;
+  }
+  return FileSystemWrapper::DeleteFile(name, options, debug);
+}
+
+IOStatus LogFileSystem::LockFile(const std::string& name, const IOOptions& options,
+                                 rocksdb::FileLock** lock, IODebugContext* debug) {
+  IOStatus status = FileSystemWrapper::LockFile(name, options, lock, debug);
+  if (!status.ok() || !locked_) return status;
+  status = locked_();
+  if (!status.ok()) {
+    UnlockFile(*lock, options, debug).PermitUncheckedError();
+    *lock = nullptr;
+  }
+  return status;
+}
+
+IOStatus LogFileSystem::GetFreeSpace(const std::string&, const IOOptions&, uint64_t*,
+                                     IODebugContext*) {
+  return IOStatus::NotSupported("not to be known");
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,111 @@
+#ifndef HULLD_SERVER_STORE_FILES_LOG_FILE_SYSTEM_H_
+#define HULLD_SERVER_STORE_FILES_LOG_FILE_SYSTEM_H_
+
+#include <rocksdb/file_system.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "server/store/files/log_mark.h"
+
+namespace hulld::server {
+
+// A file system that knows the committed part of each of RocksDB's write-ahead logs.
+//
+// After a failed write the rest of the log can be cut off: a refused change must not appear when
+// the log is read again. A log that is cut while RocksDB has it open takes no more writes.
+//
+// The committed part that is on disk is kept in a mark (log_mark.h), so that a start notices a log
+// that lost some of it. The mark costs one write of 512 bytes to the page cache for each commit,
+// and no sync: it is synced in the background and before a log is deleted.
+//
+// The free space of the disk is hidden: RocksDB would resume by itself after an error and write to
+// a log that failed.
+class LogFileSystem : public rocksdb::FileSystemWrapper {
+ public:
+  // directory: that of the logs. Copies of logs elsewhere are ordinary files.
+  LogFileSystem(const std::shared_ptr<rocksdb::FileSystem>& base, std::string directory)
+      : FileSystemWrapper(base), directory_(std::move(directory)) {}
+  const char* Name() const override { return "LogFileSystem"; }
+
+  // Called whenever the database's lock was taken, before anything else is done with it; an error
+  // gives the lock back. Set before the first lock.
+  void OnLocked(std::function<rocksdb::IOStatus()> locked) { locked_ = std::move(locked); }
+
+  // Keeps the mark in the file of this path from now on. `mark` is what the file holds.
+  rocksdb::IOStatus ResumeMark(const std::string& path, LogMark mark);
+  // Keeps the mark in a new file, which replaces any other. Requires: all committed bytes are on
+  // disk.
+  rocksdb::IOStatus StartMark(const std::string& path, uint64_t revision);
+  bool keeps_mark() const;
+
+  // Everything written to the logs so far is committed. is_synced: it is on disk as well, up to
+  // this revision of the store.
+  void Commit(uint64_t revision, bool is_synced);
+  // Puts the mark on disk if it changed since.
+  rocksdb::IOStatus SyncMark();
+
+  // Syncs of files and directories that failed so far. RocksDB refuses writes after one in the
+  // background, too.
+  uint64_t failed_syncs() const { return failed_syncs_.load(std::memory_order_relaxed); }
+  // Cuts off all uncommitted bytes and syncs the logs. Requires that nothing is written to them
+  // meanwhile (unchecked: RocksDbStore, the only caller, holds its log_mutex_ or has closed the
+  // database). An error: some bytes may still be there, and the next call tries again.
+  rocksdb::IOStatus CutUncommitted();
+
+  rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
+                                    std::unique_ptr<rocksdb::FSWritableFile>* result,
+                                    rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus NewDirectory(const std::string& name, const rocksdb::IOOptions& options,
+                                 std::unique_ptr<rocksdb::FSDirectory>* result,
+                                 rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus DeleteFile(const std::string& name, const rocksdb::IOOptions& options,
+                               rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus LockFile(const std::string& name, const rocksdb::IOOptions& options,
+                             rocksdb::FileLock** lock, rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus GetFreeSpace(const std::string& path, const rocksdb::IOOptions& options,
+                                 uint64_t* bytes, rocksdb::IODebugContext* debug) override;
+
+ private:
+  class File;
+  class Directory;
+  class Log;
+  struct LogState {
+    LogMark::Synced written;
+    LogMark::Synced committed;
+    // Null once RocksDB has closed it.
+    Log* open = nullptr;
+  };
+
+  bool IsLog(const std::string& name) const;
+  rocksdb::IOStatus NoteSync(const rocksdb::IOStatus& status);
+  rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
+  // Before a log is deleted.
+  rocksdb::IOStatus Forget(const std::string& name);
+  // The following require the mutex.
+  void NoteCommitted();
+  void WriteMark();
+
+  const std::string directory_;
+  std::function<rocksdb::IOStatus()> locked_;
+  std::atomic<uint64_t> failed_syncs_ = 0;
+
+  mutable std::mutex mutex_;
+  // Guarded by the mutex.
+  std::map<std::string, LogState> logs_;
+  LogMark mark_;
+  // Null: no mark is kept.
+  std::shared_ptr<LogMarkFile> mark_file_;
+  bool mark_changed_ = false;
+  bool mark_fails_ = false;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_FILES_LOG_FILE_SYSTEM_H_

@@ -1,0 +1,206 @@
+#include "server/store/files/log_mark.h"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <iterator>
+#include <limits>
+
+namespace hulld::server {
+namespace {
+
+using rocksdb::FileOptions;
+using rocksdb::IOOptions;
+using rocksdb::IOStatus;
+
+// A slot: generation, revision, number of logs; number, size and CRC-32 of each; zeros; and the
+// CRC-32 of all that. It fills one sector, which disks write as a whole.
+constexpr size_t kSlotWords = 64;
+using Slot = std::array<uint64_t, kSlotWords>;
+static_assert(sizeof(Slot) == 512);
+// The slots are in different pages, so that the kernel writes one without the other.
+constexpr uint64_t kSlotDistance = 4096;
+constexpr size_t kHeadWords = 3;
+constexpr size_t kLogWords = 3;
+constexpr size_t kMostLogs = (kSlotWords - kHeadWords - 1) / kLogWords;
+
+uint32_t Crc32(uint32_t crc, std::string_view bytes) {
+  return static_cast<uint32_t>(
+      crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+std::string_view Bytes(const Slot& slot) {
+  return {reinterpret_cast<const char*>(slot.data()), sizeof(Slot)};
+}
+
+uint64_t ChecksumOf(const Slot& slot) {
+  return Crc32(0, Bytes(slot).substr(0, sizeof(Slot) - sizeof(uint64_t)));
+}
+
+// Encodes the newest logs if the slot does not hold all. RocksDB keeps one to three.
+Slot Encode(const LogMark& mark, uint64_t generation) {
+  const size_t count = std::min(mark.logs.size(), kMostLogs);
+  Slot slot = {generation, mark.revision, count};
+  auto log = std::prev(mark.logs.end(), static_cast<std::ptrdiff_t>(count));
+  for (size_t word = kHeadWords; log != mark.logs.end(); ++log, word += kLogWords) {
+    slot[word] = log->first;
+    slot[word + 1] = log->second.size;
+    slot[word + 2] = log->second.crc32;
+  }
+  slot.back() = ChecksumOf(slot);
+  return slot;
+}
+
+struct Decoded {
+  uint64_t generation = 0;
+  LogMark mark;
+};
+
+// None if the slot was never written, or is damaged.
+std::optional<Decoded> Decode(const Slot& slot) {
+  if (slot.back() != ChecksumOf(slot) || slot[2] > kMostLogs) return std::nullopt;
+  Decoded decoded = {slot[0], {slot[1], {}}};
+  for (size_t i = 0; i < slot[2]; ++i) {
+    const uint64_t* const log = &slot[kHeadWords + i * kLogWords];
+    decoded.mark.logs[log[0]] = {log[1], static_cast<uint32_t>(log[2])};
+  }
+  return decoded.generation == 0 ? std::nullopt : std::optional(decoded);
+}
+
+absl::StatusOr<std::optional<Decoded>> ReadNewest(rocksdb::FileSystem& files,
+                                                  const std::string& path) {
+  const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
+  if (exists.IsNotFound()) return std::nullopt;
+  std::unique_ptr<rocksdb::FSRandomAccessFile> file;
+  IOStatus status = files.NewRandomAccessFile(path, FileOptions(), &file, nullptr);
+  std::optional<Decoded> newest;
+  for (uint64_t offset = 0; status.ok() && offset <= kSlotDistance; offset += kSlotDistance) {
+    Slot slot;
+    char scratch[sizeof(Slot)];
+    rocksdb::Slice bytes;
+    status = file->Read(offset, sizeof(Slot), IOOptions(), &bytes, scratch, nullptr);
+    if (!status.ok() || bytes.size() != sizeof(Slot)) continue;
+    std::memcpy(slot.data(), bytes.data(), sizeof(Slot));
+    std::optional<Decoded> decoded = Decode(slot);
+    if (!decoded.has_value()) continue;
+    if (!newest.has_value() || decoded->generation > newest->generation) newest = decoded;
+  }
+  if (!status.ok()) {
+    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
+  }
+  if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
+  return newest;
+}
+
+// Empty: the log holds these bytes.
+absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::string& path,
+                                    const LogMark::Synced& synced) {
+  const std::string name = std::filesystem::path(path).filename();
+  const auto failure = [&](const IOStatus& status) {
+    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
+  };
+  if (files.FileExists(path, IOOptions(), nullptr).IsNotFound()) {
+    return absl::StrCat("the log ", name, " is missing");
+  }
+  std::unique_ptr<rocksdb::FSSequentialFile> file;
+  IOStatus status = files.NewSequentialFile(path, FileOptions(), &file, nullptr);
+  if (!status.ok()) return failure(status);
+  uint64_t size = 0;
+  uint32_t crc32 = 0;
+  std::string scratch(size_t{1} << 20, '\0');
+  while (size < synced.size) {
+    const size_t wanted = std::min<uint64_t>(scratch.size(), synced.size - size);
+    rocksdb::Slice read;
+    status = file->Read(wanted, IOOptions(), &read, scratch.data(), nullptr);
+    if (!status.ok()) return failure(status);
+    if (read.empty()) {
+      return absl::StrCat("the log ", name, " holds ", size, " bytes of ", synced.size);
+    }
+    size += read.size();
+    crc32 = Crc32(crc32, {read.data(), read.size()});
+  }
+  if (crc32 == synced.crc32) return std::string();
+  return absl::StrCat("the log ", name, " does not hold what was written to it");
+}
+
+IOStatus SyncDirectoryOf(rocksdb::FileSystem& files, const std::string& path) {
+  std::unique_ptr<rocksdb::FSDirectory> directory;
+  const std::string parent = std::filesystem::path(path).parent_path();
+  const IOStatus opened = files.NewDirectory(parent, IOOptions(), &directory, nullptr);
+  return opened.ok() ? directory->Fsync(IOOptions(), nullptr) : opened;
+}
+
+// Under its name only when it is whole and on disk.
+IOStatus Make(rocksdb::FileSystem& files, const std::string& path, const Slot& slot) {
+  const std::string unfinished = path + ".new";
+  std::unique_ptr<rocksdb::FSWritableFile> file;
+  IOStatus status = files.NewWritableFile(unfinished, FileOptions(), &file, nullptr);
+  std::string content(2 * kSlotDistance, '\0');
+  content.replace(0, sizeof(Slot), Bytes(slot));
+  if (status.ok()) status = file->Append(content, IOOptions(), nullptr);
+  if (status.ok()) status = file->Sync(IOOptions(), nullptr);
+  if (status.ok()) status = file->Close(IOOptions(), nullptr);
+  if (status.ok()) status = files.RenameFile(unfinished, path, IOOptions(), nullptr);
+  return status.ok() ? SyncDirectoryOf(files, path) : status;
+}
+
+}  // namespace
+
+std::string LogPath(const std::string& directory, uint64_t number) {
+  return absl::StrFormat("%s/%06u.log", directory, number);
+}
+
+std::optional<uint64_t> LogNumber(const std::string& path) {
+  const std::filesystem::path file(path);
+  uint64_t number = 0;
+  const bool is_log = file.extension() == ".log" && absl::SimpleAtoi(file.stem().string(), &number);
+  return is_log ? std::optional(number) : std::nullopt;
+}
+
+absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
+                                                   const std::string& directory,
+                                                   const LogMark& mark) {
+  for (const auto& [number, synced] : mark.logs) {
+    absl::StatusOr<std::string> finding = Compare(files, LogPath(directory, number), synced);
+    if (!finding.ok()) return finding.status();
+    if (!finding->empty()) return LostLog{number, *std::move(finding)};
+  }
+  return std::nullopt;
+}
+
+absl::StatusOr<std::optional<LogMark>> LogMarkFile::Read(rocksdb::FileSystem& files,
+                                                         const std::string& path) {
+  absl::StatusOr<std::optional<Decoded>> newest = ReadNewest(files, path);
+  if (!newest.ok()) return newest.status();
+  if (!newest->has_value()) return std::nullopt;
+  return std::move((*newest)->mark);
+}
+
+IOStatus LogMarkFile::Open(rocksdb::FileSystem& files, const std::string& path, const LogMark& mark,
+                           bool replace, std::unique_ptr<LogMarkFile>* result) {
+  uint64_t generation = 1;
+  const absl::StatusOr<std::optional<Decoded>> newest = ReadNewest(files, path);
+  if (!replace && newest.ok() && newest->has_value()) {
+    generation = (*newest)->generation;
+  } else if (IOStatus made = Make(files, path, Encode(mark, generation)); !made.ok()) {
+    return made;
+  }
+  std::unique_ptr<rocksdb::FSRandomRWFile> file;
+  const IOStatus opened = files.NewRandomRWFile(path, FileOptions(), &file, nullptr);
+  if (opened.ok()) result->reset(new LogMarkFile(std::move(file), generation));
+  return opened;
+}
+
+IOStatus LogMarkFile::Write(const LogMark& mark) {
+  const Slot slot = Encode(mark, ++generation_);
+  return file_->Write(generation_ % 2 * kSlotDistance, {Bytes(slot).data(), sizeof(Slot)},
+                      IOOptions(), nullptr);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,81 @@
+#ifndef HULLD_SERVER_STORE_FILES_LOG_MARK_H_
+#define HULLD_SERVER_STORE_FILES_LOG_MARK_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <rocksdb/file_system.h>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace hulld::server {
+
+// The high-water mark of the write-ahead logs: a lower bound of their synced bytes. A start
+// compares the logs with it before it opens the database, which replays and deletes the logs.
+struct LogMark {
+  // The first bytes of a log.
+  struct Synced {
+    uint64_t size = 0;
+    uint32_t crc32 = 0;
+
+    friend bool operator==(const Synced&, const Synced&) = default;
+  };
+
+  // The store's last acknowledged revision.
+  uint64_t revision = 0;
+  // The live logs, by their numbers.
+  std::map<uint64_t, Synced> logs;
+
+  friend bool operator==(const LogMark&, const LogMark&) = default;
+};
+
+// "000012.log" in `directory`, as RocksDB names it.
+std::string LogPath(const std::string& directory, uint64_t number);
+// The number in such a name; none where it is another file.
+std::optional<uint64_t> LogNumber(const std::string& path);
+
+// Returns the first log in `directory` that is missing, is shorter than `mark` says, or differs in
+// these bytes, with the finding; none if there is no such log. UNAVAILABLE: a log cannot be read.
+// Cost: reads all bytes of the mark.
+struct LostLog {
+  uint64_t number = 0;
+  std::string finding;
+};
+absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
+                                                   const std::string& directory,
+                                                   const LogMark& mark);
+
+// The file that keeps the mark. Two slots of one sector each are overwritten in turn, so that one
+// of them is whole whenever the power goes out, and a full disk is no obstacle.
+class LogMarkFile {
+ public:
+  // None if there is no file. DATA_LOSS: it holds no mark. UNAVAILABLE: it cannot be read.
+  static absl::StatusOr<std::optional<LogMark>> Read(rocksdb::FileSystem& files,
+                                                     const std::string& path);
+  // Opens the file for writing, and makes it first, on disk, if it does not exist or `replace` is
+  // true. Its mark is then `mark`, which an existing file must hold.
+  static rocksdb::IOStatus Open(rocksdb::FileSystem& files, const std::string& path,
+                                const LogMark& mark, bool replace,
+                                std::unique_ptr<LogMarkFile>* result);
+
+  // Overwrites the older slot. Survives the end of the process; the end of the machine only after
+  // Sync. One thread at a time.
+  rocksdb::IOStatus Write(const LogMark& mark);
+  // Any thread.
+  rocksdb::IOStatus Sync() { return file_->Sync(rocksdb::IOOptions(), nullptr); }
+
+ private:
+  LogMarkFile(std::unique_ptr<rocksdb::FSRandomRWFile> file, uint64_t generation)
+      : file_(std::move(file)), generation_(generation) {}
+
+  const std::unique_ptr<rocksdb::FSRandomRWFile> file_;
+  uint64_t generation_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_FILES_LOG_MARK_H_

@@ -1,0 +1,201 @@
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "client/formats/mesh_file.h"
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace gltf_file_test {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+template <typename Scalar>
+std::string Bytes(const std::vector<Scalar>& values) {
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Scalar));
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string DataUri(const std::string& bytes) {
+  return absl::StrCat("data:application/octet-stream;base64,", absl::Base64Escape(bytes));
+}
+
+// A mesh of the positions, shown by one node with `node` in it.
+std::string Gltf(const std::string& bytes, const std::string& accessor,
+                 const std::string& node = "", const std::string& root = "",
+                 const std::string& stride = "") {
+  return absl::StrCat(R"({"asset":{"version":"2.0"},)", root,
+                      R"("scene":0,"scenes":[{"nodes":[0]}],)", R"("nodes":[{"mesh":0)", node,
+                      R"(}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],)",
+                      R"("buffers":[{"byteLength":)", bytes.size(), R"(,"uri":")", DataUri(bytes),
+                      R"("}],"bufferViews":[{"buffer":0,"byteLength":)", bytes.size(), stride,
+                      R"(}],"accessors":[{"bufferView":0,"type":"VEC3",)", accessor, "}]}");
+}
+
+constexpr char kQuantization[] = R"("extensionsRequired":["KHR_mesh_quantization"],)";
+const std::vector<float> kTriangle = {0.1f, 0, 0, 1, 0, 0, 0, 2, 0};
+constexpr char kFloats[] = R"("componentType":5126,"count":3)";
+
+std::string Error(const std::string& text) { return ReadText(text, PointFormat::kGltf).error(); }
+
+// As gltfpack writes it: a tetrahedron of 2 x 3 x 4, whose node undoes the quantization.
+TEST(QuantizedGltf, IntegersAreScaledByTheNode) {
+  const std::string bytes =
+      Bytes<uint16_t>({0, 0, 0, 9, 8192, 0, 0, 9, 0, 12288, 0, 9, 0, 0, 16384, 9});
+  const PointsRead read = ReadText(
+      Gltf(bytes, R"("componentType":5123,"count":4)",
+           R"(,"scale":[0.000244140625,0.000244140625,0.000244140625],"translation":[1,0,0])",
+           kQuantization, R"(,"byteStride":8)"),
+      PointFormat::kGltf);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 0, 0, 3, 0, 0, 1, 3, 0, 1, 0, 4));
+}
+
+TEST(QuantizedGltf, EachTypeIsDecodedAsTheExtensionSays) {
+  const auto read = [](const std::string& bytes, const std::string& type, bool normalized) {
+    return ReadText(Gltf(bytes,
+                         absl::StrCat(R"("componentType":)", type, R"(,"count":1,"normalized":)",
+                                      normalized ? "true" : "false"),
+                         "", kQuantization),
+                    PointFormat::kGltf)
+        .xyz();
+  };
+  EXPECT_THAT(read(Bytes<int8_t>({-128, 127, 1}), "5120", true), ElementsAre(-1, 1, 1 / 127.0));
+  EXPECT_THAT(read(Bytes<int8_t>({-128, 127, 1}), "5120", false), ElementsAre(-128, 127, 1));
+  EXPECT_THAT(read(Bytes<uint8_t>({0, 255, 1}), "5121", true), ElementsAre(0, 1, 1 / 255.0));
+  EXPECT_THAT(read(Bytes<uint8_t>({0, 255, 1}), "5121", false), ElementsAre(0, 255, 1));
+  EXPECT_THAT(read(Bytes<int16_t>({-32768, 32767, 1}), "5122", true),
+              ElementsAre(-1, 1, 1 / 32767.0));
+  EXPECT_THAT(read(Bytes<int16_t>({-32768, 32767, 1}), "5122", false),
+              ElementsAre(-32768, 32767, 1));
+  EXPECT_THAT(read(Bytes<uint16_t>({0, 65535, 1}), "5123", true), ElementsAre(0, 1, 1 / 65535.0));
+  EXPECT_THAT(read(Bytes<uint16_t>({0, 65535, 1}), "5123", false), ElementsAre(0, 65535, 1));
+}
+
+TEST(GltfFile, RequiredExtensionsThatAreNotKnownAreRefusedByName) {
+  for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "ACME_new"}) {
+    EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, "",
+                           absl::StrCat(R"("extensionsRequired":[")", name, R"("],)"))),
+                HasSubstr(absl::StrCat("FILE: the extension \"", name, "\" is required")));
+  }
+  EXPECT_EQ(Error(Gltf(Bytes(kTriangle), kFloats, "",
+                       R"("extensionsRequired":["KHR_materials_unlit"],)")),
+            "");
+}
+
+TEST(GltfFile, FloatsThatNothingMovesStayFloats) {
+  const PointsRead read = ReadText(Gltf(Bytes(kTriangle), kFloats), PointFormat::kGltf);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_TRUE(read.all_float());
+  EXPECT_THAT(read.xyz(), ElementsAre(0.1f, 0, 0, 1, 0, 0, 0, 2, 0));
+}
+
+TEST(GltfFile, FilesWithoutScenesShowAllRoots) {
+  const std::string text = Replaced(Gltf(Bytes(kTriangle), kFloats, R"(,"translation":[0,0,5])"),
+                                    R"("scene":0,"scenes":[{"nodes":[0]}],)", "");
+  EXPECT_THAT(ReadText(text, PointFormat::kGltf).xyz(), ElementsAre(0.1f, 0, 5, 1, 0, 5, 0, 2, 5));
+  const std::string bare = Replaced(text, R"("nodes":[{"mesh":0,"translation":[0,0,5]}],)", "");
+  EXPECT_EQ(ReadText(bare, PointFormat::kGltf).counts.points, 3u);
+}
+
+TEST(GltfFile, NodesComposeMatricesAndTurns) {
+  const std::string matrix = R"(,"matrix":[0,1,0,0,-1,0,0,0,0,0,1,0,10,0,0,1])";
+  EXPECT_THAT(ReadText(Gltf(Bytes(kTriangle), kFloats, matrix), PointFormat::kGltf).xyz(),
+              ElementsAre(10, 0.1f, 0, 10, 1, 0, 8, 0, 0));
+  const std::string nested = Replaced(
+      Gltf(Bytes(kTriangle), kFloats,
+           R"(,"rotation":[1,0,0,0]},{"children":[0],"scale":[1,1,2],"translation":[0,0,1])"),
+      R"("scenes":[{"nodes":[0]}])", R"("scenes":[{"nodes":[1]}])");
+  EXPECT_THAT(ReadText(nested, PointFormat::kGltf).xyz(),
+              ElementsAre(0.1f, 0, 1, 1, 0, 1, 0, -2, 1));
+  EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, R"(,"children":[0])")),
+              HasSubstr("several parents"));
+}
+
+TEST(GltfFile, BuffersMayLieInFilesWithEscapedNames) {
+  const TempFile buffer("my buffer#1.bin", Bytes(kTriangle));
+  const std::string name = buffer.path().substr(buffer.path().rfind('/') + 1);
+  const std::string escaped = Replaced(Replaced(name, " ", "%20"), "#", "%23");
+  const std::string text =
+      Replaced(Gltf(Bytes(kTriangle), kFloats), DataUri(Bytes(kTriangle)), escaped);
+  EXPECT_EQ(ReadText(text, PointFormat::kGltf).counts.points, 3u);
+  EXPECT_THAT(Error(Replaced(text, "%23", "%24")), HasSubstr("cannot be read"));
+  EXPECT_THAT(Error(Replaced(text, R"("byteLength":36,"uri")", R"("byteLength":37,"uri")")),
+              HasSubstr("declares 37 bytes"));
+}
+
+TEST(GltfFile, SparseAccessorsReplacePositions) {
+  const std::string bytes = Bytes(kTriangle) + Bytes<float>({7, 8, 9}) + Bytes<uint16_t>({1});
+  const std::string text = Gltf(
+      bytes,
+      absl::StrCat(kFloats, R"(,"sparse":{"count":1,"indices":{"bufferView":0,"byteOffset":48,)"
+                            R"("componentType":5123},"values":{"bufferView":0,"byteOffset":36}})"));
+  EXPECT_THAT(ReadText(text, PointFormat::kGltf).xyz(), ElementsAre(0.1f, 0, 0, 7, 8, 9, 0, 2, 0));
+  const std::string zeros = Replaced(text, R"("bufferView":0,"type")", R"("type")");
+  EXPECT_THAT(ReadText(zeros, PointFormat::kGltf).xyz(), ElementsAre(0, 0, 0, 7, 8, 9, 0, 0, 0));
+  EXPECT_THAT(Error(Replaced(text, R"("byteOffset":48)", R"("byteOffset":49)")),
+              HasSubstr("reaches beyond its buffer"));
+}
+
+TEST(GltfFile, BoundsAreChecked) {
+  const std::string good = Gltf(Bytes(kTriangle), kFloats);
+  const auto error = [&](const std::string& from, const std::string& to) {
+    return Error(Replaced(good, from, to));
+  };
+  EXPECT_THAT(error(R"("count":3)", R"("count":4)"), HasSubstr("accessors[0] reaches beyond"));
+  EXPECT_THAT(error(R"("count":3)", R"("count":9e15)"), HasSubstr("accessors[0] reaches beyond"));
+  EXPECT_THAT(error(R"("count":3)", R"("count":-1)"), HasSubstr("count is not a whole number"));
+  EXPECT_THAT(error(R"("count":3)", R"("count":0)"), HasSubstr("has no positions"));
+  EXPECT_THAT(error(R"("POSITION":0)", R"("POSITION":1)"), HasSubstr("accessors[1] is named"));
+  EXPECT_THAT(error(R"("POSITION":0)", R"("NORMAL":0)"), HasSubstr("there is no vertex"));
+  EXPECT_THAT(error("VEC3", "VEC2"), HasSubstr("is no position"));
+  EXPECT_THAT(error(R"("mesh":0)", R"("mesh":1)"), HasSubstr("meshes[1] is named"));
+  EXPECT_THAT(error(R"("2.0")", R"("1.0")"), HasSubstr("only glTF 2.0 is read"));
+  EXPECT_THAT(error("}]}", "}]"), HasSubstr("is not read as the JSON of glTF"));
+}
+
+TEST(GltfFile, IndicesMakeTrianglesOfEachMode) {
+  const std::string bytes =
+      Bytes<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) + Bytes<uint8_t>({0, 1, 2, 3});
+  const auto triangles = [&](const std::string& mode, const std::string& count) {
+    const std::string text =
+        Replaced(Gltf(bytes, R"("componentType":5126,"count":4)"), R"("attributes")",
+                 absl::StrCat(R"("indices":1,"mode":)", mode, R"(,"attributes")"));
+    const TempFile file(
+        "a.gltf",
+        Replaced(text, R"("count":4}])",
+                 absl::StrCat(R"("count":4},{"bufferView":0,"byteOffset":48,)",
+                              R"("type":"SCALAR","componentType":5121,"count":)", count, "}]")));
+    const auto mesh = ReadMesh(file.path());
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return mesh.ok() ? mesh->triangles : TriangleMesh().triangles;
+  };
+  EXPECT_THAT(triangles("0", "4"), ElementsAre());
+  EXPECT_THAT(triangles("4", "3"), ElementsAre(ElementsAre(0, 1, 2)));
+  EXPECT_THAT(triangles("5", "4"), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(2, 1, 3)));
+  EXPECT_THAT(triangles("6", "4"), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(0, 2, 3)));
+}
+
+TEST(GltfFile, BinaryFormIsReadAndCutOnesAreRefused) {
+  std::string json = Replaced(Gltf(Bytes(kTriangle), kFloats),
+                              absl::StrCat(R"(,"uri":")", DataUri(Bytes(kTriangle)), "\""), "");
+  while (json.size() % 4 != 0) json += ' ';
+  const auto size = [](size_t value) { return Bytes<uint32_t>({static_cast<uint32_t>(value)}); };
+  const std::string body =
+      size(json.size()) + "JSON" + json + size(36) + std::string("BIN\0", 4) + Bytes(kTriangle);
+  const std::string glb = "glTF" + size(2) + size(12 + body.size()) + body;
+  EXPECT_EQ(ReadText(glb, PointFormat::kGltf).counts.points, 3u);
+  for (size_t length = 4; length < glb.size(); ++length) {
+    EXPECT_THAT(Error(glb.substr(0, length)), HasSubstr("FILE: byte ")) << length;
+  }
+}
+
+}  // namespace gltf_file_test
+}  // namespace hulld

@@ -1,0 +1,129 @@
+#include "server/network/frame_guard.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <string>
+
+#include "tests/server/network/frame_bytes.h"
+
+namespace hulld::server {
+namespace frame_guard_test {
+
+using Verdict = FrameGuard::Verdict;
+
+class FrameGuardTest : public testing::Test {
+ protected:
+  Verdict Send(const std::string& bytes) { return guard_.Take(bytes, now_); }
+  static std::string Open(uint32_t stream) {
+    return FrameBytes(Frame::kHeaders, kEndHeadersFlag, stream, HeaderBlock("/a/b"));
+  }
+  static std::string Reset(uint32_t stream) {
+    return FrameBytes(Frame::kResetStream, 0, stream, BigEndian(8));
+  }
+
+  FrameGuard::Clock::time_point now_{};
+  std::atomic<size_t> all_half_open_ = 0;
+  FrameGuard guard_{FrameLimits{}, all_half_open_, now_};
+};
+
+TEST_F(FrameGuardTest, OrdinaryCallsPassInPiecesOfAnySize) {
+  std::string bytes = kOpening;
+  for (uint32_t stream = 1; stream < 400; stream += 2) {
+    bytes += Open(stream) + FrameBytes(Frame::kData, stream % 4 == 1 ? kEndStreamFlag : 0, stream,
+                                       MessageBytes("a message"));
+  }
+  for (const size_t piece : {size_t{1}, size_t{7}, size_t{100}, bytes.size()}) {
+    FrameGuard guard(FrameLimits{}, all_half_open_, now_);
+    for (size_t at = 0; at < bytes.size(); at += piece) {
+      ASSERT_EQ(guard.Take(bytes.substr(at, piece), now_), Verdict::kAllowed);
+    }
+    EXPECT_EQ(guard.half_open_streams(), 0);
+  }
+  EXPECT_EQ(all_half_open_, 0);
+}
+
+TEST_F(FrameGuardTest, WhatDoesNotBeginAsHttp2IsRefused) {
+  EXPECT_EQ(Send("PRI * HTTP/2.0\r\n\r\nS"), Verdict::kAllowed);
+  EXPECT_EQ(Send("X"), Verdict::kNotHttp2);
+}
+
+TEST_F(FrameGuardTest, AStreamIsHalfOpenUntilItsFirstMessageIsComplete) {
+  const std::string message = MessageBytes("0123456789");
+  ASSERT_EQ(Send(kOpening + Open(1)), Verdict::kAllowed);
+  for (const char byte : message) {
+    EXPECT_EQ(guard_.half_open_streams(), 1);
+    ASSERT_EQ(Send(FrameBytes(Frame::kData, 0, 1, std::string(1, byte))), Verdict::kAllowed);
+  }
+  EXPECT_EQ(guard_.half_open_streams(), 0);
+  ASSERT_EQ(Send(Open(3) + Open(5) + Reset(3) + FrameBytes(Frame::kData, kEndStreamFlag, 5, "")),
+            Verdict::kAllowed);
+  EXPECT_EQ(guard_.half_open_streams(), 0);
+  ASSERT_EQ(Send(Open(7) + FrameBytes(Frame::kData, 0, 7, MessageBytes(""))), Verdict::kAllowed);
+  EXPECT_EQ(all_half_open_, 0);
+}
+
+TEST_F(FrameGuardTest, HalfOpenStreamsAreBoundedByConnectionAndInTotal) {
+  ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
+  for (uint32_t i = 0; i < 100; ++i) ASSERT_EQ(Send(Open(2 * i + 1)), Verdict::kAllowed);
+  EXPECT_EQ(Send(Open(201)), Verdict::kHalfOpenStreams);
+  all_half_open_ = 4096;
+  FrameGuard other(FrameLimits{}, all_half_open_, now_);
+  // Headers and message together leave nothing half-open.
+  EXPECT_EQ(
+      other.Take(kOpening + Open(1) + FrameBytes(Frame::kData, 0, 1, MessageBytes("m")), now_),
+      Verdict::kAllowed);
+  EXPECT_EQ(other.Take(Open(3), now_), Verdict::kHalfOpenStreams);
+}
+
+TEST_F(FrameGuardTest, AGuardThatEndsReturnsItsHalfOpenStreams) {
+  {
+    FrameGuard other(FrameLimits{}, all_half_open_, now_);
+    ASSERT_EQ(other.Take(kOpening + Open(1), now_), Verdict::kAllowed);
+    EXPECT_EQ(all_half_open_, 1);
+  }
+  EXPECT_EQ(all_half_open_, 0);
+}
+
+TEST_F(FrameGuardTest, AHeaderBlockIsBoundedOverItsContinuations) {
+  ASSERT_EQ(Send(kOpening + FrameBytes(Frame::kHeaders, 0, 1, std::string(10'000, 'a'))),
+            Verdict::kAllowed);
+  ASSERT_EQ(Send(FrameBytes(Frame::kContinuation, 0, 1, std::string(6'384, 'a'))),
+            Verdict::kAllowed);
+  EXPECT_EQ(Send(FrameBytes(Frame::kContinuation, 0, 1, "a")), Verdict::kHeaderBlock);
+}
+
+TEST_F(FrameGuardTest, LargeHeaderBlocksAreBoundedInTime) {
+  ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
+  const auto send_large = [this](uint32_t stream) {
+    return Send(FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, stream,
+                           std::string(FrameLimits::kUsualHeaderBytes + 8192, 'a')));
+  };
+  uint32_t stream = 1;
+  for (int i = 0; i < 32; ++i, stream += 2) ASSERT_EQ(send_large(stream), Verdict::kAllowed);
+  now_ += std::chrono::seconds(1);
+  for (int i = 0; i < 8; ++i, stream += 2) ASSERT_EQ(send_large(stream), Verdict::kAllowed);
+  EXPECT_EQ(send_large(stream), Verdict::kLargeHeaders);
+}
+
+TEST_F(FrameGuardTest, ControlFramesOfEveryKindAreBoundedInTime) {
+  for (const std::string& frame :
+       {Reset(1), FrameBytes(Frame::kPing, 0, 0, "12345678"),
+        FrameBytes(Frame::kSettings, 0, 0, ""), FrameBytes(Frame::kContinuation, 0, 1, ""),
+        FrameBytes(Frame::kData, 0, 1, ""), FrameBytes(Frame{200}, 0, 0, "x"),
+        // Trailers.
+        FrameBytes(Frame::kHeaders, kEndHeadersFlag, 1, "")}) {
+    auto now = now_;
+    FrameGuard guard(FrameLimits{}, all_half_open_, now);
+    // The settings of the opening count.
+    ASSERT_EQ(guard.Take(kOpening + Open(1), now), Verdict::kAllowed);
+    for (int i = 0; i < 999; ++i) ASSERT_EQ(guard.Take(frame, now), Verdict::kAllowed);
+    now += std::chrono::seconds(1);
+    for (int i = 0; i < 200; ++i) ASSERT_EQ(guard.Take(frame, now), Verdict::kAllowed);
+    EXPECT_EQ(guard.Take(frame, now), Verdict::kControlFrames);
+  }
+}
+
+}  // namespace frame_guard_test
+}  // namespace hulld::server

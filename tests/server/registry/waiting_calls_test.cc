@@ -1,0 +1,80 @@
+#include "server/registry/waiting_calls.h"
+
+#include <absl/status/status.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <thread>
+
+#include "server/contract/stopped_call.h"
+
+namespace hulld::server {
+namespace waiting_calls_test {
+
+TEST(WaitingCalls, OneIsToldOnce) {
+  WaitingCalls calls;
+  int told = 0;
+  const auto wait = calls.Add({}, [&](const absl::Status& status) {
+    EXPECT_TRUE(absl::IsUnavailable(status));
+    ++told;
+  });
+  EXPECT_EQ(calls.count(), 1);
+  wait->Tell(absl::UnavailableError("no database"));
+  EXPECT_EQ(calls.count(), 0);
+  wait->Tell(absl::OkStatus());
+  EXPECT_FALSE(wait->Withdraw());
+  EXPECT_EQ(told, 1);
+}
+
+TEST(WaitingCalls, OneThatIsWithdrawnIsNotTold) {
+  WaitingCalls calls;
+  const auto wait = calls.Add({}, [](const absl::Status&) { FAIL(); });
+  EXPECT_TRUE(wait->Withdraw());
+  EXPECT_EQ(calls.count(), 0);
+  wait->Tell(absl::OkStatus());
+}
+
+// Also the last one in the queue.
+TEST(WaitingCalls, OneThatIsCancelledEndsAndTheOthersWait) {
+  WaitingCalls calls;
+  std::atomic<bool> is_cancelled = false;
+  std::promise<absl::Status> told;
+  const auto other = calls.Add([] { return false; }, [](const absl::Status&) { FAIL(); });
+  const auto wait = calls.Add([&] { return is_cancelled.load(); },
+                              [&](const absl::Status& status) { told.set_value(status); });
+  is_cancelled = true;
+  EXPECT_TRUE(absl::IsCancelled(told.get_future().get()));
+  EXPECT_EQ(calls.count(), 1);
+  wait->Tell(absl::OkStatus());
+  EXPECT_TRUE(other->Withdraw());
+}
+
+// The state of a call's stop predicate is gone as soon as the call ends, on any thread.
+TEST(WaitingCalls, NobodyIsAskedWhetherToStopOnceItIsOver) {
+  WaitingCalls calls;
+  constexpr int kCalls = 2000;
+  std::atomic<int> told = 0;
+  for (int i = 0; i < kCalls; ++i) {
+    auto alive = std::make_shared<std::atomic<bool>>(true);
+    const auto wait = calls.Add(
+        [alive] {
+          EXPECT_TRUE(alive->load());
+          return true;
+        },
+        [alive, &told](const absl::Status&) {
+          alive->store(false);
+          ++told;
+        });
+    if (i % 100 == 0) std::this_thread::sleep_for(kStopPoll / 2);
+    wait->Tell(absl::OkStatus());
+  }
+  // None is notified twice; the notification of a call that the other thread ends may arrive
+  // slightly later.
+  while (calls.count() > 0 || told < kCalls) std::this_thread::yield();
+  EXPECT_EQ(told, kCalls);
+}
+
+}  // namespace waiting_calls_test
+}  // namespace hulld::server
