@@ -117,7 +117,7 @@ class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
     // Overwriting takes no space, so it succeeds on a full disk.
-    if (IOStatus error = system_.Error(false); !error.ok() && !error.IsNoSpace()) return error;
+    if (IOStatus error = system_.WhatFails(false); !error.ok() && !error.IsNoSpace()) return error;
     std::string former(data.size(), '\0');
     rocksdb::Slice read;
     IOStatus status = Read(offset, data.size(), options, &read, former.data(), debug);
@@ -125,10 +125,11 @@ class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper
     system_.files_[name_].overwritten.emplace(offset, former);
     return FSRandomRWFileOwnerWrapper::Write(offset, data, options, debug);
   }
+  // Does not count as one of the failures, as it runs at intervals of its own.
   IOStatus Sync(const IOOptions&, IODebugContext*) override {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
-    if (IOStatus error = system_.Error(true); !error.ok()) return error;
+    if (IOStatus error = system_.WhatFails(true); !error.ok()) return error;
     system_.files_[name_].overwritten.clear();
     return IOStatus::OK();
   }
