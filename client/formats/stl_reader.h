@@ -22,7 +22,7 @@ struct StlReceiver {
   // Parses a coordinate (axis: 0, 1, 2) of a text file.
   std::function<NumberText(std::string_view text, size_t axis, double* value)> parse;
   std::function<absl::Status(const std::array<double, 3>& p, const StlErrorAt& error_at)> corner;
-  // The same of a binary file.
+  // The same for a binary file.
   std::function<absl::Status(const std::array<float, 3>& p, const StlErrorAt& error_at)>
       float_corner;
 };
