@@ -7,6 +7,7 @@
 #include <cmath>
 #include <exception>
 #include <set>
+#include <sstream>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
@@ -22,6 +23,28 @@ std::string PlaceText(const std::string& name, const YAML::Mark& mark) {
   return absl::StrCat(name, ":", mark.line + 1, ":", mark.column + 1);
 }
 
+// Records where the last document starts and ignores its content.
+class DocumentStart : public YAML::EventHandler {
+ public:
+  const YAML::Mark& mark() const { return mark_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { mark_ = mark; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  YAML::Mark mark_;
+};
+
 }  // namespace
 
 absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
@@ -29,23 +52,29 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": more than ", kMostBytes, " bytes; write so large a scene as JSON"));
   }
-  std::vector<YAML::Node> documents;
+  // Parses at most two documents: for text such as "," yaml-cpp 0.7 finds documents without end.
+  YAML::Node root;
+  int documents = 0;
+  DocumentStart last;
   try {
-    documents = YAML::LoadAll(text);
+    std::istringstream input(text);
+    YAML::Parser parser(input);
+    while (documents < 2 && parser.HandleNextDocument(last)) ++documents;
+    if (documents == 1) root = YAML::Load(text);
   } catch (const YAML::Exception& problem) {
     return absl::InvalidArgumentError(
-        absl::StrCat(PlaceText(name, problem.mark), ": not read as YAML: ", problem.msg));
+        absl::StrCat(PlaceText(name, problem.mark), ": not valid YAML: ", problem.msg));
   } catch (const std::exception& problem) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": not read as YAML: ", problem.what()));
+    return absl::InvalidArgumentError(absl::StrCat(name, ": not valid YAML: ", problem.what()));
   }
-  if (documents.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": there is no scene in it"));
+  if (documents == 0) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": contains no scene"));
   }
-  if (documents.size() > 1) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(PlaceText(name, documents[1].Mark()), ": a second document; a scene is one"));
+  if (documents > 1) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        PlaceText(name, last.mark()), ": a second document starts here; a scene file holds one"));
   }
-  return YamlReader(documents.front(), name);
+  return YamlReader(root, name);
 }
 
 std::string YamlReader::PlaceOf(const YAML::Node& node) const {

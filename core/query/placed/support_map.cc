@@ -32,6 +32,9 @@ constexpr size_t kMostCellsPerPoint = 8;
 // average for points all over a surface. The bound is for points along curves, where the number
 // doubles with every second division of a square.
 constexpr double kMostCopies = 64;
+// Sets of up to this many points get lists throughout: as the number of copies grows with the
+// square root of the number of points, a tree saves nothing.
+constexpr size_t kMostWithoutTree = 4096;
 // Fraction of candidates among all points beyond which scanning all is faster than sorting the
 // candidates.
 constexpr size_t kPointsPerCandidate = 16;
@@ -215,7 +218,8 @@ void Filter(const FacePoints& from, const Square& square, double bound, FacePoin
 // Fills the cells of a map.
 class SupportMap::Filling {
  public:
-  explicit Filling(SupportMap& map) : map_(map) {}
+  explicit Filling(SupportMap& map)
+      : map_(map), may_need_tree_(map.points_.size() > kMostWithoutTree) {}
 
   // `bound`: see Filter.
   void Fill(double bound) {
@@ -297,7 +301,9 @@ class SupportMap::Filling {
     const uint32_t rows = range.i_end - range.i_begin;
     const uint32_t columns = range.j_end - range.j_begin;
     if (found.size <= 4) return FillAll(found, grid, range);
-    if (found.size > kMostCompared && copies > kMostCopies) return LeaveToTree(grid, range);
+    if (may_need_tree_ && found.size > kMostCompared && copies > kMostCopies) {
+      return LeaveToTree(grid, range);
+    }
     if (rows == 1 && columns == 1) return FillCell(found, grid, range, depth, copies);
     Range low = range;
     Range high = range;
@@ -379,6 +385,7 @@ class SupportMap::Filling {
   }
 
   SupportMap& map_;
+  const bool may_need_tree_;
   double bound_ = 0;
   size_t most_cells_ = 0;
   // All points, as seen on the face being filled.
