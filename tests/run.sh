@@ -131,7 +131,10 @@ test_preset() {  # test_preset PRESET EXCLUDED_LABELS TARGET...
     run_part "$preset: tests" run_tests "$preset" -LE "^($core_labels|$excluded)$"
 }
 
-[[ $mode == tidy ]] || run_part "format" check_format
+if [[ $mode != tidy ]]; then
+  run_part "format" check_format
+  run_part "prose" python3 tests/prose.py
+fi
 case $mode in
   quick)
     run_part "configure" cmake --preset release &&

@@ -214,52 +214,6 @@ TEST(Tests, StandWhereWhatTheyAreNamedForStands) {
   EXPECT_GT(checked, 50);
 }
 
-// Returns true for handwritten files in a language with comments known to this test.
-bool IsSource(const fs::path& path) {
-  constexpr std::string_view kExtensions[] = {".h",  ".cc", ".proto", ".py",
-                                              ".js", ".sh", ".awk",   ".g"};
-  const std::string extension = path.extension().string();
-  return std::find(std::begin(kExtensions), std::end(kExtensions), extension) !=
-         std::end(kExtensions);
-}
-
-// Returns the first forbidden text of a line: a vague pronoun, or a comment that starts with a
-// genitive. Empty if none. The texts are concatenated, so that this file does not contain them.
-std::string OddTextIn(const std::string& line) {
-  for (const std::string& word : {std::string("who") + "ever", std::string("Who") + "ever"}) {
-    const auto is_letter = [&](size_t at) {
-      return at < line.size() && std::isalpha(static_cast<unsigned char>(line[at])) != 0;
-    };
-    for (size_t at = line.find(word); at != line.npos; at = line.find(word, at + 1)) {
-      if (!(at > 0 && is_letter(at - 1)) && !is_letter(at + word.size())) return word;
-    }
-  }
-  for (const std::string mark : {"// ", "# ", "#: ", "* ", "\"\"\""}) {
-    if (line.find(mark + "Of ") != line.npos) return mark + "Of";
-  }
-  return "";
-}
-
-TEST(Comments, NameTheirSubject) {
-  ASSERT_EQ(OddTextIn(std::string("int x = 0;  // ") + "Of it."), "// Of");
-  const fs::path root = SourceTree();
-  int files = 0;
-  for (const std::string top : {"core", "server", "client", "proto", "tests"}) {
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / top)) {
-      if (!entry.is_regular_file() || !IsSource(entry.path())) continue;
-      ++files;
-      std::ifstream file(entry.path());
-      int number = 0;
-      for (std::string line; std::getline(file, line);) {
-        ++number;
-        EXPECT_EQ(OddTextIn(line), "")
-            << fs::relative(entry.path(), root).string() << ":" << number << ": " << line;
-      }
-    }
-  }
-  EXPECT_GT(files, 500);
-}
-
 // A call of hulld_add_test in a CMakeLists.txt, split into words.
 struct TestProgram {
   fs::path folder;

@@ -276,7 +276,8 @@ TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
   {
     const auto hulls = from_->Serve();
     const uint64_t revision = hulls->store().revision();
-    for (const std::string& id : copied) ASSERT_TRUE(hulls->Put(id, {}).ok());
+    ASSERT_TRUE(hulls->Put(copied.front(), {}).ok());
+    ASSERT_TRUE(hulls->Put(copied.back(), {}).ok());
     EXPECT_EQ(hulls->store().revision(), revision);
   }
   const Ran ran = Migrate(*from_, *to_);
