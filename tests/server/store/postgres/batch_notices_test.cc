@@ -16,12 +16,13 @@
 
 namespace {
 
-// Where set, who reads an eventfd says so first, and reads it once it can be read.
+// If set, a reader of an eventfd releases this semaphore first, then blocks until the eventfd is
+// readable.
 std::atomic<std::binary_semaphore*> reading = nullptr;
 
 }  // namespace
 
-// Takes the place of the C library's.
+// Replaces the C library's function.
 extern "C" int eventfd_read(int fd, eventfd_t* value) {
   if (std::binary_semaphore* const told = reading.exchange(nullptr); told != nullptr) {
     told->release();
@@ -34,8 +35,8 @@ extern "C" int eventfd_read(int fd, eventfd_t* value) {
 namespace hulld::server {
 namespace batch_notices_test {
 
-// The end comes between a look at whether it has come and the taking back of what wakes. A thread
-// that misses it waits until the test is ended from outside.
+// The end arrives between the check for it and the reset of the eventfd. A thread that misses it
+// blocks until the time limit of the test.
 TEST(BatchNotices, EndAlsoWhileTheyTakeBackWhatWokeThem) {
   if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
   PostgresCluster& cluster = PostgresCluster::Shared();

@@ -29,7 +29,7 @@ TEST(Conninfo, WhatIsLeftOpenHasATimeout) {
   EXPECT_EQ(given.at("connect_timeout"), "60");
 }
 
-// Each of these would make a part of the password a host, a port, a database, or a word of an
+// Each text moves part of the password into the host, the port, the database, or a word of an
 // error.
 TEST(Conninfo, NoErrorQuotesAPassword) {
   for (const char* text :

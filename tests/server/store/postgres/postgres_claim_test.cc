@@ -1,4 +1,4 @@
-// Several servers over one database: one is active, and none that was superseded changes anything.
+// Several servers over one database: one is active, and a superseded server changes nothing.
 
 #include <absl/strings/str_cat.h>
 
@@ -16,13 +16,13 @@ using ::testing::Not;
 
 class PostgresClaim : public PostgresTest {};
 
-// Holds for the session whose lock makes its server the active one.
+// True for the session whose lock makes its server the active one.
 constexpr char kHasLock[] =
     "pid IN (SELECT pid FROM pg_locks JOIN pg_database ON database = pg_database.oid WHERE "
     "locktype = 'advisory' AND granted AND pg_database.datname = current_database())";
 
 TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
-  // It looks by itself at no time during this test: what refuses it is the database.
+  // The server sends no heartbeat during this test: the database refuses it.
   options_.beat = std::chrono::hours(1);
   Start();
   const AppendSession session = hulls_->Open("h")->session;
@@ -46,7 +46,7 @@ TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
   EXPECT_EQ(hulls_->registry().Sizes().hull_count, 1);
 }
 
-// What is there now may be newer than what it knows, which is no damage.
+// The stored state may be newer than the server's; that is not damage.
 TEST_F(PostgresClaim, ASupersededServerReadsNothing) {
   options_.beat = std::chrono::hours(1);
   Start();
@@ -84,7 +84,7 @@ TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
     return false;
   };
   auto next = std::async(std::launch::async, [this] { return Open(); });
-  // It found the store taken.
+  // It found the store claimed.
   asked.get_future().get();
   EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
   hulls_ = nullptr;
@@ -99,8 +99,8 @@ TEST_F(PostgresClaim, WhoWaitsCanBeToldToEnd) {
   EXPECT_TRUE(absl::IsCancelled(Open().status()));
 }
 
-// As when the machine of the active server is cut off, or the server stands still: the database
-// ends its session, which held the lock.
+// The active server's machine is cut off or the server hangs: the database ends its session, which
+// held the lock.
 TEST_F(PostgresClaim, WhoWaitsTakesOverWhenTheLockOfTheActiveServerGoes) {
   options_.beat = std::chrono::hours(1);
   Start();
@@ -118,7 +118,7 @@ TEST_F(PostgresClaim, AServerThatLosesItsLockWithNobodyWaitingTakesItAgain) {
   Start();
   const uint64_t epoch = hulls_->store().epoch();
   EndSessions(kHasLock);
-  // Bounded by the time limit of the test alone.
+  // Bounded only by the time limit of the test.
   while (Ask(absl::StrCat("SELECT 1 FROM pg_stat_activity WHERE ", kHasLock)).empty()) {
     std::this_thread::yield();
   }
@@ -146,7 +146,7 @@ TEST_F(PostgresClaim, ADatabaseThatWasPutBackIsAnotherStore) {
   Start();
   const std::string id = hulls_->store().id();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  // As after a failover to a standby that was behind.
+  // Simulates a failover to a standby that lagged behind.
   Ask("UPDATE hulld.store SET batch = batch - 1");
   EndSessions("true");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));

@@ -1,4 +1,4 @@
-// The disk of the database is full: that of its tables, or that of its log.
+// The database's disk is full: the disk of its tables, or that of its log.
 #include <absl/strings/str_cat.h>
 
 #include <memory>
@@ -14,12 +14,12 @@ namespace postgres_disk_test {
 
 using ::testing::HasSubstr;
 
-// For one server, and for several.
+// The parameter: several servers share the database.
 class PostgresDisk : public ::testing::TestWithParam<bool> {
  protected:
   using Server = std::unique_ptr<PostgresRegistry>;
 
-  // A database whose log is on one small disk, and whose tablespace "small" is on another.
+  // A database with its log on one small disk and its tablespace "small" on another.
   struct Machine {
     Machine() {
       for (const SmallDisk* disk : {&log, &tables})
@@ -61,12 +61,12 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
     }
     return std::make_unique<PostgresRegistry>(*std::move(store));
   }
-  // Before the database does.
+  // Servers end before the database does.
   void EndServers() {
     hulls_ = nullptr;
     other_ = nullptr;
   }
-  // Another server, or this one started anew.
+  // Returns the peer server, or this one after a restart.
   PostgresRegistry& Other() {
     if (GetParam()) return *other_;
     hulls_ = nullptr;
@@ -74,7 +74,7 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
     return *hulls_;
   }
   static std::string Name(int i) { return absl::StrCat("h", i); }
-  // As large as a chunk of a thousand points gets, of points that do not compress.
+  // A chunk of a thousand points that do not compress: the largest size.
   absl::Status PutNext() {
     std::uniform_real_distribution<double> angle(-1, 1);
     std::vector<Vector> points;
@@ -85,8 +85,8 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
     if (put.ok()) ++acknowledged_;
     return put;
   }
-  // All that was acknowledged is there, and what was refused is not but for the hull that the
-  // opening of its stream made.
+  // Expects that every acknowledged change is stored and every refused one is not. Opening a
+  // refused stream still creates its hull.
   void ExpectAcknowledged(PostgresRegistry& server) {
     for (int i = 0; i < acknowledged_; ++i) {
       const auto view = server.View(Name(i));
@@ -123,7 +123,7 @@ TEST_P(PostgresDisk, TablesThatDoNotFitAreSaidToAndNothingOfTheChangeStays) {
   for (int i = 0; i < 200 && refused.ok(); ++i) refused = PutNext();
   EXPECT_TRUE(absl::IsResourceExhausted(refused)) << refused;
   EXPECT_THAT(std::string(refused.message()), HasSubstr("nothing was changed"));
-  // Questions go on.
+  // Queries continue.
   ExpectAcknowledged(*hulls_);
   if (GetParam()) ExpectAcknowledged(*other_);
   machine_->tables.Free();
@@ -133,7 +133,7 @@ TEST_P(PostgresDisk, TablesThatDoNotFitAreSaidToAndNothingOfTheChangeStays) {
   EndServers();
 }
 
-// PostgreSQL ends all its processes then, recovers, and ends for good if that needs room, too.
+// PostgreSQL ends all its processes and recovers. If recovery needs space as well, it shuts down.
 TEST_P(PostgresDisk, ALogThatDoesNotFitLosesNothing) {
   options_.patience = std::chrono::milliseconds(500);
   Start("pg_default");
@@ -145,7 +145,7 @@ TEST_P(PostgresDisk, ALogThatDoesNotFitLosesNothing) {
   machine_->log.Free();
   cluster().StopImmediately();
   cluster().Start();
-  // One whose outcome was not known is there, or not.
+  // A change with an unknown outcome may or may not be stored.
   if (const auto last = Other().View(Name(acknowledged_));
       last.ok() && last->record.counts.received > 0) {
     ++acknowledged_;

@@ -1,4 +1,4 @@
-// The database fails, or the network does, while hulls grow.
+// Failures of the database or of the network while hulls grow.
 
 #include <absl/strings/str_cat.h>
 
@@ -46,8 +46,7 @@ TEST_F(PostgresFault, ACommitThatDidNotArriveIsRepeated) {
   EXPECT_EQ(ReceivedAnew("h"), 9);
 }
 
-// A transaction that a network holds back arrives when others have followed. It brings no vertex,
-// so that no key of a table would refuse it.
+// A delayed transaction arrives after later ones. It adds no vertex, so no table key rejects it.
 TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -62,7 +61,7 @@ TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
   EXPECT_EQ(hulls_->Open("h")->last_sequence, 3);
 }
 
-// Nobody can be asked: the answer says so, and nothing is taken until somebody can.
+// While the outcome cannot be determined, the error says so and further changes are refused.
 TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
   options_.patience = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
@@ -77,12 +76,13 @@ TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
     EXPECT_TRUE(absl::IsUnavailable(unknown)) << unknown;
     EXPECT_THAT(std::string(unknown.message()), HasSubstr("it may appear"));
     EXPECT_TRUE(absl::IsUnavailable(hulls_->Create("new").status()));
-    // Nobody sees the change; queries go on.
+    // The change is not visible; queries continue.
     EXPECT_EQ(hulls_->View(id)->record.counts.received, 8);
     EXPECT_FALSE(ended);
     proxy_->SetDown(false);
     const absl::Status next = hulls_->Create(id + "/next").status();
-    // What was refused and is there after all is left to the next server.
+    // If the refused change turns out to be stored, this server stops and leaves it to its
+    // successor.
     EXPECT_EQ(ended, cut == Cut::kAfterCommit);
     EXPECT_EQ(next.ok(), cut == Cut::kBeforeCommit) << next;
     EXPECT_EQ(ReceivedAnew(id), cut == Cut::kAfterCommit ? 9 : 8);
@@ -129,13 +129,13 @@ TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
     proxy_->SetDown(false);
   }
   EXPECT_GT(hulls_->store().failures().write, 0);
-  // No restart, not even a new stream.
+  // The stream continues without a restart.
   const auto accepted = hulls_->Append(session, 2, {{9, 9, 9}});
   ASSERT_TRUE(accepted.ok()) << accepted.status();
   EXPECT_EQ(ReceivedAnew("h"), 9);
 }
 
-// It neither answers nor closes anything.
+// The database neither answers nor closes its connections.
 TEST_F(PostgresFault, ADatabaseThatStandsStillHoldsNoThreadForEver) {
   options_.answer_time = std::chrono::milliseconds(200);
   options_.patience = std::chrono::milliseconds(100);
@@ -147,14 +147,13 @@ TEST_F(PostgresFault, ADatabaseThatStandsStillHoldsNoThreadForEver) {
   EXPECT_TRUE(
       absl::IsUnavailable(hulls_->store().LoadSequence(hulls_->View("h")->record, "x").status()));
   cluster().Resume();
-  // Whatever became of the first, the next server knows, and says the same as this one if it goes
-  // on.
+  // Whatever the outcome of the first change, the next server agrees with this one if it continues.
   const bool goes_on = hulls_->Put("h", {{10, 9, 9}}).ok();
   const uint64_t received = Received();
   EXPECT_EQ(ReceivedAnew("h"), goes_on ? received : 9);
 }
 
-// What PostgreSQL answers is no, and nothing of it stays.
+// The database rejects the transaction and keeps none of it.
 TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -168,7 +167,7 @@ TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
   EXPECT_EQ(ReceivedAnew("h"), 9);
 }
 
-// PostgreSQL then says that it has committed, and warns that a standby may not have it.
+// PostgreSQL reports a commit with a warning that a standby may lack it.
 TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -186,7 +185,7 @@ TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
   const std::string first = Ask("SELECT pid FROM pg_stat_activity WHERE " + waiting).front();
   const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
   Ask(absl::StrCat("SELECT pg_cancel_backend(", first, ")"));
-  // The store asks in a new session what became of it, and that waits for the standby, too.
+  // A new session queries the outcome, which also waits for the standby.
   await(waiting + " AND pid <> " + first);
   EXPECT_EQ(put.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
   Ask("ALTER SYSTEM RESET synchronous_standby_names");

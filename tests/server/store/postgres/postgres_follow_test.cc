@@ -1,5 +1,4 @@
-// Several servers over one database: what it costs a server to follow the others, and how soon it
-// does.
+// Several servers over one database: the cost and the delay of applying changes of peer servers.
 #include <absl/strings/str_cat.h>
 
 #include <functional>
@@ -19,7 +18,7 @@ using Server = std::unique_ptr<PostgresRegistry>;
 
 constexpr std::chrono::hours kNever{1};
 constexpr char kLook[] = "SELECT batch FROM hulld.store";
-// What has not come after this long does not come.
+// Waits that take this long have failed.
 constexpr std::chrono::seconds kLong{60};
 
 class PostgresFollow : public PostgresTest {
@@ -29,12 +28,12 @@ class PostgresFollow : public PostgresTest {
     options_.shared = true;
   }
 
-  // A server follows the others when it is called, and only then.
+  // A server reads changes of its peers only when it is called.
   void FollowWhenCalled() {
     options_.notices = false;
     options_.look = options_.beat = kNever;
   }
-  // One that reaches the database without the proxy.
+  // Starts a server that bypasses the proxy.
   Server StartBeside() {
     const PostgresOptions through_proxy = options_;
     options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
@@ -42,7 +41,7 @@ class PostgresFollow : public PostgresTest {
     options_ = through_proxy;
     return server;
   }
-  // The second has read the hull, of points on a sphere, and its next answers come from memory.
+  // The second server has read the hull, of points on a sphere, and answers from memory.
   void StartWithHull(int vertices) {
     Start();
     other_ = StartBeside();
@@ -54,7 +53,7 @@ class PostgresFollow : public PostgresTest {
     other_ = nullptr;
     hulls_ = nullptr;
   }
-  // What a server says of "h" is what one says that starts now and reads it anew.
+  // Expects that a server serves the same "h" as a server that just started.
   void ExpectAsReadAnew(PostgresRegistry& server) {
     const Server fresh = StartBeside();
     const auto view = server.View("h");
@@ -65,7 +64,7 @@ class PostgresFollow : public PostgresTest {
     EXPECT_EQ(view->served->high(), expected->served->high());
     EXPECT_EQ(Canonical(server, *view), Canonical(*fresh, *expected));
   }
-  // Empty: there is none.
+  // Empty if the hull does not exist.
   static std::vector<Vector> Canonical(PostgresRegistry& server, const HullView& view) {
     const auto hull = server.registry().Canonical(view, {});
     if (!hull.ok()) {
@@ -78,7 +77,7 @@ class PostgresFollow : public PostgresTest {
   Server other_;
 };
 
-// A point outside of the sphere of radius 1, further out each time, so that all stay vertices.
+// Returns a point outside the unit sphere, farther out for each i, so that all remain vertices.
 Vector PointOutside(int i) {
   const double angle = 0.1 * i;
   return (1.1 + 0.001 * i) * Vector(std::cos(angle), std::sin(angle), 0.01 * i);
@@ -105,15 +104,15 @@ TEST_F(PostgresFollow, WhatAnotherServerAddsCostsWhatItAdds) {
     EXPECT_EQ(hulls_->registry().Cache().loads, 1);
     EXPECT_EQ(hulls_->registry().Cache().grown, kAppends);
     if (bytes_of_the_smallest == 0) bytes_of_the_smallest = bytes;
-    // The same messages; numbers are of one size.
+    // The messages are the same, and numbers have a fixed size.
     EXPECT_EQ(bytes, bytes_of_the_smallest) << vertices << " vertices";
     EXPECT_LT(bytes, kAppends * 2048);
     ExpectAsReadAnew(*hulls_);
   }
 }
 
-// Points that take others in, points inside, several batches at a time, and a reader who holds what
-// was before.
+// Covers points that absorb vertices, inside points, several batches per read, and a reader that
+// holds an old snapshot.
 TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
   FollowWhenCalled();
   StartWithHull(300);
@@ -141,7 +140,7 @@ TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
   EXPECT_EQ(first.served->query_hull().point_count(), 300);
 }
 
-// Both append in turn: the builders are kept, and given what they lack.
+// Both servers append alternately: each keeps its builder and adds the peer's points to it.
 TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
   FollowWhenCalled();
   StartWithHull(1000);
@@ -152,7 +151,7 @@ TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
   for (int i = 0; i < 20; ++i) {
     const auto added = other_->Append(there->session, i + 1, {PointOutside(2 * i)});
     ASSERT_TRUE(added.ok()) << added.status();
-    // A server that follows before it builds is not superseded.
+    // A server that applies peer changes before it builds has no conflict.
     ASSERT_TRUE(hulls_->View("h").ok());
     const auto result = hulls_->Append(here->session, i + 1, {PointOutside(2 * i + 1)});
     ASSERT_TRUE(result.ok()) << result.status();
@@ -165,8 +164,8 @@ TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
   ExpectAsReadAnew(*other_);
 }
 
-// Both append at the same time, so that chunks that are being built, or on their way, are
-// superseded and built again.
+// Both servers append concurrently, so that chunks being built or in flight conflict and are built
+// again.
 TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
   StartWithHull(1000);
   constexpr uint64_t kChunks = 40;
@@ -200,7 +199,7 @@ TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
 TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
   FollowWhenCalled();
   StartWithHull(1000);
-  // More than its base.
+  // Larger than its base.
   ASSERT_TRUE(other_->Put("h", SpherePoints(3500, 2)).ok());
   ASSERT_EQ(Ask("SELECT count(*) FROM hulld.deltas").front(), "0");
   ASSERT_TRUE(hulls_->View("h").ok());
@@ -219,7 +218,7 @@ TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
 }
 
-// As without deltas: every caller that asks is told.
+// Every caller gets the error, as without deltas.
 TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
   FollowWhenCalled();
   StartWithHull(1000);
@@ -229,7 +228,7 @@ TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
 }
 
-// Nothing of what another server added outlives what it was added to.
+// Points added by a peer server do not survive the deletion of the hull.
 TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
   FollowWhenCalled();
   StartWithHull(500);
@@ -242,7 +241,7 @@ TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
   ExpectAsReadAnew(*hulls_);
 }
 
-// What a server keeps in memory of what it has not followed yet is bounded.
+// The memory for changes that are not yet applied is bounded.
 TEST_F(PostgresFollow, WhoIsBehindByTooManyHullsEnds) {
   FollowWhenCalled();
   Start();
@@ -263,7 +262,7 @@ TEST_F(PostgresFollow, WhoIsBehindByTooManyHullsEnds) {
   EXPECT_TRUE(ended);
 }
 
-// Waits until a watch of all hulls is told of something.
+// Waits for the events of a watch of all hulls.
 class Watcher {
  public:
   explicit Watcher(Registry& registry) : registry_(registry) {
@@ -275,7 +274,7 @@ class Watcher {
   }
   ~Watcher() { registry_.CloseWatch(watch_); }
 
-  // Whether it was told of this hull.
+  // Returns true when an event for this hull arrives; false after kLong.
   bool IsToldOf(const std::string& id) {
     while (true) {
       const auto piece = registry_.TakeChanges(*watch_);
@@ -298,7 +297,7 @@ class Watcher {
   bool is_ready_ = false;
 };
 
-// Whether it comes to be.
+// Returns true when the condition becomes true; false after kLong.
 bool Comes(const std::function<bool()>& what) {
   const auto end = std::chrono::steady_clock::now() + kLong;
   while (!what()) {
@@ -308,7 +307,7 @@ bool Comes(const std::function<bool()>& what) {
   return true;
 }
 
-// None of them looks by itself.
+// No server polls.
 TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
   options_.look = options_.beat = kNever;
   Start();
@@ -334,7 +333,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersLook) {
   EXPECT_TRUE(watcher.IsToldOf("h"));
 }
 
-// It comes back by itself, and hears again.
+// The listening session reconnects by itself.
 TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(20);
@@ -357,8 +356,8 @@ TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
   EXPECT_THAT(log.text(), HasSubstr("it is asked for that every 20 ms"));
 }
 
-// The connection stands, and nothing comes: the keeper finds with a beat what nobody told it, and
-// looks more often from then on, until it hears again.
+// The connection stays open but no notice arrives: the heartbeat finds the missed batch, and the
+// server polls more often until notices arrive again.
 TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   const CapturedLog log;
   options_.look = std::chrono::milliseconds(5);
@@ -379,7 +378,7 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   proxy_->SetDeaf(false);
   ASSERT_TRUE(other_->Create("heard again").ok());
   EXPECT_TRUE(watcher->IsToldOf("heard again"));
-  // With two beats come two looks, and one was perhaps under way.
+  // Two heartbeats cause two polls, and one poll may already have been running.
   EXPECT_TRUE(Comes([&] {
     const int looks_before = looks();
     const int beats_before = beats();
@@ -390,7 +389,7 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   EXPECT_THAT(log.text(), HasSubstr("no notice comes of what other servers commit"));
 }
 
-// A database that speaks PostgreSQL's protocol and knows no LISTEN. It is said once.
+// The database speaks PostgreSQL's protocol but lacks LISTEN. The log says so a single time.
 TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(10);

@@ -1,5 +1,5 @@
-// Records are looked up, not read at the start; and what the store holds is counted with each
-// batch.
+// Records are looked up on demand instead of being read at the start, and each batch updates the
+// totals of the store.
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace postgres_records_test {
 
 class PostgresRecords : public PostgresTest {
  protected:
-  // As the database counts them.
+  // The database's own counts.
   std::string Counted() const { return Ask("SELECT count(*) FROM hulld.hulls").front(); }
   std::string Kept() const { return Ask("SELECT hulls FROM hulld.store").front(); }
   std::string CountedBodies() const { return Ask("SELECT count(*) FROM hulld.bodies").front(); }
@@ -52,7 +52,7 @@ class PostgresRecords : public PostgresTest {
       server.registry().DeleteBody(id, std::nullopt, std::move(done));
     });
   }
-  // DATA_LOSS, NOT_FOUND: none can be had.
+  // DATA_LOSS or NOT_FOUND if the record is unavailable.
   static absl::StatusOr<BodyRecord> FindBody(PostgresRegistry& server, const std::string& id) {
     const FoundBodies found = server.registry().FindBodies(std::span(&id, 1));
     if (!found.status.ok()) return found.status;
@@ -62,7 +62,7 @@ class PostgresRecords : public PostgresTest {
     return body->record();
   }
   void StartOverMany(bool bodies);
-  // Hulls of 8 vertices, and one that is gone.
+  // Stores hulls of 8 vertices and deletes one.
   void FillSome() {
     ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
     ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
@@ -86,8 +86,8 @@ TEST_F(PostgresRecords, NoRecordIsReadUntilItIsAskedFor) {
   EXPECT_EQ(hulls_->registry().Cache().damaged, 1);
 }
 
-// What was found may be of a moment after which the registry has not heard of its own commit yet:
-// then it waits for its committer, which follows, also where nobody else commits.
+// A record may be newer than the registry's last applied commit. The lookup then waits for the
+// committer to apply it, even if no other commit follows.
 TEST_F(PostgresRecords, AServerThatIsActiveAloneHasNobodyToFollow) {
   const auto store = Open();
   ASSERT_TRUE(store.ok()) << store.status();
@@ -121,7 +121,7 @@ TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
     EXPECT_EQ(Kept(), Counted());
     EXPECT_EQ(KeptVertices(), 16);
   }
-  // The other server is told how many there are, without having asked for any.
+  // The peer server learns the totals without looking up any record.
   const std::unique_ptr<PostgresRegistry> other = MakeRegistry();
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Put("b", {{9, 9, 9}}, "other").ok());
@@ -178,7 +178,7 @@ TEST_F(PostgresRecords, AServerThatIsToldToEndLeavesTablesAsTheyWere) {
   EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
 }
 
-// As while another server counts what tables of a former format hold.
+// Simulates a peer server that counts the rows of an older table format.
 TEST_F(PostgresRecords, AServerWaitsWhileAnotherChangesTheTables) {
   Start();
   FillSome();
@@ -198,7 +198,7 @@ TEST_F(PostgresRecords, AServerWaitsWhileAnotherChangesTheTables) {
   }
 }
 
-// Hulls were counted by then.
+// That format already counted hulls.
 TEST_F(PostgresRecords, OfFormat3OnlyBodiesAreCounted) {
   options_.shared = true;
   Start();
@@ -234,12 +234,12 @@ TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
     EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
     EXPECT_TRUE(absl::IsDataLoss(FindBody(*hulls_, "body-2").status()));
     EXPECT_EQ(hulls_->registry().Cache().damaged, 1);
-    // One that was not looked for is in the way of a hull, too.
+    // A body that was never looked up also blocks a hull of its ID.
     EXPECT_TRUE(absl::IsAlreadyExists(hulls_->Create("body-3").status()));
     ASSERT_TRUE(DeleteBody(*hulls_, "body-3").ok());
     EXPECT_TRUE(hulls_->Create("body-3").ok());
     EXPECT_TRUE(absl::IsAlreadyExists(PutBody(*hulls_, "body-3").status()));
-    // A damaged body is replaced.
+    // A put replaces a damaged body.
     ASSERT_TRUE(PutBody(*hulls_, "body-2").ok());
     EXPECT_EQ(KeptBodies(), CountedBodies());
     for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(DeleteBody(*hulls_, id).ok());
@@ -252,7 +252,7 @@ TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
 TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
   Start();
   constexpr size_t kPieces = 10'000;
-  // Some 600 KB each: more than one page takes.
+  // About 600 KB each: more than one page holds.
   constexpr int kBodies = 40;
   for (int i = 0; i < kBodies; ++i) {
     ASSERT_TRUE(PutBody(*hulls_, absl::StrCat("large-", 100 + i), kPieces).ok());
@@ -275,7 +275,7 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
   EXPECT_LT(pages, 4);
 }
 
-// What others did of a body that is not in memory is told as what it was.
+// A watch reports a peer's change of a body that is not in memory with its correct kind.
 TEST_F(PostgresRecords, AWatchIsToldOfBodiesThatAreNotInMemory) {
   options_.shared = true;
   Start();
@@ -329,8 +329,8 @@ TEST_F(PostgresRecords, AWatchIsToldOfBodiesThatAreNotInMemory) {
   EXPECT_TRUE(told(of_hulls) == of_hulls_alone);
 }
 
-// HULLD_RECORDS in the environment: how many, by hand; it prints what a start takes, and what
-// reading all of them would.
+// HULLD_RECORDS sets the number of records for manual runs. Prints the cost of a start and that of
+// reading all records.
 void PostgresRecords::StartOverMany(bool bodies) {
   const char* const wanted = std::getenv("HULLD_RECORDS");
   const uint64_t count = wanted == nullptr ? 20'000 : std::stoull(wanted);
@@ -412,8 +412,8 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
   EXPECT_TRUE(hulls_->registry().List("", "c", 10)->hulls.empty());
 }
 
-// One that is not in memory, one of which is known that it went, which came again since, and one
-// that came again as a body.
+// One hull is not in memory, one is known to be deleted, one was recreated, and one was recreated
+// as a body.
 TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
   Start();
   FillSome();
@@ -426,7 +426,7 @@ TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
   ASSERT_TRUE(hulls_->Create("a").ok());
   ASSERT_TRUE(hulls_->Delete("b").ok());
   ASSERT_TRUE(PutBody(*hulls_, "b").ok());
-  // What is known of them goes.
+  // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
   EXPECT_FALSE(registry.TryFindBodies(std::vector<std::string>{"b"}).has_value());
   const auto told = [&](uint64_t after, bool bodies = false) {

@@ -1,4 +1,4 @@
-// Several servers that are active at once over one database.
+// Several servers that are active simultaneously over one database.
 #include <absl/strings/str_cat.h>
 #include <libpq-fe.h>
 
@@ -30,7 +30,7 @@ class PostgresShared : public PostgresTest {
     PostgresTest::TearDown();
   }
 
-  // One that reaches the database without the proxy.
+  // Starts a server that bypasses the proxy.
   Server StartBeside() {
     PostgresOptions through_proxy = options_;
     options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
@@ -60,7 +60,7 @@ class PostgresShared : public PostgresTest {
       server.registry().PutBody(std::move(body), if_revision, std::move(done));
     });
   }
-  // As the store keeps it now.
+  // Returns the hull as currently stored.
   StoredHull KeptHull(const std::string& id) {
     StoredHull kept;
     const absl::Status read =
@@ -70,7 +70,7 @@ class PostgresShared : public PostgresTest {
     EXPECT_TRUE(read.ok()) << read;
     return kept;
   }
-  // Wait until the database has a session of which this holds, or none; for a minute at most.
+  // Wait, for at most a minute, until a session matches the condition, or none does.
   void AwaitSession(const std::string& condition) const { AwaitCount(condition, true); }
   void AwaitNoSession(const std::string& condition) const { AwaitCount(condition, false); }
   void AwaitCount(const std::string& condition, bool is_some) const {
@@ -85,8 +85,8 @@ class PostgresShared : public PostgresTest {
       std::this_thread::yield();
     }
   }
-  // A cube is there, and a point is added whose COMMIT the proxy holds back, until another session
-  // waits for the turn. The future is that of Put.
+  // Creates a cube and appends a point; the proxy holds back the COMMIT until another session waits
+  // for the lock. Returns the future of Put.
   auto PutAPointWhoseCommitIsHeld() {
     EXPECT_TRUE(hulls_->Put("h", CubeCorners()).ok());
     proxy_->CutNext(Cut::kHoldCommit);
@@ -107,7 +107,7 @@ class PostgresShared : public PostgresTest {
   }
 };
 
-// However seldom it looks by itself what others did.
+// Holds regardless of how rarely the server polls.
 TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
   LookOnlyWhenAsked();
   Start();
@@ -153,7 +153,7 @@ TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
   const auto there = other->Open("h");
   ASSERT_TRUE(there.ok());
   ASSERT_TRUE(hulls_->Append(here->session, 1, CubeCorners()).ok());
-  // The writer moved on, and sends what it does not know to be there again.
+  // The writer moved to the peer server and resends the chunks that it has no acknowledgement for.
   const auto again = other->Append(there->session, 1, CubeCorners());
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_TRUE(again->already_applied);
@@ -167,7 +167,7 @@ TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
   EXPECT_EQ(other->Open("h")->last_sequence, 3);
 }
 
-// Each writer sends each of its chunks through both servers, as one that lost an answer does.
+// Each writer sends each chunk through both servers, like a client that lost an answer.
 TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
   Start();
   const Server other = StartBeside();
@@ -279,7 +279,7 @@ TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
   ASSERT_TRUE(opened.ok()) << opened.status();
   ASSERT_TRUE(hulls_->Append(opened->session, 1, CubeCorners()).ok());
   ASSERT_TRUE(other->Delete("h").ok());
-  // Nobody calls this server.
+  // No call reaches this server.
   EXPECT_TRUE(absl::IsFailedPrecondition(gone.get_future().get()));
   EXPECT_TRUE(absl::IsFailedPrecondition(hulls_->Append(opened->session, 2, {{9, 9, 9}}).status()));
 }
@@ -318,7 +318,7 @@ TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
                                    Told("h", ChangeKind::kDeleted)));
 }
 
-// The stream keeps the hull awake, but not what it holds of it.
+// The stream keeps the hull registered but does not pin its memory.
 TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
   Limits limits;
   limits.memory_limit = 1 << 20;
@@ -329,7 +329,7 @@ TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
   const Server other = StartBeside();
   const auto opened = hulls_->Open("h");
   ASSERT_TRUE(hulls_->Append(opened->session, 1, CubeCorners()).ok());
-  // More than the limit, so that what is not in use goes.
+  // Exceeds the limit, so that unused hulls are evicted.
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(hulls_->Put(absl::StrCat("large/", i), SpherePoints(1000)).ok());
     ASSERT_TRUE(hulls_->View(absl::StrCat("large/", i)).ok());
@@ -340,7 +340,7 @@ TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
   EXPECT_EQ(Received(*other, "h"), 10);
 }
 
-// Both changes of an ID are told as one. A watch of hulls alone is told of the hull.
+// Both changes of an ID form one event. A watch of hulls alone reports the hull.
 TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
   options_.notices = false;
   options_.look = options_.beat = std::chrono::hours(1);
@@ -410,7 +410,7 @@ TEST_F(PostgresShared, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
   EXPECT_EQ(Received(*other, "h"), 10);
 }
 
-// It is refused as unknown, and then found as if another server had done it.
+// The change is refused with an unknown outcome, and later applied as if a peer server had made it.
 TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
   options_.patience = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
@@ -422,7 +422,7 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
     proxy_->CutNext(cut);
     proxy_->GoDownWithCut();
     EXPECT_TRUE(absl::IsUnavailable(hulls_->Append(opened->session, 2, {{9, 9, 9}}).status()));
-    // What others did cannot be known.
+    // Changes of peer servers cannot be read.
     EXPECT_TRUE(absl::IsUnavailable(hulls_->View(id).status()));
     ASSERT_TRUE(other->Put(id, {{10, 9, 9}}, "v").ok());
     proxy_->SetDown(false);
@@ -434,8 +434,8 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
   }
 }
 
-// The transaction has the turn, and its COMMIT is on its way. Who asks what became of it waits for
-// the turn.
+// The transaction holds the lock and its COMMIT is in flight. A query of its outcome waits for the
+// lock.
 TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
   Start();
   const Server other = StartBeside();
@@ -453,7 +453,7 @@ TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
   Start();
   const Server other = StartBeside();
   auto put = PutAPointWhoseCommitIsHeld();
-  // As it does itself once nothing has come for ten seconds.
+  // The store does the same after ten seconds of silence.
   EndSessions("state = 'idle in transaction'");
   ASSERT_TRUE(put.get().ok());
   ASSERT_TRUE(other->Put("h", {{10, 9, 9}}, "v").ok());
@@ -478,7 +478,7 @@ TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
   EXPECT_EQ(Received(*hulls_, "h"), 10);
 }
 
-// When a creation or a deletion is made again, nothing tells that it was made before.
+// A repeated creation or deletion cannot be recognized as a repetition.
 TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
   Start();
   const Server other = StartBeside();
@@ -495,7 +495,7 @@ TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
   EXPECT_TRUE(absl::IsNotFound(other->View("h").status()));
 }
 
-// What belongs to a record is not given to a caller that has another one.
+// Data of one record is not returned to a caller with an older record.
 TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
   LookOnlyWhenAsked();
   Start();
@@ -504,7 +504,7 @@ TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
   const StoredHull former = KeptHull("h");
   PostgresStore& store = hulls_->store();
   EXPECT_EQ(*store.LoadSequence(former.record, "w"), 1);
-  // No vertex, hence no revision; but a sequence.
+  // No vertex, hence no revision; the sequence still advances.
   ASSERT_TRUE(other->Put("h", {{0.5, 0.5, 0.5}}).ok());
   EXPECT_TRUE(absl::IsAborted(store.LoadSequence(former.record, "w").status()));
   EXPECT_EQ(*store.LoadSequence(KeptHull("h").record, "w"), 2);
@@ -516,7 +516,7 @@ TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
   EXPECT_TRUE(absl::IsAborted(store.LoadSequence(former.record, "w").status()));
 }
 
-// What it knows of the hull is not the last, so each of these would be answered wrongly from it.
+// The server's knowledge of the hull is stale, so deciding from it would be wrong in each case.
 TEST_F(PostgresShared, ChangesAreDecidedByWhatOthersDid) {
   LookOnlyWhenAsked();
   Start();
@@ -533,7 +533,7 @@ TEST_F(PostgresShared, ChangesAreDecidedByWhatOthersDid) {
   EXPECT_TRUE(Replace(*hulls_, "h", SpherePoints(20), replaced->hull.revision).ok());
   ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
   EXPECT_EQ(hulls_->Open("h", "w", false)->last_sequence, 1);
-  // The chunks that are repeated, and what follows them.
+  // Repeated chunks, and the chunks after them.
   const auto opened = hulls_->Open("h");
   ASSERT_TRUE(other->Put("h", {{10, 9, 9}}).ok());
   EXPECT_TRUE(hulls_->Append(opened->session, 2, {{10, 9, 9}})->already_applied);
@@ -571,7 +571,7 @@ TEST_F(PostgresShared, ServersThatStartAtOnceMakeOneStore) {
   }
 }
 
-// As where those of servers that were killed are still there.
+// Simulates leftover sessions of killed servers.
 TEST_F(PostgresShared, AServerThatFindsNoRoomForItsSessionsWaits) {
   for (const int room : {1, 3}) {
     const std::string role = absl::StrCat("narrow_", room);
@@ -614,7 +614,7 @@ TEST_F(PostgresShared, AServerThatWasActiveAloneIsShutOutAndShutsOut) {
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   options_.shared = true;
   options_.should_stop = [] { return true; };
-  // It waits for the one that is active alone.
+  // It waits for the server that is active alone.
   EXPECT_TRUE(absl::IsCancelled(Open().status()));
   hulls_ = nullptr;
   options_.should_stop = {};
@@ -648,13 +648,13 @@ TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
   Ask("UPDATE hulld.store SET batch = batch - 1");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
   EXPECT_TRUE(ended);
-  // It sees the new ID at the latest.
+  // It detects the new ID at the latest.
   EXPECT_TRUE(absl::IsUnavailable(other->View("h").status()));
   Start();
   EXPECT_NE(hulls_->store().id(), id);
 }
 
-// Half of a batch has come, and nothing follows.
+// Half of a batch has arrived, and nothing follows.
 TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
   options_.longest_send = std::chrono::milliseconds(100);
   options_.beat = std::chrono::milliseconds(50);
@@ -669,7 +669,7 @@ TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
   }
   ASSERT_EQ(PQsendFlushRequest(stopped), 1);
   ASSERT_EQ(PQflush(stopped), 0);
-  // It has the turn once both are answered; each answer ends with a null.
+  // The session holds the lock after both answers; each answer ends with a null.
   for (int answers = 0; answers < 2;) {
     PGresult* const result = PQgetResult(stopped);
     if (result == nullptr) ++answers;
