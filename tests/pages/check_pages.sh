@@ -94,15 +94,15 @@ mapfile -t flags < <("$programs/hulld" --help | grep -oE '^  (-[a-z],)?--[a-z-]+
 for flag in "${flags[@]}"; do
   case $flag in
     --help | --version | --config | --check-config) ;;
-    *) check_complete server/README.md setting "$flag" ;;
+    *) check_complete server/REFERENCE.md setting "$flag" ;;
   esac
 done
 while read -r flag; do
-  [[ " ${flags[*]} " == *" $flag "* ]] || problem "server/README.md: hulld has no $flag"
-done < <(sed -n '/^## Settings/,/^## /p' server/README.md | grep -oE '^\| `--[a-z-]+' | grep -oE -- '--[a-z-]+')
+  [[ " ${flags[*]} " == *" $flag "* ]] || problem "server/REFERENCE.md: hulld has no $flag"
+done < <(sed -n '/^## Settings/,/^## Errors/p' server/REFERENCE.md | grep -oE '^\| `--[a-z-]+' | grep -oE -- '--[a-z-]+')
 
 while read -r reason; do
-  grep -qw "$reason" server/README.md || problem "server/README.md: the errors lack the reason $reason"
+  grep -qw "$reason" server/REFERENCE.md || problem "server/REFERENCE.md: the errors lack the reason $reason"
 done < <(sed -nE 's/^ *ERROR_REASON_([A-Z_]+) = [1-9][0-9]*;$/\1/p' proto/hulld/v1/error.proto)
 
 mapfile -t commands < <("$programs/hullctl" --help | sed '/^Options/,$d' | sed -nE 's/^  ([a-z]+) .*/\1/p')
