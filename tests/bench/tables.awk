@@ -314,13 +314,12 @@ function accuracy(   i, key) {
   printf "\n*Counts of %s questions, the same on every machine; rows in %s.*\n", cell[key, "questions"], files
 }
 
-function trade(only,   i, key) {
+function trade(   i, key) {
   read_rows("query_trade_" machine)
   peer_names()
   head("| method | ordinary | wrong | open | within 1e-6 of contact | wrong | open | depth | largest error of depth |")
   for (i = 1; i <= rows; i++) {
     key = order[i]
-    if (only != "" && index(only, "|" key "|") == 0) continue
     printf "| %s | %s | %d | %d | %s | %d | %d | %s | %s |\n", named(key), unit(cell[key, "ordinary_ns"]),
            cell[key, "ordinary_wrong"], cell[key, "ordinary_open"], unit(cell[key, "near_contact_ns"]),
            cell[key, "near_contact_wrong"], cell[key, "near_contact_open"],
@@ -452,7 +451,7 @@ function grown(vertices,   fields, step) {
   while (next_row("query_live_" machine, fields)) {
     if (fields[1] == "1 point, 1 question" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
   }
-  compare("one point more, then a question, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
+  compare("add a point, then query, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
 }
 # Over PostgreSQL: returns the name of a row of results/postgres/.
 function store_name(row) {
@@ -540,7 +539,7 @@ function summary(   one) {
   hull("hull of 100000 points on a sphere", "sphere:100000")
   one = "sphere:100000"
   # 100000 points, milliseconds: 10 ns per point for each.
-  compare("insert a point, mean over 100000 on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
+  compare("add a point, mean over 100000 on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
           10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
           cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
           cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])
@@ -570,9 +569,7 @@ BEGIN {
   else if (table == "motion") motion()
   else if (table == "batch") batch()
   else if (table == "scenes") scenes()
-  else if (table == "trade") trade("")
-  else if (table == "trade-short")
-    trade("|hulld|hulld tau 1e-09|simplified 1e-02|GJK double|FCL libccd|libccd MPR|Bullet|SAT double|")
+  else if (table == "trade") trade()
   else if (table == "network") network()
   else if (table == "start") start()
   else if (table == "postgres-commit") postgres_commit()
