@@ -376,10 +376,11 @@ function overload(   fields) {
   measured()
 }
 
-# One row per workload and size: hulld's step, Bullet's, and hulld's speedup.
+# One row per workload and size, of three sizes: hulld's step, Bullet's, and hulld's speedup.
 function live(   fields, key, order_of, i, n, part) {
   head("| a step | vertices | hulld: p50 | p99 | Bullet: p50 | with its box | hulld faster | with its box |")
   while (next_row("query_live_" machine, fields)) {
+    if (fields[3] !~ /^(64|10000|1000000)$/) continue
     key = fields[1] SUBSEP fields[3]
     if (fields[2] == "hulld") order_of[++n] = key
     step[key, fields[2]] = fields[4]
@@ -396,9 +397,11 @@ function live(   fields, key, order_of, i, n, part) {
   measured()
 }
 
+# Of three sizes; leaves out questions about another hull.
 function live_service(   fields, reader) {
   head("| vertices | question | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
   while (next_row("server_live_" machine, fields)) {
+    if (fields[1] !~ /^(64|10000|1000000)$/ || fields[2] ~ /^another/) continue
     reader = fields[4] != ""
     printf "| %d | %s | %s | %s | %s | %s | %s |\n", fields[1], fields[2], (reader ? unit(1000 * fields[4]) : "-"),
            (reader ? unit(1000 * fields[5]) : "-"), (reader ? sprintf("%.2f", fields[6]) : "-"),
@@ -497,16 +500,6 @@ function postgres_questions(clients,   i, key) {
   measured()
 }
 
-function postgres_bounded(   i, key) {
-  read_rows("postgres/bounded_" machine)
-  head("| BOUNDED, 8 clients | CPU of hulld | of RocksDB | turns |")
-  for (i = 1; i <= rows; i++) {
-    key = order[i]
-    printf "| %s | %s | %.3f | %d |\n", store_name(key), micro(cell[key, "cpu_us"]), cell[key, "cpu_of_peer"], cell[key, "rounds"]
-  }
-  measured()
-}
-
 function postgres_ingest(   i, key) {
   read_rows("postgres/ingest_" machine)
   head("| store | points | least of all rounds | CPU of hulld | of the database |")
@@ -575,7 +568,6 @@ BEGIN {
   else if (table == "postgres-commit") postgres_commit()
   else if (table == "postgres-questions") postgres_questions(1)
   else if (table == "postgres-many-questions") postgres_questions(64)
-  else if (table == "postgres-bounded") postgres_bounded()
   else if (table == "postgres-ingest") postgres_ingest()
   else if (table == "postgres-start") postgres_start()
   else if (table == "overload") overload()

@@ -24,9 +24,9 @@ find "$headers" -name '*.h' -printf '#include "%P"\n' | sort >"$work/headers.cc"
 cmake -G Ninja -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
-# The CMake code of client/README.md finds the package, too; tests/pages compiles the C++ code.
+# The CMake code of client/guide/CPP.md finds the package, too; tests/pages compiles the C++ code.
 mkdir "$work/page"
-pages=$here/../pages client_page=$here/../../client/README.md
+pages=$here/../pages client_page=$here/../../client/guide/CPP.md
 bash "$pages/extract_code.sh" "$client_page" cmake >"$work/page/CMakeLists.txt"
 bash "$pages/extract_code.sh" "$client_page" cpp >"$work/page/example.cc"
 cmake -G Ninja -S "$work/page" -B "$work/page/build" -DCMAKE_PREFIX_PATH="$work/prefix" \

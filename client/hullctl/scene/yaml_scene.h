@@ -15,7 +15,7 @@ namespace hulld {
 // Returns true if a scene with this first line that is not blank is YAML.
 bool LooksLikeYaml(std::string_view line);
 
-// Parses a YAML scene; for the keys see client/README.md#scene-files. `name` appears in errors, and
+// Parses a YAML scene; for the keys see client/guide/SCENES.md. `name` appears in errors, and
 // relative file names start at its folder. Opens none of the named files. INVALID_ARGUMENT
 // "NAME:LINE:COLUMN: message": not YAML; an unknown key; a value of the wrong type; an undefined or
 // duplicate name; more than kMostPieces pieces.

@@ -1,4 +1,4 @@
-"""Renders the pictures of the viewer in client/README.md.
+"""Renders the pictures of the viewer in README.md and client/guide/VIEWER.md.
 
     /usr/bin/python3 pictures.py BIN_DIRECTORY OUTPUT_DIRECTORY
 """
