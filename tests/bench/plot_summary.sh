@@ -3,6 +3,7 @@
 #
 #   bash tests/bench/plot_summary.sh [MACHINE]       writes results/summary_MACHINE{,_dark}.svg
 #   bash tests/bench/plot_summary.sh [MACHINE] png   writes PNGs for viewing into the same folder
+#   bash tests/bench/plot_summary.sh [MACHINE] check   fails if a chart lacks a label of the summary
 #
 # One bar per library and task on a logarithmic axis of time. The share of wrong answers is written
 # on the bar.
@@ -27,6 +28,15 @@ rows() {
     }'
 }
 
+if [[ $format == check ]]; then
+  for chart in results/summary_"$machine"{,_dark}.svg; do
+    rows | cut -f 3- | tr '\t' '\n' | grep -v '^ *$' | while IFS= read -r label; do
+      grep -qF ">$label<" "$chart" || { echo "$chart lacks \"$label\"; run plot_summary.sh"; exit 1; }
+    done
+  done
+  exit
+fi
+
 # plot NAME INK GRID OURS PEER WRONG BACKGROUND
 plot() {
   local terminal tasks
@@ -34,7 +44,7 @@ plot() {
     svg) terminal="svg size 860,540 font 'Helvetica,13'" ;;
     png) terminal="pngcairo size 860,540 font 'Helvetica,10' background '$7'" ;;
     *)
-      echo "plot_summary.sh: svg or png, not $format" >&2
+      echo "plot_summary.sh: svg, png, or check, not $format" >&2
       exit 2
       ;;
   esac

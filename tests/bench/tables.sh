@@ -2,7 +2,7 @@
 # Keeps the tables of measurements in the pages equal to the rows in tests/bench/results/.
 #
 #   tables.sh --write [MACHINE]   writes them into the pages
-#   tables.sh --check [MACHINE]   fails with a message if a page differs
+#   tables.sh --check [MACHINE]   fails with a message if a page, or the chart of the summary, differs
 #   tables.sh TABLE [MACHINE]     prints one
 #
 # MACHINE names the files, as in hull_build_MACHINE.csv; epyc_gcc12 by default. In a page, a table
@@ -50,6 +50,7 @@ case $what in
       rewritten "$page" | diff -u "$page" - || different=1
     done
     ((different == 0)) || echo "Please run: bash tests/bench/tables.sh --write"
+    bash plot_summary.sh "$machine" check || different=1
     exit $different
     ;;
   --help) sed -n '2,10s/^# \{0,1\}//p' tables.sh ;;
