@@ -60,13 +60,13 @@ set logscale x
 set lmargin at screen 0.36
 set rmargin at screen 0.98
 set xrange [5:3e11]
-set yrange [$tasks - 0.3:-1.2]
+set yrange [$tasks - 0.3:-0.7]
 set xtics ('10 ns' 1e1, '100 ns' 1e2, '1 us' 1e3, '10 us' 1e4, '100 us' 1e5, '1 ms' 1e6, \\
            '10 ms' 1e7, '100 ms' 1e8) textcolor rgb '$2' scale 0
 set grid xtics lt 1 lw 0.6 lc rgb '$3'
 set border 0
 set ytics scale 0 textcolor rgb '$2'
-set key at graph 1, graph 0.995 right top horizontal samplen 1.2 textcolor rgb '$2'
+set key at graph 0.995, graph 0.595 right top samplen 1.2 textcolor rgb '$2'
 set style fill solid 1 noborder
 plot \$rows using (\$1):0:(5):1:(\$0 - 0.34):(\$0 - 0.03):ytic(6) with boxxyerror lc rgb '$4' title 'hulld', \\
      '' using (\$2):0:(5):2:(\$0 + 0.03):(\$0 + 0.34) with boxxyerror lc rgb '$5' title 'fastest of qhull, CGAL, Bullet, FCL, libccd', \\
