@@ -77,6 +77,7 @@ start_server() {
 }
 
 for place in "$work"/steps/*.place; do
+  [[ -e $place ]] || continue  # A page without steps.
   step=${place%.place}
   if [[ -f $step.file ]]; then
     mkdir -p "$(dirname "$(head -1 "$step.file")")"
