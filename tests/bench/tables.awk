@@ -407,15 +407,6 @@ function live_work(   fields, enough) {
   measured()
 }
 
-function busy(   fields) {
-  head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
-  while (next_row("server_busy_" machine, fields)) {
-    sub(/^alone$/, "nothing", fields[2])
-    printf "| %s | %s | %.3g | %.3g | %.2f | %.2f |\n", fields[1], fields[2], fields[4], fields[5], fields[6], fields[7]
-  }
-  measured()
-}
-
 # One row of the summary; times in nanoseconds. wrong: errors of hulld and the peer.
 function compare(what, ours, peer, theirs, wrong) {
   printf "| %s | %s | %s: %s | %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours), wrong
@@ -472,8 +463,8 @@ function postgres_commit(   i, key, floor, both) {
   measured()
 }
 
-function postgres_questions(clients,   i, key) {
-  read_rows("postgres/questions" (clients > 1 ? clients : "") "_" machine)
+function postgres_questions(   i, key) {
+  read_rows("postgres/questions_" machine)
   head("| a question | p50 | p99 | a second | CPU of hulld | of RocksDB | CPU of the database |")
   for (i = 1; i <= rows; i++) {
     key = order[i]
@@ -481,28 +472,6 @@ function postgres_questions(clients,   i, key) {
            cell[key, "per_second"], micro(cell[key, "cpu_us"]),
            cell[key, "peer"] == "" ? "-" : sprintf("%.2f", cell[key, "cpu_of_peer"]),
            key ~ /rocksdb|gRPC/ ? "-" : micro(cell[key, "database_cpu_us"])
-  }
-  measured()
-}
-
-function postgres_ingest(   i, key) {
-  read_rows("postgres/ingest_" machine)
-  head("| store | points | least of all rounds | CPU of hulld | of the database |")
-  for (i = 1; i <= rows; i++) {
-    key = order[i]
-    printf "| %s | %s | %s | %.0f ns a point | %.0f ns |\n", store_name(key), million(cell[key, "per_second"]),
-           million(cell[key, "least_per_second"]), 1000 * cell[key, "cpu_us"], 1000 * cell[key, "database_cpu_us"]
-  }
-  measured()
-}
-
-function postgres_start(   i, key) {
-  read_rows("postgres/start_" machine)
-  head("| hulls of 64 vertices | listens after | first answer after | resident | processor time | in the database |")
-  for (i = 1; i <= rows; i++) {
-    key = order[i]
-    printf "| %d | %.0f ms | %.0f ms | %.0f MiB | %.0f ms | %.1f MiB |\n", key, cell[key, "listens_ms"], cell[key, "answers_ms"],
-           cell[key, "resident_mib"], cell[key, "cpu_ms"], cell[key, "store_mib"]
   }
   measured()
 }
@@ -550,12 +519,8 @@ BEGIN {
   else if (table == "network") network()
   else if (table == "start") start()
   else if (table == "postgres-commit") postgres_commit()
-  else if (table == "postgres-questions") postgres_questions(1)
-  else if (table == "postgres-many-questions") postgres_questions(64)
-  else if (table == "postgres-ingest") postgres_ingest()
-  else if (table == "postgres-start") postgres_start()
+  else if (table == "postgres-questions") postgres_questions()
   else if (table == "overload") overload()
-  else if (table == "busy") busy()
   else if (table == "live") live()
   else if (table == "live-service") live_service()
   else if (table == "live-work") live_work()
