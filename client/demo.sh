@@ -123,7 +123,7 @@ ask() {
 }
 
 # turned_about NAME SHIFT: the pose that turns a copy of a hull by half a turn about the vertical
-# line through its vertex of largest x, moved by SHIFT of the way towards the middle of the hull.
+# line through its vertex of largest x, moved by SHIFT of the way toward the middle of the hull.
 # With SHIFT 0 the two share exactly that vertex, and the plane of constant x through it separates
 # the rest; a little inwards the line runs through the inside of both; a little outwards a gap opens.
 # Doubling a coordinate and turning by half a turn round nothing, so the touching is exact.
@@ -169,8 +169,8 @@ generated_scenes() {
   register ball100 "$work/ball100.xyz"
 
   heading "The two random balls"
-  ask SEPARATED "centres 2.5 apart?" ball3000 ball100 --pose-b 2.5,0,0
-  ask OVERLAPPING "centres 1 apart?" ball3000 ball100 --pose-b 1,0,0
+  ask SEPARATED "centers 2.5 apart?" ball3000 ball100 --pose-b 2.5,0,0
+  ask OVERLAPPING "centers 1 apart?" ball3000 ball100 --pose-b 1,0,0
 }
 
 # A writer streams ever larger balls into one hull while a reader asks whether it reaches a second

@@ -45,11 +45,11 @@ spdx_id() {
 }
 
 # License names in Debian's copyright files, if these have the machine-readable format.
-declare -A licences_of
-read_licences() {
-  local name licences
-  while IFS=$'\t' read -r name licences; do
-    licences_of[$name]=$licences
+declare -A licenses_of
+read_licenses() {
+  local name licenses
+  while IFS=$'\t' read -r name licenses; do
+    licenses_of[$name]=$licenses
   done < <(awk '/^License: */ {
       sub(/^License: */, "")
       split(FILENAME, part, "/")
@@ -98,8 +98,8 @@ package() {
 # debian_package PREFIX NAME VERSION ARCHITECTURE
 debian_package() {
   local more='' id
-  if [[ -n ${licences_of[$2]-} ]]; then
-    quote "Debian's copyright file names: ${licences_of[$2]}"
+  if [[ -n ${licenses_of[$2]-} ]]; then
+    quote "Debian's copyright file names: ${licenses_of[$2]}"
     more=" \"licenseComments\": $REPLY,"
   fi
   quote "pkg:deb/debian/${2//+/%2B}@${3//:/%3A}?arch=$4&distro=debian-12"
@@ -128,7 +128,7 @@ cat <<END
   "creationInfo": {"created": "$created", "creators": ["Tool: docker/sbom.sh"]},
   "packages": [
 END
-read_licences
+read_licenses
 separator=
 for program in "${programs[@]}"; do
   name=$(basename "$program")

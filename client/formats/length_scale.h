@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// An exact decimal factor of coordinates, such as 0.0254 from inches to metres. Default: 1.
+// An exact decimal factor of coordinates, such as 0.0254 from inches to meters. Default: 1.
 //
 // Scaling has a single rounding: the result is the double nearest to the real product, ties to
 // even, or infinity if the product is beyond the largest double.
@@ -26,7 +26,7 @@ class LengthScale {
   double Apply(double x) const;
 
   // Parses `text` as ParseDouble does and sets `value` to the exact decimal number times the scale.
-  // Only the product is rounded: 0.1 inches are 0.00254 metres.
+  // Only the product is rounded: 0.1 inches are 0.00254 meters.
   NumberText Parse(std::string_view text, double* value) const;
 
  private:

@@ -14,7 +14,7 @@ namespace hulld {
 
 // Receives the statements of an OBJ file in order. Functions that are empty are not called.
 struct ObjReceiver {
-  // The text after `v`: three coordinates, then weight or colour.
+  // The text after `v`: three coordinates, then weight or color.
   std::function<absl::Status(std::string_view text)> vertex;
   // The vertices of a face, counted from 0. They exist once the whole file is read.
   std::function<void(const std::vector<uint32_t>& corners)> face;

@@ -167,7 +167,7 @@ class AsciiBody {
   AsciiBody(ByteSource* source, const PointCollector& points) : source_(source), points_(points) {}
 
   // Reads the values of an element and sets its coordinates, scaled. White space separates values,
-  // line ends included: RealSense Viewer splits a vertex and its colour over two lines.
+  // line ends included: RealSense Viewer splits a vertex and its color over two lines.
   absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz) {
     std::string_view token;
     for (const Property& property : element.properties) {

@@ -28,10 +28,10 @@ bool IsMeshFormat(PointFormat format);
 // Errors of the file are INVALID_ARGUMENT and name file and line, or file and byte. Errors of
 // `receive` are returned unchanged.
 //
-// Points by format: obj: each `v` (weights and colours are ignored); off, ply, pcd, las: each
+// Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each
 // vertex; xyz, pts: the first three columns; csv: the columns x, y, and z; stl: each corner of each
 // triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that shows
-// it. COLLADA (dae) is converted to metres by the file's own unit and keeps its axes, as robot
+// it. COLLADA (dae) is converted to meters by the file's own unit and keeps its axes, as robot
 // descriptions expect: up_axis is ignored.
 //
 // `path` "-" is standard input, which dae refuses. `progress`, if set, periodically receives

@@ -41,10 +41,10 @@ void AddOutputOptions(Command program, Invocation* invocation) {
           "--color",
           [invocation](const std::string& when) {
             const bool terminal = &invocation->out == &std::cout && isatty(STDOUT_FILENO) != 0;
-            invocation->paint = Painter(WantsColour(when, terminal));
+            invocation->paint = Painter(WantsColor(when, terminal));
             return absl::OkStatus();
           },
-          "Whether to use colours (default auto: on a terminal, unless $NO_COLOR is set)")
+          "Whether to use colors (default auto: on a terminal, unless $NO_COLOR is set)")
       .ValueName("WHEN")
       .OneOf({"auto", "always", "never"});
 }
@@ -168,7 +168,7 @@ ExitCode Act(Invocation* invocation) {
     const absl::Status resolved = ResolveConnection(invocation);
     if (!resolved.ok()) return invocation->FailUsage(resolved);
   }
-  // Machine-readable output has no colours.
+  // Machine-readable output has no colors.
   if (invocation->json() || invocation->names()) invocation->paint = Painter();
   const ExitCode code = invocation->action();
   invocation->out.flush();
@@ -184,7 +184,7 @@ int Run(const std::vector<std::string>& arguments, const Invocation* session, st
       "hullctl", HULLD_VERSION,
       "Keeps convex hulls on a hulld server and asks it whether they collide.");
   Invocation invocation(out, err);
-  invocation.paint = Painter(WantsColour("auto", &out == &std::cout && isatty(STDOUT_FILENO) != 0));
+  invocation.paint = Painter(WantsColor("auto", &out == &std::cout && isatty(STDOUT_FILENO) != 0));
   invocation.shows_progress = &err == &std::cerr && isatty(STDERR_FILENO) != 0;
   if (session != nullptr) {
     invocation.form = session->form;

@@ -65,7 +65,7 @@ def own_nodes(function: ast.FunctionDef) -> list[ast.AST]:
     return found
 
 
-class Colours:
+class Colors:
     """The functions that become coroutines, or asynchronous generators."""
 
     def __init__(self, trees: list[ast.Module]) -> None:
@@ -103,8 +103,8 @@ def is_async_context(node: ast.With) -> bool:
 
 
 class ToAsync(ast.NodeTransformer):
-    def __init__(self, colours: Colours) -> None:
-        self._colours = colours
+    def __init__(self, colors: Colors) -> None:
+        self._colors = colors
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
         module = node.module or ""
@@ -128,7 +128,7 @@ class ToAsync(ast.NodeTransformer):
             # The garbage collector runs in any thread, and a loop has one.
             return None
         nodes = own_nodes(node)
-        becomes_async = node.name in ASYNC_METHODS or any(map(self._colours.waits, nodes))
+        becomes_async = node.name in ASYNC_METHODS or any(map(self._colors.waits, nodes))
         self.generic_visit(node)
         node.name = METHODS.get(node.name, node.name)
         if not becomes_async:
@@ -137,7 +137,7 @@ class ToAsync(ast.NodeTransformer):
         return ast.copy_location(ast.AsyncFunctionDef(**fields), node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        is_awaited = self._colours.is_awaited(node)
+        is_awaited = self._colors.is_awaited(node)
         self.generic_visit(node)
         return ast.Await(node) if is_awaited else node
 
@@ -150,7 +150,7 @@ class ToAsync(ast.NodeTransformer):
         return node
 
     def visit_For(self, node: ast.For) -> ast.AST:
-        is_iterated = self._colours.is_iterated(node.iter)
+        is_iterated = self._colors.is_iterated(node.iter)
         self.generic_visit(node)
         if not is_iterated:
             return node
@@ -181,10 +181,10 @@ def generate(source: pathlib.Path, target: pathlib.Path) -> None:
         lines = (source / f"{module}.py").read_text(encoding="utf-8").splitlines()
         kept = [line for line in lines if not line.endswith("# sync only")]
         trees.append(ast.parse("\n".join(kept)))
-    colours = Colours(trees)
+    colors = Colors(trees)
     (target / "aio").mkdir(parents=True, exist_ok=True)
     for module, tree in zip(MODULES, trees):
-        text = ast.unparse(ast.fix_missing_locations(ToAsync(colours).visit(tree)))
+        text = ast.unparse(ast.fix_missing_locations(ToAsync(colors).visit(tree)))
         (target / "aio" / f"{module}.py").write_text(
             f"# Written by generate_aio.py from {module}.py; do not edit.\n{text}\n",
             encoding="utf-8",

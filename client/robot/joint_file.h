@@ -13,7 +13,7 @@
 namespace hulld {
 
 // Reads waypoints one by one from a table: a header of variable names (see JointVariable), then one
-// row per waypoint, in radians and metres, separated by commas, semicolons, tabs, or spaces. Skips
+// row per waypoint, in radians and meters, separated by commas, semicolons, tabs, or spaces. Skips
 // a column "time", blank lines, and lines that start with #. Variables without a column stay at
 // rest. Memory does not grow with the file.
 class WaypointReader {

@@ -13,7 +13,7 @@
 namespace hulld {
 
 // The collision model of a robot description: links that form a tree of joints, and their collision
-// shapes. Lengths are metres and angles radians, as in URDF.
+// shapes. Lengths are meters and angles radians, as in URDF.
 
 enum class ShapeKind { kBox, kCylinder, kSphere, kCapsule, kMesh };
 

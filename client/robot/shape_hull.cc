@@ -131,7 +131,7 @@ ShapeHull BoxHull(const CollisionShape& box) {
 
 ShapeHull CylinderHull(const CollisionShape& cylinder) {
   ShapeHull hull;
-  // The sides of a regular polygon are nearer to its centre than its corners, by this factor.
+  // The sides of a regular polygon are nearer to its center than its corners, by this factor.
   const double reach = kOutward * cylinder.radius / std::cos(std::numbers::pi / kCylinderSides);
   for (int side = 0; side < kCylinderSides; ++side) {
     const double angle = 2 * std::numbers::pi * side / kCylinderSides;

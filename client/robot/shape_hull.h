@@ -14,7 +14,7 @@ namespace hulld {
 struct ShapeHull {
   // n x 3, in the frame of the shape.
   std::vector<double> xyz;
-  // The hull contains the shape and extends at most this far beyond it, in metres; proven, up to
+  // The hull contains the shape and extends at most this far beyond it, in meters; proven, up to
   // the rounding of this number. 0 for boxes, and for meshes, which are replaced by their hull.
   double excess = 0;
 };

@@ -97,7 +97,7 @@ TriangleTree::Box TriangleTree::BoxOf(const Triangle& triangle) const {
   return box;
 }
 
-// Splits at the median of the triangle centres along the longest side of their box.
+// Splits at the median of the triangle centers along the longest side of their box.
 void TriangleTree::Build(uint32_t first, uint32_t end) {
   Box box = BoxOf(triangles_[order_[first]]);
   for (uint32_t i = first + 1; i < end; ++i) {

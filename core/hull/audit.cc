@@ -131,7 +131,7 @@ struct SharedEdge {
   Side right;
 };
 
-// Returns every side by tail and head, with the opposite side of the neighbouring facet: the one at
+// Returns every side by tail and head, with the opposite side of the neighboring facet: the one at
 // the same place in the order by head and tail.
 absl::StatusOr<std::vector<SharedEdge>> CheckManifold(const Hull& hull, StopPoll& poll) {
   const size_t count = hull.vertices().size();
@@ -202,7 +202,7 @@ absl::Status CheckConnected(const Hull& hull, const std::vector<SharedEdge>& sha
   return absl::OkStatus();
 }
 
-// Checks that the neighbour of every facet across every edge bends strictly inwards.
+// Checks that the neighbor of every facet across every edge bends strictly inwards.
 absl::Status CheckLocalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
                                  const std::vector<SharedEdge>& shared, StopPoll& poll) {
   for (const auto& [left, right] : shared) {

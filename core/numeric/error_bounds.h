@@ -148,17 +148,17 @@ inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
 // that, because underflow adds less. Times E. Proven.
 inline constexpr double kLeadErrorFactor = 64 * kUnitRoundoff;
 
-// The distance of a vertex from the hull's centre: the difference errs by u of itself, the norm by
+// The distance of a vertex from the hull's center: the difference errs by u of itself, the norm by
 // at most 8 u. Proven.
 inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;
 
-// Bounding spheres: the distance of their centres errs by sqrt(3) * 128 u S, the sum of the radii
+// Bounding spheres: the distance of their centers errs by sqrt(3) * 128 u S, the sum of the radii
 // (at most 4 S in total) by 4 u S; squares by 4 u of themselves each. As kSphereErrorFactor S and a
 // factor kSphereSquareRoundUp. Proven.
 inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
 inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 
-// Bounds about a hull's centre c (center_bounds.h). They exist only if the radius R, the largest |v
+// Bounds about a hull's center c (center_bounds.h). They exist only if the radius R, the largest |v
 // - c|, and the least reach from c along a corner's direction are at least kCenterLeastRadius M. At
 // a corner, the support value errs by 64 u M (16 u M, the blur 32 u M, n . c and the difference) <=
 // 2^-27 R. The point p proven to be inside is off the corner's ray by e <= 6 u M, so the gauge g is
@@ -170,12 +170,12 @@ inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 inline constexpr double kCenterLeastRadius = 0x1p-20;
 inline constexpr double kCenterMargin = 0x1p-20;
 
-// n . (a - b) over all vertices against the support functions along n about the centres, with n the
-// computed difference of the centres, which errs by 128 u S per component: 384 u |n| S; n . n, at
+// n . (a - b) over all vertices against the support functions along n about the centers, with n the
+// computed difference of the centers, which errs by 128 u S per component: 384 u |n| S; n . n, at
 // most 3 sqrt(3) |n| S, errs by 16 u |n| S, the sums by 22 u |n| S. Times |n| S. Proven.
 inline constexpr double kCenterSupportFactor = 512 * kUnitRoundoff;
 
-// The gauge of a hull along the true difference n of the centres in its frame, against the gauge
+// The gauge of a hull along the true difference n of the centers in its frame, against the gauge
 // along the computed one: the difference errs by 128 u S per component, rotated by sqrt(3) times
 // that; the rotation by 57 u |n|, the interpolation by 8 sqrt(3) u |n|, |n| <= sqrt(3) S: 345 u S.
 // Times S and the largest gauge. The points c_A + s n of A with s < 1 / g_A and c_B - t n of B with
@@ -218,10 +218,10 @@ inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
 // (box_gap.h); M the largest absolute coordinate of a body's boxes, t the translation between the
 // bodies, S = M_X + M_Y + |t|. Entries of the product of two computed rotations err by 2 sqrt(3) *
 // 16 u and their own rounding, 3 u: 59 u. The translation, rotated into the frame of X, errs by 57
-// u |t| as above and 3 u |t| of the difference; a centre by 3 * 59 u M, 9 u M from its rotation and
-// 2 u M of its own. The step between the centres, at most 5 S, therefore errs by 200 u S and its
+// u |t| as above and 3 u |t| of the difference; a center by 3 * 59 u M, 9 u M from its rotation and
+// 2 u M of its own. The step between the centers, at most 5 S, therefore errs by 200 u S and its
 // sums by 12 u S. Rotated into the frame of Y: 3 * 212 u S, 3 * 59 u * 5 S and 9 u * 5 S: below
-// 1600 u S. Half widths err like centres. The total is below 2000 u S, also for the corners of a
+// 1600 u S. Half widths err like centers. The total is below 2000 u S, also for the corners of a
 // box that contains a rotated one. Times S, for S between kFilterMinSize and kFilterMaxSize.
 // Proven.
 inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
@@ -246,7 +246,7 @@ inline constexpr double kRoundedRelativeError = 2 * kUnitRoundoff;
 // exactly, and are usually equal. Times the larger. Proven.
 inline constexpr double kDepthKeyErrorFactor = 0x1p-40;
 
-// Hull centre: the sum of the sixths of six vertices. Sixths err by u M in total, the sums by 3 u
+// Hull center: the sum of the sixths of six vertices. Sixths err by u M in total, the sums by 3 u
 // M: at most 7 u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). The
 // same holds for the mean of up to ten inner vertices: nine sums of values up to 10 M, 90 u M / 10,
 // and a division: 11 u M. Proven.

@@ -18,8 +18,8 @@ Box Box::Empty() { return {Vector::Constant(kInfinity), Vector::Constant(-kInfin
 Box GrownBy(const Box& box, double clearance) {
   if (clearance == 0) return box;
   // Rounds outwards by one unit in the last place, the largest error of the sums.
-  const auto grown = [&](double x, double towards) {
-    return std::nextafter(x + std::copysign(clearance, towards), towards);
+  const auto grown = [&](double x, double toward) {
+    return std::nextafter(x + std::copysign(clearance, toward), toward);
   };
   Box result = box;
   for (int axis = 0; axis < 3; ++axis) {
@@ -61,12 +61,12 @@ BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should
   for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
 }
 
-// Splits the boxes in half along the axis with the widest spread of centres.
+// Splits the boxes in half along the axis with the widest spread of centers.
 uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll) {
   const auto node = static_cast<uint32_t>(nodes_.size());
   Box bounds = Box::Empty();
   Box centers = bounds;
-  // Twice the centre; 0 for a box that covers all of space.
+  // Twice the center; 0 for a box that covers all of space.
   const auto center = [&](uint32_t index) {
     const Vector sum = boxes[index].low + boxes[index].high;
     return sum.array().isFinite().all() ? sum : Vector(Vector::Zero());

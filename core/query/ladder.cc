@@ -13,7 +13,7 @@
 namespace hulld {
 namespace {
 
-// Returns true if bounding spheres prove the hulls separated along n, the vector from A's centre to
+// Returns true if bounding spheres prove the hulls separated along n, the vector from A's center to
 // B's.
 bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
   const double reach = pair.a().query_hull().radius() + pair.b().query_hull().radius() +
@@ -21,9 +21,9 @@ bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
   return SquaredNorm(n) > reach * reach * kSphereSquareRoundUp;
 }
 
-// Compares the bounds about the hulls' centres along n, the vector from A's centre to B's. Returns
+// Compares the bounds about the hulls' centers along n, the vector from A's center to B's. Returns
 // SEPARATED if n separates the hulls, OVERLAPPING if their interiors cover the segment between the
-// centres.
+// centers.
 std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n,
                                             const FloatPair::CenterView& view) {
   if (!view.known()) return std::nullopt;
@@ -39,21 +39,21 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
   return std::nullopt;
 }
 
-// Returns true if bounds about the centres may settle a pair that spheres do not.
+// Returns true if bounds about the centers may settle a pair that spheres do not.
 bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
   if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
-  // Coarse bounds settle little except overlaps of hulls with centres this near.
+  // Coarse bounds settle little except overlaps of hulls with centers this near.
   const double reach = a.radius() + b.radius();
   return 4 * SquaredNorm(n) < reach * reach;
 }
 
-// Returns the relation if the bounds about the centres prove it. Otherwise sets `first` to the
-// initial direction of the walk, from the normals of the surfaces between the centres; they
-// indicate a gap better than the centres do. Leaves `first` unchanged if these normals are unknown
+// Returns the relation if the bounds about the centers prove it. Otherwise sets `first` to the
+// initial direction of the walk, from the normals of the surfaces between the centers; they
+// indicate a gap better than the centers do. Leaves `first` unchanged if these normals are unknown
 // or nearly cancel. Not inlined, to keep the path of distant pairs short.
 [[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
                                                         PlainVector& first) {
@@ -103,7 +103,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 }
 
 // Tries the rungs between spheres and exact arithmetic. Returns false if none of them decides. `n`
-// leads from A's centre to B's; `found` receives the state in which the search ended. Requires:
+// leads from A's center to B's; `found` receives the state in which the search ended. Requires:
 // pair.usable(). Not inlined, to keep the path of distant pairs short.
 [[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
                                              double tolerance, PairCache* cache, Purpose purpose,

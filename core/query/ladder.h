@@ -43,7 +43,7 @@ enum class Purpose {
 
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound
 // proves it: bounding spheres; the suggestion of the cache; for the relation alone, bounds of the
-// hulls along the line of their centres; the hulls in floating point; exact arithmetic. Fills
+// hulls along the line of their centers; the hulls in floating point; exact arithmetic. Fills
 // `decision`, which must be as constructed. Requires: tolerance >= 0. Updates the cache, which may
 // be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,
 // returned true; only the exact rung polls it.

@@ -122,14 +122,14 @@ class SeparationSearch {
   // Chooses the start of the floating-point search: the axis that it found, or four pairs with
   // differences that surround the origin. The choice does not depend on the suggestion of a cache.
   void StartFrom(const Decision& decision, bool cold) {
-    towards_ = -pair_.CenterDifference();
+    toward_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
-      if (const Vector* n = std::get_if<Vector>(&decision.axis)) towards_ = *n;
+      if (const Vector* n = std::get_if<Vector>(&decision.axis)) toward_ = *n;
       start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
       return;
     }
     const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference());
-    if (found.verdict == FloatVerdict::kSeparated) towards_ = found.axis;
+    if (found.verdict == FloatVerdict::kSeparated) toward_ = found.axis;
     if (found.verdict != FloatVerdict::kOverlapping) return;
     start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
   }
@@ -139,7 +139,7 @@ class SeparationSearch {
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (relation_ == Relation::kSeparated) {
-      bounds_ = BoundDistance(pair_, towards_, goal);
+      bounds_ = BoundDistance(pair_, toward_, goal);
       seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
     } else {
       seed_.clear();
@@ -232,7 +232,7 @@ class SeparationSearch {
   const std::function<bool()>& should_stop_;
   StopPoll poll_;
   const double size_;
-  Vector towards_ = Vector::Zero();
+  Vector toward_ = Vector::Zero();
   std::vector<VertexPair> start_;
   std::vector<VertexPair> seed_;
   SeparationBounds bounds_;

@@ -95,7 +95,7 @@ class AxisTable {
     return ExactGap(Exact(axis));
   }
 
-  // Returns the exact axis, oriented from A towards B. Requires: a gap of at least zero.
+  // Returns the exact axis, oriented from A toward B. Requires: a gap of at least zero.
   IntegerVector Oriented(uint64_t axis) {
     const IntegerVector n = Exact(axis);
     if (SignOfGap(n) >= 0) return n;

@@ -18,7 +18,7 @@ using ReflectionServiceOfBytes =
         grpc::reflection::v1alpha::ServerReflection::Service>;
 
 // grpc.reflection.v1alpha.ServerReflection: lists the services for tools such as grpcurl. It needs
-// no token, since the contract is no secret. Its streams count towards --max-streams-per-client and
+// no token, since the contract is no secret. Its streams count toward --max-streams-per-client and
 // hold no thread while they wait.
 class ReflectionService : public ReflectionServiceOfBytes {
  public:

@@ -16,7 +16,7 @@ namespace {
 
 constexpr char kRequestIdKey[] = "x-request-id";
 constexpr char kTraceKey[] = "traceparent";
-// Also honoured by gRPC's own retries.
+// Also honored by gRPC's own retries.
 constexpr char kRetryKey[] = "grpc-retry-pushback-ms";
 
 double Milliseconds(std::chrono::steady_clock::duration duration) {

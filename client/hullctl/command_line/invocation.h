@@ -57,7 +57,7 @@ struct Invocation {
   // Freshness of reads, if set by options.
   std::optional<v1::Freshness> freshness;
   OutputForm form = OutputForm::kTable;
-  // Colours for `out`.
+  // Colors for `out`.
   Painter paint;
   // True if `err` is a terminal.
   bool shows_progress = false;

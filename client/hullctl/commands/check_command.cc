@@ -221,7 +221,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
-       {"Are they within a centimetre?", "hullctl check arm box --clearance 0.01"},
+       {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record it, and prove it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});

@@ -31,7 +31,7 @@ std::vector<ManSection> ProgramSections() {
   absl::StrAppend(&variables,
                   "  HULLCTL_CONTEXT       as --context\n"
                   "  HULLD_TOKEN           the token itself\n"
-                  "  NO_COLOR              no colours, unless --color says so");
+                  "  NO_COLOR              no colors, unless --color says so");
   return {{"environment", variables},
           {"files",
            "  $XDG_CONFIG_HOME/hullctl/contexts.json   contexts: see hullctl-context(1)\n"

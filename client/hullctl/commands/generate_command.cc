@@ -89,7 +89,7 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
             if (center.ok()) cloud->center = *center;
             return center.status();
           },
-          "Centre; of the lattice its first point (default 0,0,0)")
+          "Center; of the lattice its first point (default 0,0,0)")
       .ValueName("x,y,z");
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");

@@ -188,7 +188,7 @@ void AddSceneCommand(Command program, Invocation* invocation) {
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\nWith a clearance, pairs within it are found although they are separated.");
   command.SetExamples({{"", "hullctl scene scene.json"},
-                       {"What comes within a centimetre",
+                       {"What comes within a centimeter",
                         "hullctl scene scene.txt --clearance 0.01 --separation"}});
   command.OnGiven([=] {
     // A subcommand has already set the action.

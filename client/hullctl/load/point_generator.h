@@ -30,9 +30,9 @@ struct CloudOptions {
   uint64_t seed = 1;
   // Radius of ball and sphere.
   double radius = 1;
-  // Edge of the cube; distance between neighbours of the lattice.
+  // Edge of the cube; distance between neighbors of the lattice.
   double size = 1;
-  // Centre of ball, sphere, and cube; first point of the lattice.
+  // Center of ball, sphere, and cube; first point of the lattice.
   std::array<double, 3> center = {0, 0, 0};
 };
 

@@ -33,7 +33,7 @@ Point Normalized(const Point& a) {
   return {a[0] / length, a[1] / length, a[2] / length};
 }
 
-// Maps coordinates of any magnitude to a box within [-1, 1]^3 centred on 0.
+// Maps coordinates of any magnitude to a box within [-1, 1]^3 centered on 0.
 class Normalization {
  public:
   explicit Normalization(const std::vector<ScenePanel>& panels) {

@@ -26,7 +26,7 @@ std::string Painter::operator()(Hue hue, const std::string& text) const {
   return std::string("\x1b[") + CodeOf(hue) + "m" + text + "\x1b[0m";
 }
 
-bool WantsColour(const std::string& when, bool is_terminal) {
+bool WantsColor(const std::string& when, bool is_terminal) {
   if (when != "auto") return when == "always";
   const char* const no_color = std::getenv("NO_COLOR");
   const char* const terminal = std::getenv("TERM");

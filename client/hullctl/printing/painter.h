@@ -5,10 +5,10 @@
 
 namespace hulld {
 
-// Meaning of a colour. The text always states it too.
+// Meaning of a color. The text always states it too.
 enum class Hue { kHeading, kGood, kNotable, kBad };
 
-// Colours words by terminal escape sequences; leaves them unchanged if disabled.
+// Colors words by terminal escape sequences; leaves them unchanged if disabled.
 class Painter {
  public:
   Painter() = default;
@@ -20,9 +20,9 @@ class Painter {
   bool on_ = false;
 };
 
-// Returns true if output is coloured. `when` is "always", "never", or "auto": on a terminal that
-// supports colour, unless $NO_COLOR is set (https://no-colour.org).
-bool WantsColour(const std::string& when, bool is_terminal);
+// Returns true if output is colored. `when` is "always", "never", or "auto": on a terminal that
+// supports color, unless $NO_COLOR is set (https://no-color.org).
+bool WantsColor(const std::string& when, bool is_terminal);
 
 // Returns the number of columns of a text, without escape sequences.
 size_t VisibleWidth(const std::string& text);

@@ -27,7 +27,7 @@ const char kRobotHelp[] =
     "--split does so with any parts. The hulls are removed at the end unless --prefix keeps them.\n"
     "Meshes are obj, stl, ply, off, gltf or dae. A package://NAME/ is found by --package, in\n"
     "ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above FILE.\n"
-    "Metres and radians, as in URDF. Poses are computed in floating point; answers are exact for\n"
+    "Meters and radians, as in URDF. Poses are computed in floating point; answers are exact for\n"
     "those poses.\n";
 
 namespace {

@@ -37,7 +37,7 @@ constexpr char kYamlHelp[] =
     "...}\n"
     "or {xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and what 'hullctl\n"
     "check' asks for: separation, witness, axis, certificate, analysis, clearance, max_error,\n"
-    "tolerance. Coordinates of files become metres by `scale`, rounded once. Files stand beside\n"
+    "tolerance. Coordinates of files become meters by `scale`, rounded once. Files stand beside\n"
     "the scene file.\n";
 
 // Deletes only the listed revision, if it was listed.

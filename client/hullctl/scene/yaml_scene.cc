@@ -18,7 +18,7 @@ namespace {
 
 struct UnitName {
   const char* name;
-  // Metres, exact.
+  // Meters, exact.
   const char* length;
 };
 constexpr UnitName kUnits[] = {
@@ -83,7 +83,7 @@ class SceneParser {
     if (const auto scale = LengthScale::FromText(*text); scale.has_value()) return *scale;
     return yaml_.ErrorAt(node, absl::StrCat("scale: ", Quoted(*text),
                                             " is no unit and no number other than 0; units are "
-                                            "mm, cm, m, in and ft, of a scene in metres"));
+                                            "mm, cm, m, in and ft, of a scene in meters"));
   }
 
   absl::Status TakeHulls(const YAML::Node& node) {
@@ -136,7 +136,7 @@ class SceneParser {
     return absl::OkStatus();
   }
 
-  // Reads edge lengths; the box is centred on the origin.
+  // Reads edge lengths; the box is centered on the origin.
   absl::Status TakeBox(const YAML::Node& node, HullDefinition* hull) const {
     const auto size = yaml_.Numbers(node, "box", {3});
     if (!size.ok()) return size.status();

@@ -40,7 +40,7 @@ v1::PointBlock GrowthOf(int step) {
 absl::Status SendGrowth(const Client::PointSink& sink) { return sink(GrowthOf(1)); }
 
 // Returns the pose that turns a copy of a hull by half a turn about the vertical line through its
-// vertex of largest x, moved by `shift` of the distance towards the mean of its vertices. With
+// vertex of largest x, moved by `shift` of the distance toward the mean of its vertices. With
 // shift 0 the two share exactly that vertex, and the plane of constant x through it separates the
 // rest. Doubling a coordinate and half a turn round nothing, so the contact is exact.
 Pose7 TurnedAbout(const HullMesh& hull, double shift) {
@@ -131,7 +131,7 @@ ViewScene CubeScene(const std::string& cube) {
 ViewScene BallScene(const std::string& large, const std::string& small) {
   ViewScene scene;
   scene.title = "Two balls of random points";
-  scene.note = "Hulls of 3000 and of 100 points in balls of radius 1, their centres 1.9 apart.";
+  scene.note = "Hulls of 3000 and of 100 points in balls of radius 1, their centers 1.9 apart.";
   scene.objects = {{"3000 points", large, -1, kIdentityPose},
                    {"100 points", small, -1, MovedBy(1.9, 0, 0)}};
   return scene;

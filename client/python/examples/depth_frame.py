@@ -1,4 +1,4 @@
-"""Turns a depth frame into a hull, and lowers a gripper towards it.
+"""Turns a depth frame into a hull, and lowers a gripper toward it.
 
     python depth_frame.py
 
@@ -17,18 +17,18 @@ import hulld
 Array = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0  # pixels
-CAMERA_HEIGHT = 0.6  # metres above the table
-EGG_CENTRE, EGG_RADII = np.array([0.02, -0.01, 0.04]), np.array([0.03, 0.03, 0.04])
+CAMERA_HEIGHT = 0.6  # meters above the table
+EGG_CENTER, EGG_RADII = np.array([0.02, -0.01, 0.04]), np.array([0.03, 0.03, 0.04])
 # The camera looks down: its z axis is the world's -z.
 X_WC = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, CAMERA_HEIGHT], [0, 0, 0, 1]])
 
 
 def render() -> npt.NDArray[np.float32]:
-    """Depth along the camera's z axis in metres: HEIGHT x WIDTH, NaN where nothing is measured."""
+    """Depth along the camera's z axis in meters: HEIGHT x WIDTH, NaN where nothing is measured."""
     u, v = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     rays_C = np.stack([(u - WIDTH / 2) / FOCAL, (v - HEIGHT / 2) / FOCAL, np.ones(u.shape)], -1)
     rays = rays_C @ X_WC[:3, :3].T / EGG_RADII
-    origin = (X_WC[:3, 3] - EGG_CENTRE) / EGG_RADII
+    origin = (X_WC[:3, 3] - EGG_CENTER) / EGG_RADII
     # |origin + depth ray| = 1 where the egg is hit.
     a, b, c = (rays * rays).sum(-1), rays @ origin, origin @ origin - 1
     with np.errstate(invalid="ignore"):
@@ -67,7 +67,7 @@ def main() -> None:
         assert above.separation is not None
         print(f"at 0.2 m: {above.relation.name}, {above.separation.value:.4f} m apart")
 
-        # Many questions: lower it by a millimetre each time, and stop when it touches.
+        # Many questions: lower it by a millimeter each time, and stop when it touches.
         heights = np.arange(0.2, 0.0, -0.001)
         with client.stream_collisions(["gripper", "egg"], [(0, 1)], clearance=0.002) as stream:
             for height in heights:

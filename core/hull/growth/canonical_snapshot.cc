@@ -199,10 +199,10 @@ class FaceCollector {
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;
       flags_[id] |= t.flat;
-      const TriangleId next = t.neighbours[1];
+      const TriangleId next = t.neighbors[1];
       const SurfaceTriangle& other = surface_.triangle(next);
       if (other.corners[2] != t.corners[2]) return;
-      HULLD_CHECK(other.neighbours[2] == id);
+      HULLD_CHECK(other.neighbors[2] == id);
       if (surface_.IsInPlane(vertices_, id, vertices_[other.corners[1]])) {
         flags_[id] |= 1 << 1;
         flags_[next] |= 1 << 2;
@@ -213,7 +213,7 @@ class FaceCollector {
   void TracePolygons(StopPoll& poll) {
     for (TriangleId id = 0; id < flags_.size() && !poll.stopped(); ++id) {
       if ((flags_[id] & kAnyFlat) == 0 || (flags_[id] & kVisited) != 0) continue;
-      // A triangle with all edges within its facet is reached from its neighbours.
+      // A triangle with all edges within its facet is reached from its neighbors.
       uint32_t edge = 0;
       while (edge < 3 && IsFlat(id, edge)) ++edge;
       if (edge < 3) TracePolygon(id, edge, poll);
@@ -237,8 +237,8 @@ class FaceCollector {
       edge = (edge + 1) % 3;
       while (IsFlat(id, edge)) {
         HULLD_CHECK(steps_left-- > 0);
-        const TriangleId across = surface_.triangle(id).neighbours[edge];
-        const auto& back = surface_.triangle(across).neighbours;
+        const TriangleId across = surface_.triangle(id).neighbors[edge];
+        const auto& back = surface_.triangle(across).neighbors;
         edge = back[0] == id ? 1 : back[1] == id ? 2 : 0;
         id = across;
         flags_[id] |= kVisited;
@@ -350,18 +350,18 @@ std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<con
   }
   std::rotate(facet.begin(), std::min_element(facet.begin(), facet.end()), facet.end());
   if (facet[1] > facet[n - 1]) std::reverse(facet.begin() + 1, facet.end());
-  // The two edges of each vertex lead to its neighbours; each edge is recorded at its lower vertex.
-  std::vector<std::pair<uint32_t, uint32_t>> neighbours(n);
+  // The two edges of each vertex lead to its neighbors; each edge is recorded at its lower vertex.
+  std::vector<std::pair<uint32_t, uint32_t>> neighbors(n);
   for (uint32_t i = 0; i < n; ++i) {
     if (poll.Step()) return std::nullopt;
-    neighbours[facet[i]] = std::minmax(facet[(i + n - 1) % n], facet[(i + 1) % n]);
+    neighbors[facet[i]] = std::minmax(facet[(i + n - 1) % n], facet[(i + 1) % n]);
   }
   std::vector<Edge> edges;
   edges.reserve(n);
   for (uint32_t v = 0; v < n; ++v) {
     if (poll.Step()) return std::nullopt;
-    if (neighbours[v].first > v) edges.push_back({v, neighbours[v].first});
-    if (neighbours[v].second > v) edges.push_back({v, neighbours[v].second});
+    if (neighbors[v].first > v) edges.push_back({v, neighbors[v].first});
+    if (neighbors[v].second > v) edges.push_back({v, neighbors[v].second});
   }
   return Hull(2, std::move(ranking.points), {0, n}, std::move(facet), std::move(edges));
 }

@@ -14,7 +14,7 @@ namespace hulld {
 // A coordinate plane onto which the polygon projects with non-zero area preserves every orientation
 // in it, up to one common sign. There the boundary is a lower and an upper chain, each sorted
 // lexicographically. A point joins a chain if it lies strictly beyond the chain's edge above or
-// below it, and then removes neighbours that are no longer strictly convex. Source: Preparata 1979,
+// below it, and then removes neighbors that are no longer strictly convex. Source: Preparata 1979,
 // An Optimal Real-Time Algorithm for Planar Convex Hulls.
 class PolygonBoundary {
  public:

@@ -17,7 +17,7 @@ namespace hulld {
 namespace {
 
 // The first attempt uses the computed corners. Then corners move outwards by this fraction of their
-// distance from the centre, eight times as much in each failed attempt. From the third attempt on,
+// distance from the center, eight times as much in each failed attempt. From the third attempt on,
 // the amount added by pushing doubles each time.
 constexpr double kFirstInflation = 0x1p-50;
 constexpr double kFirstGrowth = 0x1p-6;
@@ -26,7 +26,7 @@ constexpr int kMostAttempts = 18;
 // angle between the mean and a normal. It limits the distance if they differ widely, as at the tip
 // of a needle.
 constexpr double kLeastCosine = 0.05;
-// Corners farther from the centre, in units of the hull's size, do not enclose tightly. A choice.
+// Corners farther from the center, in units of the hull's size, do not enclose tightly. A choice.
 constexpr double kFarthestCorner = 0x1p20;
 // Vertices of the full hull per check. As many, spread over all vertices, are checked first: most
 // failing hulls fail early.
@@ -148,7 +148,7 @@ std::optional<SimplifiedHull> Enclosure::ByPlanes(const Hull& inside) {
   return std::nullopt;
 }
 
-// Returns the corners, relative to the centre and at unit scale, of the intersection of the
+// Returns the corners, relative to the center and at unit scale, of the intersection of the
 // half-spaces, by duality: each facet of the hull of the points normal / reach is a corner.
 // Rounded; empty on failure.
 std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> planes,
@@ -157,7 +157,7 @@ std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> plane
   std::vector<Corner> dual;
   for (const Plane& plane : planes) {
     const double reach = plane.offset + plane.gap - plane.normal.dot(center);
-    // If the centre is too near to a plane, dual points are too far away to compute with.
+    // If the center is too near to a plane, dual points are too far away to compute with.
     if (!(reach > kDualMinReach)) return {};
     dual.push_back({plane.normal / reach, plane.farthest});
   }

@@ -10,7 +10,7 @@ namespace hulld {
 namespace {
 
 // One vertex in this many is a candidate for removal, as one of the least protruding. About half of
-// the candidates have a neighbour that protrudes even less, and stay.
+// the candidates have a neighbor that protrudes even less, and stay.
 constexpr size_t kVerticesPerFlat = 10;
 
 }  // namespace
@@ -63,22 +63,22 @@ std::vector<uint32_t> Relaxation::Ascending(std::span<const uint32_t> chosen) co
   return ascending;
 }
 
-// Finds vertices with about the least height above their neighbours' mean, no two of them
-// neighbours.
+// Finds vertices with about the least height above their neighbors' mean, no two of them
+// neighbors.
 std::vector<bool> Relaxation::FindFlattest(const Hull& inside, std::span<const Vector> points,
                                            std::span<const Vector> normals) {
   const size_t count = points.size();
   std::vector<Vector> sum(count, Vector::Zero());
-  std::vector<int> neighbours(count, 0);
+  std::vector<int> neighbors(count, 0);
   for (const Edge& edge : inside.edges()) {
     sum[edge.tail] += points[edge.head];
     sum[edge.head] += points[edge.tail];
-    ++neighbours[edge.tail];
-    ++neighbours[edge.head];
+    ++neighbors[edge.tail];
+    ++neighbors[edge.head];
   }
   std::vector<double> heights(count);
   for (size_t v = 0; v < count; ++v) {
-    heights[v] = normals[v].stableNormalized().dot(points[v] - sum[v] / neighbours[v]);
+    heights[v] = normals[v].stableNormalized().dot(points[v] - sum[v] / neighbors[v]);
   }
   std::vector<double> least = heights;
   const auto last = least.begin() + static_cast<ptrdiff_t>(count / kVerticesPerFlat);

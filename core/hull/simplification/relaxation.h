@@ -16,11 +16,11 @@ namespace hulld {
 // Spreads chosen vertices of a hull of dimension 3 more evenly. Proves nothing: measure the quality
 // of a choice afterwards.
 //
-// If the neighbours of a chosen vertex are fixed, the hull of all chosen vertices has the most
+// If the neighbors of a chosen vertex are fixed, the hull of all chosen vertices has the most
 // volume with that vertex farthest along the sum of the area normals of the surrounding facets.
 // Repeatedly moving all vertices there at once turns the irregular triangles of farthest first into
 // nearly equilateral ones, as far as curvature permits, and these have the least error for their
-// area. Crowded vertices protrude least, and removing one makes room for its neighbours. Source:
+// area. Crowded vertices protrude least, and removing one makes room for its neighbors. Source:
 // Chen and Xu 2004, Optimal Delaunay Triangulations, for the place of most volume; Lloyd 1982,
 // Least Squares Quantization in PCM, for moving all at once.
 class Relaxation {
@@ -33,7 +33,7 @@ class Relaxation {
   // ascending. Returns nothing if the chosen vertices lie in a plane or the poll stopped. Cost: a
   // hull of the chosen vertices and a support point for each.
   std::optional<std::vector<uint32_t>> Move(std::span<const uint32_t> chosen);
-  // Move, with some of the least protruding vertices removed, no two of them neighbours: about one
+  // Move, with some of the least protruding vertices removed, no two of them neighbors: about one
   // in 20.
   std::optional<std::vector<uint32_t>> MoveFewer(std::span<const uint32_t> chosen);
 

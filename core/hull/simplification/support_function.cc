@@ -16,7 +16,7 @@ constexpr uint32_t kLeafVertices = 8;
 // Number of vertices partitioned in about the time of a poll step.
 constexpr uint32_t kVerticesPerStep = 256;
 // The most edges of a vertex to climb along.
-constexpr size_t kMostNeighbours = 64;
+constexpr size_t kMostNeighbors = 64;
 // The most vertices to climb to, so that a path around a long edge of small facets is not walked to
 // its end.
 constexpr int kMostClimbs = 256;
@@ -50,11 +50,11 @@ void SupportFunction::Link(const Hull& hull, StopPoll& poll) {
   }
   uint32_t end = 0;
   for (uint32_t& start : starts_) start = end += start;
-  neighbours_.resize(2 * hull.edges().size());
+  neighbors_.resize(2 * hull.edges().size());
   for (const Edge& edge : hull.edges()) {
     if (poll.Step()) return;
-    neighbours_[--starts_[edge.tail]] = edge.head;
-    neighbours_[--starts_[edge.head]] = edge.tail;
+    neighbors_[--starts_[edge.tail]] = edge.head;
+    neighbors_[--starts_[edge.head]] = edge.tail;
   }
 }
 
@@ -84,9 +84,9 @@ uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start)
   double most = points_[best].dot(direction);
   for (int climbs = 0; climbs < kMostClimbs; ++climbs) {
     const uint32_t at = best;
-    const std::span<const uint32_t> neighbours = NeighboursOf(at);
-    if (neighbours.size() > kMostNeighbours) break;
-    for (const uint32_t next : neighbours) {
+    const std::span<const uint32_t> neighbors = NeighborsOf(at);
+    if (neighbors.size() > kMostNeighbors) break;
+    for (const uint32_t next : neighbors) {
       if (const double reach = points_[next].dot(direction); reach > most) {
         most = reach;
         best = next;
@@ -130,11 +130,11 @@ double SupportFunction::DistanceBound(const Vector& p, uint32_t start, double en
   TriangleDistance best = DistanceToTriangle(corners[0], corners[1], corners[2], p);
   uint32_t at = start;
   for (int k = 0; k < kMostSupportPoints && best.bound > enough; ++k) {
-    const Vector towards = (p - best.nearest).stableNormalized();
-    at = FarthestAlong(towards, at);
+    const Vector toward = (p - best.nearest).stableNormalized();
+    at = FarthestAlong(toward, at);
     const Vector& support = points_[at];
     // The whole hull is behind the plane through the support point.
-    if (towards.dot(p - support) >= (1 - kRelativeEnough) * best.bound) break;
+    if (toward.dot(p - support) >= (1 - kRelativeEnough) * best.bound) break;
     TriangleDistance least = best;
     size_t goes = 3;
     for (size_t out = 0; out < 3; ++out) {

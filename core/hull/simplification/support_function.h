@@ -30,7 +30,7 @@ class SupportFunction {
 
   // Returns a **proven** bound of the distance of p from the hull; usually within one in 10^9,
   // except that a bound below `enough` is returned at once. Maintains a triangle of vertices, and
-  // replaces one of them by the support point towards p while that brings the triangle nearer.
+  // replaces one of them by the support point toward p while that brings the triangle nearer.
   // Source: Gilbert, Johnson and Keerthi 1988. Cost: some 5 support points.
   double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 
@@ -45,8 +45,8 @@ class SupportFunction {
     uint32_t second_half;
   };
 
-  std::span<const uint32_t> NeighboursOf(uint32_t vertex) const {
-    return std::span(neighbours_).subspan(starts_[vertex], starts_[vertex + 1] - starts_[vertex]);
+  std::span<const uint32_t> NeighborsOf(uint32_t vertex) const {
+    return std::span(neighbors_).subspan(starts_[vertex], starts_[vertex + 1] - starts_[vertex]);
   }
   void Link(const Hull& hull, StopPoll& poll);
   void Build(uint32_t first, uint32_t end, StopPoll& poll);
@@ -55,7 +55,7 @@ class SupportFunction {
   std::span<const Vector> points_;
   // Adjacent vertices, by vertex.
   std::vector<uint32_t> starts_;
-  std::vector<uint32_t> neighbours_;
+  std::vector<uint32_t> neighbors_;
   // The vertices in the order of the tree.
   std::vector<uint32_t> order_;
   std::vector<Node> nodes_;

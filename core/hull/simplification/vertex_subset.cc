@@ -16,7 +16,7 @@
 namespace hulld {
 namespace {
 
-// The most steps from triangle to triangle towards a nearer one; the next search continues from
+// The most steps from triangle to triangle toward a nearer one; the next search continues from
 // there.
 constexpr int kMostSteps = 64;
 // Average walk steps per point above which a shape is unsuitable for walks.
@@ -271,7 +271,7 @@ TriangleId VertexSubset::ClimbFrom(TriangleId id, uint32_t point) const {
   double height = HeightOver(id, point);
   for (int step = 0; step < kMostSteps; ++step) {
     TriangleId higher = id;
-    for (const TriangleId next : surface_->triangle(id).neighbours) {
+    for (const TriangleId next : surface_->triangle(id).neighbors) {
       if (const double h = HeightOver(next, point); h > height) {
         height = h;
         higher = next;

@@ -95,7 +95,7 @@ class DirectionMap {
   int resolution() const { return n_; }
   size_t cell_count() const { return 6 * static_cast<size_t>(n_) * static_cast<size_t>(n_); }
 
-  // NaN-free for every finite point. By rounding, the cell may be a neighbour of the true one; the
+  // NaN-free for every finite point. By rounding, the cell may be a neighbor of the true one; the
   // gauges allow for that.
   Place PlaceOf(const Vector& point) const { return PlaceIn(frame_, n_, point); }
   // PlaceOf for a map of any resolution.

@@ -215,7 +215,7 @@ TriangleId Surface::NewId() {
 void Surface::Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat) {
   const auto link = [this, is_flat](TriangleId from, uint32_t edge, TriangleId to) {
     SurfaceTriangle& t = triangles_.Mutable(from);
-    t.neighbours[edge] = to;
+    t.neighbors[edge] = to;
     t.flat = (t.flat & ~(1u << edge)) | static_cast<uint32_t>(is_flat) << edge;
   };
   link(a, edge_a, b);
@@ -281,11 +281,11 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
     const uint32_t i = visit.edge;
     visit.edge = NextEdge(i);
     --visit.left;
-    const TriangleId next = t.neighbours[i];
+    const TriangleId next = t.neighbors[i];
     const SurfaceTriangle& other = triangles_[next];
     if (other.mark == mark) continue;
-    const uint16_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
-    HULLD_DCHECK(other.neighbours[back] == id);
+    const uint16_t back = other.neighbors[0] == id ? 0 : other.neighbors[1] == id ? 1 : 2;
+    HULLD_DCHECK(other.neighbors[back] == id);
     const int side = classify(next);
     if (side > 0) {
       triangles_.Mutable(next).mark = mark;
@@ -300,7 +300,7 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
 
 // CollectRegion for points for which doubles are certain of all signs, with the horizon in no
 // order. Returns false if they are not certain. Branch-free, because visibility is unpredictable:
-// each neighbour is written to both lists, and then one list counts it.
+// each neighbor is written to both lists, and then one list counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
   // Local copies: for the compiler, the stores below might alias the originals.
@@ -322,7 +322,7 @@ bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double
     const SurfaceTriangle& t = triangles_[id];
     uint32_t is_certain = 1;
     for (uint32_t i = 0; i < 3; ++i) {
-      const TriangleId next = t.neighbours[i];
+      const TriangleId next = t.neighbors[i];
       // All of them are modified eventually.
       SurfaceTriangle& other = triangles_.Mutable(next);
       const double* const normal = other.normal.data();
@@ -334,8 +334,8 @@ bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double
       region[seen] = next;
       seen += is_seen & static_cast<uint32_t>(mark_before != mark);
       other.mark = is_seen != 0 ? mark : mark_before;
-      const auto back = static_cast<uint16_t>(static_cast<uint32_t>(other.neighbours[1] == id) +
-                                              2 * static_cast<uint32_t>(other.neighbours[2] == id));
+      const auto back = static_cast<uint16_t>(static_cast<uint32_t>(other.neighbors[1] == id) +
+                                              2 * static_cast<uint32_t>(other.neighbors[2] == id));
       horizon[edges] = {t.corners[i], t.corners[NextEdge(i)], next, back, false};
       edges += is_seen ^ 1;
     }
@@ -388,10 +388,10 @@ bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& befor
   uint32_t edge = before.edge_beyond;
   for (;;) {
     flat_stars_.push_back(id);
-    const TriangleId next = triangles_[id].neighbours[(edge + 2) % 3];
+    const TriangleId next = triangles_[id].neighbors[(edge + 2) % 3];
     if (triangles_[next].mark == mark_) return true;
     if (SideOf(vertices, next, point, size) != 0) return false;
-    const auto& back = triangles_[next].neighbours;
+    const auto& back = triangles_[next].neighbors;
     edge = back[0] == id ? 0 : back[1] == id ? 1 : 2;
     id = next;
   }
@@ -428,20 +428,20 @@ void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
     SurfaceTriangle& t = triangles_.Mutable(id);
     SetPlane(t, vertices[edge.tail], vertices[edge.head], top);
     t.corners = {edge.tail, edge.head, apex};
-    t.neighbours[0] = edge.beyond;
-    t.neighbours[1] = after;
+    t.neighbors[0] = edge.beyond;
+    t.neighbors[1] = after;
     t.mark = 0;
     t.flat = edge.is_flat;
-    triangles_.Mutable(after).neighbours[2] = id;
+    triangles_.Mutable(after).neighbors[2] = id;
     SurfaceTriangle& beyond = triangles_.Mutable(edge.beyond);
-    beyond.neighbours[edge.edge_beyond] = id;
+    beyond.neighbors[edge.edge_beyond] = id;
     beyond.flat = (beyond.flat & ~(1u << edge.edge_beyond)) | static_cast<uint32_t>(edge.is_flat)
                                                                   << edge.edge_beyond;
   }
   for (size_t k = new_count; k < old_count; ++k) {
     SurfaceTriangle& t = triangles_.Mutable(region[k]);
     t.corners[0] = kDead;
-    t.neighbours[0] = region[0];
+    t.neighbors[0] = region[0];
     free_.push_back(region[k]);
   }
   steps_ += 1 + (old_count + new_count) / kTrianglesPerStep;

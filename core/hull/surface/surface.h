@@ -23,7 +23,7 @@ namespace hulld {
 
 using TriangleId = uint32_t;
 
-// A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbours[i]
+// A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbors[i]
 // lies across the edge from corners[i] to corners[(i + 1) % 3]. The last corner is the apex: the
 // triangle was created when that vertex was added, as one of a fan around it.
 struct alignas(64) SurfaceTriangle {
@@ -32,7 +32,7 @@ struct alignas(64) SurfaceTriangle {
   Vector normal;
   double offset;
   std::array<VertexId, 3> corners;
-  std::array<TriangleId, 3> neighbours;
+  std::array<TriangleId, 3> neighbors;
   float slope;
   // The last traversal with this triangle in its region.
   uint32_t mark : 29;
@@ -57,7 +57,7 @@ static_assert(sizeof(SurfaceTriangle) == 64);
 // edges of these strictly from within that plane, because they are chords between remaining
 // corners. Hence no new triangle is degenerate and no vertex of the horizon redundant.
 //
-// A walk on the surface finds the first triangle: towards the one that the ray from a fixed
+// A walk on the surface finds the first triangle: toward the one that the ray from a fixed
 // interior point through the new point pierces. A map of directions around that point rejects
 // points that are certainly inside and supplies the start of the walk. Source: Clarkson and Shor
 // 1989 for the incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
@@ -242,10 +242,10 @@ class Surface {
     double largest = 0;
   };
 
-  // Follows dead triangles: a dead triangle's first neighbour is one that replaced it.
+  // Follows dead triangles: a dead triangle's first neighbor is one that replaced it.
   TriangleId Alive(TriangleId id) const {
     if (id >= triangles_.size()) return last_;
-    while (!IsAlive(id)) id = triangles_[id].neighbours[0];
+    while (!IsAlive(id)) id = triangles_[id].neighbors[0];
     return id;
   }
   // Returns +1 if the point sees the triangle from outside, 0 if it lies in its plane.
@@ -269,7 +269,7 @@ class Surface {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
     double most = HeightAbove(t, point, size);
-    for (const TriangleId next : t.neighbours) {
+    for (const TriangleId next : t.neighbors) {
       const double height = HeightAbove(triangles_[next], point, size);
       best = height > most ? next : best;
       most = std::max(most, height);
@@ -286,8 +286,8 @@ class Surface {
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
-  size_t EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
-                     const Ray& ray, std::optional<uint32_t> first) const;
+  size_t EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
+                    const Ray& ray, std::optional<uint32_t> first) const;
   double LeastTurn(const VertexTable& vertices, TriangleId id, const Vector& direction) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Measure(const VertexTable& vertices);

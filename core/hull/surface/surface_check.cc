@@ -47,7 +47,7 @@ size_t TwinOf(const SurfaceTriangle& t, size_t i, const SurfaceTriangle& other) 
   return j;
 }
 
-// Returns the sign of the dihedral angle at edge j of `other`, with t as its neighbour there: -1 if
+// Returns the sign of the dihedral angle at edge j of `other`, with t as its neighbor there: -1 if
 // the surface bends inwards, as required, 0 if both lie in one plane.
 int BendAt(const VertexTable& vertices, const SurfaceTriangle& t, const SurfaceTriangle& other,
            size_t j) {
@@ -58,12 +58,12 @@ int BendAt(const VertexTable& vertices, const SurfaceTriangle& t, const SurfaceT
 const char* FindLinkDefect(const Surface& surface, const VertexTable& vertices, TriangleId id) {
   const SurfaceTriangle& t = surface.triangle(id);
   for (size_t i = 0; i < 3; ++i) {
-    const TriangleId next = t.neighbours[i];
-    if (next >= surface.id_bound() || !surface.IsAlive(next)) return "a neighbour is not alive";
+    const TriangleId next = t.neighbors[i];
+    if (next >= surface.id_bound() || !surface.IsAlive(next)) return "a neighbor is not alive";
     const SurfaceTriangle& other = surface.triangle(next);
     const size_t j = TwinOf(t, i, other);
-    if (j == 3) return "a neighbour does not run along the common edge the other way";
-    if (other.neighbours[j] != id) return "a neighbour does not link back";
+    if (j == 3) return "a neighbor does not run along the common edge the other way";
+    if (other.neighbors[j] != id) return "a neighbor does not link back";
     if (const char* defect = FindCornerDefect(vertices, other)) return defect;
     const int bend = BendAt(vertices, t, other, j);
     if (bend > 0) return "the surface is not convex at an edge";
@@ -103,13 +103,13 @@ const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
   TriangleId next = star[0];
   for (size_t k = 0; k < star.size(); ++k) {
     if (k > 0 && next == star[0]) return "the new triangles form more than one ring";
-    next = surface.triangle(next).neighbours[1];
+    next = surface.triangle(next).neighbors[1];
   }
   if (next != star[0]) return "the new triangles form no ring";
   for (const TriangleId id : star) {
     const SurfaceTriangle& t = surface.triangle(id);
     if (t.corners[2] != apex) return "a new triangle does not end at the new vertex";
-    const SurfaceTriangle& beyond = surface.triangle(t.neighbours[0]);
+    const SurfaceTriangle& beyond = surface.triangle(t.neighbors[0]);
     const bool is_flat = BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) == 0;
     if (is_flat != ((t.flat & 1) != 0)) return "the horizon does not bend where it should";
   }

@@ -9,12 +9,12 @@
 
 namespace hulld {
 
-// Checks of the invariants of a surface, each stated for a triangle and its neighbours. Both return
+// Checks of the invariants of a surface, each stated for a triangle and its neighbors. Both return
 // null if all hold, otherwise a description of the violated invariant.
 
 // Checks the triangles with the given IDs: they are alive; their corners are three live vertices
-// that span a plane; their neighbours are alive, link back, and traverse the common edge in the
-// opposite direction; no neighbour's opposite corner lies above (exact signs); the center of the
+// that span a plane; their neighbors are alive, link back, and traverse the common edge in the
+// opposite direction; no neighbor's opposite corner lies above (exact signs); the center of the
 // map of directions, if any, lies strictly below; their rounded plane contains their corners within
 // its error; edges marked flat are flat on both sides. Also checks that the counts of vertices,
 // triangles and free IDs agree (Euler). Cost: O(triangles given), some five exact signs each.

@@ -49,9 +49,9 @@ Surface::Ray Surface::RayTo(const Vector& point) const {
 // triangle's cone contains the point. If there are several: the one for which this holds most
 // clearly or, from `first` on around the triangle, the next one. Computing all three without a
 // branch is faster than guessing the first.
-size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t,
-                            const Vector& point, const Ray& ray,
-                            std::optional<uint32_t> first) const {
+size_t Surface::EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t,
+                           const Vector& point, const Ray& ray,
+                           std::optional<uint32_t> first) const {
   const Vector& center = directions_->center();
   const Vector a = vertices[t.corners[0]] - center;
   const Vector b = vertices[t.corners[1]] - center;
@@ -74,7 +74,7 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
 }
 
 // Returns the depth of the direction within the triangle's cone, negative outside, in no particular
-// unit: the least of the values that EdgeTowards compares.
+// unit: the least of the values that EdgeToward compares.
 double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
                           const Vector& direction) const {
   const Vector& center = directions_->center();
@@ -106,9 +106,9 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
       first = (random >> 16) % 3;
     }
     const SurfaceTriangle& t = triangles_[at];
-    const size_t edge = EdgeTowards(vertices, t, point, ray, first);
+    const size_t edge = EdgeToward(vertices, t, point, ray, first);
     if (edge == 3) return Location{Side::kInside, at};
-    at = t.neighbours[edge];
+    at = t.neighbors[edge];
     ++steps;
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
   }

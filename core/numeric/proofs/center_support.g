@@ -1,5 +1,5 @@
-# n . (a - b) over all vertices against the support functions about the centres, with n the computed
-# difference of the centres, which errs by e kMinkowskiErrorFactor S per component. Units: |n| = 1,
+# n . (a - b) over all vertices against the support functions about the centers, with n the computed
+# difference of the centers, which errs by e kMinkowskiErrorFactor S per component. Units: |n| = 1,
 # S = 1; |n| itself is N = sqrt(3) S at most (by hand), so n . n = N (y . y) in this unit. The
 # supports are at most 4 in total.
 

@@ -1,6 +1,6 @@
 # A component of w = R_A a - (R_B b + (t_B - t_A)), in units of S = M_A + M_B + |t_B - t_A|, with
 # parts P, (1 - P) Q and (1 - P) (1 - Q). The entries r of the rotations err by g. A point a or b
-# may be a mean of vertices that errs by m in units of M: by 7 u for the centre, the sum of six
+# may be a mean of vertices that errs by m in units of M: by 7 u for the center, the sum of six
 # sixths, by 11 u for a mean of up to ten vertices (by hand: at most ten roundings of at most 10 M,
 # divided by ten, and the division).
 

@@ -1,4 +1,4 @@
-# Radii, spheres and gauges about centres, and slopes of planes: factors close to 1 that round up.
+# Radii, spheres and gauges about centers, and slopes of planes: factors close to 1 that round up.
 #
 # radius: the computed |v - c|^2 is the sum of three squares, each of a rounded difference, with one
 # rounding and at most two sums: by hand, because all are positive, |v - c|^2 times factors of d1 to
@@ -6,11 +6,11 @@
 radius = sqrt((1 + d1) * (1 + d1) * (1 + d2) * (1 + d3) * (1 + d4)) * (1 + d5) * kRadiusRoundUp
   * (1 + d6);
 
-# spheres: if |n|^2 of the computed difference of the centres, which has three more roundings,
+# spheres: if |n|^2 of the computed difference of the centers, which has three more roundings,
 # exceeds the square of the reach, rounded twice with the factor, then |n| exceeds the reach.
 squares = (1 + d1) * kSphereSquareRoundUp * (1 + d2) / ((1 + d3) * (1 + d4) * (1 + d5));
 # The reach covers radii of at most 4 S in total, with the rounding of their sums, and the error of
-# the difference of the centres, sqrt(3) times kMinkowskiErrorFactor S, in units of S.
+# the difference of the centers, sqrt(3) times kMinkowskiErrorFactor S, in units of S.
 reach = (r * (1 + d1) + kSphereErrorFactor * (1 + d2)) * (1 + d3);
 needed = r + 0x1.bb67bp0 * kMinkowskiErrorFactor;
 

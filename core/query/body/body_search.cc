@@ -136,7 +136,7 @@ absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
   return ended_;
 }
 
-// Makes one step towards the relation.
+// Makes one step toward the relation.
 absl::Status BodySearch::Search() {
   if (!candidates_.empty()) {
     const Candidate candidate = candidates_.back();
@@ -152,7 +152,7 @@ absl::Status BodySearch::Search() {
   return absl::OkStatus();
 }
 
-// Makes one step towards its certificates.
+// Makes one step toward its certificates.
 absl::Status BodySearch::Prove() {
   if (certification_) return certification_->Step();
   certification_.emplace(*a_, *b_, *options_, relation_, decided_);

@@ -40,7 +40,7 @@ double BoxGap::AtLeast(const Box& of_x, const Box& of_y) const {
   const Vector half_x = 0.5 * (of_x.high - of_x.low);
   const Vector center_y = 0.5 * (of_y.low + of_y.high);
   const Vector half_y = 0.5 * (of_y.high - of_y.low);
-  // Vector from X's centre to Y's, in the frame of X.
+  // Vector from X's center to Y's, in the frame of X.
   const Vector step = Product(R_XY_, center_y) + p_XY_ - center_x;
   const Vector along_x = step.cwiseAbs() - half_x - Product(abs_R_XY_, half_y);
   const Vector along_y =

@@ -97,8 +97,8 @@ class ExactExpansion {
       return true;
     }
     for (const IntegerVector& n : directions) {
-      for (const IntegerVector& towards : {n, -n}) {
-        ExactCorner corner = pair_.Farthest(towards);
+      for (const IntegerVector& toward : {n, -n}) {
+        ExactCorner corner = pair_.Farthest(toward);
         if (pair_.stopped()) return false;
         if (!differs(corner.w)) continue;
         corners_.push_back(std::move(corner));

@@ -22,7 +22,7 @@ struct Part {
   Integer weight_sum;
   // A positive multiple of the vector from that point to the origin; zero if the point is the
   // origin.
-  IntegerVector towards_origin;
+  IntegerVector toward_origin;
   Integer numerator;
   Integer denominator;
 };
@@ -43,9 +43,9 @@ std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q) {
   std::vector<Integer> weights = {Dot(q.w, e), -Dot(p.w, e)};
   if (!AllPositive(weights)) return std::nullopt;
   const IntegerVector moment = Cross(p.w, q.w);
-  IntegerVector towards = -(weights[0] * p.w + weights[1] * q.w);
+  IntegerVector toward = -(weights[0] * p.w + weights[1] * q.w);
   Integer length = Dot(e, e);
-  return Part{{p, q}, std::move(weights), length, std::move(towards), Dot(moment, moment), length};
+  return Part{{p, q}, std::move(weights), length, std::move(toward), Dot(moment, moment), length};
 }
 
 std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r) {
@@ -55,9 +55,9 @@ std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const Exa
   if (!AllPositive(weights)) return std::nullopt;
   const Integer height = Dot(n, p.w);
   const int side = Sign(height);
-  const IntegerVector towards = side == 0 ? IntegerVector{0, 0, 0} : side > 0 ? -n : n;
+  const IntegerVector toward = side == 0 ? IntegerVector{0, 0, 0} : side > 0 ? -n : n;
   const Integer area = Dot(n, n);
-  return Part{{p, q, r}, std::move(weights), area, towards, height * height, area};
+  return Part{{p, q, r}, std::move(weights), area, toward, height * height, area};
 }
 
 std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r,
@@ -93,9 +93,9 @@ std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
 // Returns true if no corner is nearer to the origin than the part, along the direction to the
 // origin.
 bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
-  const Integer reach = Dot(part.towards_origin, part.corners[0].w);
+  const Integer reach = Dot(part.toward_origin, part.corners[0].w);
   return std::all_of(corners.begin(), corners.end(), [&](const ExactCorner& corner) {
-    return Dot(part.towards_origin, corner.w) <= reach;
+    return Dot(part.toward_origin, corner.w) <= reach;
   });
 }
 
@@ -129,7 +129,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
   for (;;) {
     if (poll.Step()) return absl::CancelledError("stopped in an exact query");
     Part part = NearestPart(corners);
-    const IntegerVector& n = part.towards_origin;
+    const IntegerVector& n = part.toward_origin;
     if (!IsZero(n)) {
       ExactCorner farthest = pair.Farthest(n);
       if (pair.stopped()) return absl::CancelledError("stopped in an exact query");

@@ -31,7 +31,7 @@ struct ExactNearest {
 
 // Finds the exact nearest point, for hulls of every dimension, by the walk of Gilbert, Johnson and
 // Keerthi (1988) in integers. Keeps a part (vertex, edge, triangle) of A - B with its nearest point
-// strictly inside, and adds the farthest vertex towards the origin until no vertex is farther. The
+// strictly inside, and adds the farthest vertex toward the origin until no vertex is farther. The
 // distance decreases strictly, so no part recurs and the walk terminates. Directions have degree at
 // most 3 in the coordinates. `seed`: initial pairs; may be empty. Requires: at most four initial
 // pairs. CANCELLED: should_stop, which may be empty, returned true.

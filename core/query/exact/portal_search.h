@@ -18,13 +18,13 @@ namespace hulld {
 // - B, or A - B thickened along a coordinate axis.
 //
 // A portal is a triangle of vertices of C that the ray crosses. The search explores the far side of
-// its plane by the support vertex w along its normal n, pointing away from the centre. If n.w < 0,
+// its plane by the support vertex w along its normal n, pointing away from the center. If n.w < 0,
 // all of C is below the origin and n separates. If the portal itself lies beyond the origin, the
 // origin is interior. If w is no farther than the portal, the plane supports C there and the
 // origin, which is not below the plane, lies on it. Otherwise w replaces a corner of the portal so
 // that the ray still crosses it, and the crossing moves outwards.
 //
-// Ties: the centre c is taken to be c + (e, e^2, e^3) for an infinitesimal e, with the ray's
+// Ties: the center c is taken to be c + (e, e^2, e^3) for an infinitesimal e, with the ray's
 // direction d = -c unchanged. The ray then crosses no edge, unless the edge is parallel to it, and
 // every refinement moves the crossing strictly outwards, so with exact signs the search terminates
 // for every input. All signs are exact: floating point with a proven bound decides most, integers
@@ -49,7 +49,7 @@ class PortalSearch {
   enum class Verdict { kSeparated, kTouching, kOverlapping, kStopped };
   struct Result {
     Verdict verdict = Verdict::kStopped;
-    // Separated and touching: from A towards B, n.w <= 0 for all w in C.
+    // Separated and touching: from A toward B, n.w <= 0 for all w in C.
     std::optional<ExactDirection> axis;
     // Touching: pairs for which the vertices of C are a triangle, possibly degenerate, that
     // contains the origin.
@@ -70,7 +70,7 @@ class PortalSearch {
   uint64_t directions_tried() const { return directions_tried_; }
 
  private:
-  // A vertex of C, or the centre. In floating point within kMinkowskiErrorFactor of the pair's size
+  // A vertex of C, or the center. In floating point within kMinkowskiErrorFactor of the pair's size
   // if there is a filter.
   struct Point {
     VertexPair pair = {};
@@ -117,7 +117,7 @@ class PortalSearch {
   double position_error_;
   int axis_ = -1;
   Number half_;
-  // From the centre through the origin; the exact value is computed on demand.
+  // From the center through the origin; the exact value is computed on demand.
   mutable std::optional<Coordinates> exact_ray_;
   Vector ray_ = Vector::Zero();
   std::array<Point, 3> portal_;

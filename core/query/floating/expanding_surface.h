@@ -15,7 +15,7 @@ class ExpandingSurface {
  public:
   struct Facet {
     std::array<uint32_t, 3> corners;
-    // Across the edge from corner i to corner i + 1: the neighbouring facet, and the index of the
+    // Across the edge from corner i to corner i + 1: the neighboring facet, and the index of the
     // edge there.
     std::array<uint32_t, 3> neighbors;
     std::array<uint8_t, 3> their_edges;

@@ -37,7 +37,7 @@ class Walk {
       const NearestPart part = Nearest();
       // In exact arithmetic every step comes nearer.
       if (count_ == 0 || !Accept(part)) break;
-      n = part.towards;
+      n = part.toward;
       if (goal_.Met(bounds_.low, bounds_.high)) break;
     }
     bounds_.low = std::min(bounds_.low, bounds_.high);
@@ -66,7 +66,7 @@ class Walk {
     if (count_ == 2) return NearestOnEdge(corners_[0].w, corners_[1].w, 0, 1);
     if (count_ == 3) return OnFace(0, 1, 2);
     // The nearest part includes the newest corner. A face away from the origin is never nearer than
-    // a face towards it.
+    // a face toward it.
     NearestPart best = OnFace(3, 0, 1);
     double least = best.point.squaredNorm();
     for (const NearestPart& part : {OnFace(3, 1, 2), OnFace(3, 2, 0)}) {

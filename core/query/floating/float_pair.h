@@ -89,7 +89,7 @@ class FloatPair {
   PlainVector CenterDifference() const {
     return PlainVector(a_->rotated_center()) - (PlainVector(b_->rotated_center()) + offset_);
   }
-  // The hulls' bounds about their centres along n_W.
+  // The hulls' bounds about their centers along n_W.
   class CenterView;
   CenterView ViewCenters(const PlainVector& n_W) const;
   // The difference of the means of the hulls' inner vertices, within the same bound.
@@ -144,7 +144,7 @@ class FloatPair::CenterView {
   bool known() const { return place_a_.known() && place_b_.known(); }
   CenterBounds::Bounds bounds_a() const { return pair_->a_->query_hull().BoundsAt(place_a_, n_a_); }
   CenterBounds::Bounds bounds_b() const { return pair_->b_->query_hull().BoundsAt(place_b_, n_b_); }
-  // Approximate direction from A's surface to B's at the line of the centres; zero if unknown.
+  // Approximate direction from A's surface to B's at the line of the centers; zero if unknown.
   PlainVector LikelyAxis() const {
     return OutOfOwnFrame(*pair_->a_, center_bounds_a().NormalAt(place_a_)) -
            OutOfOwnFrame(*pair_->b_, center_bounds_b().NormalAt(place_b_));

@@ -53,7 +53,7 @@ class Simplex {
   }
 
   // Reduces to the corners of the face nearest to the origin, up to rounding, and sets n to a
-  // direction from that face towards the origin. Returns false if the origin is in the tetrahedron.
+  // direction from that face toward the origin. Returns false if the origin is in the tetrahedron.
   bool Reduce(PlainVector& n) {
     switch (count_) {
       case 1:
@@ -132,7 +132,7 @@ class Simplex {
     count_ = 3;
   }
 
-  // Returns the direction from the edge's line towards the origin.
+  // Returns the direction from the edge's line toward the origin.
   static PlainVector AcrossEdge(const PlainVector& p, const PlainVector& e) {
     return (Dot(e, p) / SquaredNorm(e)) * e - p;
   }
@@ -149,7 +149,7 @@ class Simplex {
   }
 
   // Finds the nearest part of the triangle of the newest corner p, and of p + e and p + f. The edge
-  // between the latter two and its ends are not nearest, because p was farther towards the origin;
+  // between the latter two and its ends are not nearest, because p was farther toward the origin;
   // so three of the seven parts that FindNearestOnTriangle distinguishes need no test. `normal`: e
   // x f.
   enum class Part { kCorner, kEdgeToQ, kEdgeToR, kInside };
@@ -221,14 +221,14 @@ class Simplex {
     Part part = Part::kInside;
     const auto consider = [&](int i, const PlainVector& to_q, const PlainVector& to_r,
                               const PlainVector& normal) {
-      PlainVector towards;
-      const Part candidate = NearestPart(p, to_q, to_r, normal, towards);
-      const double distance = SquaredDistance(towards, p);
+      PlainVector toward;
+      const Part candidate = NearestPart(p, to_q, to_r, normal, toward);
+      const double distance = SquaredDistance(toward, p);
       if (!(distance < nearest)) return;
       nearest = distance;
       face = i;
       part = candidate;
-      n = towards;
+      n = toward;
     };
     if (beyond_ef) consider(0, e, f, normal_ef);
     if (beyond_fg) consider(1, f, g, normal_fg);
@@ -296,7 +296,7 @@ class FloatSearch {
     if (farthest.value < -error) return EndSeparated(n);
     const PlainVector along = n;
     along_ = along;
-    // Without progress, no vertex is farther towards the origin.
+    // Without progress, no vertex is farther toward the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
     bool outside = true;
     bool at_corner = false;

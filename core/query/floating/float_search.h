@@ -25,12 +25,12 @@ struct FloatSearchResult {
   uint64_t directions_tried = 0;
 };
 
-// Walks towards the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
+// Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
 // 1988), but only until the sign of the separation shows. The walk may err; every claim is
 // certified. SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside
 // a tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: both
 // a point of A - B and a plane that A - B does not reach beyond are within the tolerance of the
-// origin. `first`: the initial direction, for example from A's centre to B's. Requires:
+// origin. `first`: the initial direction, for example from A's center to B's. Requires:
 // pair.usable().
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first);

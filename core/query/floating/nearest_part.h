@@ -17,8 +17,8 @@ struct NearestPart {
   std::array<uint8_t, 3> corners = {};
   std::array<double, 3> weights = {};
   Vector point = Vector::Zero();
-  // Direction towards the origin across the part, of any length; more accurate than -point.
-  Vector towards = Vector::Zero();
+  // Direction toward the origin across the part, of any length; more accurate than -point.
+  Vector toward = Vector::Zero();
 };
 
 inline NearestPart NearestOfVertex(const Vector& p) { return {1, {0}, {1}, p, -p}; }

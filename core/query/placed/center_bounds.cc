@@ -328,7 +328,7 @@ void CenterBounds::MakeCell(uint32_t face, uint32_t i, uint32_t j) const {
 }
 
 // Allocates the corners and computes the largest gauge: the maximum over the cube's eight corners,
-// because the gauge is convex on each face. It stays unknown unless the centre is certainly inside.
+// because the gauge is convex on each face. It stays unknown unless the center is certainly inside.
 void CenterBounds::Begin() const {
   map_->corners.resize(corner_count(), {kUnknown, kUnknown});
   map_->per_width = PerWidth(*map_->support);
@@ -338,7 +338,7 @@ void CenterBounds::Begin() const {
   for (uint32_t octant = 0; octant < 8; ++octant) {
     const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
     least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
-    // The centre is strictly inside only if it is surrounded, up to rounding.
+    // The center is strictly inside only if it is surrounded, up to rounding.
     if (!(least > 0 && least >= kCenterLeastRadius * map_->max_abs)) return;
   }
   map_->largest_gauge = (1 + kCenterMargin) / least;
@@ -376,7 +376,7 @@ float CenterBounds::MakeGauge(uint32_t corner) const {
   return corners[twin].gauge = gauge;
 }
 
-// Returns the mean over the two or four equidistant neighbours of a corner.
+// Returns the mean over the two or four equidistant neighbors of a corner.
 float CenterBounds::MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const {
   const double sum = double{MakeGauge(corner - down - right)} + MakeGauge(corner - down + right) +
                      MakeGauge(corner + down - right) + MakeGauge(corner + down + right);

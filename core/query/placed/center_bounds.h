@@ -22,7 +22,7 @@
 
 namespace hulld {
 
-// Upper and lower bounds of a hull's extent as seen from its centre c, for every direction, without
+// Upper and lower bounds of a hull's extent as seen from its center c, for every direction, without
 // access to its vertices.
 //
 // The upper bound is the support function h(n): the largest n . (v - c). The lower bound is the
@@ -43,8 +43,8 @@ class CenterBounds {
 
   // Has no bounds: every bound is unknown.
   CenterBounds() = default;
-  // Bounds for the hull of the points about a centre. A flat hull (`dimension` below 3) has none.
-  // The gauge is unknown unless the centre is certainly strictly inside. max_abs: the largest
+  // Bounds for the hull of the points about a center. A flat hull (`dimension` below 3) has none.
+  // The gauge is unknown unless the center is certainly strictly inside. max_abs: the largest
   // absolute coordinate of the points. The points and the support map must outlive the bounds and
   // must not move. Cost: O(V) comparisons; the first computed cell takes some 100 support points
   // more, and each of 24 or 384 cells some 25.

@@ -35,7 +35,7 @@ class GrowthTail {
   }
 
   Vector point(size_t i) const { return blocks_[i / 4].point(i % 4); }
-  // Returns the largest distance of the first `count` points from the centre; rounded up.
+  // Returns the largest distance of the first `count` points from the center; rounded up.
   double RadiusOf(size_t count) const { return count == 0 ? 0 : radii_[count - 1]; }
   // Returns the farthest of the first `count` points.
   SupportPoint Farthest(size_t count, const PlainVector& n) const {

@@ -52,7 +52,7 @@ HullBase::HullBase(std::vector<Vector> points, int dimension)
   Span(dimension);
 }
 
-// Computes the axis extremes, the centre, and sizes.
+// Computes the axis extremes, the center, and sizes.
 void HullBase::Measure() {
   std::array<uint32_t, 6> extremes = {};
   exponent_ = kAboveAllExponents;
@@ -60,7 +60,7 @@ void HullBase::Measure() {
     const Vector& p = points_[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (p[axis] < points_[extremes[axis]][axis]) extremes[axis] = i;
-      // The last of several equal points is taken, so that the centre of a box is its middle.
+      // The last of several equal points is taken, so that the center of a box is its middle.
       if (p[axis] >= points_[extremes[axis + 3]][axis]) extremes[axis + 3] = i;
     }
     exponent_ = LowestBitExponent(p, exponent_);

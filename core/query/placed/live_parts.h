@@ -18,7 +18,7 @@ struct PreparedLevel {
       : mapped(std::move(mapped_in)), radius(radius_in) {}
 
   const MappedPoints mapped;
-  // Radius of the points about the base's centre.
+  // Radius of the points about the base's center.
   const double radius;
 };
 

@@ -30,7 +30,7 @@ class PlacedHull {
   const PoseProduct* product() const { return product_; }
   // The rotation R(q) / |q|^2, each entry within kRotationEntryError.
   const Eigen::Matrix3d& R_WH() const { return R_WH_; }
-  // The hull's centre rotated, R_WH * center, before the translation.
+  // The hull's center rotated, R_WH * center, before the translation.
   const Vector& rotated_center() const { return rotated_center_; }
 
  private:

@@ -23,7 +23,7 @@ struct Feature {
   std::optional<uint32_t> facet;   // when the feature is a whole facet
 };
 
-// A direction (world frame) from A towards B, with max n.A <= min n.B over the reals. `direction`
+// A direction (world frame) from A toward B, with max n.A <= min n.B over the reals. `direction`
 // is n rounded to unit length.
 //
 // FACET_A and FACET_B name the line: the direction may be minus the facet's outward normal, as in

@@ -13,7 +13,7 @@ namespace hulld {
 // that separated them, or vertex pairs with differences that surrounded the origin. It is never an
 // answer: the next query proves the suggestion again, or drops it. Not thread-safe.
 struct PairCache {
-  // World frame, from A towards B.
+  // World frame, from A toward B.
   std::optional<Vector> axis;
   // 0 or 4.
   uint32_t pair_count = 0;

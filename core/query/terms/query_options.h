@@ -11,7 +11,7 @@
 namespace hulld {
 
 // Default of QueryOptions::max_error, relative to the separation and the largest absolute
-// coordinates of the two hulls, each about its centre.
+// coordinates of the two hulls, each about its center.
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
 enum class Method : uint8_t { kCertifiedSearch, kTextbookSat };

@@ -10,7 +10,7 @@ namespace hulld {
 // The step of the ladder that decided an answer.
 enum class Rung : uint8_t {
   kBounds,         // an empty hull, or bounding spheres; for the relation alone, also bounds of the
-                   // hulls along the line of their centres
+                   // hulls along the line of their centers
   kCached,         // the axis or the vertex pairs of the previous query of the pair
   kFloatingPoint,  // the hulls, in floating point with a proven error bound
   kExact,          // exact arithmetic

@@ -74,10 +74,10 @@ absl::Status WatchedPairs::AskAbout(std::span<const uint32_t> changed,
     for (const uint32_t number : pairs_of_[placement]) Ask(number);
     if (is_scene_) boxes_[placement] = table.BoxOf(placement);
   }
-  return is_scene_ ? AskAboutNeighbours(changed) : absl::OkStatus();
+  return is_scene_ ? AskAboutNeighbors(changed) : absl::OkStatus();
 }
 
-absl::Status WatchedPairs::AskAboutNeighbours(std::span<const uint32_t> changed) {
+absl::Status WatchedPairs::AskAboutNeighbors(std::span<const uint32_t> changed) {
   if (changed.size() <= kMostCompared) {
     for (const uint32_t a : changed) {
       const Box box = GrownBy(boxes_[a], clearance_);

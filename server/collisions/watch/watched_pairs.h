@@ -63,7 +63,7 @@ class WatchedPairs {
   uint32_t Add(uint32_t a, uint32_t b);
   void Drop(uint32_t number);
   void Ask(uint32_t number);
-  absl::Status AskAboutNeighbours(std::span<const uint32_t> changed);
+  absl::Status AskAboutNeighbors(std::span<const uint32_t> changed);
   absl::Status AskAboutPair(uint32_t a, uint32_t b);
 
   std::vector<WatchedPair> pairs_;

@@ -10,7 +10,7 @@
 namespace hulld::server {
 
 // Equal IDs have equal hashes, so sorting by hash groups them. Hulls are numbered by their first
-// occurrence: neighbours in a request were mostly created together, so a store has them in one
+// occurrence: neighbors in a request were mostly created together, so a store has them in one
 // place.
 void KnownHulls::Begin(std::span<const std::string> ids) {
   HULLD_CHECK(!has_begun_ || hull_of_.size() == ids.size());

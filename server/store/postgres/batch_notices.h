@@ -42,7 +42,7 @@ class BatchNotices {
 
   // open: creates the session. on_batch: receives, on the thread, the number of each committed
   // batch, including this server's, and the last one whenever listening begins. fallback: text of
-  // the log for the behaviour without notices.
+  // the log for the behavior without notices.
   BatchNotices(Opener open, std::chrono::milliseconds retry,
                std::function<void(uint64_t batch)> on_batch, std::string fallback);
   BatchNotices(const BatchNotices&) = delete;

@@ -69,7 +69,7 @@ Points Rotated(Points points, const std::array<double, 4>& q) {
 struct Pair {
   Points a;
   Points b;
-  // From A towards B.
+  // From A toward B.
   Vector direction;
 };
 

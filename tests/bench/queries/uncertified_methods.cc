@@ -140,7 +140,7 @@ class InFloat : public ClimbingHull<float> {
   using ClimbingHull<float>::ClimbingHull;
 };
 
-// GJK to the sign: a simplex of A - B moves towards the origin until a support plane misses it or
+// GJK to the sign: a simplex of A - B moves toward the origin until a support plane misses it or
 // four points surround it. Source: van den Bergen 2003, Collision Detection in Interactive 3D
 // Environments; the case analysis is that of Muratori 2006.
 template <typename Support>
@@ -193,7 +193,7 @@ struct PlainGjk {
   }
 
   // Returns true if four points surround the origin. Otherwise drops the points irrelevant to the
-  // origin and turns n towards it.
+  // origin and turns n toward it.
   static bool Surrounds(Simplex& simplex, Vector3& n) {
     switch (simplex.count) {
       case 1:

@@ -574,7 +574,7 @@ TEST_F(HullctlTest, NamesStandAloneOnALine) {
   EXPECT_EQ(names({"delete", "b"}), "b\n");
 }
 
-TEST_F(HullctlTest, ColoursAreForTerminalsUnlessAskedFor) {
+TEST_F(HullctlTest, ColorsAreForTerminalsUnlessAskedFor) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
   constexpr char kPainted[] = "\x1b[31mOVERLAPPING\x1b[0m";
   EXPECT_THAT(Ask({"check", "a", "b"}).out, testing::Not(HasSubstr("\x1b")));

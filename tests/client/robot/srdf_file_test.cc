@@ -45,7 +45,7 @@ TEST_F(SrdfFile, ErrorsNameLineAndLink) {
 }
 
 // The tool is attached to a bare flange, so its neighbor is the finger.
-TEST_F(SrdfFile, NeighboursAreFoundThroughBareLinks) {
+TEST_F(SrdfFile, NeighborsAreFoundThroughBareLinks) {
   const std::set<LinkPair> expected = {Pair("base", "upper"), Pair("upper", "lower"),
                                        Pair("lower", "finger"), Pair("finger", "tool")};
   EXPECT_EQ(AdjacentPairs(robot_), expected);
@@ -64,7 +64,7 @@ TEST(AdjacentPairs, LooseJointsConnectNothing) {
 }
 
 // All links attached to a bare root are neighbors; branches of a link with shapes are not.
-TEST(AdjacentPairs, BranchesOfABareRootAreNeighbours) {
+TEST(AdjacentPairs, BranchesOfABareRootAreNeighbors) {
   const auto robot = [](const char* root) {
     const std::string shape = "<collision><geometry><sphere radius=\"1\"/></geometry></collision>";
     return *ParseUrdf("<robot name=\"r\"><link name=\"root\">" + std::string(root) +

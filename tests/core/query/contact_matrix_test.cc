@@ -88,7 +88,7 @@ struct Contact {
   Pose X_WB;
 };
 
-// Moves B by the smallest step of a coordinate of its translation, towards +direction.
+// Moves B by the smallest step of a coordinate of its translation, toward +direction.
 void Nudge(Contact& contact, int coordinate, int direction) {
   double& t = contact.X_WB.t[coordinate];
   t = std::nextafter(t, direction * kInfinity);
@@ -102,13 +102,13 @@ Contact IntegerContact(Random& random, const std::vector<Vector>& a, const std::
   const auto place = [&](const std::vector<Vector>& shape, Pose* pose) {
     const Quaternion q = kRotations[random.Below(std::size(kRotations))];
     // The hull's own frame may be far away as well.
-    const Vector centre = random.Below(3) == 0 ? Vector(315e4, -630, 945) : Vector(0, 0, 0);
+    const Vector center = random.Below(3) == 0 ? Vector(315e4, -630, 945) : Vector(0, 0, 0);
     std::vector<Vector> local;
-    for (const Vector& p : shape) local.push_back(RotatedBack(q, kUnit * p - centre) * scale);
+    for (const Vector& p : shape) local.push_back(RotatedBack(q, kUnit * p - center) * scale);
     // Any multiple of q is the same rotation.
     const double factor = std::array{1.0, -2.0, 3.0, 0x1p-300, 0x1p400}[random.Below(5)];
     for (int i = 0; i < 4; ++i) pose->q[i] = q[i] * factor;
-    pose->t = (offset + centre) * scale;
+    pose->t = (offset + center) * scale;
     return BuildHull(local);
   };
   Contact contact;

@@ -67,14 +67,14 @@ TEST(LargeContact, IntegerHullsTouchFaceToFace) {
   const Hull a = BuildHull(bowl);
   ASSERT_EQ(a.vertices().size(), bowl.size());
   // Twice the center of the square on (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1).
-  const auto twice_centre = [](int i, int j) {
+  const auto twice_center = [](int i, int j) {
     return Vector(2 * i + 1, 2 * j + 1, i * i + j * j + (i + 1) * (i + 1) + (j + 1) * (j + 1));
   };
   Pose pose;
   pose.q = {0.9, -0.2, 0.31, 0.7};
   pose.t = Vector(0.1, 1e6, 3);
   for (const auto& [i, j] : {std::pair(0, 0), std::pair(-5, 3), std::pair(4, 6)}) {
-    const Hull b = BuildHull(Shifted(Reflected(bowl), twice_centre(i, j)));
+    const Hull b = BuildHull(Shifted(Reflected(bowl), twice_center(i, j)));
     ExpectRelation("square to square", a, Pose(), b, Pose(), Relation::kTouching);
     ExpectRelation("square to square, any pose", a, pose, b, pose, Relation::kTouching);
     Pose turned;
@@ -82,10 +82,10 @@ TEST(LargeContact, IntegerHullsTouchFaceToFace) {
     ExpectRelation("square to square, integer pose", a, turned, b, turned, Relation::kTouching);
     // One step down in the common frame, along the square's normal (a, b, -1) on the outside.
     const Hull apart =
-        BuildHull(Shifted(Reflected(bowl), twice_centre(i, j) - Vector(0, 0, 0x1p-40)));
+        BuildHull(Shifted(Reflected(bowl), twice_center(i, j) - Vector(0, 0, 0x1p-40)));
     ExpectRelation("a hair apart", a, pose, apart, pose, Relation::kSeparated);
     const Hull deep =
-        BuildHull(Shifted(Reflected(bowl), twice_centre(i, j) + Vector(0, 0, 0x1p-40)));
+        BuildHull(Shifted(Reflected(bowl), twice_center(i, j) + Vector(0, 0, 0x1p-40)));
     ExpectRelation("a hair deep", a, pose, deep, pose, Relation::kOverlapping);
   }
 }

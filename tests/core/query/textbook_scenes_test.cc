@@ -54,14 +54,14 @@ void ExpectScenes(const Hull& a, const Hull& b) {
   apart.t.x() = std::nextafter(apart.t.x(), 2 * std::abs(apart.t.x()) + 1);
   Expect(a, At(at_a), b, apart, Relation::kSeparated, "one unit in the last place apart");
 
-  // Towards the other's center, by about a tenth and by about 2^-40 of the size.
-  const auto centre = [](const Hull& hull) {
+  // Toward the other's center, by about a tenth and by about 2^-40 of the size.
+  const auto center = [](const Hull& hull) {
     Vector sum = Vector::Zero();
     for (const Vector& p : hull.vertices()) sum += p;
     return Vector(sum / static_cast<double>(hull.vertices().size()));
   };
   // From B's center to A's, each relative to the common origin: an inner direction of A - B.
-  const Vector inward = (centre(a) + at_a) - (centre(b) + at_b);
+  const Vector inward = (center(a) + at_a) - (center(b) + at_b);
   Expect(a, At(at_a), b, At(at_b + 0.9 * inward), Relation::kOverlapping, "overlapping plainly");
   Expect(a, At(at_a), b, At(at_b + 0x1p-40 * inward), Relation::kOverlapping, "overlapping barely");
   // A common quarter turn changes nothing.

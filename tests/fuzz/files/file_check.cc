@@ -248,7 +248,7 @@ FileVerdict CheckUrdf(std::string_view content) {
   }
   for (const LinkPair& pair : AdjacentPairs(*robot)) {
     if (pair.first < 0 || pair.first >= pair.second || pair.second >= links) {
-      return {"neighbours that are no links", false};
+      return {"neighbors that are no links", false};
     }
   }
   return {"", true};

@@ -52,7 +52,7 @@ class Decoder {
       case 2:
         return Add(Earlier());
       case 3:
-        return AddNeighbour();
+        return AddNeighbor();
       case 4:
         return AddOnLine();
       case 5:
@@ -99,7 +99,7 @@ class Decoder {
     const Vector b = Earlier();
     Add(a + b - Earlier());
   }
-  void AddNeighbour() {
+  void AddNeighbor() {
     Vector p = Earlier();
     const uint8_t which = in_.Byte();
     double& x = p[which % 3];

@@ -45,7 +45,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   // Limits the space for all files written through this file system. Writes that do not fit are cut
   // short. Space that RocksDB preallocates for its own files does not count.
   void SetRoom(uint64_t bytes);
-  // Space used by files that count towards SetRoom.
+  // Space used by files that count toward SetRoom.
   uint64_t used() const;
   // File syncs so far, except those of files overwritten in place.
   int64_t syncs() const;

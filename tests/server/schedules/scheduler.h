@@ -36,7 +36,7 @@ struct ScheduleFault {
 // Code between two such points is atomic for other threads, so data races are left to
 // ThreadSanitizer.
 //
-// Half of the seeds walk at random, each with its own bias towards staying with the same thread.
+// Half of the seeds walk at random, each with its own bias toward staying with the same thread.
 // The rest use priorities that change a few times (PCT: Burckhardt, Kothari, Musuvathi and
 // Nagarakatte 2010, A Randomized Scheduler with Probabilistic Guarantees of Finding Bugs): a defect
 // that needs d steps in a certain order among n threads and k steps is found by at least one in n

@@ -1,6 +1,6 @@
 // The server's answer about the pair, and about all pairs of the scene.
 import {element, exact, facts, grouped, short, vector} from 'hulld/dom.js';
-import {MARK_COLOURS, RELATIONS, RUNGS} from 'hulld/palette.js';
+import {MARK_COLORS, RELATIONS, RUNGS} from 'hulld/palette.js';
 import {poseText} from 'hulld/pose.js';
 
 const MOST_ROWS = 200;
@@ -151,7 +151,7 @@ export class AnswerPanel {
         'div', {className: 'marks', role: 'group', 'aria-label': 'What of the answer is drawn'},
         ...Object.entries(MARK_NAMES).map(([key, name]) => {
           const swatch = element('span', {className: 'swatch'});
-          swatch.style.background = MARK_COLOURS[key];
+          swatch.style.background = MARK_COLORS[key];
           return element(
               'label', {}, element('input', {
                 type: 'checkbox',

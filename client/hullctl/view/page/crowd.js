@@ -24,7 +24,7 @@ export class Crowd extends DrawnGroup {
     const edgeTotal = total((hull) => hull.edges.length);
     const withEdges = model.show.edges && edgeTotal / 2 <= MOST_EDGES;
     this.positions = new Float32Array(3 * total((hull) => hull.vertexCount));
-    this.colours = new Uint8Array(this.positions.length);
+    this.colors = new Uint8Array(this.positions.length);
     const triangles = new Uint32Array(total((hull) => hull.triangles.length));
     const edges = new Uint32Array(withEdges ? edgeTotal : 0);
     let vertex = 0;
@@ -45,11 +45,11 @@ export class Crowd extends DrawnGroup {
 
   add(triangles, edges) {
     const position = new THREE.BufferAttribute(this.positions, 3);
-    const colour = new THREE.BufferAttribute(this.colours, 3, true);
+    const color = new THREE.BufferAttribute(this.colors, 3, true);
     const geometryWith = (index) => {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute('position', position);
-      geometry.setAttribute('color', colour);
+      geometry.setAttribute('color', color);
       geometry.setIndex(new THREE.BufferAttribute(index, 1));
       return geometry;
     };
@@ -84,28 +84,28 @@ export class Crowd extends DrawnGroup {
     const quaternion = unitQuaternion(object.pose);
     const {origin} = this.model;
     const relation = RELATIONS[this.model.relationOf.get(object.index)];
-    const colour = new THREE.Color(relation ? relation.lit : object.colour);
-    const bytes = [colour.r, colour.g, colour.b].map((value) => Math.round(255 * value));
+    const color = new THREE.Color(relation ? relation.lit : object.color);
+    const bytes = [color.r, color.g, color.b].map((value) => Math.round(255 * value));
     const shift =
         [object.pose[4] - origin[0], object.pose[5] - origin[1], object.pose[6] - origin[2]];
     for (let i = 0; i < hull.xyz.length; i += 3) {
       const p = rotate(quaternion, [hull.xyz[i], hull.xyz[i + 1], hull.xyz[i + 2]]);
       for (let k = 0; k < 3; ++k) {
         this.positions[3 * vertex + i + k] = p[k] + shift[k];
-        this.colours[3 * vertex + i + k] = bytes[k];
+        this.colors[3 * vertex + i + k] = bytes[k];
       }
     }
   }
 
-  // Updates all colours after a change of the colliding objects.
-  recolour() {
+  // Updates all colors after a change of the colliding objects.
+  recolor() {
     for (const [index, vertex] of this.ranges) {
       const object = this.model.objects[index];
       const relation = RELATIONS[this.model.relationOf.get(index)];
-      const colour = new THREE.Color(relation ? relation.lit : object.colour);
-      const bytes = [colour.r, colour.g, colour.b].map((value) => Math.round(255 * value));
+      const color = new THREE.Color(relation ? relation.lit : object.color);
+      const bytes = [color.r, color.g, color.b].map((value) => Math.round(255 * value));
       const end = 3 * (vertex + this.model.hullOf(object).vertexCount);
-      for (let i = 3 * vertex; i < end; ++i) this.colours[i] = bytes[i % 3];
+      for (let i = 3 * vertex; i < end; ++i) this.colors[i] = bytes[i % 3];
     }
     for (const part of this.group.children) {
       if (part.geometry.attributes.color) part.geometry.attributes.color.needsUpdate = true;

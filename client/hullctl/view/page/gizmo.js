@@ -1,14 +1,14 @@
-// Handles at the centre of the selected object's box that move and turn it.
-import {AXIS_COLOURS} from 'hulld/palette.js';
+// Handles at the center of the selected object's box that move and turn it.
+import {AXIS_COLORS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
-// three.js paints axes pure red, green, and blue, which colour-blind users may confuse.
+// three.js paints axes pure red, green, and blue, which color-blind users may confuse.
 function repaint(handles) {
-  const colours = {ff0000: AXIS_COLOURS.x, '00ff00': AXIS_COLOURS.y, '0000ff': AXIS_COLOURS.z};
+  const colors = {ff0000: AXIS_COLORS.x, '00ff00': AXIS_COLORS.y, '0000ff': AXIS_COLORS.z};
   handles.traverse((part) => {
-    const colour = part.material && colours[part.material.color.getHexString()];
-    if (colour) part.material.color.set(colour);
+    const color = part.material && colors[part.material.color.getHexString()];
+    if (color) part.material.color.set(color);
   });
 }
 
@@ -53,9 +53,9 @@ export class Gizmo {
       return;
     }
     if (!this.handles.dragging) {
-      const centre = model.centreOf(object);
+      const center = model.centerOf(object);
       const [w, x, y, z] = unitQuaternion(object.pose);
-      this.proxy.position.set(...centre.map((value, k) => value - model.origin[k]));
+      this.proxy.position.set(...center.map((value, k) => value - model.origin[k]));
       this.proxy.quaternion.set(x, y, z, w);
       this.proxy.updateMatrixWorld();
     }
@@ -68,7 +68,7 @@ export class Gizmo {
   }
 
   // Applies the handles to the pose. A move adds to the translation and keeps the quaternion bit
-  // for bit; a turn keeps the centre of the box in place.
+  // for bit; a turn keeps the center of the box in place.
   follow(rest) {
     const {object, model} = this;
     if (!object || !this.startPose) return;
@@ -78,9 +78,9 @@ export class Gizmo {
       for (let k = 0; k < 3; ++k) pose[4 + k] += moved[k];
     } else {
       const {w, x, y, z} = this.proxy.quaternion;
-      const centre = model.shapeOf(object).centre;
-      const before = rotate(unitQuaternion(pose), centre);
-      const after = rotate(unitQuaternion([w, x, y, z]), centre);
+      const center = model.shapeOf(object).center;
+      const before = rotate(unitQuaternion(pose), center);
+      const after = rotate(unitQuaternion([w, x, y, z]), center);
       pose = [w, x, y, z, ...[0, 1, 2].map((k) => pose[4 + k] + (before[k] - after[k]))];
     }
     model.setPose(object.index, pose, rest);

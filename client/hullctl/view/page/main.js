@@ -86,7 +86,7 @@ class Viewer {
       this.stage.draw();
       this.ask(rest);
     });
-    model.on('visibility colour shown', () => {
+    model.on('visibility color shown', () => {
       this.rebuildViews();
       this.gizmo.update();
       this.marks.rebuild();
@@ -96,7 +96,7 @@ class Viewer {
     model.on('collisions', (changed) => {
       this.answerPanel.updateCollisions();
       if (!changed.size) return;
-      if (model.isCrowd) this.crowd?.recolour();
+      if (model.isCrowd) this.crowd?.recolor();
       for (const index of changed) this.views.get(index)?.rebuild();
       this.tree.rebuild();
       this.labels.rebuild();
@@ -300,13 +300,13 @@ class Viewer {
     });
   }
 
-  // Called when all shapes have arrived: centres the origin, and selects a pair in a small scene.
+  // Called when all shapes have arrived: centers the origin, and selects a pair in a small scene.
   firstFit() {
     const {model} = this;
     const bounds = model.bounds();
     if (!bounds) return;
     this.fitted = true;
-    model.origin = bounds.centre.slice();
+    model.origin = bounds.center.slice();
     this.stage.radius = bounds.radius;
     this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
     const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);

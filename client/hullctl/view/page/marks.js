@@ -1,7 +1,7 @@
 // Draws an answer: the separating plane and its axis, the witness points, and the vertex pairs of
 // the certificate.
 import {DrawnGroup} from 'hulld/drawn_group.js';
-import {MARK_COLOURS} from 'hulld/palette.js';
+import {MARK_COLORS} from 'hulld/palette.js';
 import {discTexture, THREE} from 'hulld/three.js';
 
 // With more edges, lines would hide the surface.
@@ -35,19 +35,19 @@ export class Marks extends DrawnGroup {
     return new THREE.Vector3(...p.map((value, k) => value - this.model.origin[k]));
   }
 
-  line(points, colour, options = {}) {
+  line(points, color, options = {}) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
     const material = new THREE.LineBasicMaterial(
-        {color: colour, depthTest: false, transparent: true, ...options});
+        {color: color, depthTest: false, transparent: true, ...options});
     const line = new THREE.LineSegments(geometry, material);
     line.renderOrder = 8;
     this.group.add(line);
   }
 
-  dots(points, colour, size) {
+  dots(points, color, size) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
     const material = new THREE.PointsMaterial({
-      color: colour,
+      color: color,
       size,
       sizeAttenuation: false,
       depthTest: false,
@@ -75,8 +75,8 @@ export class Marks extends DrawnGroup {
 
   addWitness(points) {
     const [a, b] = points.map((p) => this.local(p));
-    this.line([a, b], MARK_COLOURS.witness);
-    this.dots([a, b], MARK_COLOURS.witness, 9);
+    this.line([a, b], MARK_COLORS.witness);
+    this.dots([a, b], MARK_COLORS.witness, 9);
   }
 
   // Draws the plane between the two features of the axis, near the witness points.
@@ -96,7 +96,7 @@ export class Marks extends DrawnGroup {
       const length = 0.5 * this.size;
       const arrow = new THREE.ArrowHelper(
           n, middle.clone().addScaledVector(n, -length / 2), length,
-          new THREE.Color(MARK_COLOURS.axis).getHex(), 0.22 * length, 0.1 * length);
+          new THREE.Color(MARK_COLORS.axis).getHex(), 0.22 * length, 0.1 * length);
       arrow.traverse((part) => {
         part.renderOrder = 8;
         if (part.material) {
@@ -116,7 +116,7 @@ export class Marks extends DrawnGroup {
         new THREE.Vector3(half * x, half * y, 0).applyQuaternion(turn).add(middle);
     const plane = new THREE.Mesh(
         new THREE.PlaneBufferGeometry(2 * half, 2 * half), new THREE.MeshBasicMaterial({
-          color: MARK_COLOURS.plane,
+          color: MARK_COLORS.plane,
           transparent: true,
           opacity: 0.16,
           side: THREE.DoubleSide,
@@ -128,7 +128,7 @@ export class Marks extends DrawnGroup {
     this.group.add(plane);
     const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
     const border = corners.flatMap((p, i) => [p, corners[(i + 1) % 4]]);
-    this.line(border, MARK_COLOURS.plane, {depthTest: true, opacity: 0.9});
+    this.line(border, MARK_COLORS.plane, {depthTest: true, opacity: 0.9});
   }
 
   addCertificate({certificate}, objects) {
@@ -140,7 +140,7 @@ export class Marks extends DrawnGroup {
       });
     }
     if (!points.length) return;
-    this.line(points, MARK_COLOURS.certificate);
-    this.dots(points, MARK_COLOURS.certificate, 7);
+    this.line(points, MARK_COLORS.certificate);
+    this.dots(points, MARK_COLORS.certificate, 7);
   }
 }

@@ -1,9 +1,9 @@
 // The displayed scene and the user's choices, without drawing. Parts of the page listen to its
 // changes.
-import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
+import {CROWD_COLOR, OBJECT_COLORS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
-// Maximum number of objects drawn and labelled individually; more are drawn as a crowd.
+// Maximum number of objects drawn and labeled individually; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
 
 // Bodies with more pairs of pieces than this are queried without a certificate.
@@ -65,7 +65,7 @@ export class Model extends EventTarget {
         start: object.pose,
         visible: true,
         gone: false,
-        colour: many ? CROWD_COLOUR : OBJECT_COLOURS[index % OBJECT_COLOURS.length],
+        color: many ? CROWD_COLOR : OBJECT_COLORS[index % OBJECT_COLORS.length],
       });
     }
   }
@@ -137,10 +137,10 @@ export class Model extends EventTarget {
     return object.visible && !object.gone;
   }
 
-  // Returns the centre of an object's box in the world, in double.
-  centreOf(object) {
+  // Returns the center of an object's box in the world, in double.
+  centerOf(object) {
     const shape = this.shapeOf(object);
-    return toWorld(object.pose, shape ? shape.centre : [0, 0, 0]);
+    return toWorld(object.pose, shape ? shape.center : [0, 0, 0]);
   }
 
   radiusOf(object) {
@@ -162,7 +162,7 @@ export class Model extends EventTarget {
     return corners;
   }
 
-  // Returns {centre, radius, corners}: a sphere around all shown objects, and its input points;
+  // Returns {center, radius, corners}: a sphere around all shown objects, and its input points;
   // null if none is shown.
   bounds(objects = this.objects) {
     const corners = objects
@@ -179,9 +179,9 @@ export class Model extends EventTarget {
         high[k] = Math.max(high[k], corner[k]);
       }
     }
-    const centre = low.map((value, k) => value / 2 + high[k] / 2);
+    const center = low.map((value, k) => value / 2 + high[k] / 2);
     return {
-      centre,
+      center,
       radius: Math.hypot(...high.map((value, k) => value - low[k])) / 2 || 1,
       corners
     };
@@ -207,13 +207,13 @@ export class Model extends EventTarget {
   // Returns the other object with the nearest bounding sphere; null if none exists.
   nearestTo(index) {
     const object = this.objects[index];
-    const centre = this.centreOf(object);
+    const center = this.centerOf(object);
     let nearest = null;
     let least = Infinity;
     for (const candidate of this.objects) {
       if (candidate === object || !candidate.hullId || candidate.gone) continue;
-      const c = this.centreOf(candidate);
-      const gap = Math.hypot(c[0] - centre[0], c[1] - centre[1], c[2] - centre[2]) -
+      const c = this.centerOf(candidate);
+      const gap = Math.hypot(c[0] - center[0], c[1] - center[1], c[2] - center[2]) -
           this.radiusOf(candidate);
       if (gap < least) [nearest, least] = [candidate.index, gap];
     }

@@ -1,7 +1,7 @@
-// Draws one object with three.js: points, mesh, and hull with its edges. Its group is at the centre
+// Draws one object with three.js: points, mesh, and hull with its edges. Its group is at the center
 // of the object's box, turned by the pose.
 import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
-import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
+import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {discTexture, THREE} from 'hulld/three.js';
 
@@ -42,7 +42,7 @@ export class ObjectView extends DrawnGroup {
     this.group.visible = model.isShown(object);
     const hull = model.hullOf(object);
     const mesh = model.meshOf(object);
-    this.centre = (hull || mesh)?.centre || [0, 0, 0];
+    this.center = (hull || mesh)?.center || [0, 0, 0];
     const {show} = model;
     if (mesh && show.mesh && mesh.triangles.length) this.addMesh(mesh);
     // A file without triangles has only points.
@@ -59,15 +59,15 @@ export class ObjectView extends DrawnGroup {
     this.place();
   }
 
-  // Shapes other than the hull have their own centres.
+  // Shapes other than the hull have their own centers.
   shift(part, shape) {
-    part.position.set(...shape.centre.map((value, k) => value - this.centre[k]));
+    part.position.set(...shape.center.map((value, k) => value - this.center[k]));
     part.userData.sharesGeometry = true;
     this.group.add(part);
   }
 
   addMesh(mesh) {
-    const material = facetMaterial({color: this.object.colour, side: THREE.DoubleSide});
+    const material = facetMaterial({color: this.object.color, side: THREE.DoubleSide});
     this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
   }
 
@@ -94,7 +94,7 @@ export class ObjectView extends DrawnGroup {
     for (const side of sides) {
       const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
       const material = facetMaterial(
-          {color: this.object.colour, side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+          {color: this.object.color, side, ...(isHuge(hull) && !isBeside ? {} : glass)});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
       part.renderOrder = side === THREE.FrontSide ? 4 : 3;
       this.shift(part, hull);
@@ -115,9 +115,9 @@ export class ObjectView extends DrawnGroup {
 
   // Subtracts in double, then converts to float: no jitter.
   place() {
-    const centre = this.model.centreOf(this.object);
+    const center = this.model.centerOf(this.object);
     const [w, x, y, z] = unitQuaternion(this.object.pose);
-    this.group.position.set(...centre.map((value, k) => value - this.model.origin[k]));
+    this.group.position.set(...center.map((value, k) => value - this.model.origin[k]));
     this.group.quaternion.set(x, y, z, w);
   }
 
@@ -126,11 +126,11 @@ export class ObjectView extends DrawnGroup {
     const geometry = new THREE.BufferGeometry();
     const positions = new Float32Array(3 * indices.length);
     indices.forEach((v, i) => {
-      for (let k = 0; k < 3; ++k) positions[3 * i + k] = hull.xyz[3 * v + k] - hull.centre[k];
+      for (let k = 0; k < 3; ++k) positions[3 * i + k] = hull.xyz[3 * v + k] - hull.center[k];
     });
     geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
     const material = new THREE.PointsMaterial({
-      color: MARK_COLOURS.flash,
+      color: MARK_COLORS.flash,
       size: 11,
       sizeAttenuation: false,
       transparent: true,

@@ -1,11 +1,11 @@
-// Colours distinguishable with any kind of colour vision, and the accompanying words. Source: Okabe
+// Colors distinguishable with any kind of color vision, and the accompanying words. Source: Okabe
 // and Ito 2008, Color Universal Design.
-export const OBJECT_COLOURS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
+export const OBJECT_COLORS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
 
-// A neutral colour: among many objects, only the colliding ones stand out.
-export const CROWD_COLOUR = '#8fa9bd';
+// A neutral color: among many objects, only the colliding ones stand out.
+export const CROWD_COLOR = '#8fa9bd';
 
-// `sign` distinguishes relations without colour.
+// `sign` distinguishes relations without color.
 export const RELATIONS = {
   RELATION_OVERLAPPING: {word: 'overlapping', sign: '\u25cf', style: 'overlapping', lit: '#d55e00'},
   RELATION_TOUCHING: {word: 'touching', sign: '\u25d0', style: 'touching', lit: '#e69f00'},
@@ -21,7 +21,7 @@ export const RUNGS = {
   RUNG_EXACT: 'exact arithmetic',
 };
 
-export const MARK_COLOURS = {
+export const MARK_COLORS = {
   plane: '#56b4e9',
   axis: '#009e73',
   witness: '#d55e00',
@@ -29,7 +29,7 @@ export const MARK_COLOURS = {
   shell: '#f0e442',
   flash: '#e69f00',
 };
-export const AXIS_COLOURS = {
+export const AXIS_COLORS = {
   x: '#d55e00',
   y: '#009e73',
   z: '#0072b2'

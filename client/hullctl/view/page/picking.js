@@ -42,15 +42,14 @@ export function pick(model, stage, x, y) {
   for (const object of model.objects) {
     const shape = model.shapeOf(object);
     if (!model.isShown(object) || !shape || shape.isEmpty) continue;
-    const centre = model.centreOf(object).map((value, k) => value - model.origin[k]);
-    const towards = origin.map((value, k) => value - centre[k]);
-    const along =
-        -(towards[0] * direction[0] + towards[1] * direction[1] + towards[2] * direction[2]);
-    const closest = towards.map((value, k) => value + along * direction[k]);
+    const center = model.centerOf(object).map((value, k) => value - model.origin[k]);
+    const toward = origin.map((value, k) => value - center[k]);
+    const along = -(toward[0] * direction[0] + toward[1] * direction[1] + toward[2] * direction[2]);
+    const closest = toward.map((value, k) => value + along * direction[k]);
     if (Math.hypot(...closest) > shape.radius || along + shape.radius < 0) continue;
     if (along - shape.radius > nearest) continue;
     const q = unitQuaternion(object.pose);
-    const local = rotateBack(q, towards).map((value, k) => value + shape.centre[k]);
+    const local = rotateBack(q, toward).map((value, k) => value + shape.center[k]);
     const distance =
         shape.triangles.length ? hitTriangles(shape, local, rotateBack(q, direction)) : along;
     if (distance < nearest) [nearest, picked] = [distance, object.index];

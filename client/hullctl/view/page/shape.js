@@ -1,5 +1,5 @@
 // The content of a frame, prepared for drawing and measuring. In double; only GPU data is float,
-// relative to the shape's centre, so that distant shapes do not jitter.
+// relative to the shape's center, so that distant shapes do not jitter.
 import {toWorld} from 'hulld/pose.js';
 
 function boxOf(xyz) {
@@ -44,7 +44,7 @@ function triangulate(rest, facets) {
 }
 
 // Returns the signed volume (by the divergence theorem) and the area of triangles, about the
-// centre.
+// center.
 function measure(xyz, triangles, [cx, cy, cz]) {
   let volume = 0;
   let area = 0;
@@ -97,13 +97,13 @@ export class Shape {
     this.isEmpty = xyz.length === 0;
     this.low = low;
     this.high = high;
-    this.centre = this.isEmpty ? [0, 0, 0] : low.map((value, k) => value / 2 + high[k] / 2);
+    this.center = this.isEmpty ? [0, 0, 0] : low.map((value, k) => value / 2 + high[k] / 2);
     let reach = 0;
     for (let i = 0; i < xyz.length; i += 3) {
       reach = Math.max(
           reach,
           Math.hypot(
-              xyz[i] - this.centre[0], xyz[i + 1] - this.centre[1], xyz[i + 2] - this.centre[2]));
+              xyz[i] - this.center[0], xyz[i + 1] - this.center[1], xyz[i + 2] - this.center[2]));
     }
     this.radius = reach;
   }
@@ -112,9 +112,9 @@ export class Shape {
     return this.xyz.length / 3;
   }
 
-  // Relative to the centre.
+  // Relative to the center.
   positions() {
-    const [cx, cy, cz] = this.centre;
+    const [cx, cy, cz] = this.center;
     const positions = new Float32Array(this.xyz.length);
     for (let i = 0; i < positions.length; i += 3) {
       positions[i] = this.xyz[i] - cx;
@@ -127,7 +127,7 @@ export class Shape {
   // Returns {volume, area}; volume is null if undefined.
   get measures() {
     if (!this.measured) {
-      this.measured = measure(this.xyz, this.triangles, this.centre);
+      this.measured = measure(this.xyz, this.triangles, this.center);
       if (!this.hasVolume()) this.measured.volume = null;
     }
     return this.measured;

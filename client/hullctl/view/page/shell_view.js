@@ -1,7 +1,7 @@
 // Draws a simpler hull in place of the selected one with the shell of its proven error, or the
 // shell of the tolerance.
 import {DrawnGroup} from 'hulld/drawn_group.js';
-import {MARK_COLOURS} from 'hulld/palette.js';
+import {MARK_COLORS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
@@ -30,7 +30,7 @@ export class ShellView extends DrawnGroup {
     if (!object || object.hullId !== hullId) return;
     this.empty();
     this.object = object;
-    this.add(this.plain(simpler), simpler.centre, {color: MARK_COLOURS.witness, opacity: 0.35});
+    this.add(this.plain(simpler), simpler.center, {color: MARK_COLORS.witness, opacity: 0.35});
     const inner = side === 'inside' ? simpler : this.model.hullOf(object);
     this.addShell(inner, simpler.error);
     this.place();
@@ -56,10 +56,10 @@ export class ShellView extends DrawnGroup {
   addShell(hull, distance) {
     if (!(distance > 0)) return;
     const make = hull.facetCount > MOST_FACETS ? fineShell : shellGeometry;
-    this.add(make(hull, distance), hull.centre, {color: MARK_COLOURS.shell, opacity: 0.2});
+    this.add(make(hull, distance), hull.center, {color: MARK_COLORS.shell, opacity: 0.2});
   }
 
-  add(geometry, centre, {color, opacity}) {
+  add(geometry, center, {color, opacity}) {
     const part = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({
       color,
       opacity,
@@ -69,20 +69,20 @@ export class ShellView extends DrawnGroup {
       side: THREE.DoubleSide,
     }));
     part.renderOrder = 6;
-    part.userData.centre = centre;
+    part.userData.center = center;
     this.group.add(part);
   }
 
   // Moves the shell to the object.
   place() {
     if (!this.object || !this.group.children.length) return;
-    const base = this.model.hullOf(this.object).centre;
-    const centre = this.model.centreOf(this.object);
+    const base = this.model.hullOf(this.object).center;
+    const center = this.model.centerOf(this.object);
     const [w, x, y, z] = unitQuaternion(this.object.pose);
-    this.group.position.set(...centre.map((value, k) => value - this.model.origin[k]));
+    this.group.position.set(...center.map((value, k) => value - this.model.origin[k]));
     this.group.quaternion.set(x, y, z, w);
     for (const part of this.group.children) {
-      part.position.set(...part.userData.centre.map((value, k) => value - base[k]));
+      part.position.set(...part.userData.center.map((value, k) => value - base[k]));
     }
     this.stage.draw();
   }
@@ -94,7 +94,7 @@ export class ShellView extends DrawnGroup {
 function shellGeometry(hull, distance) {
   const sizes = hull.facets.subarray(0, hull.facetCount);
   const corners = hull.facets.subarray(hull.facetCount);
-  const [cx, cy, cz] = hull.centre;
+  const [cx, cy, cz] = hull.center;
   const positions = [];
   const indices = [];
   // New indices of the two ends of each directed edge.
@@ -154,7 +154,7 @@ function fineShell(hull, distance) {
   for (let i = 0; i < xyz.length; i += 3) {
     const scale = distance / (Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1);
     for (let k = 0; k < 3; ++k) {
-      positions[i + k] = xyz[i + k] - hull.centre[k] + scale * normals[i + k];
+      positions[i + k] = xyz[i + k] - hull.center[k] + scale * normals[i + k];
     }
   }
   const geometry = new THREE.BufferGeometry();

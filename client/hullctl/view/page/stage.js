@@ -1,6 +1,6 @@
 // The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
 // relative to model.origin.
-import {AXIS_COLOURS, THEMES} from 'hulld/palette.js';
+import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 import {THREE} from 'hulld/three.js';
 
 const FLIGHT_MS = 350;
@@ -106,8 +106,8 @@ export class Stage {
   }
 
   // Shows all of the bounds (model.js); keeps the direction of view unless one is given.
-  flyTo({centre, radius, corners}, {jump = false, direction = null} = {}) {
-    const target = new THREE.Vector3(...centre.map((value, k) => value - this.model.origin[k]));
+  flyTo({center, radius, corners}, {jump = false, direction = null} = {}) {
+    const target = new THREE.Vector3(...center.map((value, k) => value - this.model.origin[k]));
     const view = direction || this.camera.position.clone().sub(this.controls.target).normalize();
     if (!(view.length() > 0.5)) view.copy(this.defaultView());
     const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();
@@ -117,7 +117,7 @@ export class Stage {
     const width = height * this.camera.aspect;
     let distance = 0.05 * radius;
     for (const corner of corners) {
-      const p = new THREE.Vector3(...corner.map((value, k) => value - centre[k]));
+      const p = new THREE.Vector3(...corner.map((value, k) => value - center[k]));
       distance = Math.max(
           distance, p.dot(view) + Math.abs(p.dot(up)) / height,
           p.dot(view) + Math.abs(p.dot(right)) / width);
@@ -198,7 +198,7 @@ export class Stage {
       for (const name of 'xyz') {
         const line = document.createElementNS(svg.namespaceURI, 'line');
         const text = document.createElementNS(svg.namespaceURI, 'text');
-        line.setAttribute('stroke', AXIS_COLOURS[name]);
+        line.setAttribute('stroke', AXIS_COLORS[name]);
         line.setAttribute('stroke-width', '2');
         text.setAttribute('fill', 'currentColor');
         text.setAttribute('text-anchor', 'middle');

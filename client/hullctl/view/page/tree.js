@@ -1,4 +1,4 @@
-// The list of objects: search, select, show and hide, colour. IDs with slashes form groups.
+// The list of objects: search, select, show and hide, color. IDs with slashes form groups.
 import {element, grouped} from 'hulld/dom.js';
 import {RELATIONS} from 'hulld/palette.js';
 
@@ -152,11 +152,11 @@ export class Tree {
         'div', {className: names.filter(Boolean).join(' '), 'data-index': object.index},
         element('input', {
           type: 'color',
-          value: object.colour,
-          'aria-label': `Colour of ${object.name}`,
+          value: object.color,
+          'aria-label': `Color of ${object.name}`,
           oninput: ({target}) => {
-            object.colour = target.value;
-            model.tell('colour');
+            object.color = target.value;
+            model.tell('color');
           },
         }),
         element(

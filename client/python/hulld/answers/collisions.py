@@ -124,7 +124,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Axis:
-    """direction: x y z in the world frame, from A towards B, of unit length up to rounding."""
+    """direction: x y z in the world frame, from A toward B, of unit length up to rounding."""
 
     direction: npt.NDArray[np.float64]
     kind: AxisKind
@@ -147,7 +147,7 @@ class VertexPair:
 class Certificate:
     """A proof of the relation from vertices and poses alone.
 
-    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size) if
+    direction: x y z in the world frame, from A toward B, exact as given; integers (of any size) if
     doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max n.A
     <= min n.B, and the differences of at most four pairs hold 0 in their convex hull. OVERLAPPING:
     the differences of at most six pairs hold 0 strictly inside.

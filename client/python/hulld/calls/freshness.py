@@ -42,7 +42,7 @@ class Freshness:
             message.at_least_revision = self.at_least.revision
             message.store_id = self.at_least.store_id
         if self.max_staleness is not None:
-            # Rounded towards fresher.
+            # Rounded toward fresher.
             message.max_staleness.FromNanoseconds(math.floor(self.max_staleness * 1e9))
         return message
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from hulld import arguments
 
 #: The default of the largest entry of R Rᵀ - I that a matrix may have. It is relative to 1, the
-#: length of a row: within it, a hull of 1 m stands within about a nanometre of its place by the matrix.
+#: length of a row: within it, a hull of 1 m stands within about a nanometer of its place by the matrix.
 #: Products of hundreds of rotations in double precision stay far below (observed: 1e-13), matrices
 #: of float32 do not (1e-7).
 ORTHOGONALITY_TOLERANCE = 1e-9

@@ -1,6 +1,6 @@
 # The gap between two boxes along axes of either, in units of S = M_X + M_Y + |t|, with parts P, (1
 # - P) Q and (1 - P) (1 - Q); one component of each. The entries A, B of the two bodies' rotations
-# err by g and h, and their product R_XY by k. A centre c and a half width are halves of a sum and a
+# err by g and h, and their product R_XY by k. A center c and a half width are halves of a sum and a
 # difference of two doubles: one rounding, m.
 #
 # By hand: an absolute value errs as its argument does, so the gap is proved without them; Eigen may

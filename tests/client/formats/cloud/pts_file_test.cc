@@ -9,7 +9,7 @@ namespace pts_file_test {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-TEST(PtsFile, CountThenPointsWithIntensityAndColour) {
+TEST(PtsFile, CountThenPointsWithIntensityAndColor) {
   EXPECT_THAT(ReadText("2\r\n1 2 3 -1204 255 0 7\r\n0.1 5 6 12 1 2 3\r\n", PointFormat::kPts).xyz(),
               ElementsAre(1, 2, 3, 0.1, 5, 6));
   EXPECT_THAT(ReadText("# scan\n\n1\n1 2 3\n", PointFormat::kPts).xyz(), ElementsAre(1, 2, 3));

@@ -114,7 +114,7 @@ EOF
     contains "a yes to a prune" "cell/stray" "$(on_terminal 'y\n' 'hullctl scene apply cell.yaml --prune')"
     expect "a yes to a prune" "cell/table" "$(hullctl list cell/ --output name)"
     hullctl delete cell/table >/dev/null
-    contains "colours" $'\e[1mHULL\e[0m' "$(on_terminal '' 'hullctl list')"
+    contains "colors" $'\e[1mHULL\e[0m' "$(on_terminal '' 'hullctl list')"
     expect "NO_COLOR" "0" "$(NO_COLOR=1 on_terminal '' 'hullctl list' | grep -c $'\e\\[1m')"
     expect "a pipe" "0" "$(hullctl list | grep -c $'\e')"
     said=$(on_terminal 'get bo\t\nexit\n' 'hullctl shell')

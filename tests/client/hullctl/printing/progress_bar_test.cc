@@ -36,20 +36,20 @@ TEST(ProgressBar, ShowsNothingAtOnceOrWhenHidden) {
   EXPECT_EQ(out.str(), "");
 }
 
-TEST(Painter, ColoursAreForTerminalsThatWantThem) {
+TEST(Painter, ColorsAreForTerminalsThatWantThem) {
   setenv("TERM", "xterm", 1);
   unsetenv("NO_COLOR");
-  EXPECT_TRUE(WantsColour("auto", true));
-  EXPECT_FALSE(WantsColour("auto", false));
+  EXPECT_TRUE(WantsColor("auto", true));
+  EXPECT_FALSE(WantsColor("auto", false));
   setenv("NO_COLOR", "", 1);
-  EXPECT_TRUE(WantsColour("auto", true));
+  EXPECT_TRUE(WantsColor("auto", true));
   setenv("NO_COLOR", "1", 1);
-  EXPECT_FALSE(WantsColour("auto", true));
-  EXPECT_TRUE(WantsColour("always", false));
+  EXPECT_FALSE(WantsColor("auto", true));
+  EXPECT_TRUE(WantsColor("always", false));
   unsetenv("NO_COLOR");
   setenv("TERM", "dumb", 1);
-  EXPECT_FALSE(WantsColour("auto", true));
-  EXPECT_FALSE(WantsColour("never", true));
+  EXPECT_FALSE(WantsColor("auto", true));
+  EXPECT_FALSE(WantsColor("never", true));
   EXPECT_EQ(Painter(true)(Hue::kBad, "x"), "\x1b[31mx\x1b[0m");
   EXPECT_EQ(VisibleWidth("\x1b[31mxm\x1b[0m y"), 4U);
 }

@@ -242,18 +242,18 @@ TEST_F(HullctlScene, AMissingFileNamesItsPlace) {
 class SceneUnits : public HullctlOnServer {};
 
 // Each coordinate is rounded one time: 3 in is the double nearest to 0.0762 m, as is that text.
-TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMetres) {
+TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMeters) {
   const struct {
     const char* unit;
     const char* length;
-    const char* metres;
+    const char* meters;
   } cases[] = {{"in", "3", "0.0762"},    {"in", "0.1", "0.00254"}, {"ft", "11", "3.3528"},
                {"ft", "0.7", "0.21336"}, {"mm", "0.3", "0.0003"},  {"cm", "2.3", "0.023"},
                {"0.0254", "3", "0.0762"}};
-  for (const auto& [unit, length, metres] : cases) {
+  for (const auto& [unit, length, meters] : cases) {
     const TempFile part("part.xyz", "0 0 0\n" + std::string(length) + " 0 0\n0 1 0\n0 0 1\n");
     const TempFile scene("cell.yaml", "prefix: cell/\nhulls:\n  part: {file: " + part.path() +
-                                          ", scale: " + unit + "}\n  wall: {points: [[" + metres +
+                                          ", scale: " + unit + "}\n  wall: {points: [[" + meters +
                                           ", 0, 0], [9, 0, 0], [9, 1, 0], [9, 0, 1]]}\n"
                                           "place:\n  part: {hull: part}\n  wall: {hull: wall}\n"
                                           "ask: {pairs: [[part, wall]]}\n");

@@ -64,7 +64,7 @@ class ViewerTest(unittest.TestCase):
         return self.browser.driver.find_element(By.ID, "canvas")
 
     def pixels(self):
-        """Returns the number of colours of the canvas, and the part that is not ground."""
+        """Returns the number of colors of the canvas, and the part that is not ground."""
         self.browser.wait("!hulldViewer.stage.waiting")
         return self.browser.js("""(() => {
           const {stage} = hulldViewer;
@@ -75,10 +75,10 @@ class ViewerTest(unittest.TestCase):
           gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
           const counts = new Map();
           for (let i = 0; i < data.length; i += 4) {
-            const colour = data[i] << 16 | data[i + 1] << 8 | data[i + 2];
-            counts.set(colour, (counts.get(colour) || 0) + 1);
+            const color = data[i] << 16 | data[i + 1] << 8 | data[i + 2];
+            counts.set(color, (counts.get(color) || 0) + 1);
           }
-          return {colours: counts.size, drawn: 1 - Math.max(...counts.values()) / (w * h)};
+          return {colors: counts.size, drawn: 1 - Math.max(...counts.values()) / (w * h)};
         })()""")
 
     def keys(self, *keys):
@@ -126,7 +126,7 @@ class ViewerTest(unittest.TestCase):
     def test_canvas_is_not_blank_and_follows_what_is_shown(self):
         self.view("room/")
         full = self.pixels()
-        self.assertGreater(full["colours"], 20)
+        self.assertGreater(full["colors"], 20)
         self.assertGreater(full["drawn"], 0.03)
         self.browser.driver.find_element(By.TAG_NAME, "body").click()
         self.keys("l")
@@ -407,7 +407,7 @@ class ViewerTest(unittest.TestCase):
             }
             return most;
           };
-          return reach(position, 0, shell.group.children[1].userData.centre) >=
+          return reach(position, 0, shell.group.children[1].userData.center) >=
               reach(hull.xyz, 0, [0, 0, 0]) - 1e-4;
         })()"""))
 
@@ -422,11 +422,11 @@ class ViewerTest(unittest.TestCase):
         # Distance that each vertex of the sphere was moved from its center, in tolerances.
         least, most = self.browser.js("""(() => {
           const {model, shell} = hulldViewer;
-          const {xyz, centre} = model.hulls.get('many');
+          const {xyz, center} = model.hulls.get('many');
           const at = shell.group.children[0].geometry.attributes.position.array;
           let [least, most] = [Infinity, -Infinity];
           for (let i = 0; i < xyz.length; i += 3) {
-            const was = Math.hypot(...[0, 1, 2].map((k) => xyz[i + k] - centre[k]));
+            const was = Math.hypot(...[0, 1, 2].map((k) => xyz[i + k] - center[k]));
             const moved = (Math.hypot(at[i], at[i + 1], at[i + 2]) - was) / model.tolerance;
             least = Math.min(least, moved);
             most = Math.max(most, moved);
@@ -533,7 +533,7 @@ class ViewerTest(unittest.TestCase):
         pathlib.Path(self.hulld.directory, "many.json").write_text(json.dumps(scene))
         self.view("many.json")
         self.browser.wait("hulldViewer.crowd?.group.children.length > 0")
-        self.assertGreater(self.pixels()["colours"], 20)
+        self.assertGreater(self.pixels()["colors"], 20)
         self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
         self.canvas().click()
         self.browser.wait("hulldViewer.model.selected !== null")
@@ -562,7 +562,7 @@ class ViewerTest(unittest.TestCase):
         self.assertEqual(struct.unpack(">II", png[16:24]), (1200, 800))
         # Shaded facets on a ground that reaches every corner, hence no panel.
         self.browser.driver.get("about:blank")
-        colours = self.browser.driver.execute_async_script("""
+        colors = self.browser.driver.execute_async_script("""
           const [base64, done] = arguments;
           const image = new Image();
           image.onload = () => {
@@ -578,8 +578,8 @@ class ViewerTest(unittest.TestCase):
             done({all: all.size, corners: [at(2, 2), at(right, 2), at(2, low), at(right, low)]});
           };
           image.src = 'data:image/png;base64,' + base64;""", base64.b64encode(png).decode())
-        self.assertGreater(colours["all"], 20)
-        self.assertEqual(len(set(colours["corners"])), 1)
+        self.assertGreater(colors["all"], 20)
+        self.assertEqual(len(set(colors["corners"])), 1)
 
     def test_a_picture_needs_a_browser(self):
         for name, words in (("no-such-browser", "is no program"), ("/bin/false", "made no picture")):

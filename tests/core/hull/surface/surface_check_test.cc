@@ -85,33 +85,33 @@ TEST_F(SurfaceCheck, FindsNothingWhereFacetsAreCoplanar) {
   }
 }
 
-TEST_F(SurfaceCheck, FindsADeadNeighbour) {
-  const TriangleId neighbour = Triangle(0).neighbours[1];
-  Triangle(neighbour).corners[0] = UINT32_MAX;
+TEST_F(SurfaceCheck, FindsADeadNeighbor) {
+  const TriangleId neighbor = Triangle(0).neighbors[1];
+  Triangle(neighbor).corners[0] = UINT32_MAX;
   EXPECT_STREQ(FindDefect(surface_, vertices_, std::vector<TriangleId>{0}),
-               "a neighbour is not alive");
-  EXPECT_STREQ(FindDefect(surface_, vertices_, std::vector<TriangleId>{neighbour}),
+               "a neighbor is not alive");
+  EXPECT_STREQ(FindDefect(surface_, vertices_, std::vector<TriangleId>{neighbor}),
                "a triangle is not alive");
 }
 
-TEST_F(SurfaceCheck, FindsANeighbourThatDoesNotExist) {
-  Triangle(0).neighbours[1] = 1'000'000;
-  EXPECT_STREQ(Defect(), "a neighbour is not alive");
+TEST_F(SurfaceCheck, FindsANeighborThatDoesNotExist) {
+  Triangle(0).neighbors[1] = 1'000'000;
+  EXPECT_STREQ(Defect(), "a neighbor is not alive");
 }
 
 TEST_F(SurfaceCheck, FindsALinkThatIsNotMutual) {
   // The neighbor of a neighbor links to a triangle that is not beyond the edge.
-  const TriangleId neighbour = Triangle(0).neighbours[0];
-  for (TriangleId& link : Triangle(neighbour).neighbours) {
-    if (link == 0) link = neighbour;
+  const TriangleId neighbor = Triangle(0).neighbors[0];
+  for (TriangleId& link : Triangle(neighbor).neighbors) {
+    if (link == 0) link = neighbor;
   }
   EXPECT_STREQ(FindDefect(surface_, vertices_, std::vector<TriangleId>{0}),
-               "a neighbour does not link back");
+               "a neighbor does not link back");
 }
 
 TEST_F(SurfaceCheck, FindsSwappedLinks) {
-  std::swap(Triangle(0).neighbours[0], Triangle(0).neighbours[1]);
-  EXPECT_STREQ(Defect(), "a neighbour does not run along the common edge the other way");
+  std::swap(Triangle(0).neighbors[0], Triangle(0).neighbors[1]);
+  EXPECT_STREQ(Defect(), "a neighbor does not run along the common edge the other way");
 }
 
 TEST_F(SurfaceCheck, FindsATriangleTurnedInsideOut) {
@@ -152,11 +152,11 @@ TEST_F(SurfaceCheck, FindsWrongCounts) {
 // Flips the diagonal of two neighbors: all links are right, and the edge is a dent.
 TEST_F(SurfaceCheck, FindsADent) {
   const TriangleId f = 0;
-  const TriangleId g = Triangle(f).neighbours[0];
+  const TriangleId g = Triangle(f).neighbors[0];
   const std::array<VertexId, 3> abc = Triangle(f).corners;
-  const std::array<TriangleId, 3> of_f = Triangle(f).neighbours;
+  const std::array<TriangleId, 3> of_f = Triangle(f).neighbors;
   std::array<VertexId, 3> bad = Triangle(g).corners;
-  std::array<TriangleId, 3> of_g = Triangle(g).neighbours;
+  std::array<TriangleId, 3> of_g = Triangle(g).neighbors;
   while (bad[0] != abc[1]) {
     std::rotate(bad.begin(), bad.begin() + 1, bad.end());
     std::rotate(of_g.begin(), of_g.begin() + 1, of_g.end());
@@ -164,16 +164,16 @@ TEST_F(SurfaceCheck, FindsADent) {
   const VertexId d = bad[2];
   // a b c and b a d become d c a and c d b; the planes stay with their triangles.
   const auto relink = [&](TriangleId at, TriangleId from, TriangleId to) {
-    for (TriangleId& link : Triangle(at).neighbours) {
+    for (TriangleId& link : Triangle(at).neighbors) {
       if (link == from) link = to;
     }
   };
   VertexTable other;
   for (const Vector& p : points_) other.Add(p);
   Triangle(f).corners = {d, abc[2], abc[0]};
-  Triangle(f).neighbours = {g, of_f[2], of_g[1]};
+  Triangle(f).neighbors = {g, of_f[2], of_g[1]};
   Triangle(g).corners = {abc[2], d, abc[1]};
-  Triangle(g).neighbours = {f, of_g[2], of_f[1]};
+  Triangle(g).neighbors = {f, of_g[2], of_f[1]};
   relink(of_g[1], g, f);
   relink(of_f[1], f, g);
   for (const TriangleId id : {f, g}) {

@@ -235,7 +235,7 @@ TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
 }
 
 // Coincident centers, and hulls that touch along the line of their centers.
-TEST(CenterBounds, LimitsOfTheLineOfCentres) {
+TEST(CenterBounds, LimitsOfTheLineOfCenters) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const QueryHull query_hull(cube);
   const auto ask = [&](const Vector& t) {
