@@ -65,7 +65,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
   v1::AppendPointsResponse response;
   if (!connection_->TakeResponse(&response)) {
     absl::Status status = EndOf(connection_.get());
-    if (status.ok()) status = absl::InternalError("the server ended the stream unopened");
+    if (status.ok()) status = absl::InternalError("the server ended the stream before opening it");
     return status;
   }
   if (!response.has_opened()) {
@@ -105,7 +105,7 @@ absl::Status Appender::Reconnect(absl::Status cause) {
     if (absl::IsNotFound(cause)) {
       cause = absl::FailedPreconditionError(
           absl::StrCat("hull \"", open_.hull_id(),
-                       "\" vanished while the connection was lost; append everything again"));
+                       "\" was deleted while the connection was down; append all points again"));
     }
   }
   return Fail(std::move(cause));
@@ -115,16 +115,17 @@ absl::Status Appender::ResumeAfter(const v1::AppendOpened& opened) {
   if (opened.header().store_id() != opened_.header().store_id() ||
       opened.hull().create_revision() != opened_.hull().create_revision()) {
     return Fail(absl::FailedPreconditionError(absl::StrCat(
-        "hull \"", open_.hull_id(), "\" is another one since the connection was lost; ",
-        totals_.points_acknowledged, " acknowledged points are gone with the old one; ",
-        "append everything again")));
+        "hull \"", open_.hull_id(), "\" was replaced while the connection was down; ",
+        totals_.points_acknowledged, " acknowledged points were lost with the old one; ",
+        "append all points again")));
   }
   const uint64_t first = next_sequence_ - unacknowledged_.size();
   const uint64_t last = opened.last_sequence();
   if (last + 1 < first || last >= next_sequence_) {
-    return Fail(absl::InternalError(absl::StrCat(
-        "the server's last sequence of writer \"", open_.writer_id(), "\" is ", last,
-        ", which this stream cannot continue; does another client write under the same name?")));
+    return Fail(absl::InternalError(absl::StrCat("the server's last sequence of writer \"",
+                                                 open_.writer_id(), "\" is ", last,
+                                                 ", which this stream cannot continue; check that "
+                                                 "no other client uses the same writer ID")));
   }
   DropAcknowledged(last, /*recovered=*/true);
   return absl::OkStatus();

@@ -64,11 +64,11 @@ absl::StatusOr<v1::SaveBackupResponse> ReadPart(std::istream& file) {
   uint32_t size = 0;
   uint32_t checksum = 0;
   if (!ReadNumber(file, &size) || !ReadNumber(file, &checksum)) {
-    return Damaged("it is cut short: its end is missing");
+    return Damaged("it is truncated: its end is missing");
   }
   if (size > kMaxPartBytes) return Damaged("a part has an impossible size");
   std::string bytes(size, '\0');
-  if (!file.read(bytes.data(), size)) return Damaged("it is cut short: its end is missing");
+  if (!file.read(bytes.data(), size)) return Damaged("it is truncated: its end is missing");
   v1::SaveBackupResponse part;
   if (Checksum(bytes) != checksum || !part.ParseFromString(bytes)) {
     return Damaged("the checksum of a part does not match");
@@ -181,7 +181,7 @@ absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* c
   }
   if (absl::Status s = WritePieces(file, staging.string(), check); !s.ok()) return s;
   if (file.peek() != std::ifstream::traits_type::eof()) {
-    return Damaged("something follows its end");
+    return Damaged("data follows its end");
   }
   if (absl::Status s = MoveIntoPlace(staging, target); !s.ok()) return s;
   fs::remove(staging, error);
@@ -191,11 +191,11 @@ absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* c
 }  // namespace
 
 absl::Status BackupCheck::Take(const v1::SaveBackupResponse& part) {
-  if (complete_) return Damaged("something follows its end");
+  if (complete_) return Damaged("data follows its end");
   if (!begun_ && !part.has_begin()) return Damaged("its beginning is missing");
   switch (part.part_case()) {
     case v1::SaveBackupResponse::kBegin:
-      if (std::exchange(begun_, true)) return Damaged("it begins twice");
+      if (std::exchange(begun_, true)) return Damaged("it has two beginnings");
       begin_ = part.begin();
       return absl::OkStatus();
     case v1::SaveBackupResponse::kPiece:
@@ -212,12 +212,12 @@ absl::Status BackupCheck::Take(const v1::SaveBackupResponse& part) {
     case v1::SaveBackupResponse::PART_NOT_SET:
       break;
   }
-  return Damaged("it holds a part of an unknown kind");
+  return Damaged("it contains a part of an unknown kind");
 }
 
 absl::Status BackupCheck::TakePiece(const v1::BackupPiece& piece) {
   if (piece.offset() == 0) {
-    if (!IsInside(piece.path())) return Damaged("a file's path leads out of the directory");
+    if (!IsInside(piece.path())) return Damaged("the path of a file leaves the directory");
     path_ = piece.path();
     file_bytes_ = 0;
     totals_.set_file_count(totals_.file_count() + 1);
@@ -245,7 +245,7 @@ BackupWriter::~BackupWriter() {
 absl::Status BackupWriter::Open() {
   std::error_code error;
   if (fs::exists(path_, error)) {
-    return absl::InvalidArgumentError(absl::StrCat(path_, " exists; name another file"));
+    return absl::InvalidArgumentError(absl::StrCat(path_, " exists; choose another file name"));
   }
   file_.open(partial_path_, std::ios::binary | std::ios::trunc);
   file_ << kFirstLine;
@@ -267,7 +267,7 @@ absl::Status BackupWriter::Write(const v1::SaveBackupResponse& part) {
 }
 
 absl::Status BackupWriter::Finish() {
-  if (!check_.complete()) return Damaged("it is cut short: its end is missing");
+  if (!check_.complete()) return Damaged("it is truncated: its end is missing");
   file_.close();
   std::error_code error;
   if (!file_ || !SyncPath(partial_path_)) {
@@ -286,14 +286,14 @@ absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::st
   std::string line(kFirstLineBytes, '\0');
   file.read(line.data(), static_cast<std::streamsize>(line.size()));
   if (line != kFirstLine) {
-    return absl::InvalidArgumentError(absl::StrCat(path, " is no backup of hulld"));
+    return absl::InvalidArgumentError(absl::StrCat(path, " is not a hulld backup"));
   }
   std::error_code error;
   const fs::path target =
       fs::absolute(fs::path(directory) / ".", error).lexically_normal().parent_path();
   if (fs::exists(target, error) && !IsFree(target)) {
     return absl::FailedPreconditionError(
-        absl::StrCat(directory, " is there and not empty; name a new directory"));
+        absl::StrCat(directory, " exists and is not empty; choose a new directory"));
   }
   const absl::StatusOr<std::vector<fs::path>> made = MakeDirectories(target);
   if (!made.ok()) return made.status();

@@ -50,7 +50,7 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
     case v1::GetHullMeshResponse::PART_NOT_SET:
       break;
   }
-  return absl::InternalError("the mesh stream holds a message of an unknown kind");
+  return absl::InternalError("the mesh stream contains a message of an unknown kind");
 }
 
 // Code that draws, writes, or verifies the mesh relies on these checks.
@@ -97,7 +97,7 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
     *all.mutable_header() = page->header();
     items(all)->MergeFrom(*items(*page));
     if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
-      return absl::InternalError("the server answered a page that continues with itself");
+      return absl::InternalError("the server returned a page token that repeats itself");
     }
     all.set_next_page_token(page->next_page_token());
     // Otherwise a later page could come from an older snapshot and lack items.
@@ -161,7 +161,7 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     // This client does not cancel the call. gRPC reports CANCELLED when a call reaches a server
     // during its shutdown.
     if (status.error_code() == grpc::StatusCode::CANCELLED) {
-      return absl::UnavailableError("the server ended the call, as it is going");
+      return absl::UnavailableError("the server ended the call because it is shutting down");
     }
     return FromGrpcStatus(status, context);
   };

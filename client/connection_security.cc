@@ -70,21 +70,19 @@ bool IsToken(const std::string& token) {
 
 absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server) {
   if (security.certificate.empty() != security.key.empty()) {
-    return absl::InvalidArgumentError(
-        "a client certificate and its key belong together; give both or neither");
+    return absl::InvalidArgumentError("a client certificate requires its key; set both or neither");
   }
   if (security.tls && security.server_name.empty() && TargetName(server) != server) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "several addresses have certificates for one name: say which, with --server-name"));
+        "a list of addresses requires one certificate name; set it with --server-name"));
   }
   if (security.token.empty()) return absl::OkStatus();
   if (!IsToken(security.token)) {
-    return absl::InvalidArgumentError("the token holds blanks or control characters");
+    return absl::InvalidArgumentError("the token contains spaces or control characters");
   }
   if (MaySendToken(security, server)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "the token would travel unencrypted to ", server,
-      ", where everyone on the way could read it; use TLS (--tls), or allow it (--insecure)"));
+  return absl::InvalidArgumentError(absl::StrCat("the token would travel unencrypted to ", server,
+                                                 "; use TLS (--tls), or allow it with --insecure"));
 }
 
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
@@ -115,7 +113,7 @@ absl::StatusOr<std::string> ReadTokenFile(const std::string& path) {
   if (!file) return problem(std::strerror(errno));
   struct stat info = {};
   if (stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode) && (info.st_mode & 0077) != 0) {
-    return problem("others can read this token; chmod 600 it");
+    return problem("the token is readable by other users; run chmod 600 on the file");
   }
   std::string token;
   std::string more;

@@ -50,7 +50,7 @@ absl::Status ValidateList(const std::string& server) {
   for (const std::string& one : servers) {
     if (!IsHostAndPort(one)) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "\"", one, "\" is not ADDRESS:PORT; a list reads 10.0.0.1:50551,10.0.0.2:50551"));
+          "\"", one, "\" is not ADDRESS:PORT; write a list as 10.0.0.1:50551,10.0.0.2:50551"));
     }
     const HostKind kind = KindOf(HostOf(one));
     if (kind == HostKind::kName) {

@@ -67,10 +67,10 @@ absl::Status CheckDataDir(const std::string& path) {
     nearest = nearest.parent_path();
   }
   if (!std::filesystem::is_directory(nearest, error)) {
-    return problem(nearest.string(), "is no directory");
+    return problem(nearest.string(), "is not a directory");
   }
   if (access(nearest.c_str(), R_OK | W_OK | X_OK) != 0) {
-    return problem(nearest.string(), "cannot be written by the user who runs this");
+    return problem(nearest.string(), "is not writable by the current user");
   }
   return absl::OkStatus();
 }
@@ -88,12 +88,12 @@ std::vector<std::string> ExposureWarnings(const Config& config) {
   std::vector<std::string> warnings;
   if (!config.has_tls()) {
     warnings.push_back(
-        "other machines can reach this server, and nothing is encrypted (--insecure)");
+        "the server is reachable from other machines without encryption (--insecure)");
   }
   if (config.tokens_file.empty() && config.tls_client_ca.empty()) {
     warnings.push_back(
-        "everybody who can reach this server may read and change everything; limit that with "
-        "--tokens-file or --tls-client-ca");
+        "every client that can reach this server may read and change everything; restrict access "
+        "with --tokens-file or --tls-client-ca");
   }
   return warnings;
 }

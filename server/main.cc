@@ -35,15 +35,16 @@ sigset_t HandledSignals() {
 
 void LogStore(const Config& config) {
   if (config.store == "memory") {
-    spdlog::info("hulls live in memory and end with this process");
+    spdlog::info("store: memory; all hulls are lost when this process exits");
   } else if (config.store == "postgres") {
     // The store logged the details when it was opened.
-    spdlog::info(config.postgres_servers == "many" ? "this is an active server of its database"
-                                                   : "this is the active server of its database");
+    spdlog::info(config.postgres_servers == "many"
+                     ? "this server is active on its database, possibly with peers"
+                     : "this server is the active one on its database");
   } else if (config.durability == "sync") {
-    spdlog::info("hulls live in {}; what is acknowledged is on disk", config.data_dir);
+    spdlog::info("store: {}; acknowledged changes are on disk", config.data_dir);
   } else {
-    spdlog::info("hulls live in {}; what is acknowledged is on disk within {} ms", config.data_dir,
+    spdlog::info("store: {}; acknowledged changes reach the disk within {} ms", config.data_dir,
                  Config::kRelaxedSyncInterval.count());
   }
 }
@@ -56,7 +57,7 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
   for (;;) {
     const int received = sigtimedwait(&signals, nullptr, &kPause);
     if (received == SIGHUP) {
-      spdlog::info("SIGHUP received: looking at the files of certificates and tokens");
+      spdlog::info("SIGHUP received: reloading certificates and tokens");
       server.ReloadFiles();
     } else if (received > 0) {
       return received;
@@ -81,9 +82,9 @@ void LogStart(const Config& config, const Server& server) {
       HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
   if (config.threads > 0) {
-    spdlog::info("threads that compute answers: {}, as --threads says", config.threads);
+    spdlog::info("query threads: {} (--threads)", config.threads);
   } else {
-    spdlog::info("threads that compute answers: {}", ReadCpuLimit().Describe());
+    spdlog::info("query threads: {}", ReadCpuLimit().Describe());
   }
   LogStore(config);
   for (const std::string& warning : ExposureWarnings(config)) spdlog::warn("{}", warning);
@@ -123,14 +124,14 @@ int Run(const Config& config) {
   const int received = WaitForEnd(signals, **server);
   if (store_ended) {
     // Memory may be stale from now on, so no call may continue.
-    spdlog::error("the store is no longer this server's: ending without draining");
+    spdlog::error("lost the store: exiting without draining");
     return kExitFailure;
   }
-  spdlog::info("{} received: draining for at most {} ms; once more ends at once",
+  spdlog::info("{} received: draining for at most {} ms; send it again to exit immediately",
                received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
   if (!(*server)->Drain(config.drain_timeout)) {
-    spdlog::warn("the drain timeout passed; cancelled the calls that still ran");
+    spdlog::warn("the drain timeout expired; cancelled the remaining calls");
   }
   return 0;
 }

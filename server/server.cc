@@ -102,7 +102,7 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
   guard_->OnTokensChanged([this] {
     const size_t ended = admission_.EndRevoked(
         [this](const Caller& caller) { return guard_->authenticator().Knows(caller); });
-    if (ended > 0) spdlog::info("{} calls ended, as their tokens are no longer valid", ended);
+    if (ended > 0) spdlog::info("ended {} calls whose tokens were revoked", ended);
   });
   AddSizesToMetrics();
 }
@@ -186,7 +186,7 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&maintenance_service_);
   builder.RegisterService(&reflection_service_);
   grpc_server_ = builder.BuildAndStart();
-  if (grpc_server_ == nullptr) return absl::InternalError("gRPC does not start");
+  if (grpc_server_ == nullptr) return absl::InternalError("gRPC failed to start the server");
   address_ = address->Format(acceptor_->port());
   AddDescriptorsToMetrics();
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
@@ -205,15 +205,15 @@ absl::Status Server::Listen(const Config& config) {
 
 void Server::AddDescriptorsToMetrics() {
   prometheus::Gauge& descriptors =
-      metrics_.AddGauge("process_open_fds", "Descriptors that the process has open.");
+      metrics_.AddGauge("process_open_fds", "Open file descriptors of the process.");
   prometheus::Gauge& connections =
-      metrics_.AddGauge("hulld_connections", "Connections that clients have open.");
+      metrics_.AddGauge("hulld_connections", "Open client connections.");
   metrics_.AddRefresh([this, &descriptors, &connections] {
     descriptors.Set(static_cast<double>(CountDescriptors()));
     connections.Set(static_cast<double>(connection_table_.size()));
   });
   metrics_.AddGauge("hulld_half_open_streams",
-                    "Streams whose first message is not complete, without TLS.",
+                    "Streams with an incomplete first message, without TLS.",
                     [] { return static_cast<double>(HalfOpenStreams()); });
   std::vector<prometheus::Counter*> closed;
   for (size_t i = 1; i < FrameGuard::kVerdictCount; ++i) {

@@ -163,7 +163,7 @@ absl::StatusOr<ConvexRegion> ConvexRegion::Make(const HullMesh& mesh, const Comm
   if (vertices.size() == 2) maker.AddSegment(vertices[0], vertices[1]);
   const bool is_flat = mesh.facet_sizes.size() == 1;
   if (vertices.size() > 2 && mesh.facet_sizes.empty()) {
-    return absl::InternalError("a hull of more than two vertices came without facets");
+    return absl::InternalError("a hull of more than two vertices has no facets");
   }
   size_t begin = 0;
   for (const uint32_t size : mesh.facet_sizes) {

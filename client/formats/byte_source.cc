@@ -28,7 +28,7 @@ absl::StatusOr<std::unique_ptr<ByteSource>> ByteSource::Open(const std::string& 
   struct stat info;
   if (fstat(descriptor, &info) == 0 && S_ISDIR(info.st_mode)) {
     close(descriptor);
-    return absl::InvalidArgumentError(absl::StrCat(path, " is a directory; name a file"));
+    return absl::InvalidArgumentError(absl::StrCat(path, " is a directory; pass a file"));
   }
   return std::make_unique<ByteSource>(descriptor, path);
 }

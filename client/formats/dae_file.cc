@@ -148,7 +148,7 @@ absl::Status ReadDae(const std::string& path, PointCollector* points) {
         return AddPoints(path, mesh, X_WM, points);
       });
   if (!read.ok() || !is_empty) return read;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": there is no vertex in it"));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": it contains no vertex"));
 }
 
 absl::Status ReadDaeParts(const std::string& path, std::vector<MeshPart>* parts) {

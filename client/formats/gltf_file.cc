@@ -100,7 +100,7 @@ class GltfWalk {
     if (ok()) CheckVersion();
     if (ok()) LoadBuffers();
     if (ok()) VisitScene();
-    if (ok() && vertices_ == 0) Fail("there is no vertex in the meshes that the file shows");
+    if (ok() && vertices_ == 0) Fail("the meshes of the scene have no vertex");
     return status_;
   }
 
@@ -175,7 +175,7 @@ class GltfWalk {
   const Struct& Element(const std::string& list, size_t index) {
     const auto& values = ListOf(root_, list).values();
     if (index >= static_cast<size_t>(values.size())) {
-      Fail(absl::StrCat(list, "[", index, "] is named, but there are ", values.size()));
+      Fail(absl::StrCat(list, "[", index, "] is out of range; the list's size is ", values.size()));
       return Struct::default_instance();
     }
     const Value& value = values[static_cast<int>(index)];
@@ -207,7 +207,7 @@ class GltfWalk {
     const auto parsed = google::protobuf::util::JsonStringToMessage(json, &root_);
     if (!parsed.ok()) {
       const std::string problem(parsed.message().data(), parsed.message().size());
-      Fail(absl::StrCat("is not read as the JSON of glTF: ", problem));
+      Fail(absl::StrCat("is not valid glTF JSON: ", problem));
     }
   }
 
@@ -221,7 +221,8 @@ class GltfWalk {
     constexpr uint32_t kJson = 0x4E4F534A;
     constexpr uint32_t kBinary = 0x004E4942;
     if (load(4) != 2) {
-      Fail(absl::StrCat("byte 4: GLB version ", load(4), " is not read; convert it to glTF 2.0"));
+      Fail(absl::StrCat("byte 4: GLB version ", load(4),
+                        " is not supported; convert it to glTF 2.0"));
       return {};
     }
     const size_t length = load(8);
@@ -250,7 +251,7 @@ class GltfWalk {
     const std::string version = TextOf(ObjectOf(root_, "asset"), "version");
     if (version.rfind("2.", 0) != 0) {
       Fail(absl::StrCat("asset.version is ", Quoted(version),
-                        "; only glTF 2.0 is read, so convert the file"));
+                        "; only glTF 2.0 is supported; convert the file"));
     }
     for (const Value& extension : ListOf(root_, "extensionsRequired").values()) {
       if (!IsKnownExtension(extension.string_value())) RefuseExtension(extension.string_value());
@@ -316,7 +317,7 @@ class GltfWalk {
     const uintmax_t file_size = std::filesystem::file_size(path, error);
     if (uri.find("://") != std::string::npos || name.find('\0') != std::string::npos || error) {
       Fail(absl::StrCat(what, ": the file ", Quoted(name), " cannot be read",
-                        error ? ": " + error.message() : "", "; put it beside the glTF file"));
+                        error ? ": " + error.message() : "", "; put it next to the glTF file"));
       return {};
     }
     if (file_size < size) {
@@ -404,7 +405,7 @@ class GltfWalk {
     for (size_t i = 0; i < count && ok(); ++i) {
       const double index = LoadScalar(*type, view.at(i), false);
       if (index >= static_cast<double>(limit)) {
-        Fail(absl::StrCat(what, ": index ", index, " names none of ", limit, " vertices"));
+        Fail(absl::StrCat(what, ": index ", index, " is out of range of ", limit, " vertices"));
       }
       indices.push_back(static_cast<uint32_t>(index));
     }
@@ -435,7 +436,8 @@ class GltfWalk {
     std::vector<std::array<double, 3>> positions;
     if (!ok()) return positions;
     if (TextOf(accessor, "type") != "VEC3" || *type == ScalarType::kUint32) {
-      Fail(absl::StrCat(what, " is no position: VEC3 of floats, or of integers of 8 or 16 bits"));
+      Fail(absl::StrCat(
+          what, " is not a position: it must be VEC3 of floats or of 8- or 16-bit integers"));
     }
     const bool has_view = Find(accessor, "bufferView") != nullptr;
     const bool has_sparse = Find(accessor, "sparse") != nullptr;

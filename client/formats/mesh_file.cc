@@ -218,7 +218,7 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
   }
   std::erase_if(parts, [](const MeshPart& part) { return part.mesh.triangles.empty(); });
   if (!parts.empty()) return parts;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": there is no triangle in it"));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": it contains no triangle"));
 }
 
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {
@@ -274,7 +274,7 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
     default:
       status = absl::InvalidArgumentError(
           absl::StrCat(path,
-                       ": no mesh is read from this format; convert it to obj, off, stl, "
+                       ": this format has no meshes; convert it to obj, off, stl, "
                        "gltf or dae"));
   }
   if (!status.ok()) return status;

@@ -98,12 +98,13 @@ absl::Status ParseProperty(const ByteSource& source, std::string_view rest, PlyH
     property.count_type = TypeFromName(count_name);
     if (!property.count_type || *property.count_type == ScalarType::kFloat ||
         *property.count_type == ScalarType::kDouble) {
-      return source.ErrorAtLine(absl::StrCat(Quoted(count_name), " is no type of a list's count"));
+      return source.ErrorAtLine(
+          absl::StrCat(Quoted(count_name), " is not a valid type of a list's count"));
     }
     type_name = NextToken(&rest);
   }
   const std::optional<ScalarType> type = TypeFromName(type_name);
-  if (!type) return source.ErrorAtLine(absl::StrCat(Quoted(type_name), " is no type of PLY"));
+  if (!type) return source.ErrorAtLine(absl::StrCat(Quoted(type_name), " is not a PLY type"));
   property.type = *type;
   const std::string_view name = NextToken(&rest);
   if (name.empty()) return source.ErrorAtLine("the property has no name");

@@ -24,7 +24,7 @@ std::string PointCollector::NonFiniteMessage(double x, double y, double z) const
   while (std::isfinite(xyz[bad])) ++bad;
   return absl::StrCat("point ", counts_.points + counts_.skipped + counts_.zeros, " has ",
                       std::string(1, "xyz"[bad]), " = ", std::isnan(xyz[bad]) ? "NaN" : "infinity",
-                      "; leave such points out with --skip-nonfinite");
+                      "; skip such points with --skip-nonfinite");
 }
 
 }  // namespace hulld

@@ -62,7 +62,7 @@ absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
   if (request.format != PointFormat::kDae) return ReadText(request, points);
   if (request.path == "-") {
     return absl::InvalidArgumentError(
-        "dae cannot be read from standard input; save the data to a file and name it");
+        "dae cannot be read from standard input; save it to a file first");
   }
   // Reports plainly why a file cannot be opened.
   if (auto source = ByteSource::Open(request.path); !source.ok()) return source.status();
@@ -96,7 +96,7 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
     if (auto format = PointFormatFromName(file.substr(dot + 1)); format.ok()) return format;
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(path, ": no known format has this extension; say which with --format (",
+      absl::StrCat(path, ": unknown file extension; set the format with --format (",
                    absl::StrJoin(PointFormatNames(), ", "), ")"));
 }
 
@@ -117,7 +117,7 @@ absl::Status AddTextPoint(const ByteSource& source, std::string_view text, Point
   for (size_t i = 0; i < 3; ++i) {
     const std::string_view token = NextToken(&text);
     if (token.empty()) {
-      return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, here are ", i));
+      return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, got ", i));
     }
     if (const NumberText kind = points->Parse(token, i, &xyz[i]); kind != NumberText::kNumber) {
       return source.ErrorAtLine(NumberProblem(kind, token));

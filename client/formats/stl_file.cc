@@ -33,7 +33,7 @@ class StlText {
       if (absl::Status status = ReadSolid(); !status.ok()) return status;
     }
     if (!source_->status().ok()) return source_->status();
-    return facets_ > 0 ? absl::OkStatus() : source_->ErrorAtLine("there is no facet in the file");
+    return facets_ > 0 ? absl::OkStatus() : source_->ErrorAtLine("the file contains no facet");
   }
 
  private:
@@ -167,7 +167,7 @@ absl::Status WalkStl(ByteSource* source, const StlReceiver& receiver) {
     return StlText(source, receiver).Run();
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(source->name(), ": is no STL file: it starts with ", Quoted(word),
+      absl::StrCat(source->name(), ": not an STL file: it starts with ", Quoted(word),
                    " where \"solid\" or the ", "header of a binary file is expected"));
 }
 

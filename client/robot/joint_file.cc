@@ -52,7 +52,7 @@ absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<JointVariable>
   const int joint = robot.FindJoint(name);
   if (joint < 0) {
     return absl::InvalidArgumentError(absl::StrCat(
-        Quoted(name), " is no joint of the robot; those with a value are ", NamesOf(variables)));
+        Quoted(name), " is not a joint of the robot; joints with values: ", NamesOf(variables)));
   }
   const RobotJoint& found = robot.joints[static_cast<size_t>(joint)];
   if (found.mimics >= 0) {
@@ -121,7 +121,7 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
   if (!source->status().ok()) return source->status();
   if (!names_joint) {
     return absl::InvalidArgumentError(
-        absl::StrCat(source->name(), ": there is no header that names joints in it"));
+        absl::StrCat(source->name(), ": it has no header with joint names"));
   }
   absl::Status good = CheckRotations(*source, robot, variables, reader.columns_);
   if (!good.ok()) return good;
@@ -150,7 +150,7 @@ absl::StatusOr<bool> WaypointReader::Next(std::vector<double>* free_values) {
     const std::string joint = JointWithoutRotation(*robot_, *free_values);
     if (joint.empty()) return true;
     return source_->ErrorAtLine(
-        absl::StrCat("the quaternion of ", joint, " is 0 0 0 0, which is no rotation"));
+        absl::StrCat("the quaternion of ", joint, " is 0 0 0 0, which is not a rotation"));
   }
   if (!source_->status().ok()) return source_->status();
   return false;

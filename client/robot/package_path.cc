@@ -96,13 +96,13 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
                               ? fs::path(rest)
                               : fs::path(paths.description).parent_path() / rest;
     if (IsFile(path)) return path.string();
-    return absl::NotFoundError(absl::StrCat("there is no file ", path.string()));
+    return absl::NotFoundError(absl::StrCat("no such file: ", path.string()));
   }
   const size_t slash = rest.find('/');
   const std::string package = rest.substr(0, slash);
   if (package.empty() || slash == std::string::npos || slash + 1 == rest.size()) {
     return absl::NotFoundError(
-        absl::StrCat(Quoted(name), " names no file of a package; package://PACKAGE/FILE does"));
+        absl::StrCat(Quoted(name), " is not a package file; write package://PACKAGE/FILE"));
   }
   std::vector<std::string> tried;
   for (const fs::path& folder : FoldersOf(paths, package)) {
@@ -117,7 +117,7 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
   tried.resize(tried.size() - more);
   return absl::NotFoundError(absl::StrCat(
       "no folder of the package ", Quoted(package), " holds ", rest.substr(slash + 1),
-      "; say where it is with --package ", package, "=DIR (looked in ", absl::StrJoin(tried, ", "),
+      "; set its folder with --package ", package, "=DIR (looked in ", absl::StrJoin(tried, ", "),
       more > 0 ? absl::StrCat(" and ", more, " more") : "", ")"));
 }
 

@@ -21,7 +21,7 @@ absl::StatusOr<int> LinkOf(const XmlDocument& document, const TiXmlElement& elem
       element, name.empty()
                    ? absl::StrCat("<", element.ValueStr(), "> lacks ", attribute, "=\"...\"")
                    : absl::StrCat("<", element.ValueStr(), "> names the link ", Quoted(name),
-                                  ", which the robot ", Quoted(robot.name), " has not"));
+                                  ", which robot ", Quoted(robot.name), " does not have"));
 }
 
 absl::StatusOr<LinkPair> PairOf(const XmlDocument& document, const TiXmlElement& element,

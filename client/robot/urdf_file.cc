@@ -80,7 +80,8 @@ class UrdfCheck {
     if (!name.ok()) return name.status();
     const auto [other, is_new] = links_.emplace(*name, &link);
     if (!is_new) {
-      return document_.ErrorAt(link, absl::StrCat("link ", Quoted(*name), " is there already, in ",
+      return document_.ErrorAt(link, absl::StrCat("link ", Quoted(*name),
+                                                  " is defined twice; the first definition is in ",
                                                   "line ", other->second->Row()));
     }
     for (const TiXmlElement* collision : ChildrenOf(link, "collision")) {
@@ -151,7 +152,7 @@ class UrdfCheck {
     std::string link = AttributeOf(*element, "link");
     if (links_.contains(link)) return link;
     return document_.ErrorAt(*element, absl::StrCat("joint ", joint_name, " has a ", end,
-                                                    " that there is not: ", Quoted(link)));
+                                                    " that does not exist: ", Quoted(link)));
   }
 
   absl::Status TakeJoint(const TiXmlElement& joint) {
@@ -159,7 +160,8 @@ class UrdfCheck {
     if (!name.ok()) return name.status();
     const auto [other, is_new] = joints_.emplace(*name, &joint);
     if (!is_new) {
-      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(*name), " is there already, ",
+      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(*name),
+                                                   " is defined twice; the first definition is ",
                                                    "in line ", other->second->Row()));
     }
     const std::string kind = AttributeOf(joint, "type");
@@ -228,9 +230,9 @@ class UrdfCheck {
       }
       std::string leader = AttributeOf(*mimic, "joint");
       if (!joints_.contains(leader)) {
-        return document_.ErrorAt(*mimic,
-                                 absl::StrCat("joint ", Quoted(name),
-                                              " mimics one that there is not: ", Quoted(leader)));
+        return document_.ErrorAt(
+            *mimic, absl::StrCat("joint ", Quoted(name),
+                                 " mimics a joint that does not exist: ", Quoted(leader)));
       }
       for (const std::string& one : {name, leader}) {
         const std::string kind = AttributeOf(*joints_.at(one), "type");
@@ -241,7 +243,7 @@ class UrdfCheck {
       name = std::move(leader);
     }
     return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
-                                                 " mimics itself in the end"));
+                                                 " mimics itself through other joints"));
   }
 
   absl::Status CheckTree() const {
@@ -255,7 +257,7 @@ class UrdfCheck {
           up = parent->second;
           if (++steps <= links_.size()) continue;
           return document_.ErrorAt(
-              *element, absl::StrCat("link ", Quoted(name), " is in a circle of joints"));
+              *element, absl::StrCat("link ", Quoted(name), " is part of a cycle of joints"));
         }
         continue;
       }
@@ -263,9 +265,9 @@ class UrdfCheck {
         const TiXmlElement& later = root->Row() < element->Row() ? *element : *root;
         return document_.ErrorAt(
             later,
-            absl::StrCat("link ", Quoted(AttributeOf(later, "name")), " hangs on no joint, like ",
+            absl::StrCat("link ", Quoted(AttributeOf(later, "name")), " has no parent joint, like ",
                          Quoted(AttributeOf(root == &later ? *element : *root, "name")),
-                         "; all links but one are children of joints"));
+                         "; exactly one link may be the root"));
       }
       root = element;
     }
@@ -424,7 +426,7 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const Extras& e
     const auto known = extras.shapes.find(from->name);
     if (known == extras.shapes.end() || known->second.size() != from->collision_array.size()) {
       return absl::InvalidArgumentError(absl::StrCat(
-          file, ": liburdfdom reads link ", Quoted(from->name), " otherwise; use a plain name"));
+          file, ": liburdfdom reads link ", Quoted(from->name), " differently; use a plain name"));
     }
     const std::vector<ShapePlace>& lines = known->second;
     for (size_t i = 0; i < lines.size(); ++i) {
@@ -450,7 +452,7 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const Extras& e
     const auto leader = index_of.find(mimic->joint_name);
     if (leader == index_of.end()) {
       return absl::InvalidArgumentError(absl::StrCat(
-          file, ": liburdfdom reads joint ", Quoted(joint.name), " otherwise; use plain names"));
+          file, ": liburdfdom reads joint ", Quoted(joint.name), " differently; use plain names"));
     }
     joint.mimics = leader->second;
     joint.multiplier = mimic->multiplier;

@@ -23,7 +23,7 @@ class TagWalk {
   TagWalk(std::string_view text, const std::string& name) : text_(text), name_(name) {}
 
   absl::Status Run() {
-    if (text_.find('\0') != std::string_view::npos) return Error("a byte 0 is no text");
+    if (text_.find('\0') != std::string_view::npos) return Error("the text contains a zero byte");
     while (at_ < text_.size()) {
       absl::Status step = text_[at_] == '<' ? TakeMarkup() : TakeText();
       if (!step.ok()) return step;
@@ -32,7 +32,7 @@ class TagWalk {
       return Error(absl::StrCat("the file ends before </", open_.back().name, ">, which closes <",
                                 open_.back().name, "> of line ", open_.back().line));
     }
-    return roots_ == 1 ? absl::OkStatus() : Error("there is no element in it");
+    return roots_ == 1 ? absl::OkStatus() : Error("it contains no element");
   }
 
  private:
@@ -80,7 +80,7 @@ class TagWalk {
       return open_.empty() ? Error("text outside of all elements") : SkipPast("]]>", "<![CDATA[");
     }
     if (StartsWith("<?")) return SkipPast("?>", "<?");
-    if (StartsWith("<!")) return Error("document types are not read; remove <!DOCTYPE ...>");
+    if (StartsWith("<!")) return Error("document types are not supported; remove <!DOCTYPE ...>");
     return StartsWith("</") ? TakeEnd() : TakeStart();
   }
 
@@ -95,7 +95,7 @@ class TagWalk {
     const std::string name = TakeName();
     SkipSpace();
     if (at_ >= text_.size() || text_[at_] != '>') return Error("a tag </... is not closed by >");
-    if (open_.empty()) return Error(absl::StrCat("</", name, "> closes nothing"));
+    if (open_.empty()) return Error(absl::StrCat("</", name, "> has no matching start tag"));
     if (name != open_.back().name) {
       return Error(absl::StrCat("</", name, "> where <", open_.back().name, "> of line ",
                                 open_.back().line, " is to be closed"));
@@ -112,11 +112,11 @@ class TagWalk {
     const bool starts_well =
         !name.empty() && (absl::ascii_isalpha(static_cast<unsigned char>(name[0])) ||
                           name[0] == '_' || static_cast<unsigned char>(name[0]) >= 0x80);
-    if (!starts_well) return Error("a name must follow <; text has &lt; for it");
+    if (!starts_well) return Error("expected a name after <; in text, write &lt;");
     if (name.rfind("xacro:", 0) == 0) {
       return Error(absl::StrCat("<", name, "> is a macro; expand the file with 'xacro' first"));
     }
-    if (open_.empty() && ++roots_ > 1) return Error("a second element beside the first");
+    if (open_.empty() && ++roots_ > 1) return Error("a second root element");
     for (;;) {
       SkipSpace();
       if (at_ >= text_.size()) return Error(absl::StrCat("the tag <", name, " is not closed by >"));
@@ -141,7 +141,7 @@ class TagWalk {
     SkipSpace();
     if (name.empty() || at_ >= text_.size() || text_[at_] != '=') {
       return Error(absl::StrCat("in <", element, ">, ", Quoted(name),
-                                " is no attribute; attributes are NAME=\"VALUE\""));
+                                " is not an attribute; write NAME=\"VALUE\""));
     }
     Advance(1);
     SkipSpace();
@@ -182,11 +182,11 @@ absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
   document->tree.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
   if (document->tree.Error()) {
     return absl::InvalidArgumentError(absl::StrCat(
-        name, ":", document->tree.ErrorRow(), ": not read as XML: ", document->tree.ErrorDesc()));
+        name, ":", document->tree.ErrorRow(), ": not valid XML: ", document->tree.ErrorDesc()));
   }
   const TiXmlElement* const element = document->tree.RootElement();
   if (element == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": there is no element in it"));
+    return absl::InvalidArgumentError(absl::StrCat(name, ": it contains no element"));
   }
   if (element->ValueStr() != root) {
     return document->ErrorAt(*element, absl::StrCat("the outermost element is <",
@@ -241,7 +241,7 @@ absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document,
     return error(absl::StrCat("lacks ", attribute, "=\"...\""));
   }
   return error(absl::StrCat(attribute, " takes ", count, count == 1 ? " number" : " numbers",
-                            ", here are ", numbers.size()));
+                            ", got ", numbers.size()));
 }
 
 }  // namespace hulld

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kMeshReadAttempts = 5;
 
-constexpr char kOtherStore[] = "the server holds another store than the answer's";
+constexpr char kOtherStore[] = "the server's store differs from the answer's";
 
 // Returns true if a hull or a body is still at that version.
 template <typename Info>
@@ -37,7 +37,7 @@ std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement
                         absl::StrCat(v1::Relation_Name(relation), " has no certificate")};
   }
   if (of_a.hull_id() == a.hull_id() && of_b.hull_id() == b.hull_id()) return std::nullopt;
-  return Verification{Verdict::kInvalid, "the answer is about other hulls than the request"};
+  return Verification{Verdict::kInvalid, "the answer is for hulls other than the request's"};
 }
 
 Verification FromStatus(const absl::Status& checked) {
@@ -131,7 +131,7 @@ absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
     if (hull == hulls.end()) {
       *problem = {Verdict::kInvalid,
                   absl::StrCat("piece ", pieces.size(), " of body ", version.hull_id(), " is hull ",
-                               piece.hull_id(), ", of which the answer names no revision")};
+                               piece.hull_id(), ", whose revision the answer does not state")};
       return pieces;
     }
     const auto mesh = Fetch(*hull->second, problem);

@@ -25,7 +25,7 @@ absl::Status ReadInteger(const std::string& text, BigInteger* number) {
   const bool digits = std::all_of(text.begin() + static_cast<ptrdiff_t>(sign), text.end(),
                                   [](char c) { return c >= '0' && c <= '9'; });
   if (text.size() == sign || text.size() > kMostDigits || !digits) {
-    return ProofFails("integer_direction holds something else than a decimal integer");
+    return ProofFails("integer_direction is not a decimal integer");
   }
   // A leading 0 would mean octal.
   const size_t first = std::min(text.find_first_not_of('0', sign), text.size() - 1);

@@ -218,10 +218,10 @@ class AskedHull {
 };
 
 absl::Status CheckHeader(const v1::Simplification& asked, const HullMesh& simplified) {
-  if (!simplified.header.has_error()) return NotShown("the reply tells no error");
+  if (!simplified.header.has_error()) return NotShown("the reply states no error");
   const double error = simplified.header.error();
   if (std::isnan(error) || error < 0) {
-    return NotShown(absl::StrCat("the error is ", Text(error), ", which is no distance"));
+    return NotShown(absl::StrCat("the error is ", Text(error), ", which is not a distance"));
   }
   if (asked.max_vertices() > 0 && simplified.vertex_count() > asked.max_vertices()) {
     return NotShown(absl::StrCat("the simplification has ", simplified.vertex_count(),
@@ -238,7 +238,8 @@ absl::Status CheckInside(const HullMesh& hull, const HullMesh& simplified, doubl
                          const AskedHull& of_hull, const AskedHull& of_simplified) {
   for (size_t i = 0; i < simplified.vertex_count(); ++i) {
     if (!of_hull.HasVertex(PointAt(simplified.xyz, i))) {
-      return NotShown(absl::StrCat("vertex ", i, " of the simplification is none of the hull's"));
+      return NotShown(
+          absl::StrCat("vertex ", i, " of the simplification is not a vertex of the hull"));
     }
   }
   if (std::isinf(error)) return absl::OkStatus();
@@ -303,7 +304,7 @@ absl::StatusOr<VerifiedMesh> GetSimplificationVerified(
     const Client& client, const v1::GetHullMeshRequest& request,
     const std::function<void(const HullMesh&)>& on_part) {
   if (!request.has_simplification()) {
-    return absl::InvalidArgumentError("there is nothing to verify: ask for a simplification");
+    return absl::InvalidArgumentError("the request has no simplification to verify");
   }
   VerifiedMesh verified;
   for (int attempt = 0; attempt < kSimplificationReadAttempts; ++attempt) {

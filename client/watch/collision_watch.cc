@@ -25,8 +25,9 @@ absl::Status CheckUpdate(const v1::CollisionWatchOpen& open,
                              std::min(packed.hulls_size(), packed.poses_size() / kPoseNumbers));
   for (const uint32_t placement : update.placements()) {
     if (placement >= static_cast<uint32_t>(count)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("placements: there is no placement ", placement, "; there are ", count));
+      return absl::InvalidArgumentError(absl::StrCat("placements: placement ", placement,
+                                                     " does not exist; the number of placements is ",
+                                                     count));
     }
   }
   return absl::OkStatus();
@@ -141,7 +142,7 @@ absl::Status CollisionWatch::Close(Call& call) {
   }
   absl::Status status = FromGrpcStatus(call.stream->Finish(), call.context);
   // The client never half-closes the stream, so the server has no reason to end it with OK.
-  if (status.ok()) status = absl::InternalError("the server ended the watch without a cause");
+  if (status.ok()) status = absl::InternalError("the server ended the watch without an error");
   const std::lock_guard lock(cancel_mutex_);
   cancelled_call_.reset();
   if (cancelled_) return absl::CancelledError("the watch was cancelled");

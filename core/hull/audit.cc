@@ -75,7 +75,8 @@ absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uin
   const size_t n = facet.size();
   if (n < 3) return Finding("facet ", index, " has fewer than three vertices");
   for (const uint32_t u : facet) {
-    if (u >= v.size()) return Finding("facet ", index, " names vertex ", u, ", which is not there");
+    if (u >= v.size())
+      return Finding("facet ", index, " names vertex ", u, ", which does not exist");
   }
   if (*std::min_element(facet.begin(), facet.end()) != facet[0]) {
     return Finding("facet ", index, " does not start at its lowest vertex");

@@ -52,13 +52,13 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   const std::string value(first->second.data(), first->second.size());
   if (!absl::StartsWithIgnoreCase(value, kScheme)) {
     return WithReason(absl::UnauthenticatedError(
-                          "the metadata \"authorization\" is not \"Bearer TOKEN\"; write it so"),
+                          "the metadata \"authorization\" must have the form \"Bearer TOKEN\""),
                       v1::ERROR_REASON_TOKEN_MISSING);
   }
   const std::optional<Caller> caller = table->Find(value.substr(sizeof kScheme - 1));
   if (!caller.has_value()) {
     return WithReason(absl::UnauthenticatedError("the call's token is unknown or no longer valid; "
-                                                 "ask the server's operator for another"),
+                                                 "ask the server's operator for a new one"),
                       v1::ERROR_REASON_TOKEN_UNKNOWN);
   }
   if (absl::Status s = CheckPermission(*caller, rpc); !s.ok()) return s;

@@ -16,9 +16,9 @@ void Complain(const char* what, const absl::Status& status, std::string* complai
   if (message == *complaint) return;
   *complaint = message;
   if (status.ok()) {
-    spdlog::info("{} can be read again", what);
+    spdlog::info("{} are readable again", what);
   } else {
-    spdlog::error("{} stay as they were: {}", what, message);
+    spdlog::error("{} were not reloaded: {}", what, message);
   }
 }
 
@@ -96,8 +96,8 @@ void Guard::RevokeAuthorities() {
   identity_ = alone;
   tls_->SetIdentity(std::move(alone));
   spdlog::error(
-      "--tls-client-ca {} is gone or holds no certificate: no client may connect any more; restore "
-      "the file to let clients in again",
+      "--tls-client-ca {} is missing or contains no certificate: no client can connect; restore "
+      "the file",
       config_.tls_client_ca);
 }
 
@@ -111,8 +111,8 @@ absl::Status Guard::ReloadTokens() {
   authenticator_.SetTokens(tokens_);
   if (tokens_.empty()) {
     spdlog::error(
-        "--tokens-file {} is gone or holds no token: every token is revoked, and every call is "
-        "refused; add a line with 'hullctl token new' to let callers in again",
+        "--tokens-file {} is missing or contains no token: all tokens are revoked and all calls "
+        "are refused; add a token with 'hullctl token new'",
         config_.tokens_file);
   } else {
     spdlog::info("{} tokens in force", tokens_.size());

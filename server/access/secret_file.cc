@@ -23,13 +23,13 @@ absl::Status Problem(const std::string& setting, const std::string& path, const 
 std::string CheckAccess(const struct stat& info) {
   if (info.st_uid != 0 && info.st_uid != geteuid()) {
     return absl::StrFormat(
-        "it belongs to user %d; make it root's or that of the user who runs hulld (%d)",
-        info.st_uid, geteuid());
+        "it belongs to user %d; chown it to root or to the user that runs hulld (%d)", info.st_uid,
+        geteuid());
   }
   const mode_t allowed = info.st_uid == 0 ? 0740 : 0700;
   const mode_t mode = info.st_mode & 07777;
   if ((mode & ~allowed & 0077) == 0) return "";
-  return absl::StrFormat("its permissions %04o are too open; others could use it: chmod %s", mode,
+  return absl::StrFormat("its permissions %04o are too open; run: chmod %s", mode,
                          info.st_uid == 0 ? "640 (or tighter)" : "600 (or tighter)");
 }
 
@@ -37,7 +37,7 @@ absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std:
                                      bool secret) {
   struct stat info = {};
   if (fstat(fd, &info) != 0) return Problem(setting, path, std::strerror(errno));
-  if (!S_ISREG(info.st_mode)) return Problem(setting, path, "it is no regular file");
+  if (!S_ISREG(info.st_mode)) return Problem(setting, path, "it is not a regular file");
   if (secret) {
     const std::string problem = CheckAccess(info);
     if (!problem.empty()) return Problem(setting, path, problem);

@@ -54,7 +54,7 @@ absl::StatusOr<std::vector<Certificate>> ParseCertificates(const std::string& te
     return Problem(setting, path,
                    absl::StrCat("PEM certificate ", certificates.size() + 1, " is damaged"));
   }
-  if (certificates.empty()) return Problem(setting, path, "it holds no PEM certificate");
+  if (certificates.empty()) return Problem(setting, path, "it contains no PEM certificate");
   return certificates;
 }
 
@@ -69,8 +69,8 @@ absl::StatusOr<Key> ParseKey(const std::string& text, const std::string& path) {
   if (key != nullptr) return key;
   const bool encrypted = text.find("ENCRYPTED") != std::string::npos;
   return Problem("--tls-key", path,
-                 encrypted ? "the key is encrypted; give one without a passphrase"
-                           : "it holds no PEM private key, or a damaged one");
+                 encrypted ? "the key is encrypted; use one without a passphrase"
+                           : "it contains no valid PEM private key");
 }
 
 std::chrono::system_clock::time_point TimeOf(const ASN1_TIME* time) {
@@ -95,12 +95,12 @@ std::string SubjectOf(const X509* certificate) {
 
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
   if (config.tls_cert.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
-        " needs --tls-cert, the certificate that this server shows; give all of them or none"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
+                     " requires --tls-cert, the server's certificate; set all of them or none"));
   }
   if (config.tls_key.empty()) {
-    return absl::InvalidArgumentError("--tls-cert needs --tls-key, its private key; give both");
+    return absl::InvalidArgumentError("--tls-cert requires --tls-key, its private key; set both");
   }
   TlsIdentity identity;
   absl::StatusOr<std::string> certificates = ReadSettingFile(config.tls_cert, "--tls-cert");
@@ -156,7 +156,7 @@ absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_cloc
   return absl::InvalidArgumentError(absl::StrCat(
       "--tls-cert: the certificate of ", identity.subject, expired ? " expired on " : " starts on ",
       FormatTime(expired ? identity.not_after : identity.not_before),
-      "; clients refuse it until it is renewed"));
+      "; clients will reject it; renew it"));
 }
 
 std::string FormatTime(std::chrono::system_clock::time_point time) {

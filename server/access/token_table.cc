@@ -34,8 +34,8 @@ std::optional<Permission> ReadRole(const std::string& text) {
 absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
   if (text == "*") return "";
   if (!text.ends_with("/")) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "the prefix \"", absl::CEscape(text), "\" does not end in \"/\"; \"*\" stands for all"));
+    return absl::InvalidArgumentError(absl::StrCat("the prefix \"", absl::CEscape(text),
+                                                   "\" must end in \"/\"; use \"*\" for all IDs"));
   }
   const absl::Status valid = CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix");
   if (!valid.ok()) return valid;
@@ -72,12 +72,13 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   std::string more;
   if (!(words >> role >> prefix >> hash) || words >> more) {
     return absl::InvalidArgumentError(
-        "it is not four words: name, role, prefix and sha256:HASH, as 'hullctl token new' prints "
+        "expected four words: name, role, prefix, and sha256:HASH, as 'hullctl token new' prints "
         "them");
   }
   if (!IsName(name)) {
     return absl::InvalidArgumentError(
-        "the name, its first word, is not up to 64 of [A-Za-z0-9._-] that start with a letter or "
+        "the name (first word) must have at most 64 characters of [A-Za-z0-9._-] and start with a "
+        "letter or "
         "digit");
   }
   Entry entry;
@@ -85,7 +86,7 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   const std::optional<Permission> permission = ReadRole(role);
   if (!permission.has_value()) {
     return absl::InvalidArgumentError(
-        "the role, its second word, is none of read-only, read-write and admin");
+        "the role (second word) must be read-only, read-write, or admin");
   }
   entry.caller.permission = *permission;
   absl::StatusOr<std::string> checked = ReadPrefix(prefix);
@@ -96,8 +97,8 @@ absl::Status TokenTable::AddLine(const std::string& line) {
                        IsHex(hash.substr(sizeof kHashScheme - 1));
   if (!is_hash) {
     return absl::InvalidArgumentError(
-        "the hash, its last word, is not sha256: and 64 hexadecimal digits; never store the token "
-        "itself ('hullctl token hash' gives its hash)");
+        "the hash (last word) must be sha256: and 64 hexadecimal digits; never store the token "
+        "itself ('hullctl token hash' prints its hash)");
   }
   const std::string bytes = absl::HexStringToBytes(hash.substr(sizeof kHashScheme - 1));
   std::copy(bytes.begin(), bytes.end(), entry.hash.begin());
@@ -106,11 +107,13 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   }
   for (const Entry& other : entries_) {
     if (other.caller.name == name) {
-      return absl::InvalidArgumentError(absl::StrCat("the name \"", name, "\" is taken above"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("the name \"", name, "\" is already used in an earlier line"));
     }
     if (other.hash == entry.hash) {
       return absl::InvalidArgumentError(absl::StrCat("\"", name, "\" has the token of \"",
-                                                     other.caller.name, "\"; give each its own"));
+                                                     other.caller.name,
+                                                     "\"; each name needs a token of its own"));
     }
   }
   entries_.push_back(std::move(entry));
@@ -153,10 +156,10 @@ absl::StatusOr<TokenTable> RereadTokensFile(const std::string& path) {
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {
   absl::StatusOr<TokenTable> table = ParseTokensFile(path);
   if (table.ok() && table->empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("--tokens-file ", path,
-                     ": it holds no token, so that nobody could call; add one with 'hullctl token "
-                     "new'"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--tokens-file ", path,
+        ": it contains no token, so every call would be refused; add one with 'hullctl token "
+        "new'"));
   }
   return table;
 }

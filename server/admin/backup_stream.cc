@@ -62,7 +62,7 @@ absl::Status BackupStream::Begin() {
     return absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()));
   }
   std::sort(files_.rbegin(), files_.rend());
-  spdlog::info("a backup of the store is being saved");
+  spdlog::info("sending a backup of the store");
   v1::BackupBegin* begin = reply().mutable_begin();
   EncodeHeader(registry_.store(), registry_.Sizes().store_revision, begin->mutable_header());
   begin->set_version(HULLD_VERSION);

@@ -130,11 +130,12 @@ int RunDoctor(const std::vector<std::string>& arguments) {
       ->envname("HULLD_DATA_DIR")
       ->required();
   app.add_flag("--json", json, "Print one JSON object");
-  app.add_flag(
-      "--accept-loss,--cut-log", accept_loss,
-      "If the log is damaged, or shorter than what was acknowledged, accept that the changes in "
-      "the lost part are gone. The store gets a new ID. Without this flag nothing is changed");
-  app.footer("Exit status: 0 all is well, 1 something is damaged, 2 the store cannot be examined.");
+  app.add_flag("--accept-loss,--cut-log", accept_loss,
+               "Accept the loss of acknowledged changes if the log is damaged or truncated. The "
+               "store gets a new ID. Without this flag, nothing is changed");
+  app.footer(
+      "Exit status: 0 the store is sound, 1 it is damaged, 2 it could not be opened or the "
+      "arguments are wrong.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
     app.parse(std::move(reversed));

@@ -51,7 +51,7 @@ class ReflectionStream
     // The reply repeats it.
     if (request().ByteSizeLong() > kMostRequestBytes) {
       return FinishCall(absl::InvalidArgumentError(
-          absl::StrCat("a question holds more than ", kMostRequestBytes, " bytes")));
+          absl::StrCat("the request has more than ", kMostRequestBytes, " bytes")));
     }
     reply().set_valid_host(request().host());
     *reply().mutable_original_request() = request();
@@ -80,12 +80,12 @@ class ReflectionStream
       case reflection::ServerReflectionRequest::MESSAGE_REQUEST_NOT_SET:
         break;
     }
-    Refuse(absl::StatusCode::kInvalidArgument, "the message asks for nothing");
+    Refuse(absl::StatusCode::kInvalidArgument, "the request has no query; set one of its fields");
   }
 
   void TellFile(const FileDescriptor* file, const std::string& name) {
     if (file == nullptr) {
-      return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", name, "\" is not known"));
+      return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", name, "\" is unknown"));
     }
     std::set<const FileDescriptor*> added;
     AddFile(*file, added, reply().mutable_file_descriptor_response());
@@ -93,7 +93,7 @@ class ReflectionStream
 
   void TellNoExtensions(const DescriptorPool& pool, const std::string& type) {
     if (pool.FindMessageTypeByName(type) == nullptr) {
-      return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", type, "\" is not known"));
+      return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", type, "\" is unknown"));
     }
     reply().mutable_all_extension_numbers_response()->set_base_type_name(type);
   }

@@ -82,7 +82,7 @@ Admission::Ticket::~Ticket() {
 
 Admission::Admission(const Limits& limits, Metrics& metrics)
     : limits_(limits), metrics_(metrics), request_memory_(limits.request_memory) {
-  metrics_.AddGauge("hulld_request_bytes", "Bytes that requests under way take.",
+  metrics_.AddGauge("hulld_request_bytes", "Bytes held by requests in flight.",
                     [this] { return static_cast<double>(request_memory_.taken_bytes()); });
   for (size_t i = 0; i < kRpcCount; ++i) {
     running_gauges_[i] = &metrics_.RunningCalls(static_cast<Rpc>(i));
@@ -110,7 +110,7 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
     }
     return Overloaded(
         absl::StrCat(anonymous_, " calls without a token are running, ", client.anonymous,
-                     " of them this client's, which may have ", of_client),
+                     " of them from this client, whose limit is ", of_client),
         limits_.max_anonymous_calls, "max-anonymous-calls", kRetryBatch);
   }
   // Long calls leave a part to single calls.
@@ -118,9 +118,9 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
     return kind == CallKind::kUnary ? limit : limit - limit / Limits::kKeptForSingleCalls;
   };
   const auto kept = [&](uint64_t limit) {
-    return room(limit) == limit
-               ? std::string()
-               : absl::StrCat(", and the last ", limit - room(limit), " are kept for single calls");
+    return room(limit) == limit ? std::string()
+                                : absl::StrCat(", and ", limit - room(limit),
+                                               " slots are reserved for single calls");
   };
   const size_t counted = running_ - anonymous_;
   if (counted >= room(limits_.max_calls)) {

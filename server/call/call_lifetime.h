@@ -55,11 +55,11 @@ class CallLifetime {
     }
     if (Clock::now() >= deadline_) {
       return absl::DeadlineExceededError(
-          "the deadline passed while the call was running; give it more time or ask for less");
+          "the deadline expired while the call was running; increase the deadline or request less");
     }
     if (Expired()) {
       const auto limit = limit_.load(std::memory_order_relaxed);
-      return LimitExceeded("the request took too long; ask for less at once",
+      return LimitExceeded("the request took too long; split it into smaller requests",
                            absl::StrCat(static_cast<double>(limit.count()) / 1000, " s"),
                            "max-request-time");
     }
@@ -67,7 +67,7 @@ class CallLifetime {
   }
 
   static constexpr char kRevoked[] =
-      "the call's token is no longer valid; ask the server's operator for another";
+      "the call's token is no longer valid; ask the server's operator for a new one";
 
  private:
   static Clock::time_point Monotonic(WallClock::time_point deadline, WallClock::time_point wall_now,

@@ -13,7 +13,7 @@ namespace {
 
 absl::Status Malformed(const google::protobuf::Message& message) {
   return absl::InvalidArgumentError(
-      absl::StrCat("a message is malformed: it is no ", message.GetTypeName(),
+      absl::StrCat("a message is malformed: it is not a ", message.GetTypeName(),
                    "; check the serializer, and that strings are UTF-8"));
 }
 

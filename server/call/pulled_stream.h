@@ -38,7 +38,7 @@ class PulledStream : public CallStream<Reactor> {
       HULLD_CHECK(std::exchange(writing_, false));
       bytes_.Clear();
       if (this->call().ShouldStop()) return this->FinishCall(this->call().StopStatus());
-      if (!ok) return this->FinishCall(absl::CancelledError("the client is gone"));
+      if (!ok) return this->FinishCall(absl::CancelledError("the client disconnected"));
       OnSent();
     });
   }

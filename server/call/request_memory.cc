@@ -19,14 +19,13 @@ absl::Status RequestMemory::Take(uint64_t bytes, Share& share) {
   share.GiveBack();
   if (bytes > limit_bytes_) {
     return LimitExceeded(absl::StrCat("the message would take more than ", limit_bytes_,
-                                      " bytes of memory; send it in parts"),
+                                      " bytes of memory; split it into smaller messages"),
                          limit_bytes_, kFlag);
   }
   const uint64_t taken = taken_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
   if (taken > limit_bytes_) {
     taken_.fetch_sub(bytes, std::memory_order_relaxed);
-    return Overloaded("the requests under way leave no memory for another", limit_bytes_, kFlag,
-                      kRetry);
+    return Overloaded("requests in flight use all request memory", limit_bytes_, kFlag, kRetry);
   }
   share.memory_ = this;
   share.bytes_ = bytes;

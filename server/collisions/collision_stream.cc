@@ -139,7 +139,7 @@ absl::Status CollisionStream::HandleMessage() {
     case v1::StreamCollisionsRequest::kOpen:
       if (open_) {
         return absl::InvalidArgumentError(
-            "open came twice; other placements or pairs need another stream");
+            "open was sent twice; start a new stream for other placements or pairs");
       }
       return HandleOpen();
     case v1::StreamCollisionsRequest::kUpdate:

@@ -54,7 +54,7 @@ absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
 
 absl::Status Draining() {
   return WithReason(
-      absl::UnavailableError("hulld is draining and ends soon; retry when it is back"),
+      absl::UnavailableError("hulld is shutting down; retry later or on another server"),
       v1::ERROR_REASON_DRAINING);
 }
 

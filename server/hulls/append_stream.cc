@@ -82,7 +82,7 @@ void AppendStream::OnNoMessage(const absl::Status& why) { Fail(OrStopped(why)); 
 void AppendStream::HandleOpen(const v1::AppendOpen& open) {
   if (session_.has_value()) {
     return Fail(absl::InvalidArgumentError(
-        "open came twice; one stream appends to one hull, so start another stream"));
+        "open was sent twice; a stream appends to one hull; start a new stream"));
   }
   if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
     return Fail(s);

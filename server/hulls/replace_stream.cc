@@ -25,10 +25,10 @@ void ReplaceStream::OnNoMessage(const absl::Status& why) {
   const bool opened = replacement_.builder != nullptr;
   // Only the empty block distinguishes a complete request from a disconnected client.
   if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
-  FinishCall(absl::InvalidArgumentError(
-      opened ? "the stream ended without an empty block of points, which says that nothing is "
-               "missing; the hull is as it was"
-             : "the stream ended before its first message, open"));
+  FinishCall(absl::InvalidArgumentError(opened
+                                            ? "the stream ended without the empty block of points "
+                                              "that marks its end; the hull is unchanged"
+                                            : "the stream ended before its first message, open"));
 }
 
 void ReplaceStream::OnMessage() {
@@ -50,7 +50,7 @@ absl::Status ReplaceStream::HandleMessage() {
   switch (request().message_case()) {
     case v1::ReplaceHullRequest::kOpen:
       if (!opened) return HandleOpen(request().open());
-      return absl::InvalidArgumentError("open came twice; start another stream");
+      return absl::InvalidArgumentError("open was sent twice; start a new stream");
     case v1::ReplaceHullRequest::kPoints:
       if (!opened) {
         return absl::InvalidArgumentError("the first message must be open, not points");
@@ -83,7 +83,7 @@ absl::Status ReplaceStream::Build() {
   call().AddPoints(points->size());
   const uint64_t received = replacement_.counts.received + points->size();
   if (received > limits.max_points_per_hull) {
-    return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
+    return LimitExceeded(absl::StrCat(name, "the hull would have received ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
   if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())

@@ -92,7 +92,7 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
     return WatchTarget{*std::move(prefix), {}, request().bodies()};
   }
   if (!request().prefix().empty()) {
-    return absl::InvalidArgumentError("prefix and hull_id are both set; give one of them");
+    return absl::InvalidArgumentError("prefix and hull_id are both set; set one of them");
   }
   const absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
@@ -102,7 +102,7 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
 absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
   if (request().after_revision() > 0 && request().store_id().empty()) {
     return absl::InvalidArgumentError(
-        "after_revision needs store_id; give that of the same header");
+        "after_revision requires store_id; use the one from the same header");
   }
   return WatchStart{true, request().after_revision(), request().store_id()};
 }

@@ -45,7 +45,7 @@ absl::Status Explain(const Place& place, const absl::Status& status) {
   if (status.ok()) return status;
   if (absl::IsCancelled(status)) {
     return absl::FailedPreconditionError(absl::StrCat(
-        place.Describe(), ": a hulld is active over this database; end every hulld that uses it"));
+        place.Describe(), ": a hulld is active on this database; stop every hulld that uses it"));
   }
   return Prefixed(absl::StrCat(place.Describe(), ": "), status);
 }
@@ -62,7 +62,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data
   // If the directory is inaccessible, opening the store reports the reason.
   std::error_code error;
   if (!std::filesystem::exists(DatabaseDirectory(data_dir), error) && !error) {
-    return absl::NotFoundError("there is no store of hulld");
+    return absl::NotFoundError("it contains no hulld store");
   }
   if (absl::Status s = RocksDbStore::Open(options).status(); !s.ok()) return s;
   options.read_only = false;
@@ -84,7 +84,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& con
     const absl::StatusOr<Rows> there =
         (*session)->Run("SELECT to_regclass('hulld.store') IS NOT NULL");
     if (!there.ok()) return there.status();
-    if (there->at(0, 0) != "t") return absl::NotFoundError("there is no store of hulld");
+    if (there->at(0, 0) != "t") return absl::NotFoundError("it contains no hulld store");
   }
   absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
   if (!store.ok()) return store.status();
@@ -129,7 +129,7 @@ std::string Describe(const MigrationCounts& counts) {
   std::string text = absl::StrCat(count(counts.hulls, "hull", "hulls"), ", ",
                                   count(counts.bodies, "body", "bodies"));
   if (counts.resumed == 0) return text;
-  return absl::StrCat(text, "; ", counts.resumed, " of these were there from an earlier run");
+  return absl::StrCat(text, "; ", counts.resumed, " of them copied by an earlier run");
 }
 
 // Reopens the target, so that the comparison reads the data that a server will open, and nothing
@@ -139,9 +139,9 @@ absl::Status CompareAnew(const Place& to, const Migration& migration,
   target->value().reset();
   *target = OpenTarget(to);
   if (absl::IsCancelled(target->status())) {
-    return absl::AbortedError(absl::StrCat(
-        to.Describe(),
-        ": a hulld that waited for this database has its turn before all was compared; end it"));
+    return absl::AbortedError(absl::StrCat(to.Describe(),
+                                           ": a hulld that was waiting for this database became "
+                                           "active before the comparison finished; stop it"));
   }
   if (!target->ok()) return Explain(to, target->status());
   return migration.Compare(target->value()->store());
@@ -169,7 +169,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   if (absl::IsDataLoss(compared) && counts->resumed > 0) {
     // Points that move no vertex do not change the store's revision, so the source may have changed
     // undetected since the earlier run.
-    out << std::string(compared.message()) << "; copying it anew" << std::endl;
+    out << std::string(compared.message()) << "; starting the copy over" << std::endl;
     if (absl::Status s = (*target)->Begin(migration->source()); !s.ok()) return s;
     lines.SetPhase("copied");
     counts = migration->CopyTo(**target);
@@ -179,8 +179,8 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   }
   if (!compared.ok()) return compared;
   if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
-  out << "compared: every record is the same; " << to.Describe() << " is store "
-      << (*target)->store().id() << " now\n";
+  out << "verified: all records match; " << to.Describe() << " is store " << (*target)->store().id()
+      << " now\n";
   return absl::OkStatus();
 }
 
@@ -188,22 +188,22 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
 
 int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
   CLI::App app(
-      "Copies a store to another place while no hulld has either open, and compares the two. The "
-      "source stays as it is.",
+      "Copies a store and compares the copy with it. No hulld may have either store open. The "
+      "source is not changed.",
       "hulld migrate");
   Place from;
   Place to;
   app.add_option("--from-data-dir", from.data_dir, "The source: a directory of --store=rocksdb");
   app.add_option("--from-postgres-conninfo-file", from.conninfo_file,
                  "The source: a database of --store=postgres");
-  app.add_option("--to-data-dir", to.data_dir, "The destination: a directory, which is made");
+  app.add_option("--to-data-dir", to.data_dir, "The destination: a directory, created if missing");
   app.add_option("--to-postgres-conninfo-file", to.conninfo_file,
                  "The destination: an empty database");
   app.footer(
-      "A run that was ended is gone on with by the same command. Revisions and writers' sequences "
-      "are\nkept; the copy is another store, with an ID of its own.\n"
-      "Exit status: 0 all is copied and the same, 1 it failed on its way and can be run again, 2 "
-      "it was\nrefused, and nothing was changed.");
+      "Run the same command again to resume an interrupted run. Revisions and writers' sequences "
+      "are\nkept; the copy is a new store with its own ID.\n"
+      "Exit status: 0 everything is copied and verified, 1 it failed and can be resumed, 2 it "
+      "was\nrefused, and nothing was changed.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
     app.parse(std::move(reversed));
@@ -211,7 +211,7 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
     return app.exit(error, out, err) == 0 ? 0 : kExitRefused;
   }
   if (!from.is_one() || !to.is_one()) {
-    err << "hulld migrate: name one source (--from-data-dir or --from-postgres-conninfo-file) and "
+    err << "hulld migrate: set one source (--from-data-dir or --from-postgres-conninfo-file) and "
            "one destination (--to-data-dir or --to-postgres-conninfo-file)\n";
     return kExitRefused;
   }

@@ -46,7 +46,7 @@ class Batch {
 };
 
 absl::Status Differs(const std::string& id, const std::string& what) {
-  return absl::DataLossError(absl::StrCat("\"", id, "\" is not the same in the copy: ", what));
+  return absl::DataLossError(absl::StrCat("\"", id, "\" differs in the copy: ", what));
 }
 
 const std::string& IdOf(const StoredHull& hull) { return hull.record.hull_id; }
@@ -59,11 +59,11 @@ absl::Status CompareAll(const std::vector<Stored>& expected, const std::vector<S
   for (size_t i = 0; i < expected.size(); ++i) {
     const std::string& id = IdOf(expected[i]);
     if (i >= found.size() || id < IdOf(found[i])) return Differs(id, "it is missing");
-    if (IdOf(found[i]) < id) return Differs(IdOf(found[i]), "the source has none of this name");
+    if (IdOf(found[i]) < id) return Differs(IdOf(found[i]), "it is not in the source");
     if (absl::Status s = same(expected[i], found[i]); !s.ok()) return s;
   }
   if (found.size() <= expected.size()) return absl::OkStatus();
-  return Differs(IdOf(found[expected.size()]), "the source has none of this name");
+  return Differs(IdOf(found[expected.size()]), "it is not in the source");
 }
 
 bool HasSameBits(const Vector& a, const Vector& b) {
@@ -127,9 +127,9 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
     if (**mark == as_of_) return absl::OkStatus();
     if ((*mark)->store_id == as_of_.store_id) return target.Begin(as_of_);
     return absl::FailedPreconditionError(
-        absl::StrCat("the destination holds what a migration from store ", (*mark)->store_id,
-                     " has copied so far, and this is store ", as_of_.store_id,
-                     "; go on with that one, or name another destination"));
+        absl::StrCat("the destination contains an unfinished migration from store ",
+                     (*mark)->store_id, ", but the source is store ", as_of_.store_id,
+                     "; use that source, or another destination"));
   }
   uint64_t held = 0;
   const auto count = [&held](const auto&...) { ++held; };
@@ -139,7 +139,7 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
   if (held == 0 && target.store().revision() == 0) return target.Begin(as_of_);
   return absl::FailedPreconditionError(absl::StrCat(
       "the destination is not empty: it is store ", target.store().id(), " at revision ",
-      target.store().revision(), " with ", held, " hulls and bodies; name another destination"));
+      target.store().revision(), " with ", held, " hulls and bodies; use an empty destination"));
 }
 
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {

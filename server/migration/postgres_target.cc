@@ -110,7 +110,7 @@ class PostgresTarget : public MigrationTarget {
     if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
       return absl::AbortedError(
-          "a server took the database over meanwhile; end it, and run this again");
+          "a server took over the database; stop it, then run this command again");
     }
     return absl::Status(status.code(), absl::StrCat("the database: ", status.message()));
   }

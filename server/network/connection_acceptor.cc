@@ -110,16 +110,16 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
       accepted_(
           metrics.AddCounter("hulld_connections_accepted_total", "Connections accepted.", {})),
       failures_(metrics.AddCounter("hulld_accept_failures_total",
-                                   "Connections that could not be accepted.", {})),
-      refused_descriptors_(metrics.AddCounter(
-          "hulld_connections_refused_total",
-          "Connections closed at once, by the limit that they met.", {{"limit", "descriptors"}})),
+                                   "Failed attempts to accept a connection.", {})),
+      refused_descriptors_(metrics.AddCounter("hulld_connections_refused_total",
+                                              "Connections refused, by limit.",
+                                              {{"limit", "descriptors"}})),
       refused_total_(metrics.AddCounter("hulld_connections_refused_total", "",
                                         {{"limit", "max-connections"}})),
       refused_network_(metrics.AddCounter("hulld_connections_refused_total", "",
                                           {{"limit", "max-connections-per-address"}})),
       closed_idle_(metrics.AddCounter("hulld_connections_closed_total",
-                                      "Connections that the server closed, by reason.",
+                                      "Connections closed by the server, by reason.",
                                       {{"reason", "idle"}})) {
   const uint64_t most = MostDescriptors();
   const uint64_t reserved = std::min(kReservedDescriptors, most / 4);

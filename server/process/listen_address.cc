@@ -38,8 +38,8 @@ bool IsPort(const std::string& text) {
 }
 
 absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
-  return absl::InvalidArgumentError(
-      absl::StrCat(flag, " is \"", text, "\": ", why, "; give host:port, [v6]:port or unix:path"));
+  return absl::InvalidArgumentError(absl::StrCat(flag, " is \"", text, "\": ", why,
+                                                 "; expected host:port, [v6]:port, or unix:path"));
 }
 
 // Returns 0, or the errno of binding.
@@ -75,7 +75,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const 
     if (address.path.starts_with("//")) address.path = address.path.substr(2);
     if (address.path.empty()) return Malformed(flag, text, "the socket has no path");
     if (address.path.size() >= sizeof(sockaddr_un::sun_path)) {
-      return Malformed(flag, text, "the path of a unix socket holds at most 107 characters");
+      return Malformed(flag, text, "the path of a unix socket has at most 107 characters");
     }
     return address;
   }
@@ -86,7 +86,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const 
   if (address.host.starts_with("[") && address.host.ends_with("]")) {
     address.host = address.host.substr(1, address.host.size() - 2);
   } else if (address.host.find(':') != std::string::npos) {
-    return Malformed(flag, text, "an IPv6 address stands in brackets");
+    return Malformed(flag, text, "an IPv6 address must be in brackets");
   }
   if (address.host.empty()) return Malformed(flag, text, "the host is missing");
   if (!IsPort(address.port)) return Malformed(flag, text, "the port is not a number up to 65535");
@@ -97,8 +97,8 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
   if (has_tls || insecure || address.is_local()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "--listen ", address.host, ":", address.port,
-      " can be reached from other machines, which could read and change everything that passes, "
-      "tokens included; encrypt it with --tls-cert and --tls-key, listen on 127.0.0.1, [::1] or "
+      " is reachable from other machines, and traffic, including tokens, would not be encrypted; "
+      "encrypt it with --tls-cert and --tls-key, listen on 127.0.0.1, [::1] or "
       "unix:path, or allow it with --insecure"));
 }
 
@@ -113,7 +113,7 @@ absl::Status CheckSocketFree(const ListenAddress& address) {
   }
   return absl::UnavailableError(
       absl::StrCat("cannot listen on unix:", address.path,
-                   ": another server does; stop it or choose another path with --listen"));
+                   ": another server is listening; stop it or choose another path with --listen"));
 }
 
 absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) {
@@ -122,7 +122,7 @@ absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) 
       address.is_unix() ? "unix:" + address.path : address.host + ":" + address.port, ": ");
   if (address.is_unix()) {
     return absl::UnavailableError(
-        absl::StrCat(what, "check that the directory of the socket exists and can be written"));
+        absl::StrCat(what, "check that the socket's directory exists and is writable"));
   }
   addrinfo hints = {};
   hints.ai_socktype = SOCK_STREAM;
@@ -141,7 +141,7 @@ absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) 
   const char* advice = "give an address of this machine to ";
   if (error == EADDRINUSE || error == 0) {
     return absl::UnavailableError(
-        absl::StrCat(what, "the port is taken; stop the other server or choose another port with ",
+        absl::StrCat(what, "the port is in use; stop the other server or choose another port with ",
                      flag, " (port 0 picks a free one)"));
   }
   if (error == EACCES) advice = "choose a port above 1023 with ";

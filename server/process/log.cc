@@ -94,7 +94,7 @@ void LogForLibrary(const char* library, spdlog::level::level_enum level, const s
   const std::optional<uint64_t> left_out = BudgetOf(library).Spend(LineBudget::Clock::now());
   if (!left_out.has_value()) return;
   if (*left_out == 0) return spdlog::log(level, "{}: {}", library, text);
-  spdlog::log(level, "{}: {} (and {} lines left out before)", library, text, *left_out);
+  spdlog::log(level, "{}: {} ({} earlier lines omitted)", library, text, *left_out);
 }
 
 spdlog::level::level_enum LevelOf(gpr_log_severity severity) {

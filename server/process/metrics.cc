@@ -48,53 +48,53 @@ Family<prometheus::Histogram>& AddHistograms(prometheus::Registry& registry, con
 }
 
 StoreMetrics AddStore(prometheus::Registry& registry) {
-  auto& failures = AddCounters(registry, "hulld_store_failures_total",
-                               "Operations of the store that failed, by operation.");
-  auto& lookups = AddCounters(registry, "hulld_cache_lookups_total",
-                              "Hulls asked for, by whether they were in memory.");
+  auto& failures =
+      AddCounters(registry, "hulld_store_failures_total", "Failed store operations, by operation.");
+  auto& lookups =
+      AddCounters(registry, "hulld_cache_lookups_total", "Hull lookups, by cache hit or miss.");
   return {
       AddHistograms(registry, "hulld_store_commit_duration_seconds",
-                    "From handing a change to the store until it is acknowledged.")
+                    "Time from submitting a change to the store to its acknowledgment.")
           .Add({}, LatencyBuckets()),
-      AddHistograms(registry, "hulld_store_commit_changes",
-                    "Changes that one write to the store commits together.")
+      AddHistograms(registry, "hulld_store_commit_changes", "Changes per committed write.")
           .Add({}, CountBuckets()),
       failures.Add({{"operation", "write"}}),
       failures.Add({{"operation", "sync"}}),
       failures.Add({{"operation", "read"}}),
       AddCounters(registry, "hulld_store_damaged_records_total",
-                  "Records of the store whose checksum or content was wrong.")
+                  "Stored records with a wrong checksum or content.")
           .Add({}),
       AddGauges(registry, "hulld_store_read_only", "1 while the store refuses changes, else 0.")
           .Add({}),
       lookups.Add({{"result", "hit"}}),
       lookups.Add({{"result", "miss"}}),
-      AddCounters(registry, "hulld_cache_evictions_total", "Hulls that made room for others.")
-          .Add({}),
+      AddCounters(registry, "hulld_cache_evictions_total", "Hulls evicted from memory.").Add({}),
       AddGauges(registry, "hulld_cache_bytes",
-                "Bytes that count against the limit, estimated: hulls in memory, points on their "
-                "way to them, streams.")
+                "Estimated bytes charged against the memory limit: hulls in memory, points in "
+                "flight, streams.")
           .Add({}),
       AddGauges(registry, "hulld_cache_reading_bytes",
-                "What readers have of these: versions that they asked for, and long answers.")
+                "Part of hulld_cache_bytes held by readers: requested versions and long answers.")
           .Add({}),
-      AddGauges(registry, "hulld_cache_writing_bytes",
-                "What writers have of these: hulls that grow, points on their way, streams.")
+      AddGauges(
+          registry, "hulld_cache_writing_bytes",
+          "Part of hulld_cache_bytes held by writers: growing hulls, points in flight, streams.")
           .Add({}),
-      AddGauges(registry, "hulld_cache_limit_bytes", "Bytes that may count (--memory-limit).")
+      AddGauges(registry, "hulld_cache_limit_bytes", "Limit of hulld_cache_bytes (--memory-limit).")
           .Add({}),
       AddHistograms(registry, "hulld_snapshot_duration_seconds",
-                    "Making the canonical snapshot of a version of a hull.")
+                    "Time to build the canonical snapshot of a hull version.")
           .Add({}, LatencyBuckets()),
       AddGauges(registry, "hulld_store_disk_bytes", "Bytes of the store's files.").Add({}),
-      AddGauges(registry, "hulld_store_log_bytes", "Bytes of the store's log, of these.").Add({}),
-      AddGauges(registry, "hulld_store_free_bytes", "Bytes that the store's disk has left.")
+      AddGauges(registry, "hulld_store_log_bytes",
+                "Part of hulld_store_disk_bytes taken by the log.")
           .Add({}),
+      AddGauges(registry, "hulld_store_free_bytes", "Free bytes on the store's disk.").Add({}),
       AddCounters(registry, "hulld_store_stalls_total",
-                  "How often the store slowed down or stopped changes to keep up.")
+                  "Times that the store throttled or stopped writes to catch up.")
           .Add({}),
       AddGauges(registry, "hulld_store_stalled",
-                "1 while the store slows down or stops changes, else 0.")
+                "1 while the store throttles or stops writes, else 0.")
           .Add({}),
   };
 }
@@ -125,18 +125,18 @@ double Seconds(std::chrono::steady_clock::duration duration) {
 }  // namespace
 
 Metrics::Metrics()
-    : calls_(AddCounters(registry_, "hulld_requests_total", "Calls that ended, by rpc and code.")),
+    : calls_(AddCounters(registry_, "hulld_requests_total", "Finished calls, by rpc and code.")),
       limits_hit_(AddCounters(registry_, "hulld_limits_hit_total",
-                              "Calls and pairs refused because of a limit, by the limit's flag.")),
+                              "Calls and pairs refused by a limit, by its flag.")),
       auth_failures_(AddCounters(registry_, "hulld_auth_failures_total",
-                                 "Calls refused for who called, by reason.")),
-      queue_tasks_(AddGauges(registry_, "hulld_queue_tasks", "Tasks that wait for a thread.")),
+                                 "Calls refused by authentication or authorization, by reason.")),
+      queue_tasks_(AddGauges(registry_, "hulld_queue_tasks", "Tasks waiting for a thread.")),
       queue_wait_(AddHistograms(registry_, "hulld_queue_wait_seconds",
-                                "How long tasks waited for a thread.")),
-      token_calls_(AddCounters(registry_, "hulld_token_requests_total",
-                               "Calls that ended, by the name of their token.")),
+                                "Time that tasks waited for a thread.")),
+      token_calls_(
+          AddCounters(registry_, "hulld_token_requests_total", "Finished calls, by token name.")),
       exact_fallbacks_(AddCounters(registry_, "hulld_exact_fallbacks_total",
-                                   "Pairs that floating point left open for exact arithmetic.")
+                                   "Pairs that required exact arithmetic.")
                            .Add({})),
       points_received_(
           AddCounters(registry_, "hulld_points_received_total", "Points of committed chunks.")
@@ -148,16 +148,16 @@ Metrics::Metrics()
                                     "Points of committed chunks that were vertices already.")
                             .Add({})),
       points_inside_(AddCounters(registry_, "hulld_points_inside_total",
-                                 "Points of committed chunks that were no vertices.")
+                                 "Points of committed chunks inside the hull.")
                          .Add({})),
       store_(AddStore(registry_)),
       backup_saved_(AddGauges(registry_, "hulld_backup_saved_timestamp_seconds",
-                              "When the last backup was read to its end, Unix time; 0: never.")
+                              "Unix time of the last complete backup; 0: never.")
                         .Add({})) {
   auto& running = AddGauges(registry_, "hulld_requests_running",
-                            "Calls that run now, open streams included, by rpc.");
+                            "Running calls, including open streams, by rpc.");
   auto& call_seconds = AddHistograms(registry_, "hulld_request_duration_seconds",
-                                     "How long calls took, from their arrival to their end.");
+                                     "Duration of calls, from arrival to end.");
   for (size_t i = 0; i < kRpcCount; ++i) {
     const std::string rpc = RpcName(static_cast<Rpc>(i));
     running_[i] = &running.Add({{"rpc", rpc}});
@@ -167,13 +167,12 @@ Metrics::Metrics()
   }
   auto& message_seconds =
       AddHistograms(registry_, "hulld_message_duration_seconds",
-                    "How long messages of open streams took, from arrival to answer.");
+                    "Duration of messages on open streams, from arrival to answer.");
   for (const Rpc rpc : kStreamedRpcs) {
     message_seconds_[static_cast<size_t>(rpc)] =
         &message_seconds.Add({{"rpc", RpcName(rpc)}}, LatencyBuckets());
   }
-  auto& pairs =
-      AddCounters(registry_, "hulld_pairs_total", "Pairs answered, by the rung that decided.");
+  auto& pairs = AddCounters(registry_, "hulld_pairs_total", "Pairs answered, by deciding stage.");
   for (size_t i = 0; i < kRungNames.size(); ++i) pairs_[i] = &pairs.Add({{"rung", kRungNames[i]}});
   AddProcess();
 }
@@ -183,10 +182,10 @@ void Metrics::AddProcess() {
             "1, with the versions of hulld, its compiler and gRPC as labels.")
       .Add({{"version", HULLD_VERSION}, {"compiler", __VERSION__}, {"grpc", grpc::Version()}})
       .Set(1);
-  AddGauges(registry_, "process_start_time_seconds", "When this server started, Unix time.")
+  AddGauges(registry_, "process_start_time_seconds", "Unix time of the server's start.")
       .Add({})
       .SetToCurrentTime();
-  AddGauge("process_max_fds", "Descriptors that the process may have open.",
+  AddGauge("process_max_fds", "Maximum number of open file descriptors of the process.",
            [] { return static_cast<double>(MostDescriptors()); });
   AddGauge("process_resident_memory_bytes", "Resident memory of the process.", ResidentBytes);
   prometheus::Counter& processor =

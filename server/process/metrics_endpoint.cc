@@ -151,11 +151,12 @@ absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bo
   if (!parsed.ok()) return parsed.status();
   if (parsed->is_unix()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(kFlag, " is \"", address, "\": Prometheus reads TCP; give host:port"));
+        absl::StrCat(kFlag, " is \"", address, "\": it must be a TCP address, host:port"));
   }
   if (!parsed->is_local() && !exposed) {
     return absl::InvalidArgumentError(absl::StrCat(
-        kFlag, " is \"", address, "\", which other machines can reach, and metrics are neither ",
+        kFlag, " is \"", address,
+        "\", which is reachable from other machines, and metrics are neither ",
         "encrypted nor authenticated; use 127.0.0.1, or allow it with --metrics-insecure"));
   }
   return parsed;

@@ -28,11 +28,11 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
   if (!absl::IsNotFound(cause)) {
     return Prefixed(absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": "), cause);
   }
-  return WithReason(
-      absl::NotFoundError(absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ",
-                                       cause.message(), "; create it, or put the body without it")),
-      v1::ERROR_REASON_PIECE_NOT_FOUND,
-      {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
+  return WithReason(absl::NotFoundError(
+                        absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ", cause.message(),
+                                     "; create it, or put the body without that piece")),
+                    v1::ERROR_REASON_PIECE_NOT_FOUND,
+                    {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }
 
 // Returns the resolved hull of an ID.

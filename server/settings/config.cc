@@ -37,7 +37,7 @@ std::string CheckSeconds(const std::string& text) {
 class Parser {
  public:
   Parser()
-      : app_("hulld keeps 3D convex hulls by ID and answers exact collision queries.", "hulld") {
+      : app_("hulld stores 3D convex hulls by ID and answers exact collision queries.", "hulld") {
     AddServing();
     AddGuard();
     AddLimits();
@@ -48,8 +48,7 @@ class Parser {
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
     app_.footer(
         "Precedence: flag, environment variable, file, default.\n"
-        "'hulld doctor --help' tells how to audit a store, "
-        "'hulld migrate --help' how to move one.");
+        "See 'hulld doctor --help' to audit a store and 'hulld migrate --help' to copy one.");
   }
 
   // Returns the environment variables as arguments.
@@ -84,7 +83,7 @@ class Parser {
       return absl::OkStatus();
     } catch (const CLI::ConfigError& error) {
       return absl::InvalidArgumentError(
-          absl::StrCat("--config: the file holds an unknown key: ", error.what()));
+          absl::StrCat("--config: the file has an unknown key: ", error.what()));
     } catch (const CLI::FileError& error) {
       return absl::InvalidArgumentError(absl::StrCat("--config: ", error.what()));
     } catch (const CLI::Error& error) {
@@ -118,20 +117,20 @@ class Parser {
 
   void AddServing() {
     Add("listen", config_.listen,
-        "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
+        "Address to listen on: host:port, [v6]:port, or unix:path; port 0 picks a free port");
     app_.add_flag("--insecure", config_.insecure,
-                  "Allow --listen on addresses that other machines can reach without TLS: anyone "
-                  "in between can read and change what passes, tokens included")
+                  "Allow --listen without TLS on addresses reachable from other machines; the "
+                  "network can then read and change all traffic, including tokens")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("threads", config_.threads, "Threads that compute answers; 0: as many as can run at a time")
+    Add("threads", config_.threads, "Query threads; 0: one per available processor")
         ->check(CLI::Range(0, 1024));
     AddStore();
     Add("drain-timeout", drain_timeout_seconds_,
         "Seconds that running calls may take after SIGTERM or SIGINT")
         ->check(CLI::Validator(CheckSeconds, ""));
     AddObservation();
-    Add("log-level", config_.log_level, "Least severe messages to log")
+    Add("log-level", config_.log_level, "Minimum level of logged messages")
         ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
     Add("log-format", config_.log_format, "Log as text or as one JSON object per line")
         ->check(CLI::IsMember({"text", "json"}));
@@ -139,34 +138,35 @@ class Parser {
 
   void AddStore() {
     Add("store", config_.store,
-        "Where hulls live: on disk, in a PostgreSQL database, or in memory until the server ends")
+        "Where hulls are stored: on disk, in a PostgreSQL database, or in memory until the server "
+        "exits")
         ->check(CLI::IsMember({"rocksdb", "postgres", "memory"}));
     Add("data-dir", config_.data_dir,
-        "Directory of --store rocksdb; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
+        "Directory of --store rocksdb; created if missing. Default: hulld in $XDG_STATE_HOME, or "
+        "in "
         "~/.local/state, or else ./hulld-data");
     Add("durability", config_.durability,
-        "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
-        "outage of the machine can lose (relaxed)")
+        "Acknowledge changes when they are on disk (sync), or when the operating system has them "
+        "(relaxed); a crash of the machine can lose relaxed changes")
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
-        "File of the connection string of --store postgres, which only hulld may read");
+        "File with the connection string of --store postgres; only hulld may be able to read it");
     Add("postgres-servers", config_.postgres_servers,
-        "With --store postgres: one server at a time is active over a database, and others wait, "
-        "or many are at once, all with this setting")
+        "With --store postgres: one server is active on a database while further ones wait, or "
+        "many are active, all with this setting")
         ->check(CLI::IsMember({"one", "many"}));
-    app_.add_flag(
-            "--take-over", config_.take_over,
-            "With --store postgres: take the store from the server that is active, which then "
-            "ends, instead of waiting for its end; on the command line alone")
+    app_.add_flag("--take-over", config_.take_over,
+                  "With --store postgres: replace the active server, which then exits, instead of "
+                  "waiting for it; command line only")
         ->configurable(false);
   }
 
   void AddObservation() {
     Add("metrics-address", config_.metrics_address,
-        "Where Prometheus reads metrics over HTTP (/metrics): host:port; empty: nowhere");
+        "Address of the Prometheus endpoint (/metrics): host:port; empty: disabled");
     app_.add_flag("--metrics-insecure", config_.metrics_insecure,
-                  "Allow --metrics-address on addresses that other machines can reach, although "
-                  "metrics are neither encrypted nor authenticated")
+                  "Allow --metrics-address on addresses reachable from other machines; metrics are "
+                  "neither encrypted nor authenticated")
         ->envname(EnvironmentName("metrics-insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("slow-request", slow_request_seconds_,
@@ -176,15 +176,16 @@ class Parser {
 
   void AddGuard() {
     Add("tls-cert", config_.tls_cert,
-        "PEM file of the server's certificate and those that lead to its authority; read again "
-        "when it changes, as are the next three");
-    Add("tls-key", config_.tls_key, "PEM file of its private key, which only hulld may read");
+        "PEM file of the server's certificate chain; reloaded when it changes, like the next "
+        "three");
+    Add("tls-key", config_.tls_key,
+        "PEM file of its private key; only hulld may be able to read it");
     Add("tls-client-ca", config_.tls_client_ca,
-        "PEM file of the authorities of clients: clients then need a certificate");
+        "PEM file of the client CAs; clients must then present a certificate");
     Add("tokens-file", config_.tokens_file,
-        "File of the tokens that callers need, made by 'hullctl token new'");
+        "File of accepted tokens, written by 'hullctl token new'; calls must then carry a token");
     app_.add_flag("--check-config", check_,
-                  "Check the settings and the files that they name, print them and end: 0 or 2")
+                  "Check the settings and their files, print them, and exit with 0 or 2")
         ->configurable(false);
   }
 
@@ -201,26 +202,24 @@ class Parser {
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
              "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
-             "Writers whose sequences are kept for one hull", kAny);
+             "Writers of one hull with a stored sequence", kAny);
     AddLimit("max-pieces-per-body", limits.max_pieces_per_body,
-             "Pieces of one body; their answer beyond 10000 may exceed the 4 MiB that gRPC's "
-             "clients take unless told otherwise",
+             "Pieces of one body; answers for more than 10000 may exceed gRPC's default limit of 4 "
+             "MiB for received messages",
              kMaxPieceIndex);
-    AddLimit(
-        "memory-limit", limits.memory_limit,
-        "Bytes of memory that hulls, points on their way to them, replacements under way and the "
-        "placements, pairs and answers of batches, scenes and streams may hold, beside messages of "
-        "calls and the store's own buffers; 0: half "
-        "of what the machine or the control group has",
-        kAny, 0);
+    AddLimit("memory-limit", limits.memory_limit,
+             "Bytes of memory for hulls, points and replacements in flight, and the placements, "
+             "pairs, and answers of batches, scenes, and streams; excludes messages of calls and "
+             "the store's buffers; 0: half of the memory of the machine or control group",
+             kAny, 0);
     AddLimit("request-memory", limits.request_memory,
-             "Bytes that requests under way may take, and as many again those that arrive", kAny);
+             "Bytes for requests in flight, and as many again for arriving requests", kAny);
     AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
              kMaxGrpcMessageBytes);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
-             "Points that one hull takes in its life", kAny);
+             "Points that one hull can receive in total", kAny);
     AddLimit("max-placements", limits.max_placements,
-             "Placements of one batch, scene or stream of poses", kAny);
+             "Placements of one batch, scene, or stream of poses", kAny);
     AddCallLimits();
   }
 
@@ -228,30 +227,28 @@ class Parser {
     Limits& limits = config_.limits;
     constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
     AddLimit("max-connections", limits.max_connections,
-             "Open connections; beyond them the one that has been idle longest is closed", kAny);
+             "Open connections; above the limit, the longest idle one is closed", kAny);
     AddLimit("max-connections-per-address", limits.max_connections_per_address,
              "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt",
              kAny);
     AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
-             "Open streams of reflection, which need no token", kAny);
-    AddLimit("max-calls", limits.max_calls, "Calls that run at a time, open streams included",
-             kAny);
+             "Open reflection streams, which require no token", kAny);
+    AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams", kAny);
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
-             "Calls that wait for a thread before others are refused", kAny);
-    AddLimit(
-        "max-calls-per-client", limits.max_calls_per_client,
-        "Calls of one client (a token or, without tokens, an address) that run at a time, open "
-        "streams included",
-        kAny);
+             "Calls waiting for a thread; further ones are refused", kAny);
+    AddLimit("max-calls-per-client", limits.max_calls_per_client,
+             "Concurrent calls of one client (a token or, without tokens, an address), including "
+             "open streams",
+             kAny);
     AddLimit("max-streams-per-client", limits.max_streams_per_client,
-             "Streams of points or poses that one client has open", kAny);
+             "Open streams of points or poses of one client", kAny);
     AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
-             "Batches and scenes that run at a time", kAny);
+             "Concurrent batches and scenes", kAny);
     AddLimit("max-batches-per-client", limits.max_batches_per_client,
-             "Batches and scenes of one client that run at a time", kAny);
+             "Concurrent batches and scenes of one client", kAny);
     Add("max-request-time", max_request_seconds_,
-        "Seconds that one request may take; streams of points are exempt, streams of poses may "
-        "take so long per message; 0: unlimited")
+        "Seconds per request; streams of points are exempt; for streams of poses, seconds per "
+        "message; 0: unlimited")
         ->check(CLI::Validator(CheckSeconds, ""));
   }
 
@@ -289,23 +286,23 @@ absl::Status CheckStore(const Config& config) {
   const bool is_postgres = config.store == "postgres";
   if (is_postgres && config.postgres_conninfo_file.empty()) {
     return absl::InvalidArgumentError(
-        "--store postgres needs --postgres-conninfo-file, which tells where the database is");
+        "--store postgres requires --postgres-conninfo-file, a file with the connection string");
   }
   if (is_postgres && config.durability != "sync") {
     return absl::InvalidArgumentError(
-        "--durability relaxed is for --store rocksdb; with --store postgres the database decides, "
-        "as by ALTER ROLE ... SET synchronous_commit = off");
+        "--durability relaxed requires --store rocksdb; with --store postgres, configure the "
+        "database: ALTER ROLE ... SET synchronous_commit = off");
   }
   if (config.take_over && !is_postgres) {
-    return absl::InvalidArgumentError("--take-over is for --store postgres");
+    return absl::InvalidArgumentError("--take-over requires --store postgres");
   }
   const bool is_many = config.postgres_servers == "many";
   if (is_many && !is_postgres) {
-    return absl::InvalidArgumentError("--postgres-servers many is for --store postgres");
+    return absl::InvalidArgumentError("--postgres-servers many requires --store postgres");
   }
   if (is_many && config.take_over) {
     return absl::InvalidArgumentError(
-        "--take-over is for --postgres-servers one; with many, servers are active together");
+        "--take-over requires --postgres-servers one; with many, no server is replaced");
   }
   return absl::OkStatus();
 }

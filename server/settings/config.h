@@ -23,7 +23,7 @@ struct Limits {
   // pairs at their defaults.
   uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
-  // Points that one hull takes in its life. A double counts up to the default exactly; no hull
+  // Points that one hull can receive in total. A double counts up to the default exactly; no hull
   // reaches it.
   uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;

@@ -47,9 +47,9 @@ int CpuLimit::threads() const {
 std::string CpuLimit::Describe() const {
   const char* const noun = processors == 1 ? " processor" : " processors";
   if (quota >= processors) {
-    return absl::StrCat(threads(), ", as the process may use ", processors, noun);
+    return absl::StrCat(threads(), "; the process may use ", processors, noun);
   }
-  return absl::StrCat(threads(), ", as the control group grants ", quota, " of ", processors, noun);
+  return absl::StrCat(threads(), "; the control group grants ", quota, " of ", processors, noun);
 }
 
 CpuLimit ReadCpuLimit(const fs::path& root) {

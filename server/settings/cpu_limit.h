@@ -17,7 +17,7 @@ struct CpuLimit {
   // Returns the number of threads that can run concurrently: the lesser of both, rounded up, at
   // least 1.
   int threads() const;
-  // Returns a text for the log: "2, as the control group grants 1.5 of 64 processors".
+  // Returns a text for the log: "2; the control group grants 1.5 of 64 processors".
   std::string Describe() const;
 };
 

@@ -103,12 +103,12 @@ absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::strin
     for (double& component : piece.X_BP.q) component = reader.Next<double>();
     for (int k = 0; k < 3; ++k) piece.X_BP.t[k] = reader.Next<double>();
     if (piece.hull >= hulls || !IsValidPose(piece.X_BP)) {
-      return absl::DataLossError(absl::StrCat("its piece ", i, " cannot be"));
+      return absl::DataLossError(absl::StrCat("its piece ", i, " is invalid"));
     }
   }
   if (!reader.ok() || !reader.at_end()) {
     return absl::DataLossError(
-        absl::StrCat("a value of ", value.size(), " bytes, which cannot be"));
+        absl::StrCat("a value of ", value.size(), " bytes, which is not a valid size"));
   }
   return body;
 }

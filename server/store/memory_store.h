@@ -33,14 +33,15 @@ class MemoryStore : public Store {
   }
   absl::Status Recover() override { return absl::OkStatus(); }
   absl::StatusOr<std::string> MakeCopy() override {
-    return WithReason(absl::FailedPreconditionError(
-                          "the store is memory (--store=memory), of which no backup can be saved"),
-                      v1::ERROR_REASON_STORE_IN_MEMORY);
+    return WithReason(
+        absl::FailedPreconditionError("an in-memory store (--store=memory) cannot be backed up; "
+                                      "use --store=rocksdb or --store=postgres"),
+        v1::ERROR_REASON_STORE_IN_MEMORY);
   }
 
  private:
   static absl::Status KeepsNothing() {
-    return absl::NotFoundError("the store is memory, which keeps nothing to read back");
+    return absl::NotFoundError("an in-memory store has no stored records");
   }
 
   const std::string id_ = RandomId();

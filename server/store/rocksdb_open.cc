@@ -97,7 +97,7 @@ RocksDbStore::~RocksDbStore() {
   if (lock_ != nullptr) env_->UnlockFile(lock_).PermitUncheckedError();
   files_->SyncMark().PermitUncheckedError();
   if (failure_.ok() || files_->CutUncommitted().ok()) return;
-  spdlog::error("the log in {} may hold changes that were refused", options_.data_dir);
+  spdlog::error("the log in {} may contain changes that were refused", options_.data_dir);
 }
 
 rocksdb::Options RocksDbStore::DbOptions() const {
@@ -139,7 +139,7 @@ absl::Status RocksDbStore::MakeDirectories() {
   // Created by a start after the directories are durable.
   if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
   const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
-    return absl::UnavailableError(absl::StrCat("cannot make --data-dir ", options_.data_dir, ": ",
+    return absl::UnavailableError(absl::StrCat("cannot create --data-dir ", options_.data_dir, ": ",
                                                path.string(), ": ", status.ToString()));
   };
   std::vector<fs::path> missing;
@@ -198,14 +198,14 @@ absl::Status RocksDbStore::OpenDbInRoom() {
   if (IsDiskFull(opened) && reserve_.Release()) opened = OpenDb();
   if (!IsDiskFull(opened)) {
     if (opened.ok() && !reserve_.Ensure().ok()) {
-      spdlog::warn("the disk of {} is full: only deletions are taken until there are {} MiB",
+      spdlog::warn("the disk of {} is full: only deletions are accepted until {} MiB",
                    options_.data_dir, options_.reserve_bytes >> 20);
     }
     return opened;
   }
   if (!OpenForReading().ok()) return opened;
-  spdlog::warn("the disk of {} is full: no changes are taken until there are {} MiB",
-               options_.data_dir, options_.reserve_bytes >> 20);
+  spdlog::warn("the disk of {} is full: changes are refused until {} MiB", options_.data_dir,
+               options_.reserve_bytes >> 20);
   failure_ = opened;
   return absl::OkStatus();
 }
@@ -216,7 +216,7 @@ absl::Status RocksDbStore::Lock() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   if (!env_->FileExists(directory + "/CURRENT").ok()) {
     return absl::NotFoundError(
-        absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+        absl::StrCat("--data-dir ", options_.data_dir, " contains no hulld store"));
   }
   if (access(directory.c_str(), W_OK) != 0 && errno == EROFS) return CheckLogs();
   const rocksdb::Status locked = env_->LockFile(directory + "/LOCK", &lock_);
@@ -267,7 +267,7 @@ absl::Status RocksDbStore::StartMark() {
   if (started.ok()) return absl::OkStatus();
   const absl::Status error = OpenError(started, options_.data_dir, false);
   if (!IsDiskFull(error)) return error;
-  spdlog::warn("the disk of {} is full: no mark of the log is kept", options_.data_dir);
+  spdlog::warn("the disk of {} is full: the log mark is not kept", options_.data_dir);
   return absl::OkStatus();
 }
 
@@ -277,16 +277,17 @@ absl::Status RocksDbStore::ReadMeta() {
   if (!format->has_value()) {
     if (options_.read_only) {
       return absl::NotFoundError(
-          absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+          absl::StrCat("--data-dir ", options_.data_dir, " contains no hulld store"));
     }
     if (!failure_.ok()) return failure_;
     if (absl::Status s = InitializeMeta(); !s.ok()) return s;
     return BeginRun();
   }
   if (**format > kStoreFormat) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "--data-dir ", options_.data_dir, " was written in format ", **format,
-        "; this hulld knows format ", kStoreFormat, " at most; run the hulld that wrote it"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("--data-dir ", options_.data_dir, " is in format ", **format,
+                     "; this hulld reads formats up to ", kStoreFormat,
+                     "; run the hulld version that wrote it"));
   }
   const absl::StatusOr<std::optional<std::string>> mark = ReadMigrationMark();
   if (absl::IsUnavailable(mark.status())) return mark.status();
@@ -348,12 +349,12 @@ absl::Status RocksDbStore::BeginRun() {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
   if (restored) {
-    spdlog::info("restored from a backup of store {} at revision {}; this is store {}", former_id,
-                 revision_, id_);
+    spdlog::info("restored from a backup of store {} at revision {}; the new store ID is {}",
+                 former_id, revision_, id_);
   } else if (cut_short) {
     spdlog::warn(
-        "store {} was open with --durability=relaxed and was not closed: what it acknowledged "
-        "last may be lost; at revision {} this is store {}",
+        "store {} was open with --durability=relaxed and not shut down cleanly; its last "
+        "acknowledged changes may be lost; continuing at revision {} as store {}",
         former_id, revision_, id_);
   }
   return absl::OkStatus();

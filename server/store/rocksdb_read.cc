@@ -142,7 +142,7 @@ std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEac
     }
   }
   std::vector<absl::StatusOr<std::vector<Vector>>> loaded(
-      hulls.size(), absl::NotFoundError("it is not one value"));
+      hulls.size(), absl::NotFoundError("the record has an unexpected number of values"));
   FindValues(keys, [&](size_t at, std::string_view sealed) {
     const StoredHull& hull = *hulls[hull_of[at]];
     const absl::StatusOr<std::string_view> value = Unseal(keys[at], sealed);

@@ -125,7 +125,7 @@ void RocksDbStore::Compact(std::span<Change* const> changes) {
       const rocksdb::Status compacted =
           db_->CompactRange(rocksdb::CompactRangeOptions(), &first, &last);
       if (!compacted.ok()) {
-        spdlog::warn("cannot free the room of what was deleted: {}", compacted.ToString());
+        spdlog::warn("cannot reclaim the space of deleted records: {}", compacted.ToString());
         return;
       }
     }
@@ -236,12 +236,11 @@ absl::Status RocksDbStore::Reopen() {
   }
   if (opened.ok()) {
     failure_ = absl::OkStatus();
-    spdlog::warn("the store in {} can be written again", options_.data_dir);
+    spdlog::warn("the store in {} accepts writes again", options_.data_dir);
     return opened;
   }
   if (const rocksdb::Status status = OpenForReading(); !status.ok()) {
-    spdlog::critical("the store in {} cannot even be read: {}", options_.data_dir,
-                     status.ToString());
+    spdlog::critical("the store in {} cannot be read: {}", options_.data_dir, status.ToString());
   }
   return opened;
 }

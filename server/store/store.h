@@ -164,14 +164,14 @@ class Store {
   virtual bool finds_records() const { return false; }
   // Returns the hulls and bodies with these IDs.
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
-    return absl::UnimplementedError("this store does not find records");
+    return absl::UnimplementedError("this store does not support record lookups");
   }
   // Returns up to `most` records of these kinds in byte order, with IDs that start with `prefix`
   // and follow `after`. Returns fewer, but at least one, if they take more than kMostListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {
-    return absl::UnimplementedError("this store does not find records");
+    return absl::UnimplementedError("this store does not support record lookups");
   }
   static constexpr uint64_t kMostListedBytes = 16 << 20;
   // Totals at revision(), if finds_records(). Not concurrent with Commit.
@@ -180,7 +180,7 @@ class Store {
   // Returns the writers of the hull in byte order of the IDs. FAILED_PRECONDITION: the store keeps
   // nothing.
   virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& /*hull*/) {
-    return absl::FailedPreconditionError("this store keeps no writers to read back");
+    return absl::FailedPreconditionError("this store does not keep writers");
   }
 
   // Assigns revisions to a batch of changes and commits it atomically, before any reader sees it.

@@ -20,12 +20,11 @@ bool SaysDiskFull(const rocksdb::Status& status) {
 }
 
 absl::Status DiskFull(const std::string& cause, const std::string& data_dir) {
-  return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat(
-          "the disk that holds --data-dir ", data_dir, " is full (", cause,
-          "); nothing was changed; delete hulls or make room, then repeat it; no restart is "
-          "needed")),
-      v1::ERROR_REASON_DISK_FULL);
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                        "the disk that holds --data-dir ", data_dir, " is full (", cause,
+                        "); nothing was changed; delete hulls or free disk space, then retry; no "
+                        "restart is needed")),
+                    v1::ERROR_REASON_DISK_FULL);
 }
 
 }  // namespace
@@ -35,18 +34,18 @@ bool IsDiskFull(const absl::Status& status) { return absl::IsResourceExhausted(s
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
   if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
-  return absl::UnavailableError(absl::StrCat(
-      "cannot write to --data-dir ", data_dir, " (", cause,
-      "); nothing was changed; repeat it once that is repaired, no restart is needed"));
+  return absl::UnavailableError(
+      absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
+                   "); nothing was changed; fix the cause, then retry; no restart is needed"));
 }
 
 absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
                             const std::string& data_dir) {
-  return absl::UnavailableError(absl::StrCat(
-      "cannot write to --data-dir ", data_dir, " (", status.ToString(),
-      "), nor take back what is left of the write (", cut.ToString(),
-      "): nobody sees the change, but it may appear if the server is restarted before that is "
-      "repaired; look whether it did before you repeat it"));
+  return absl::UnavailableError(
+      absl::StrCat("cannot write to --data-dir ", data_dir, " (", status.ToString(),
+                   "), nor roll back the partial write (", cut.ToString(),
+                   "): the change is not visible, but may appear if the server restarts before the "
+                   "disk is fixed; check whether it is there before you retry"));
 }
 
 absl::Status ReadError(const rocksdb::Status& status, const std::string& what) {
@@ -56,8 +55,9 @@ absl::Status ReadError(const rocksdb::Status& status, const std::string& what) {
 }
 
 absl::Status CannotBeRead(const std::string& data_dir) {
-  return absl::UnavailableError(
-      absl::StrCat("the store in --data-dir ", data_dir, " cannot be read since an error"));
+  return absl::UnavailableError(absl::StrCat(
+      "the store in --data-dir ", data_dir,
+      " became unreadable after an error; restart hulld, and run 'hulld doctor' if that fails"));
 }
 
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only) {
@@ -65,7 +65,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   if (cause.find("lock") != std::string::npos || cause.find("LOCK") != std::string::npos) {
     return absl::FailedPreconditionError(
         absl::StrCat("--data-dir ", data_dir, " is in use by another hulld (", cause,
-                     "); stop that one, or name another directory"));
+                     "); stop that server, or use another directory"));
   }
   if (status.IsCorruption()) {
     return absl::DataLossError(absl::StrCat("--data-dir ", data_dir, " is damaged (", cause,
@@ -74,7 +74,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
-        absl::StrCat("--data-dir ", data_dir, " holds no store (", cause, ")"));
+        absl::StrCat("--data-dir ", data_dir, " contains no hulld store (", cause, ")"));
   }
   if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
   return absl::UnavailableError(
@@ -95,21 +95,21 @@ absl::Status LogLost(const std::string& data_dir, const std::string& finding,
 
 absl::Status UnfinishedMigration() {
   return absl::FailedPreconditionError(
-      "a migration has not copied all of its source there yet; run 'hulld migrate' again, which "
-      "goes on where it ended");
+      "the migration into it is incomplete; run the same 'hulld migrate' command again to resume "
+      "it");
 }
 
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding) {
-  return WithReason(
-      absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (", finding,
-                                       "); delete it and append it anew, or restore a backup")),
-      v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
+  return WithReason(absl::DataLossError(absl::StrCat(
+                        "hull \"", hull_id, "\" is damaged in the store (", finding,
+                        "); delete it and append its points again, or restore a backup")),
+                    v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
 }
 
 absl::Status DamagedBody(const std::string& body_id, const std::string& finding) {
   return WithReason(
       absl::DataLossError(absl::StrCat("body \"", body_id, "\" is damaged in the store (", finding,
-                                       "); put it anew or delete it, or restore a backup")),
+                                       "); replace or delete it, or restore a backup")),
       v1::ERROR_REASON_BODY_DAMAGED, {{"body_id", body_id}});
 }
 

@@ -39,7 +39,8 @@ uint32_t Checksum(std::string_view key, std::string_view value) {
 }
 
 absl::Status WrongSize(std::string_view value) {
-  return absl::DataLossError(absl::StrCat("a value of ", value.size(), " bytes, which cannot be"));
+  return absl::DataLossError(
+      absl::StrCat("a value of ", value.size(), " bytes, which is not a valid size"));
 }
 
 // The numbers of a StoredHull, in the order in which they are kept.

@@ -49,12 +49,11 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
 }
 
 absl::Status OtherStore(const Store& store) {
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          "freshness.store_id is not that of this store, which is \"", store.id(),
-          "\": the revision means something else here, as after the store was put back to an "
-          "earlier time; read without at_least_revision")),
-      v1::ERROR_REASON_OTHER_STORE, {{"store_id", store.id()}});
+  return WithReason(absl::FailedPreconditionError(absl::StrCat(
+                        "freshness.store_id differs from this store's ID, \"", store.id(),
+                        "\": the revision belongs to another store, for example one from before a "
+                        "restore; read without at_least_revision")),
+                    v1::ERROR_REASON_OTHER_STORE, {{"store_id", store.id()}});
 }
 
 absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
@@ -65,7 +64,7 @@ absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
     return absl::InvalidArgumentError(
         absl::StrCat("freshness.max_staleness is ", message.seconds(), " s and ", message.nanos(),
-                     " ns; it is at least 0, and its nanos are less than a second"));
+                     " ns; it must be at least 0, with nanos below 10^9"));
   }
   if (message.seconds() >= kMostSeconds) return std::chrono::seconds(kMostSeconds);
   return std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos());
@@ -75,7 +74,7 @@ absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
 
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points) {
   if (!block.xyz().empty() && !block.xyz_float().empty()) {
-    return absl::InvalidArgumentError("points holds both xyz and xyz_float; use one of them");
+    return absl::InvalidArgumentError("points has both xyz and xyz_float; set one of them");
   }
   if (!block.xyz_float().empty()) {
     return DecodePoints(block.xyz_float(), "points.xyz_float", max_points);
@@ -124,7 +123,7 @@ absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const St
   freshness.at_least_revision = message.at_least_revision();
   if (message.at_least_revision() > 0 && message.store_id().empty()) {
     return absl::InvalidArgumentError(
-        "freshness.at_least_revision needs store_id; give that of the same header");
+        "freshness.at_least_revision requires store_id; use the one from the same header");
   }
   if (!message.store_id().empty() && message.store_id() != store.id()) return OtherStore(store);
   if (message.has_max_staleness()) {

@@ -15,7 +15,7 @@ absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature
     return WithReason(
         absl::ResourceExhaustedError(absl::StrCat(
             "the axis touches a feature of ", feature.vertices.size(), " vertices; a reply holds ",
-            Config::kMaxFeatureVertices, " at most; ask again without the axis")),
+            Config::kMaxFeatureVertices, " at most; retry without the axis")),
         v1::ERROR_REASON_FEATURE_TOO_LARGE, {{"limit", uint64_t{Config::kMaxFeatureVertices}}});
   }
   for (const uint32_t index : feature.vertices) {

@@ -26,19 +26,19 @@ absl::StatusOr<std::string> DecodePageToken(Rpc rpc, const std::string& token,
                                             const std::string& prefix) {
   if (token.empty()) return std::string();
   const absl::Status malformed = absl::InvalidArgumentError(
-      "page_token is malformed; pass next_page_token of the previous page, or none");
+      "page_token is malformed; use next_page_token of the previous page, or leave it empty");
   std::string plain;
   if (!absl::WebSafeBase64Unescape(token, &plain)) return malformed;
   const std::vector<std::string> parts = absl::StrSplit(plain, kSeparator);
   if (parts.size() != 3) return malformed;
   if (parts[0] != RpcName(rpc)) {
-    return absl::InvalidArgumentError(absl::StrCat("page_token belongs to another call than ",
+    return absl::InvalidArgumentError(absl::StrCat("page_token belongs to a call other than ",
                                                    RpcName(rpc),
-                                                   "; list with the call of the first page"));
+                                                   "; use the call of the first page"));
   }
   if (parts[1] != prefix) {
     return absl::InvalidArgumentError(
-        "page_token belongs to another prefix; list with the prefix of the first page");
+        "page_token belongs to another prefix; use the prefix of the first page");
   }
   const std::string& last_id = parts[2];
   if (!CheckHullIdSyntax(last_id, "page_token").ok() || !last_id.starts_with(prefix)) {

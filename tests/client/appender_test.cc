@@ -199,7 +199,7 @@ TEST_F(AppenderTest, AnotherHullUnderTheSameNameIsNotContinued) {
   for (int i = 0; i < 5 && status.ok(); ++i) status = appender->Append(Block(i));
   if (status.ok()) status = appender->Finish();
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
-  EXPECT_THAT(Text(status), HasSubstr("append everything again"));
+  EXPECT_THAT(Text(status), HasSubstr("append all points again"));
   EXPECT_EQ(FirstCoordinates().size(), 0u);
 }
 

@@ -66,7 +66,7 @@ TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneIsKilled) {
   const std::unique_ptr<Process> active = Start();
   Put(*Connect(*active), Cube());
   const std::unique_ptr<Process> next = Start();
-  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  EXPECT_NE(next->ReadLineWith("another hulld is active on this database"), "");
   active->Signal(SIGKILL);
   const auto stub = Connect(*next);
   EXPECT_EQ(Received(*stub), 8);
@@ -80,7 +80,7 @@ TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
   std::unique_ptr<Process> active = Start({}, addresses[0]);
   EXPECT_NE(active->ReadLineWith("listening on "), "");
   std::unique_ptr<Process> next = Start({}, addresses[1]);
-  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  EXPECT_NE(next->ReadLineWith("another hulld is active on this database"), "");
 
   ClientOptions options;
   options.server = absl::StrCat(addresses[0], ",", addresses[1]);
@@ -115,7 +115,7 @@ TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneStandsStill) {
   const auto former = Connect(*active);
   Put(*former, Cube());
   const std::unique_ptr<Process> next = Start();
-  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  EXPECT_NE(next->ReadLineWith("another hulld is active on this database"), "");
   active->Signal(SIGSTOP);
   const auto stub = Connect(*next);
   Put(*stub, {9, 9, 9});
@@ -140,7 +140,7 @@ TEST_F(Failover, AServerThatWaitsEndsCleanlyOnASignal) {
   const std::unique_ptr<Process> active = Start();
   active->ReadLineWith("listening on ");
   const std::unique_ptr<Process> next = Start();
-  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  EXPECT_NE(next->ReadLineWith("another hulld is active on this database"), "");
   next->Signal(SIGTERM);
   EXPECT_EQ(next->Wait(), 0);
   active->Signal(SIGTERM);

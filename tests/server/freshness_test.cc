@@ -333,12 +333,12 @@ TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
   expect_refusal(freshness, grpc::StatusCode::FAILED_PRECONDITION,
                  absl::StrCat("at_least_revision is ", header.revision() + 1));
   freshness.set_store_id("another");
-  expect_refusal(freshness, grpc::StatusCode::FAILED_PRECONDITION, "is not that of this store");
+  expect_refusal(freshness, grpc::StatusCode::FAILED_PRECONDITION, "differs from this store's ID");
   freshness.clear_store_id();
-  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "needs store_id");
+  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "requires store_id");
   freshness.Clear();
   freshness.mutable_max_staleness()->set_seconds(-1);
-  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "it is at least 0");
+  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "it must be at least 0");
 }
 
 TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {

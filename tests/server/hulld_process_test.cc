@@ -92,7 +92,7 @@ TEST(HulldProgram, ATakenPortAndAWrongFlagEndItWithAnError) {
   Process first({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(first.ReadLineWith("listening on "));
   Process second({"--store", "memory", "--listen", address});
-  EXPECT_NE(second.ReadLineWith("the port is taken"), "");
+  EXPECT_NE(second.ReadLineWith("the port is in use"), "");
   EXPECT_EQ(second.Wait(), 1);
   Process third({"--max-hulls", "none"});
   EXPECT_NE(third.ReadLineWith("--max-hulls"), "");
@@ -118,7 +118,7 @@ TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {
   hulld.Signal(SIGTERM);
   EXPECT_FALSE(stream->Read(&response));
   EXPECT_FALSE(stream->Finish().ok());
-  EXPECT_NE(hulld.ReadLineWith("the drain timeout passed"), "");
+  EXPECT_NE(hulld.ReadLineWith("the drain timeout expired"), "");
   EXPECT_EQ(hulld.Wait(), 0);
 }
 

@@ -110,7 +110,7 @@ absl::Status ParsePcdHeader(ByteSource* source, PcdHeader* header) {
       status = ParseCount(*source, values, &header->points);
     } else if (keyword != "VERSION" && keyword != "VIEWPOINT") {
       status = source->ErrorAtLine(
-          absl::StrCat(Quoted(keyword), " is no keyword of a PCD header; is this a PCD file?"));
+          absl::StrCat(Quoted(keyword), " is not a keyword of a PCD header; is this a PCD file?"));
     }
     if (!status.ok()) return status;
   }
@@ -146,9 +146,9 @@ absl::Status MakeLayout(const ByteSource& source, const PcdHeader& header, bool 
     if (field.name.size() == 1 && axis != std::string_view::npos) {
       const std::optional<ScalarType> type = TypeOf(field);
       if (!type || field.count != 1 || found[axis]) {
-        return source.ErrorAtLine(absl::StrCat("field ", Quoted(field.name),
-                                               " must be there once, with COUNT 1 and a known "
-                                               "TYPE and SIZE"));
+        return source.ErrorAtLine(
+            absl::StrCat("field ", Quoted(field.name),
+                         " must occur once, with COUNT 1 and a known TYPE and SIZE"));
       }
       layout->position[axis] = layout->row;
       layout->type[axis] = *type;

@@ -35,7 +35,7 @@ absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
     rest.remove_prefix(end + 1);
   }
   if (axis < 2) {
-    return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, here are ", axis + 1));
+    return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, got ", axis + 1));
   }
   return points->AddScaled(xyz[0], xyz[1], xyz[2],
                            [&](const std::string& message) { return source.ErrorAtLine(message); });

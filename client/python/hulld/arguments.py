@@ -37,7 +37,8 @@ def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = Tr
         raise ValueError(f"{name} is {value}; it takes a finite number")
     if double != value:
         raise ValueError(
-            f"{name} is {value}, which no double holds exactly; round it yourself, as in float()"
+            f"{name} is {value}, which no double holds exactly; convert it explicitly, as with "
+            "float()"
         )
     if double < least:
         raise ValueError(f"{name} is {value}; it must be at least {least:g}")
@@ -187,8 +188,8 @@ def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
     if not same.all():
         at = tuple(int(index) for index in np.argwhere(~same)[0])
         raise ValueError(
-            f"{name}{place(at)} is {array[at]}, which no double holds exactly; round it yourself, "
-            f"as in {name}.astype(float)"
+            f"{name}{place(at)} is {array[at]}, which no double holds exactly; convert it "
+            f"explicitly, as with {name}.astype(float)"
         )
     return doubles
 

@@ -50,7 +50,7 @@ class BackupWriter:
         part = maintenance_pb2.SaveBackupResponse.FromString(data)
         kind = part.WhichOneof("part")
         if self._end is not None or (kind == "begin") != (self._begin is None) or kind is None:
-            raise ValueError("the backup's parts come out of order")
+            raise ValueError("the backup's parts are out of order")
         if kind == "begin":
             self._begin = part.begin
         elif kind == "end":
@@ -62,7 +62,7 @@ class BackupWriter:
 
     def finish(self) -> Backup:
         if self._begin is None or self._end is None:
-            raise ValueError("the backup is cut short: its end is missing")
+            raise ValueError("the backup is truncated: its end is missing")
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()

@@ -65,7 +65,7 @@ class Connection:
         if self.token is None:
             return
         if not self.token or not all("!" <= character <= "~" for character in self.token):
-            raise ValueError("the token is empty, or has blanks or characters beyond ASCII")
+            raise ValueError("the token is empty, or contains spaces or non-ASCII characters")
         if self.tls is None and not self.insecure and not is_loopback(self.server):
             raise ValueError(
                 f"the token would travel unencrypted to {self.server}; use tls=hulld.Tls(), or "
@@ -149,7 +149,7 @@ def _ip_version(servers: str) -> int:
         host, _, port = one.rpartition(":")
         if not host or not port.isdecimal():
             raise ValueError(
-                f"{one!r} is not ADDRESS:PORT; a list reads 10.0.0.1:50551,10.0.0.2:50551"
+                f"{one!r} is not ADDRESS:PORT; write a list as 10.0.0.1:50551,10.0.0.2:50551"
             )
         address = _address(host)
         if address is None:
@@ -186,7 +186,9 @@ def read_token_file(path: PathLike) -> str:
     """
     info = os.stat(path)
     if stat.S_ISREG(info.st_mode) and info.st_mode & 0o077:
-        raise ValueError(f"{os.fspath(path)}: other users can read this token; chmod 600 it")
+        raise ValueError(
+            f"{os.fspath(path)}: the token is readable by other users; run chmod 600 on the file"
+        )
     words = pathlib.Path(path).read_text(encoding="ascii", errors="replace").split()
     if len(words) != 1:
         raise ValueError(

@@ -17,7 +17,7 @@ def find_program(name: str) -> pathlib.Path:
     if named:
         if os.access(named, os.X_OK) and os.path.isfile(named):
             return pathlib.Path(named)
-        raise FileNotFoundError(f"{variable} is {named}, which is no program")
+        raise FileNotFoundError(f"{variable} is {named}, which is not an executable program")
     beside = pathlib.Path(os.environ.get("HULLD_BINARY", "")).parent / name
     if "HULLD_BINARY" in os.environ and os.access(beside, os.X_OK):
         return beside
@@ -33,8 +33,8 @@ def find_program(name: str) -> pathlib.Path:
     if builds:
         return max(builds, key=lambda path: path.stat().st_mtime)
     raise FileNotFoundError(
-        f"there is no {name}: {variable} is not set, the PATH lacks it, and there is no build of "
-        f"it in a checkout around the working directory; build hulld, or set {variable}"
+        f"{name} not found: {variable} is not set, it is not on the PATH, and no checkout "
+        f"around the working directory has a build; build hulld, or set {variable}"
     )
 
 

@@ -342,8 +342,8 @@ class Verifier:
             piece = body.pieces[index]
             if piece.id not in piece_hulls:
                 raise VerificationError(
-                    f"piece {index} of body {placement.id} is hull {piece.id}, of which the answer "
-                    "names no revision"
+                    f"piece {index} of body {placement.id} is hull {piece.id}, whose revision "
+                    "the answer does not state"
                 )
             inner = _Motion(Pose() if piece.pose is None else piece.pose)
             pieces.append(_Piece(self._vertices(piece_hulls[piece.id]), [inner, outer]))
@@ -374,7 +374,7 @@ class Verifier:
 
     def _expect(self, version: HullVersion, created: int, revision: int, store_id: str) -> None:
         if store_id != version.store_id:
-            raise VerificationError("the server has a different store than the answer")
+            raise VerificationError("the server's store differs from the answer's")
         if (created, revision) == (version.create_revision, version.revision):
             return
         # A newer answer may be about the current body.

@@ -153,7 +153,7 @@ class CollisionWatch:
                 if message is not None:
                     return self._take(read_answer(decode_collision_changes, message))
                 # The client never ends its side.
-                failed: HulldError = InternalError("the server ended the watch without a cause")
+                failed: HulldError = InternalError("the server ended the watch without an error")
             except HulldError as error:
                 failed = error
             # After an answer that cannot be read, the call is still open.

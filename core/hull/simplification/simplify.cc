@@ -28,17 +28,17 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
   if (std::isnan(target.max_error) || target.max_error < 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("max_error is ", std::isnan(target.max_error) ? "NaN" : "negative",
-                     "; give a length above 0, or 0 for no limit"));
+                     "; use a length above 0, or 0 for no limit"));
   }
   if (std::isinf(target.max_error)) {
-    return absl::InvalidArgumentError("max_error is infinite; give 0 for no limit");
+    return absl::InvalidArgumentError("max_error is infinite; use 0 for no limit");
   }
   if (target.max_vertices == 0 && target.max_error == 0) {
-    return absl::InvalidArgumentError("give max_vertices, max_error or both");
+    return absl::InvalidArgumentError("set max_vertices, max_error, or both");
   }
   if (target.max_vertices != 0 && target.max_vertices < least_vertices) {
     return absl::InvalidArgumentError(absl::StrCat("max_vertices is ", target.max_vertices,
-                                                   "; this needs at least ", least_vertices));
+                                                   "; it must be at least ", least_vertices));
   }
   return absl::OkStatus();
 }

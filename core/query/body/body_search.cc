@@ -95,7 +95,7 @@ double Extent(const Box& box) { return (box.high - box.low).maxCoeff(); }
 absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames& names) {
   if (options.method == Method::kTextbookSat) {
     return absl::InvalidArgumentError(
-        absl::StrCat(names.textbook, " is for pairs of hulls, not of bodies; leave it out"));
+        absl::StrCat(names.textbook, " applies to pairs of hulls, not of bodies; leave it out"));
   }
   return ValidateOptions(options, names);
 }

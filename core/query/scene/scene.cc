@@ -185,7 +185,7 @@ absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> pl
   if (!options.groups.empty() && options.groups.size() != placements.size()) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", options.groups.size(),
                                                    " groups for ", placements.size(),
-                                                   " placements; give one each, or none"));
+                                                   " placements; set one per placement, or none"));
   }
   HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
   SceneSearch scene(placements, options);

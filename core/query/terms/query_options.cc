@@ -11,7 +11,7 @@ absl::Status CheckLength(const char* name, double length) {
   if (length >= 0) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(name, " is ",
                                                  std::isnan(length) ? "NaN" : absl::StrCat(length),
-                                                 "; it is a length of at least 0"));
+                                                 "; it must be a length of at least 0"));
 }
 
 // Returns the name of an option that needs the exact relation, or null if none is set.

@@ -95,7 +95,7 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
   const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
   if (is_packed && !placements.empty()) {
     return absl::InvalidArgumentError(
-        "placements and packed_placements are both set; give one of them");
+        "placements and packed_placements are both set; set one of them");
   }
   const absl::Status few = CheckCount(is_packed ? packed.hulls_size() : placements.size(),
                                       " placements", max_placements, what);
@@ -462,7 +462,8 @@ absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& plac
     }
     if (named[placement]) {
       return absl::InvalidArgumentError(
-          absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
+          absl::StrCat("placements[", i, "] is ", placement,
+                       ", which is listed twice; list each placement once"));
     }
     named[placement] = true;
     const Pose pose = ReadPose(poses, i);

@@ -39,8 +39,8 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   options.tolerance = tolerance;
   if (absl::Status s = ValidateOptions(options, kFieldNames); !s.ok()) return s;
   if (wanted.clearance() < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("wanted.clearance is ", wanted.clearance(), "; it is a length of at least 0"));
+    return absl::InvalidArgumentError(absl::StrCat("wanted.clearance is ", wanted.clearance(),
+                                                   "; it must be a length of at least 0"));
   }
   options.max_textbook_axes = limits.max_textbook_axes;
   options.max_piece_certificates = Config::kMaxPieceCertificates;
@@ -88,13 +88,12 @@ absl::Status NameProofLimit(const absl::Status& status) {
 }
 
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit) {
-  return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat(
-          "the certificates of ", certificates,
-          " pairs of pieces, and what else is told of the bodies, take more than the ", limit,
-          " bytes of a reply; ask about bodies of fewer pieces, or without "
-          "certificates")),
-      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                        "the certificates of ", certificates,
+                        " pairs of pieces and the bodies' other data exceed the ", limit,
+                        " bytes of a reply; use bodies of fewer pieces, or ask without "
+                        "certificates")),
+                    v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
 }
 
 }  // namespace hulld::server

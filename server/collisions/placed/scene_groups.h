@@ -22,7 +22,7 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   if (!scene.groups().empty() && static_cast<size_t>(scene.groups_size()) != placements) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", scene.groups_size(),
                                                    " groups for ", placements,
-                                                   " placements; give one for each or none"));
+                                                   " placements; set one per placement, or none"));
   }
   if (scene.ignored_group_pairs_size() % 2 != 0) {
     return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs holds ",
@@ -33,7 +33,7 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
       (scene.ignore_same_group() || !scene.ignored_group_pairs().empty())) {
     return absl::InvalidArgumentError(
         absl::StrCat(scene.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
-                     " needs groups; give one for each placement"));
+                     " requires groups; set one per placement"));
   }
   if (scene.movers() > placements) {
     return absl::InvalidArgumentError(

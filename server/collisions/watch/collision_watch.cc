@@ -134,7 +134,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   // NaN, too.
   if (open.has_clearance() && !(open.clearance() >= 0)) {
     return absl::InvalidArgumentError(
-        absl::StrCat("clearance is ", open.clearance(), "; it is a length of at least 0"));
+        absl::StrCat("clearance is ", open.clearance(), "; it must be a length of at least 0"));
   }
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());

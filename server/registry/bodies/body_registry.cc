@@ -41,7 +41,10 @@ absl::Status BodyRegistry::Load(Locked& locked) {
     // The server never writes two records for one ID. The hull wins: its vertices cannot be
     // restored.
     if (catalog_.hulls().contains(id)) {
-      spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
+      spdlog::error(
+          "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of "
+          "the two",
+          id);
       return;
     }
     catalog_.AddBody(locked, id, stored);

@@ -68,9 +68,9 @@ BodyTable::Entry* Catalog::BodyInFlight(const std::string& id) {
 
 absl::Status Catalog::NoSuchHull(const std::string& id) const {
   if (!bodies_.contains(id)) return HullNotFound(id);
-  return WithReason(absl::NotFoundError(absl::StrCat(
-                        "\"", id, "\" is a body, not a hull; this is for hulls alone")),
-                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
+  return WithReason(
+      absl::NotFoundError(absl::StrCat("\"", id, "\" is a body; this call requires a hull")),
+      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 void Catalog::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {

@@ -230,15 +230,15 @@ absl::Status Gone(const std::string& id, const char* how) {
   return WithReason(
       absl::FailedPreconditionError(absl::StrCat(
           QuotedHull(id), " was ", how,
-          " while points were streamed into it; open the stream again and start anew")),
+          " while points were streamed into it; start a new stream and send all points again")),
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 
 absl::Status StoreDisagrees(const HullRecord& record) {
   return absl::UnavailableError(absl::StrCat(
       "the store does not hold ", QuotedHull(record.hull_id), " as of revision ", record.revision,
-      ", which is the last that this server knows of; if that does not pass, the database was "
-      "changed by others than hulld: restart this server"));
+      ", the last known to this server; if this persists, the database was changed outside of "
+      "hulld: restart this server"));
 }
 
 absl::Status HullNotFound(const std::string& id) {

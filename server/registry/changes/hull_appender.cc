@@ -47,7 +47,7 @@ absl::Status GoneWhileStreaming(const HullRecord& record) {
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
 }
 
-absl::Status Superseded() { return absl::AbortedError("another server changed the hull first"); }
+absl::Status Superseded() { return absl::AbortedError("a peer server changed the hull first"); }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
   return LimitExceeded(
@@ -375,7 +375,7 @@ absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, Reg
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
     if (store_.is_shared()) return Superseded();
-    return absl::UnavailableError("a change before it could not be stored");
+    return absl::UnavailableError("an earlier change could not be stored");
   }
   if (!added.ok()) return WhyNotBuilt(hull, added.status());
   if (hull.state.damaged()) {

@@ -251,7 +251,7 @@ void Committer::TellOthers(Locked& locked, const OtherChanges& others,
     const std::lock_guard lock(mutex_);
     take_from(queue_);
   }
-  const absl::Status status = absl::AbortedError("another server changed it first");
+  const absl::Status status = absl::AbortedError("a peer server changed it first");
   for (auto it = superseded.rbegin(); it != superseded.rend(); ++it) {
     it->done(locked, status, it->change);
   }

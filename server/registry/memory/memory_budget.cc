@@ -133,12 +133,12 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
   const MemoryStatistics now = Statistics();
   const std::string what =
       use == MemoryUse::kReading
-          ? absl::StrCat("readers hold ", now.reading,
-                         " bytes of memory in hulls that calls ask about, streams and watches, "
-                         "more than their share of it")
-          : absl::StrCat("writers hold ", now.writing,
-                         " bytes of memory in hulls that change and points on their way to them, "
-                         "more than their share of it");
+          ? absl::StrCat(
+                "readers hold ", now.reading,
+                " bytes of memory for hulls in use, streams, and watches, more than their share")
+          : absl::StrCat(
+                "writers hold ", now.writing,
+                " bytes of memory for changing hulls and points in flight, more than their share");
   return Overloaded(what, share(use), "memory-limit", kRetry);
 }
 

@@ -19,7 +19,7 @@ absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
   return WithReason(
       absl::FailedPreconditionError(absl::StrCat(
           "freshness.at_least_revision is ", wanted, ", but the store is at revision ", current,
-          " and nobody was told of a later one; give the revision of an answer's header")),
+          " and has issued no later one; use the revision of a reply's header")),
       v1::ERROR_REASON_FUTURE_REVISION,
       {{"at_least_revision", wanted}, {"current_revision", current}});
 }

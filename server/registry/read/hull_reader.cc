@@ -79,11 +79,10 @@ absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   const uint64_t share = memory_.share(MemoryUse::kReading);
   // A retry does not help a read that holds most of the memory itself.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
-    return LimitExceeded(
-        absl::StrCat("the hulls that the call names take ", bytes,
-                     " bytes of memory so far, and with what others hold that is more than the "
-                     "readers' share of it; name fewer hulls at a time"),
-        share, "memory-limit");
+    return LimitExceeded(absl::StrCat("the hulls that the call names take ", bytes,
+                                      " bytes of memory so far; with other calls that exceeds the "
+                                      "readers' share; request fewer hulls per call"),
+                         share, "memory-limit");
   }
   return memory_.Check(locked, MemoryUse::kReading);
 }

@@ -11,15 +11,15 @@ namespace {
 
 // The store reported an older revision than `asked_at`, its revision before the query.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
-  return absl::UnavailableError(
-      absl::StrCat("the store answers as of revision ", found, ", and was at ", asked_at,
-                   " before: it was put back to an earlier time, or another database answers"));
+  return absl::UnavailableError(absl::StrCat(
+      "the store answers as of revision ", found, ", and was at ", asked_at,
+      " before: it was restored to an earlier state, or another database is answering"));
 }
 
 absl::Status IsAhead(uint64_t found, uint64_t known) {
   return absl::UnavailableError(absl::StrCat("the store holds changes up to revision ", found,
-                                             ", and only those up to ", known,
-                                             " are known to be committed; try again"));
+                                             ", but only changes up to ", known,
+                                             " are known to be committed; retry"));
 }
 
 }  // namespace

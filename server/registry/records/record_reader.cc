@@ -18,7 +18,10 @@ constexpr size_t kMostThreads = 2;
 
 // The server never writes two records for one ID. The hull wins: its vertices cannot be restored.
 void NoteBodyUnderHull(const std::string& id) {
-  spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
+  spdlog::error(
+      "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of the "
+      "two",
+      id);
 }
 
 }  // namespace

@@ -82,7 +82,7 @@ class LogFileSystem::Log : public File {
   }
 
  private:
-  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was cut after an error"); }
+  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was truncated after an error"); }
 
   // A failed call may have written any part of this; none of it gets committed.
   IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
@@ -119,8 +119,7 @@ void LogFileSystem::WriteMark() {
   mark_changed_ = true;
   const IOStatus written = mark_file_->Write(mark_);
   if (!std::exchange(mark_fails_, !written.ok()) && !written.ok()) {
-    spdlog::error("cannot write the mark of the log, which lags behind now: {}",
-                  written.ToString());
+    spdlog::error("cannot update the log mark, which is now stale: {}", written.ToString());
   }
 }
 

@@ -76,8 +76,8 @@ void BatchNotices::Run() {
     const bool was_failing = std::exchange(failing, true);
     if (was_listening || !was_failing) {
       spdlog::warn("{} ({}); until that changes, {}",
-                   is_refused ? "the database does not tell when other servers commit"
-                              : "lost the session that hears when other servers commit",
+                   is_refused ? "the database refused to report commits of peer servers"
+                              : "lost the session that receives commit notices of peer servers",
                    std::string(status.message()), fallback_);
     }
     AwaitRetry(is_refused ? kRefusedRetry : retry_);

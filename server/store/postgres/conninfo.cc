@@ -37,7 +37,7 @@ absl::StatusOr<Conninfo> Conninfo::Parse(const std::string& text) {
   PQfreemem(words);
   if (options == nullptr) {
     return absl::InvalidArgumentError(
-        "it is no connection string of libpq, such as 'host=db.example dbname=hulld user=hulld "
+        "it is not a libpq connection string, such as 'host=db.example dbname=hulld user=hulld "
         "password=...' (a value with spaces in single quotes) or "
         "'postgresql://hulld@db.example/hulld'");
   }
@@ -55,8 +55,8 @@ absl::StatusOr<Conninfo> Conninfo::Parse(const std::string& text) {
   if (holds("host", "@", false) || holds("dbname", "@", false) ||
       holds("port", "0123456789,", true)) {
     return absl::InvalidArgumentError(
-        "its host or database holds an @, or its port is no number; in a URI, write @ as %40 and / "
-        "as %2F where a password holds them");
+        "its host or database contains an @, or its port is not a number; in the password of a "
+        "URI, write @ as %40 and / as %2F");
   }
   return conninfo;
 }

@@ -37,9 +37,9 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
     if (options_.migrating || mark->at(0, 0) != "t") return true;
     return UnfinishedMigration();
   }
-  return absl::FailedPreconditionError(absl::StrCat("it was written in format ", number,
-                                                    "; this hulld knows format ", kFormat,
-                                                    " at most; run the hulld that wrote it"));
+  return absl::FailedPreconditionError(absl::StrCat("the store is in format ", number,
+                                                    "; this hulld reads formats up to ", kFormat,
+                                                    "; run the hulld version that wrote it"));
 }
 
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
@@ -56,9 +56,10 @@ absl::StatusOr<std::string> PostgresStore::Owner(Session& session) const {
 }
 
 absl::Status PostgresStore::Superseded(std::string_view owner) {
-  return absl::UnavailableError(absl::StrCat(
-      "another hulld took over the store", owner.empty() ? "" : " (", std::string(owner),
-      owner.empty() ? "" : ")", ": this one ends and changes nothing; call that one"));
+  return absl::UnavailableError(
+      absl::StrCat("another hulld took over the store", owner.empty() ? "" : " (",
+                   std::string(owner), owner.empty() ? "" : ")",
+                   ": this server exits without changing anything; connect to the other one"));
 }
 
 void PostgresStore::Keep() {
@@ -81,8 +82,8 @@ void PostgresStore::Keep() {
     // Two beats without the expected notice are no accident.
     if (deaf_beats == 2 && !std::exchange(said_deaf, true)) {
       spdlog::warn(
-          "no notice comes of what other servers commit, although the session that listens is "
-          "there; until one does, it is asked for that every {} ms",
+          "no commit notices are arriving although the listening session is open; polling the "
+          "database every {} ms until one arrives",
           options_.look.count());
     }
     absl::Status status;
@@ -95,10 +96,10 @@ void PostgresStore::Keep() {
       has_lock_ = false;
     }
     if (!status.ok() && !failing) {
-      spdlog::error("cannot ask the database whether this is the active server: {}",
+      spdlog::error("cannot verify with the database that this server is active: {}",
                     std::string(status.message()));
     }
-    if (status.ok() && failing) spdlog::warn("the database answers again");
+    if (status.ok() && failing) spdlog::warn("the database responds again");
     failing = !status.ok();
     lock.lock();
     if (!ended_.ok()) return;

@@ -132,7 +132,7 @@ absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
   std::string last;
   for (uint64_t counted = kCountedAtOnce; counted == kCountedAtOnce;) {
     if (Stopped(should_stop)) {
-      return absl::CancelledError("told to end before all was counted; nothing was changed");
+      return absl::CancelledError("shutdown requested while counting; nothing was changed");
     }
     const absl::StatusOr<Rows> part =
         session.Ask({.name = statement, .parameters = {last, EncodeBigint(kCountedAtOnce)}});
@@ -242,7 +242,7 @@ absl::Status OpenFailed(const PostgresOptions& options, const absl::Status& stat
   if (SqlState(status) == "42501") {
     advice =
         "; the schema \"hulld\" and its tables must belong to the role of hulld, or the role must "
-        "be allowed to make them: CREATE SCHEMA hulld AUTHORIZATION the_role";
+        "be allowed to create them: CREATE SCHEMA hulld AUTHORIZATION the_role";
   }
   return absl::Status(status.code(), absl::StrCat("the store in PostgreSQL (", options.setting,
                                                   "): ", status.message(), advice));
@@ -292,7 +292,7 @@ absl::Status PostgresStore::BeginPatiently() {
     if (status.ok()) status = OpenFirstReaders();
     if (!IsLost(status) || std::chrono::steady_clock::now() + pause >= deadline) return status;
     if (Stopped(options_.should_stop)) {
-      return absl::CancelledError("told to end before the database took it");
+      return absl::CancelledError("shutdown requested before the database accepted the session");
     }
     std::this_thread::sleep_for(pause);
   }
@@ -349,9 +349,9 @@ absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::st
   for (bool is_first = true;; is_first = false) {
     absl::StatusOr<Rows> rows = session.Run(sql);
     if (SqlState(rows.status()) != kLockNotAvailable) return rows;
-    if (is_first) spdlog::info("another hulld changes the tables: this one waits until that ends");
+    if (is_first) spdlog::info("another hulld is changing the tables; waiting until it finishes");
     if (Stopped(options_.should_stop)) {
-      return absl::CancelledError("told to end before another hulld had changed the tables");
+      return absl::CancelledError("shutdown requested while another hulld was changing the tables");
     }
   }
 }
@@ -361,7 +361,7 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   if (session.server_version() < kLeastServerVersion) {
     return absl::FailedPreconditionError(absl::StrCat("the database is PostgreSQL ",
                                                       session.server_version() / 10'000,
-                                                      "; hulld needs 14 or later"));
+                                                      "; hulld requires 14 or later"));
   }
   const absl::StatusOr<Rows> settings =
       session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')");
@@ -371,8 +371,8 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
   if (options_.shared && !is_sync) {
     return absl::FailedPreconditionError(
-        "several servers over one database (--postgres-servers many) need synchronous_commit and "
-        "fsync on: the others would go on from changes that an outage took back");
+        "--postgres-servers many requires synchronous_commit = on and fsync = on; without them an "
+        "outage could revert changes that peer servers have already applied");
   }
   return CheckFormat(session).status();
 }
@@ -390,11 +390,12 @@ absl::Status PostgresStore::AddTotals(Session& session) const {
   if (format->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
   uint64_t number = 0;
   if (!absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {
-    return absl::DataLossError("the format of hulld.store is no number");
+    return absl::DataLossError("the format in hulld.store is not a number");
   }
   if (number >= kFormat) return absl::OkStatus();
-  spdlog::info("the tables are of format {}: counts what they hold, once, for format {}", number,
-               kFormat);
+  spdlog::info(
+      "upgrading the tables from format {} to format {}: counting hulls, vertices, and bodies",
+      number, kFormat);
   absl::Status status = session.Run(kAddTotals).status();
   if (status.ok()) status = session.Run(kPrepareCount).status();
   std::string counted;
@@ -464,12 +465,12 @@ absl::Status PostgresStore::Begin() {
   totals_ = {claimed->bigint(0, 4), claimed->bigint(0, 5), claimed->bigint(0, 6)};
   if (id_ != former->at(0, 0)) {
     spdlog::warn(
-        "store {} was open with synchronous_commit = off and was not closed: what it acknowledged "
-        "last may be lost; at revision {} this is store {}",
+        "store {} was open with synchronous_commit = off and not shut down cleanly; its last "
+        "acknowledged changes may be lost; continuing at revision {} as store {}",
         std::string(former->at(0, 0)), revision_, id_);
   }
   spdlog::info(
-      "hulls live in {}, PostgreSQL {}; an acknowledged change is {} (synchronous_commit = "
+      "store: {}, PostgreSQL {}; acknowledged changes are {} (synchronous_commit = "
       "{}); epoch {}",
       writer_->Describe(), writer_->server_version() / 10'000,
       is_relaxed ? "committed there, but an outage may lose it" : "committed there",
@@ -492,13 +493,12 @@ absl::Status PostgresStore::WaitForTurn() {
       keeper_session_ = session.ok() ? *std::move(session) : nullptr;
     } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {
       const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
-      spdlog::info(
-          "another hulld is active over this database ({}): this one waits until that ends{}",
-          owner.ok() && !owner->empty() ? *owner : "it just starts",
-          options_.shared ? "" : "; with --take-over it would not");
+      spdlog::info("another hulld is active on this database ({}); waiting until it exits{}",
+                   owner.ok() && !owner->empty() ? *owner : "starting",
+                   options_.shared ? "" : "; pass --take-over to replace it");
     }
     if (Stopped(options_.should_stop)) {
-      return absl::CancelledError("told to end before its turn came");
+      return absl::CancelledError("shutdown requested while waiting for the active server");
     }
     std::this_thread::sleep_for(pause);
   }

@@ -158,7 +158,7 @@ void NoteFormer(const Rows& rows, int row, OtherChange& other) {
   other.former_was_body = first == began(14);
 }
 
-absl::Status Moved() { return absl::AbortedError("another server changed the hull meanwhile"); }
+absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
 
 absl::Status MakeSharedTables(Session& session) {
   const absl::StatusOr<Rows> exist = session.Run("SELECT to_regclass('hulld.changes') IS NOT NULL");
@@ -196,8 +196,8 @@ absl::Status PostgresStore::Join() {
   if (joined->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
   if (joined->at(0, 4) != std::string(1, '\0')) {
     return absl::FailedPreconditionError(
-        "the store was open with synchronous_commit = off and was not closed: start and end one "
-        "hulld with --postgres-servers one first, which makes it another store");
+        "the store was open with synchronous_commit = off and not shut down cleanly; start and "
+        "stop one hulld with --postgres-servers one first, which gives the store a new ID");
   }
   // Drops killed servers. A server that still asks for its last batch committed it recently.
   const absl::Status dropped = writer_->Ask({.name = "hulld_drop_old_servers"}).status();
@@ -209,8 +209,8 @@ absl::Status PostgresStore::Join() {
   id_ = std::string(joined->at(0, 3));
   totals_ = {joined->bigint(0, 5), joined->bigint(0, 6), joined->bigint(0, 7)};
   spdlog::info(
-      "hulls live in {}, PostgreSQL {}; an acknowledged change is committed there "
-      "(synchronous_commit = {}); other servers may be active beside this one; epoch {}",
+      "store: {}, PostgreSQL {}; acknowledged changes are committed (synchronous_commit = {}); "
+      "peer servers may be active; epoch {}",
       writer_->Describe(), writer_->server_version() / 10'000, synchronous_commit_, epoch());
   MeasureDisk().IgnoreError();
   return absl::OkStatus();
@@ -229,24 +229,23 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
   if (rows.bigint(0, 2) != epoch()) {
     End(Superseded(rows.at(0, 4)));
   } else if (rows.at(0, 10) != id_) {
-    End(absl::UnavailableError(
-        "the store was given a new ID, as it was put back to an earlier time: this server ends; "
-        "start it again to serve what there is"));
+    End(
+        absl::UnavailableError("the store was restored to an earlier state and has a new ID; this "
+                               "server exits; restart it to serve the restored store"));
   } else if (rows.bigint(0, 0) < batch_) {
     went_back_ = true;
-    End(absl::UnavailableError(absl::StrCat(
-        "the database has lost ", batch_ - rows.bigint(0, 0),
-        " batches that were committed in it (a standby that was behind, or a restored backup): "
-        "this server ends, and the others do once they see that the store has a new ID")));
+    End(absl::UnavailableError(
+        absl::StrCat("the database has lost ", batch_ - rows.bigint(0, 0),
+                     " committed batches (failover to a lagging standby, or a restored backup); "
+                     "the store gets a new ID; this server and its peers exit; restart them")));
   } else if (rows.bigint(0, 3) > batch_) {
     End(absl::UnavailableError(
-        absl::StrCat("this server did not follow the others for more than ", kKeptBatches,
-                     " batches: it ends; start it again to serve what there is")));
+        absl::StrCat("this server is more than ", kKeptBatches,
+                     " batches behind its peers and exits; restart it to catch up")));
   } else if (rows.count() > kMostFollowed) {
     End(absl::UnavailableError(absl::StrCat(
-        "others changed more than ", kMostFollowed,
-        " hulls and bodies since this server followed them last: it ends; start it again to serve "
-        "what there is")));
+        "peer servers changed more than ", kMostFollowed,
+        " hulls and bodies since this server's last sync; it exits; restart it to catch up")));
   }
   return ended();
 }
@@ -305,8 +304,8 @@ absl::Status PostgresStore::Follow() {
     return noted;
   }
   ++read_failures_;
-  return absl::UnavailableError(absl::StrCat("cannot ask the database what other servers changed: ",
-                                             rows.status().message()));
+  return absl::UnavailableError(absl::StrCat(
+      "cannot read changes of peer servers from the database: ", rows.status().message()));
 }
 
 // Takes the turn before a batch is written, and reads the preceding changes of peer servers.
@@ -354,7 +353,8 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
       // For example, the wait for a standby was interrupted: committed, but not replicated as
       // required.
       writer_ = nullptr;
-      return absl::Status(absl::StatusCode::kUnavailable, "PostgreSQL warned while it committed");
+      return absl::Status(absl::StatusCode::kUnavailable,
+                          "PostgreSQL reported a warning during COMMIT");
     }
     if (status.ok()) {
       KeepShared(next);
@@ -372,7 +372,8 @@ void PostgresStore::GiveNewId() {
   const absl::Status status =
       session.ok() ? (*session)->Ask({.name = "hulld_rename", .parameters = {RandomId()}}).status()
                    : session.status();
-  if (!status.ok()) spdlog::error("cannot give it a new ID: {}", std::string(status.message()));
+  if (!status.ok())
+    spdlog::error("cannot assign a new ID to the store: {}", std::string(status.message()));
 }
 
 void PostgresStore::KeepShared(const SharedBatch& batch) {
@@ -398,7 +399,8 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   statements.push_back({.text = "COMMIT"});
   const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(statements);
   if (!rows.ok()) return rows.status();
-  if (writer_->TakeWarned()) return absl::UnavailableError("PostgreSQL warned while it committed");
+  if (writer_->TakeWarned())
+    return absl::UnavailableError("PostgreSQL reported a warning during COMMIT");
   const Rows& last = (*rows)[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
@@ -425,7 +427,7 @@ absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
     if (batch.number != 0) {
       const absl::StatusOr<bool> committed = FindSharedOutcome(batch.number, deadline);
       if (!committed.ok()) return WriteFailed(OutcomeUnknown(status));
-      spdlog::warn("the database was lost while it committed ({}); the batch was {}",
+      spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
                    std::string(status.message()), *committed ? "committed" : "not committed");
       if (*committed) {
         KeepShared(batch);
@@ -472,7 +474,7 @@ void PostgresStore::StartNotices() {
   };
   notices_ = std::make_unique<BatchNotices>(
       [this] { return OpenListener(); }, options_.beat, on_batch,
-      absl::StrCat("it is asked for that every ", options_.look.count(), " ms"));
+      absl::StrCat("the server polls it every ", options_.look.count(), " ms"));
 }
 
 // True if notices arrive. The keeper still polls the store with each beat. A batch found that way

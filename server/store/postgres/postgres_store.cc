@@ -22,20 +22,19 @@ using Clock = std::chrono::steady_clock;
 }  // namespace
 
 absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) const {
-  return absl::UnavailableError(absl::StrCat(
-      "the database was lost while it committed (", cause.message(),
-      "), and cannot be asked yet whether it did: ",
-      options_.shared ? "the change may be there, or not"
-                      : "nobody sees the change, but it may appear if the server is restarted",
-      "; look whether it did before you repeat it"));
+  return absl::UnavailableError(
+      absl::StrCat("lost the database connection during COMMIT (", cause.message(),
+                   "), and the outcome is still unknown: ",
+                   options_.shared ? "the change may or may not be committed"
+                                   : "the change is not visible, but may appear after a restart",
+                   "; check whether it is there before you retry"));
 }
 
 absl::Status PostgresStore::Refused(const absl::Status& cause) {
   absl::Status status(
       cause.code(),
-      absl::StrCat(
-          "cannot write to the database (", cause.message(),
-          "); nothing was changed; repeat it once that is repaired, no restart is needed"));
+      absl::StrCat("cannot write to the database (", cause.message(),
+                   "); nothing was changed; fix the cause, then retry; no restart is needed"));
   cause.ForEachPayload(
       [&](absl::string_view name, const absl::Cord& payload) { status.SetPayload(name, payload); });
   return status;
@@ -95,7 +94,8 @@ absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint
     // For example, the wait for a standby was interrupted: committed, but not replicated as
     // required.
     writer_ = nullptr;
-    return absl::Status(absl::StatusCode::kUnavailable, "PostgreSQL warned while it committed");
+    return absl::Status(absl::StatusCode::kUnavailable,
+                        "PostgreSQL reported a warning during COMMIT");
   }
   // A failed transaction cannot be committed, and ends with its session at the latest.
   if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
@@ -124,7 +124,8 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   const absl::StatusOr<Rows> claimed =
       writer_->Ask({.name = "hulld_reclaim", .parameters = {owner_}});
   if (!claimed.ok()) return claimed.status();
-  if (writer_->TakeWarned()) return absl::UnavailableError("PostgreSQL warned while it committed");
+  if (writer_->TakeWarned())
+    return absl::UnavailableError("PostgreSQL reported a warning during COMMIT");
   if (claimed->count() == 0) return OutcomeBeforeOthers(batch);
   epoch_ = claimed->bigint(0, 0);
   const uint64_t found = claimed->bigint(0, 1);
@@ -134,11 +135,11 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   const absl::StatusOr<Rows> renamed =
       writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}});
   if (!renamed.ok()) return renamed.status();
-  End(absl::UnavailableError(absl::StrCat(
-      "the database has lost ", batch_ - found,
-      " batches that this server had committed in it (a standby that was behind, a restored "
-      "backup, or an outage with synchronous_commit = off): this server ends; the next one serves "
-      "what is there, as another store")));
+  End(absl::UnavailableError(
+      absl::StrCat("the database has lost ", batch_ - found,
+                   " batches committed by this server (failover to a lagging standby, a restored "
+                   "backup, or an outage with synchronous_commit = off); this server exits; after "
+                   "a restart the remaining data is served under a new store ID")));
   return false;
 }
 
@@ -148,8 +149,9 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
       writer_->Ask({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}});
   if (!next.ok()) return next.status();
   if (next->count() == 0) {
-    End(absl::UnavailableError(
-        "the database was put back to a time before this server became active: this server ends"));
+    End(
+        absl::UnavailableError("the database was restored to a state before this server became "
+                               "active; this server exits"));
     return false;
   }
   End(Superseded(""));
@@ -192,7 +194,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       unknown_ = OutcomeUnknown(status);
       return WriteFailed(unknown_);
     }
-    spdlog::warn("the database was lost while it committed ({}); the batch was {}",
+    spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
                  std::string(status.message()), *committed ? "committed" : "not committed");
     if (*committed) return keep();
     if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
@@ -214,19 +216,18 @@ absl::Status PostgresStore::Recover() {
   unknown_ = absl::OkStatus();
   if (*committed) {
     End(absl::UnavailableError(
-        "the database has committed changes whose outcome was reported as unknown: this server "
-        "ends, as what it has in memory is behind; start it again to serve them"));
+        "the database committed changes whose outcome was reported as unknown; this server's "
+        "memory is stale, so it exits; restart it to serve them"));
   }
   if (absl::Status s = ended(); !s.ok()) return s;
-  spdlog::warn("the database can be written again");
+  spdlog::warn("the database accepts writes again");
   return absl::OkStatus();
 }
 
 absl::StatusOr<std::string> PostgresStore::MakeCopy() {
   return absl::FailedPreconditionError(
-      "the store is PostgreSQL (--store=postgres), whose own tools save it: pg_dump "
-      "--schema=hulld, "
-      "or pg_basebackup with an archive of its log");
+      "the store is PostgreSQL (--store=postgres); back it up with pg_dump --schema=hulld, or with "
+      "pg_basebackup and WAL archiving");
 }
 
 }  // namespace hulld::server

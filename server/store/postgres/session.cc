@@ -73,7 +73,8 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
   if (PQstatus(connection) != CONNECTION_OK) {
     return session->Lost(absl::StrCat("cannot connect: ", OneLine(PQerrorMessage(connection))));
   }
-  if (PQsetnonblocking(connection, 1) != 0) return session->Lost("cannot go on without blocking");
+  if (PQsetnonblocking(connection, 1) != 0)
+    return session->Lost("cannot switch the connection to non-blocking mode");
   PQsetNoticeReceiver(connection, &NoteWarning, session.get());
   return session;
 }
@@ -184,7 +185,7 @@ absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statem
 absl::Status Session::Start(std::span<const Statement> statements) {
   if (!lost_.ok()) return lost_;
   PGconn* const connection = connection_.get();
-  if (PQenterPipelineMode(connection) == 0) return Lost("a statement is under way");
+  if (PQenterPipelineMode(connection) == 0) return Lost("a statement is in progress");
   for (const Statement& statement : statements) {
     if (absl::Status s = Send(statement); !s.ok()) return s;
   }

@@ -116,7 +116,7 @@ TEST(PlyFile, BinaryErrorsNameTheByte) {
       .Add(6.0f);
   EXPECT_EQ(ReadText(head + body.data(), PointFormat::kPly).error(),
             "FILE: byte " + std::to_string(head.size() + 12) +
-                ": point 2 has y = NaN; leave such points out with --skip-nonfinite");
+                ": point 2 has y = NaN; skip such points with --skip-nonfinite");
   EXPECT_THAT(ReadText(head + body.data().substr(0, 20), PointFormat::kPly).error(),
               HasSubstr("FILE: ends at byte " + std::to_string(head.size() + 20)));
   ReadOptions options;

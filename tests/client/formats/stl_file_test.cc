@@ -87,7 +87,7 @@ TEST(StlText, FilesCutAnywhereAreRefusedWithLineAndCount) {
 }
 
 TEST(StlText, WhatIsNoStlIsRefusedWithLineAndCount) {
-  EXPECT_EQ(Error("solid\nendsolid\n"), "FILE:2: there is no facet in the file");
+  EXPECT_EQ(Error("solid\nendsolid\n"), "FILE:2: the file contains no facet");
   EXPECT_EQ(Error("solid\n" + Facet() + "vertex 0 0 0\n"),
             "FILE:9: \"vertex\" after 1 facets where \"facet\" is expected");
   EXPECT_EQ(Error("solid\nfacet\nouter loop\nvertex 0 0 0\nendloop\n"),

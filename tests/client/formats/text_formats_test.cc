@@ -31,7 +31,7 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("v 1 2 3\n\nv 1 abc 3\n", PointFormat::kObj).error(),
             "FILE:3: \"abc\" is not a number");
   EXPECT_EQ(ReadText("v 1 2\n", PointFormat::kObj).error(),
-            "FILE:1: a point needs 3 coordinates, here are 2");
+            "FILE:1: a point needs 3 coordinates, got 2");
 }
 
 // Modeled on malformed.obj, malformed2.obj, and empty.obj of assimp-testmodels, which were formerly
@@ -81,7 +81,7 @@ TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
   EXPECT_THAT(error("x,y,z\n1,2,3\n"),
               HasSubstr("\"x\" is not a number; --format csv reads tables with a header"));
   EXPECT_THAT(error("1,,3\n"), HasSubstr("\"\" is not a number"));
-  EXPECT_EQ(error("1,2\n"), "FILE:1: a point needs 3 coordinates, here are 2");
+  EXPECT_EQ(error("1,2\n"), "FILE:1: a point needs 3 coordinates, got 2");
 }
 
 TEST(SkipZero, DropsAndCountsPointsAtExactlyZero) {
@@ -104,7 +104,7 @@ TEST(XyzFile, ANumberTooLargeIsAnErrorEvenWhenNonFinitePointsAreSkipped) {
 
 TEST(XyzFile, NonFinitePointsAreErrorsThatNameFileAndPoint) {
   EXPECT_EQ(ReadText("1 2 3\n4 nan 6\n", PointFormat::kXyz).error(),
-            "FILE:2: point 2 has y = NaN; leave such points out with --skip-nonfinite");
+            "FILE:2: point 2 has y = NaN; skip such points with --skip-nonfinite");
   EXPECT_THAT(ReadText("1 2 -inf\n", PointFormat::kXyz).error(), HasSubstr("point 1 has z = inf"));
 }
 

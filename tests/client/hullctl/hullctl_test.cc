@@ -213,8 +213,8 @@ TEST_F(HullctlTest, AppendCountsSkippedPoints) {
   const TempFile file("a.csv", "x,y,z\n1,2,3\nnan,0,0\n0,inf,0\n4,5,6\n");
   const Ran strict = Ask({"append", "a", "--create", file.path()});
   EXPECT_EQ(strict.code, 2);
-  EXPECT_THAT(strict.err, HasSubstr(".csv:3: point 2 has x = NaN; leave such points out with "
-                                    "--skip-nonfinite"));
+  EXPECT_THAT(strict.err,
+              HasSubstr(".csv:3: point 2 has x = NaN; skip such points with --skip-nonfinite"));
   const Ran ran = Ask({"append", "b", "--create", "--skip-nonfinite", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("skipped    2 points that are not finite\n"));

@@ -89,7 +89,7 @@ TEST_F(InvalidModel, IsRefusedByAppend) {
     EXPECT_EQ(code, 2) << path;
     EXPECT_THAT(err.str(), AllOf(HasSubstr("hullctl: "), HasSubstr(path.string())));
     if (PointFormatOfPath(path.string()).ok()) {
-      EXPECT_THAT(err.str(), Not(HasSubstr("no known format")));
+      EXPECT_THAT(err.str(), Not(HasSubstr("unknown file extension")));
     } else {
       // Lists the accepted formats.
       EXPECT_THAT(err.str(), HasSubstr("obj, off, ply, xyz, csv, pcd, stl, gltf, glb, dae"));

@@ -199,7 +199,7 @@ def test_another_hull_is_not_appended_to(caller: Any, fake: FakeHulld, change: s
     fake.before = replace
     with caller.open_append("a", create=True) as appender:
         appender.append(np.zeros((1, 3)))
-        with pytest.raises(hulld.FailedPreconditionError, match="append everything again"):
+        with pytest.raises(hulld.FailedPreconditionError, match="append all points again"):
             appender.append(np.zeros((2, 3)))
             appender.finish()
         with pytest.raises(hulld.FailedPreconditionError):

@@ -79,8 +79,8 @@ TEST_F(JointFile, ErrorsNameTheLine) {
   EXPECT_THAT(Read("elbow\n1\n1,2\n"), HasSubstr(":3: the header has 1 columns, this row 2"));
   EXPECT_THAT(Read("elbow\nx\n"), HasSubstr(":2: \"x\" is not a number"));
   EXPECT_THAT(Read("elbow\ninf\n"), HasSubstr(":2: \"inf\" is not a finite number"));
-  EXPECT_THAT(Read("time\n1\n"), HasSubstr("no header that names joints"));
-  EXPECT_THAT(Read(""), HasSubstr("no header that names joints"));
+  EXPECT_THAT(Read("time\n1\n"), HasSubstr("no header with joint names"));
+  EXPECT_THAT(Read(""), HasSubstr("no header with joint names"));
 }
 
 }  // namespace joint_file_test

@@ -76,7 +76,7 @@ TEST_F(PackagePath, RefusalSaysWhereItWasLookedFor) {
   EXPECT_THAT(Resolve("package://tool/a.stl"),
               testing::AllOf(HasSubstr("no folder of the package \"tool\" holds a.stl"),
                              HasSubstr("--package tool=DIR"), HasSubstr(At("ws/src/tool"))));
-  EXPECT_THAT(Resolve("package://tool"), HasSubstr("names no file of a package"));
+  EXPECT_THAT(Resolve("package://tool"), HasSubstr("is not a package file"));
 }
 
 }  // namespace package_path_test

@@ -107,16 +107,16 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
     std::pair<std::string, std::string> change;
     const char* error;
   } cases[] = {
-      {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size takes 3 numbers, here are 2"},
+      {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size takes 3 numbers, got 2"},
       {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
       {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
       {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},
       {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> holds \"cone\""},
       {{"<link name=\"upper\">", "<link>"}, "arm.urdf:12: <link> lacks name"},
       {{"<link name=\"upper\">", "<link name=\"base\">"},
-       "arm.urdf:12: link \"base\" is there already, in line 3"},
+       "arm.urdf:12: link \"base\" is defined twice; the first definition is in line 3"},
       {{"<child link=\"upper\"/>", "<child link=\"uper\"/>"},
-       "arm.urdf:8: joint \"shoulder\" has a child that there is not: \"uper\""},
+       "arm.urdf:8: joint \"shoulder\" has a child that does not exist: \"uper\""},
       {{"type=\"revolute\"", "type=\"screw\""},
        "arm.urdf:7: joint \"shoulder\" has type \"screw\""},
       {{"<origin xyz=\"0 0 2\"/><axis xyz=\"0 0 3\"/>\n    <limit lower=\"0.5\" upper=\"1\"/>",
@@ -126,8 +126,9 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:5: <mesh> scale must not be 0"},
       {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\""}, "arm.urdf:9: <axis> xyz must not be 0 0 0"},
       {{"lower=\"-2\"", "lower=\"nan\""}, "arm.urdf:10: <limit> lower: \"nan\" is not a finite"},
-      {{"mimic joint=\"shoulder\"", "mimic joint=\"follow\""}, "mimics itself in the end"},
-      {{"<parent link=\"base\"/>", "<parent link=\"lower\"/>"}, "is in a circle of joints"},
+      {{"mimic joint=\"shoulder\"", "mimic joint=\"follow\""},
+       "mimics itself through other joints"},
+      {{"<parent link=\"base\"/>", "<parent link=\"lower\"/>"}, "is part of a cycle of joints"},
       {{"</link>\n  <joint name=\"elbow\"", "</lnk>\n  <joint name=\"elbow\""},
        "arm.urdf:19: </lnk> where <link> of line 12 is to be closed"},
       {{"</robot>", ""}, "the file ends before </robot>"},
@@ -141,9 +142,9 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
     EXPECT_THAT(message, StartsWith("arm.urdf:"));
     EXPECT_THAT(message, HasSubstr(error));
   }
-  EXPECT_THAT(ErrorOf(""), HasSubstr("there is no element in it"));
+  EXPECT_THAT(ErrorOf(""), HasSubstr("it contains no element"));
   EXPECT_THAT(ErrorOf("<sdf/>"), HasSubstr("the outermost element is <sdf>, not <robot>"));
-  EXPECT_THAT(ErrorOf(std::string("<robot name=\"\0\"/>", 17)), HasSubstr("a byte 0"));
+  EXPECT_THAT(ErrorOf(std::string("<robot name=\"\0\"/>", 17)), HasSubstr("a zero byte"));
   std::string deep;
   for (int i = 0; i < 100000; ++i) deep += "<a>";
   EXPECT_THAT(ErrorOf(deep), HasSubstr("nested deeper"));
@@ -165,7 +166,7 @@ TEST(UrdfFile, JointsOfSeveralValuesAreNotMimicked) {
 
 TEST(UrdfFile, SecondRootIsNamed) {
   EXPECT_THAT(ErrorOf("<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\"/>\n</robot>"),
-              HasSubstr("arm.urdf:3: link \"b\" hangs on no joint, like \"a\""));
+              HasSubstr("arm.urdf:3: link \"b\" has no parent joint, like \"a\""));
 }
 
 }  // namespace urdf_file_test

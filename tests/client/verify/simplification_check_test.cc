@@ -105,7 +105,7 @@ TEST(SimplificationCheck, KnowsInsideFromOutsideToTheLastBit) {
   HullMesh moved = TetrahedronInCube();
   moved.xyz[3] = std::nextafter(2.0, 0.0);
   ExpectInvalid(Asked(kInside, 4), BoxHull({0, 0, 0}, {2, 2, 2}), Claiming(2, moved),
-                "vertex 1 of the simplification is none of the hull's");
+                "vertex 1 of the simplification is not a vertex of the hull");
 }
 
 TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
@@ -117,9 +117,9 @@ TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
   ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
   // With both limits, the nearest that the server finds is accepted.
   ExpectValid(Asked(kInside, 4, 1.25), cube, simple);
-  ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "tells no error");
-  ExpectInvalid(Asked(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()), "is no distance");
-  ExpectInvalid(Asked(kInside, 4), cube, Claiming(-1, TetrahedronInCube()), "is no distance");
+  ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "states no error");
+  ExpectInvalid(Asked(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()), "is not a distance");
+  ExpectInvalid(Asked(kInside, 4), cube, Claiming(-1, TetrahedronInCube()), "is not a distance");
 }
 
 TEST(SimplificationCheck, SurvivesMeshesThatMakeNoSense) {

@@ -252,13 +252,13 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
                                                                : status.ToString();
   };
   EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = nan; }),
-            "tolerance is NaN; it is a length of at least 0");
+            "tolerance is NaN; it must be a length of at least 0");
   EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = -1; }),
-            "tolerance is -1; it is a length of at least 0");
+            "tolerance is -1; it must be a length of at least 0");
   EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = nan; }),
-            "max_error is NaN; it is a length of at least 0");
+            "max_error is NaN; it must be a length of at least 0");
   EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = -0.5; }),
-            "max_error is -0.5; it is a length of at least 0");
+            "max_error is -0.5; it must be a length of at least 0");
   EXPECT_EQ(message([&](QueryOptions& o) { o.clearance = nan; }), "clearance is NaN");
   const auto with_tolerance = [&](auto change) {
     return message([&](QueryOptions& o) {

@@ -194,8 +194,8 @@ TEST_F(Revocation, OfTheLastTokenRefusesEverything) {
     ExpectRevoked(create("gone secret"));
     EXPECT_THAT(log.text(), HasSubstr("error --tokens-file " + path_));
     // Once.
-    EXPECT_EQ(log.text().find("every token is revoked"),
-              log.text().rfind("every token is revoked"));
+    EXPECT_EQ(log.text().find("all tokens are revoked"),
+              log.text().rfind("all tokens are revoked"));
   }
 }
 

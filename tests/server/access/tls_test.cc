@@ -223,7 +223,7 @@ TEST_F(Tls, AddressesThatOthersCanReachNeedIt) {
 TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   Config config = config_;
   config.tls_key.clear();
-  ExpectWrong(config, "--tls-cert needs --tls-key");
+  ExpectWrong(config, "--tls-cert requires --tls-key");
   config = config_;
   config.tls_cert.clear();
   ExpectWrong(config, "--tls-key needs --tls-cert");
@@ -234,9 +234,9 @@ TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   config.tls_cert = directory_ + "/none";
   ExpectWrong(config, "--tls-cert " + config.tls_cert + ": No such file");
   config.tls_cert = directory_;
-  ExpectWrong(config, "it is no regular file");
+  ExpectWrong(config, "it is not a regular file");
   config.tls_cert = config_.tls_key;
-  ExpectWrong(config, "it holds no PEM certificate");
+  ExpectWrong(config, "it contains no PEM certificate");
   config.tls_cert = Write("cut.crt", identity_.certificate + identity_.certificate.substr(0, 300));
   ExpectWrong(config, "PEM certificate 2 is damaged");
   config = config_;
@@ -246,7 +246,7 @@ TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   ExpectWrong(config, "it does not belong to the first certificate of --tls-cert");
   config = config_;
   config.tls_client_ca = config_.tls_key;
-  ExpectWrong(config, "--tls-client-ca " + config.tls_key + ": it holds no PEM certificate");
+  ExpectWrong(config, "--tls-client-ca " + config.tls_key + ": it contains no PEM certificate");
   config = config_;
   ASSERT_EQ(chmod(config.tls_key.c_str(), 0644), 0);
   ExpectWrong(config, "its permissions 0644 are too open");
@@ -267,7 +267,7 @@ TEST_F(Tls, ADataDirectoryCanBeMadeWhereADirectoryIs) {
   EXPECT_TRUE(CheckDataDir("relative").ok());
   for (const char* name : {"/server.crt", "/server.crt/below"}) {
     EXPECT_THAT(std::string(CheckDataDir(directory_ + name).message()),
-                AllOf(HasSubstr("--data-dir " + directory_), HasSubstr("is no directory")));
+                AllOf(HasSubstr("--data-dir " + directory_), HasSubstr("is not a directory")));
   }
   if (geteuid() == 0) return;  // root may write everywhere
   EXPECT_THAT(std::string(CheckDataDir("/proc/new").message()), HasSubstr("cannot be written"));

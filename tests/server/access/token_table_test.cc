@@ -51,7 +51,7 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
   expect(Line(std::string(65, 'b'), "admin", "*", kAbc), "line 1: the name");
   expect(Line("b/c", "admin", "*", kAbc), "line 1: the name");
   expect(Line("b", "root", "*", kAbc), "line 1: the role");
-  expect(Line("b", "admin", "cell-1", kAbc), "does not end in \"/\"");
+  expect(Line("b", "admin", "cell-1", kAbc), "must end in \"/\"");
   expect(Line("b", "admin", "/", kAbc), "line 1: the prefix is empty");
   expect(Line("b", "admin", "a//", kAbc), "line 1: the prefix \"a/\" has an empty segment");
   expect(Line("b", "admin", "*", std::string(kAbc).substr(1)), "line 1: the hash");
@@ -72,7 +72,7 @@ TEST(TokenTable, AFileThatOthersCanUseIsRefused) {
   }
   WriteSecret(path, "# nobody\n\n");
   EXPECT_THAT(std::string(ReadTokensFile(path).status().message()),
-              HasSubstr("--tokens-file " + path + ": it holds no token"));
+              HasSubstr("--tokens-file " + path + ": it contains no token"));
   EXPECT_TRUE(RereadTokensFile(path)->empty());
   std::remove(path.c_str());
   EXPECT_TRUE(RereadTokensFile(path)->empty());

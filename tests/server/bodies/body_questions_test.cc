@@ -118,7 +118,7 @@ TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItIsThere) {
   // A body cannot be a piece.
   ASSERT_TRUE(PutBody("late", {PlacementOf("cube")}).ok());
   EXPECT_THAT(std::string(Ask(PlacementOf("b"), PlacementOf("cube")).status().message()),
-              HasSubstr("is a body, not a hull"));
+              HasSubstr("is a body; this call requires a hull"));
 }
 
 TEST_F(BodyQuestions, APieceIsItsHullAsItIsNow) {

@@ -122,7 +122,8 @@ TEST_F(BodyCalls, HullsAndBodiesShareTheirIds) {
                                       })
                          .status()),
             v1::ERROR_REASON_BODY_EXISTS);
-  EXPECT_THAT(TextOf(client.GetHull("body").status()), HasSubstr("is a body, not a hull"));
+  EXPECT_THAT(TextOf(client.GetHull("body").status()),
+              HasSubstr("is a body; this call requires a hull"));
   EXPECT_TRUE(absl::IsNotFound(client.DeleteHull("body").status()));
   EXPECT_THAT(TextOf(client.DeleteBody("hull").status()), HasSubstr("is a hull, not a body"));
   ASSERT_TRUE(client.DeleteBody("body").ok());

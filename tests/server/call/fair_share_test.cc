@@ -70,13 +70,13 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   Begin(limits);
   for (int i = 0; i < 6; ++i) EXPECT_EQ(Refusal(Rpc::kWatchHulls, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kWatchHulls, "token:a"), "max-calls-per-client");
-  EXPECT_THAT(last_message_, HasSubstr("the last 2 are kept for single calls"));
+  EXPECT_THAT(last_message_, HasSubstr("2 slots are reserved for single calls"));
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "max-calls-per-client");
   // The limit of the whole server works alike.
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "max-calls");
-  EXPECT_THAT(last_message_, HasSubstr("the last 3 are kept for single calls"));
+  EXPECT_THAT(last_message_, HasSubstr("3 slots are reserved for single calls"));
   for (int i = 0; i < 3; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:b"), "max-calls");
 }

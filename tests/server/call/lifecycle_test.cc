@@ -147,7 +147,7 @@ TEST_F(Lifecycle, ATakenPortIsSaidSo) {
   const absl::Status status = Server::Start(config).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(std::string(status.message()),
-              HasSubstr("cannot listen on " + config.listen + ": the port is taken"));
+              HasSubstr("cannot listen on " + config.listen + ": the port is in use"));
 }
 
 TEST_F(Lifecycle, AddressesThatOthersCanReachAreRefused) {
@@ -167,7 +167,7 @@ TEST_F(Lifecycle, ServesUnixSocketsAndDoesNotTakeThemOver) {
   EXPECT_TRUE(GetStatus().ok());
   const absl::Status status = Server::Start(config).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kUnavailable);
-  EXPECT_THAT(std::string(status.message()), HasSubstr("another server does"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("another server is listening"));
   EXPECT_TRUE(GetStatus().ok());
 }
 

@@ -332,7 +332,7 @@ TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
   ExpectRefused({negative}, kInvalid, "open: tolerance is -1");
   ExpectRefused({open, MoveX(1, 1), MoveX(2, 1)}, kInvalid, "update 2: placements[0] is 2");
   ExpectRefused({open, Move({{1, {1, 0, 0, 0, 0, 0, 0}}, {1, {1, 0, 0, 0, 0, 0, 0}}})}, kInvalid,
-                "update 1: placements[1] is 1, which is named twice");
+                "update 1: placements[1] is 1, which is listed twice; list each placement once");
   ExpectRefused({open, Move({{0, {1, 0, 0, 0, 0, 0, 0}}, {1, {0, 0, 0, 0, 0, 0, 0}}})}, kInvalid,
                 "update 1: poses[1].rotation is zero");
   auto few = MoveX(0, 1);

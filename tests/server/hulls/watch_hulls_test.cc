@@ -143,7 +143,7 @@ TEST_F(WatchHulls, RefusesRequestsThatContradictThemselves) {
   v1::WatchHullsRequest no_store;
   no_store.set_after_revision(3);
   EXPECT_EQ(Refused(no_store).error_code(), grpc::INVALID_ARGUMENT);
-  EXPECT_THAT(Refused(no_store).error_message(), HasSubstr("after_revision needs store_id"));
+  EXPECT_THAT(Refused(no_store).error_message(), HasSubstr("after_revision requires store_id"));
 }
 
 TEST_F(WatchHulls, ResumesAfterTheLastHeader) {

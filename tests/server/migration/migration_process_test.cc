@@ -113,7 +113,7 @@ TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
     const auto [code, error] = Migrate(
         Words{"--from-postgres-conninfo-file", conninfo_, "--to-data-dir"} + Directory("second"));
     EXPECT_EQ(code, 2);
-    EXPECT_THAT(error, HasSubstr("a hulld is active over this database"));
+    EXPECT_THAT(error, HasSubstr("a hulld is active on this database"));
     End(*hulld);
   }
   EXPECT_EQ(Migrate(Words{"--from-postgres-conninfo-file", conninfo_, "--to-data-dir"} +

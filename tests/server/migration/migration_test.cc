@@ -197,7 +197,7 @@ TEST_P(MigrationTest, TheCopyServesTheSame) {
   EXPECT_EQ(ran.err, "");
   EXPECT_THAT(ran.out, StartsWith("copied store "));
   EXPECT_THAT(ran.out, HasSubstr(absl::StrCat(": ", kMany + 4, " hulls, 2 bodies\n")));
-  EXPECT_THAT(ran.out, HasSubstr("\ncompared: every record is the same; "));
+  EXPECT_THAT(ran.out, HasSubstr("\nverified: all records match; "));
   const auto source = from_->Serve();
   const auto copy = to_->Serve();
   EXPECT_THAT(ran.out, HasSubstr("is store " + copy->store().id() + " now\n"));
@@ -232,10 +232,11 @@ TEST_P(MigrationTest, AnInterruptedRunIsGoneOnWith) {
   // No server opens a partial copy.
   const absl::Status opened = to_->Open().status();
   EXPECT_TRUE(absl::IsFailedPrecondition(opened)) << opened;
-  EXPECT_THAT(std::string(opened.message()), HasSubstr("run 'hulld migrate' again"));
+  EXPECT_THAT(std::string(opened.message()),
+              HasSubstr("run the same 'hulld migrate' command again"));
   const Ran ran = Migrate(*from_, *to_);
   ASSERT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr(absl::StrCat("; ", before, " of these were there")));
+  EXPECT_THAT(ran.out, HasSubstr(absl::StrCat("; ", before, " of them copied by an earlier run")));
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
@@ -282,7 +283,7 @@ TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
   }
   const Ran ran = Migrate(*from_, *to_);
   ASSERT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("copying it anew"));
+  EXPECT_THAT(ran.out, HasSubstr("starting the copy over"));
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
@@ -318,7 +319,7 @@ TEST_P(MigrationTest, AnOpenStoreIsRefused) {
     const auto server = busy->Serve();
     const Ran ran = Migrate(*from_, *to_);
     EXPECT_EQ(ran.code, 2) << ran.err;
-    EXPECT_THAT(ran.err, HasSubstr(busy->is_postgres() ? "a hulld is active over this database"
+    EXPECT_THAT(ran.err, HasSubstr(busy->is_postgres() ? "a hulld is active on this database"
                                                        : "is in use by another hulld"));
   }
   EXPECT_EQ(Migrate(*from_, *to_).code, 0);
@@ -327,7 +328,7 @@ TEST_P(MigrationTest, AnOpenStoreIsRefused) {
 TEST_P(MigrationTest, ASourceThatIsNotThereIsNotMade) {
   Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("there is no store of hulld"));
+  EXPECT_THAT(ran.err, HasSubstr("it contains no hulld store"));
   ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
 }
@@ -344,25 +345,25 @@ TEST_P(MigrationTest, DifferencesAreFound) {
   };
   EXPECT_EQ(differ([](AnyRegistry&) {}), "");
   EXPECT_THAT(differ([](AnyRegistry& r) { PutBody(r, "a body"); }),
-              HasSubstr("\"a body\" is not the same in the copy: its record or its pieces"));
+              HasSubstr("\"a body\" differs in the copy: its record or its pieces"));
   EXPECT_THAT(differ([](AnyRegistry& r) { r.Put("zzz", {}).IgnoreError(); }),
-              HasSubstr("\"zzz\" is not the same in the copy: the source has none"));
+              HasSubstr("\"zzz\" differs in the copy: it is not in the source"));
   EXPECT_THAT(differ([](AnyRegistry& r) {
                 r.Delete("zzz").IgnoreError();
                 r.Delete("many/9").IgnoreError();
               }),
-              HasSubstr("\"many/9\" is not the same in the copy: it is missing"));
+              HasSubstr("\"many/9\" differs in the copy: it is missing"));
   EXPECT_THAT(differ([](AnyRegistry& r) {
                 r.Put("anew", {{9, 9, 9}}).IgnoreError();
               }),
-              HasSubstr("\"anew\" is not the same in the copy: its record"));
+              HasSubstr("\"anew\" differs in the copy: its record"));
 }
 
 TEST_P(MigrationTest, TheCommandLineIsChecked) {
   std::ostringstream out;
   std::ostringstream err;
   EXPECT_EQ(RunMigrate({"--from-data-dir", "x"}, out, err), 2);
-  EXPECT_THAT(err.str(), HasSubstr("name one source"));
+  EXPECT_THAT(err.str(), HasSubstr("set one source"));
   EXPECT_EQ(RunMigrate({"--from", "x"}, out, err), 2);
   EXPECT_EQ(RunMigrate({"--from-data-dir", "x", "--to-data-dir", "x"}, out, err), 2);
   EXPECT_THAT(err.str(), HasSubstr("source and destination are both x"));

@@ -335,7 +335,7 @@ TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn
   const absl::Status refused = registry.Resolve(ids, {}).status();
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted) << refused;
   EXPECT_THAT(std::string(refused.message()), HasSubstr("--memory-limit"));
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("name fewer hulls"));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("request fewer hulls"));
   EXPECT_LT(registry.Cache().loads, 30);
   EXPECT_LE(registry.Cache().bytes, limits.memory_limit);
   // The hulls that were refused are free again; held ones are served, and writers continue.

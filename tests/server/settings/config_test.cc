@@ -173,14 +173,14 @@ TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
   EXPECT_TRUE(Accepted({postgres[0], postgres[1], "--take-over"}).take_over);
   ExpectRefused({"--store=postgres"}, "--postgres-conninfo-file");
   ExpectRefused({postgres[0], postgres[1], "--durability=relaxed"}, "synchronous_commit");
-  ExpectRefused({"--take-over"}, "--take-over is for --store postgres");
+  ExpectRefused({"--take-over"}, "--take-over requires --store postgres");
   EXPECT_EQ(Accepted(postgres).postgres_servers, "one");
   EXPECT_EQ(Accepted({postgres[0], postgres[1], "--postgres-servers=many"}).postgres_servers,
             "many");
   ExpectRefused({postgres[0], postgres[1], "--postgres-servers=two"}, "--postgres-servers");
-  ExpectRefused({"--postgres-servers=many"}, "--postgres-servers many is for --store postgres");
+  ExpectRefused({"--postgres-servers=many"}, "--postgres-servers many requires --store postgres");
   ExpectRefused({postgres[0], postgres[1], "--postgres-servers=many", "--take-over"},
-                "--take-over is for --postgres-servers one");
+                "--take-over requires --postgres-servers one");
   environment_["HULLD_STORE"] = "postgres";
   environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
   EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");

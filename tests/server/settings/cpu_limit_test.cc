@@ -86,9 +86,9 @@ TEST(CpuLimit, ThreadsAreRoundedUpAndNeverMoreThanProcessors) {
 }
 
 TEST(CpuLimit, TheLogSaysWhy) {
-  EXPECT_EQ((CpuLimit{64, 1.5}).Describe(), "2, as the control group grants 1.5 of 64 processors");
-  EXPECT_EQ((CpuLimit{8}).Describe(), "8, as the process may use 8 processors");
-  EXPECT_EQ((CpuLimit{1, 3}).Describe(), "1, as the process may use 1 processor");
+  EXPECT_EQ((CpuLimit{64, 1.5}).Describe(), "2; the control group grants 1.5 of 64 processors");
+  EXPECT_EQ((CpuLimit{8}).Describe(), "8; the process may use 8 processors");
+  EXPECT_EQ((CpuLimit{1, 3}).Describe(), "1; the process may use 1 processor");
 }
 
 }  // namespace cpu_limit_test

@@ -121,7 +121,7 @@ TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
 }
 
 // Simulates a kill and a power failure after a refused change. The change must be absent if the
-// error says that nothing was changed; otherwise the error says that it may appear.
+// error says that nothing was changed; otherwise the error says that may appear.
 TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
   constexpr int64_t kForever = std::numeric_limits<int64_t>::max();
   struct Case {
@@ -147,7 +147,7 @@ TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
     const absl::Status refused = hulls_->Put("h", {{9, 9, 9}}).status();
     EXPECT_EQ(refused.code(), c.code) << refused;
     EXPECT_THAT(std::string(refused.message()),
-                HasSubstr(c.is_certain ? "nothing was changed" : "it may appear"));
+                HasSubstr(c.is_certain ? "nothing was changed" : "may appear"));
     const bool is_sync = c.fault == Fault::kNoSpaceAtSync || c.fault == Fault::kSyncError;
     EXPECT_EQ(hulls_->store().failures().sync - syncs, is_sync ? 1 : 0);
     for (const bool is_outage : {false, true}) {

@@ -252,9 +252,9 @@ TEST_P(StoreRecovery, ANewerFormatIsRefused) {
   const auto store = kept_->Open();
   EXPECT_EQ(store.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(store.status().message()),
-              HasSubstr(absl::StrCat("was written in format ", latest + 1)));
+              HasSubstr(absl::StrCat("is in format ", latest + 1)));
   EXPECT_THAT(std::string(store.status().message()),
-              HasSubstr(absl::StrCat("knows format ", latest)));
+              HasSubstr(absl::StrCat("reads formats up to ", latest)));
 }
 
 TEST_P(StoreRecovery, WritersPerHullAreLimited) {

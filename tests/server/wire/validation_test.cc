@@ -94,7 +94,7 @@ TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
   }
   v1::Freshness message;
   message.set_at_least_revision(1);
-  expect(message, absl::StatusCode::kInvalidArgument, "needs store_id");
+  expect(message, absl::StatusCode::kInvalidArgument, "requires store_id");
   message.set_store_id("another");
   expect(message, absl::StatusCode::kFailedPrecondition, store.id());
 }

@@ -23,7 +23,7 @@ class BatchAssembly:
         before = self._frame.columns.rows
         self._frame.read_batch(data)
         if self._frame.columns.rows > before and self._frame.numbers.get(4, 0) != before:
-            raise ValueError("the batch's answers do not follow each other")
+            raise ValueError("the batch's answers are out of order")
 
     def finish(self) -> Batch:
         """ValueError: something is missing."""

@@ -402,7 +402,7 @@ def decode_mesh_part(data: bytes) -> MeshPart:
                 for n in (1, 2)
             )
             return MeshFacets(sizes, indices)
-    raise ValueError("the mesh stream holds a message of an unknown kind")
+    raise ValueError("the mesh stream contains a message of an unknown kind")
 
 
 class MeshAssembly:

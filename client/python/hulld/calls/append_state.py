@@ -128,8 +128,8 @@ class AppendState:
         ):
             raise FailedPreconditionError(
                 f'hull "{self.hull_id}" was replaced while the connection was lost; '
-                f"{self._acknowledged} acknowledged points are gone with the old one; append "
-                "everything again"
+                f"{self._acknowledged} acknowledged points were lost with the old one; append all "
+                "points again"
             )
         first = self._next_sequence - len(self._unacknowledged)
         if not first - 1 <= opened.last_sequence < self._next_sequence:

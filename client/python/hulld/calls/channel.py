@@ -31,7 +31,7 @@ class Channel:
         check_process()
         with self._lock:
             if self._closed:
-                raise FailedPreconditionError("the client is closed; make another one")
+                raise FailedPreconditionError("the client is closed; create a new one")
             if self._channel is None:
                 self._channel = self._opener(self._connection, self._pem_files)
                 _open_channels.add(self)

@@ -141,7 +141,7 @@ def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
     def decode(data: bytes) -> HullPage:
         message = hull_pb2.ListHullsResponse.FromString(data)
         if message.next_page_token and message.next_page_token == page_token:
-            raise ValueError("the server answered a page that continues with itself")
+            raise ValueError("the server returned a page token that repeats itself")
         return HullPage(
             [hulls.info_of(hull) for hull in message.hulls],
             message.next_page_token,
@@ -205,7 +205,7 @@ def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[BodyPage]:
     def decode(data: bytes) -> BodyPage:
         page = bodies.decode_page(data)
         if page.next_page and page.next_page == page_token:
-            raise ValueError("the server answered a page that continues with itself")
+            raise ValueError("the server returned a page token that repeats itself")
         return page
 
     request = body_pb2.ListBodiesRequest(

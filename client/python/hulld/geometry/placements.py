@@ -49,7 +49,7 @@ def as_placement(placement: PlacementLike) -> Placement:
     if isinstance(placement, tuple) and len(placement) == 2 and isinstance(placement[0], str):
         return Placement(*placement)
     raise TypeError(
-        f"{placement!r} is no placement; pass an ID, (ID, pose), or hulld.Placement(ID, pose)"
+        f"{placement!r} is not a placement; pass an ID, (ID, pose), or hulld.Placement(ID, pose)"
     )
 
 
@@ -201,5 +201,7 @@ def check_update(
         raise ValueError(f"there are {len(packed)} poses for {len(indices)} placements")
     values, counts = np.unique(indices, return_counts=True)
     if len(values) != len(indices):
-        raise ValueError(f"placements names {values[np.argmax(counts)]} twice; name each once")
+        raise ValueError(
+            f"placement {values[np.argmax(counts)]} is listed twice; list each placement once"
+        )
     return indices, packed

@@ -121,7 +121,7 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return value & 0xFFFFFFFFFFFFFFFF, at
         shift += 7
-    raise WireError("a varint does not end")
+    raise WireError("a varint is truncated")
 
 
 def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
@@ -184,7 +184,7 @@ def packed_varints(value: Value) -> Unsigned:
     if last.all():
         return data
     if not last[-1]:
-        raise WireError("the last varint of a field does not end")
+        raise WireError("the last varint of a field is truncated")
     ends = np.flatnonzero(last)
     starts = np.empty_like(ends)
     starts[0] = 0

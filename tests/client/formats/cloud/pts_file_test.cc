@@ -31,9 +31,9 @@ TEST(PtsFile, FewerOrMorePointsThanDeclaredAreErrors) {
   EXPECT_EQ(ReadText("1\n1 2 3 4\n4 5 6 7\n", PointFormat::kPts).error(),
             "FILE:3: the scan has more lines than the 1 points it declares");
   EXPECT_EQ(ReadText("2\n1 2 3 4\n5\n", PointFormat::kPts).error(),
-            "FILE:3: a point needs 3 coordinates, here are 1");
+            "FILE:3: a point needs 3 coordinates, got 1");
   EXPECT_EQ(ReadText("1 2 3\n5\n", PointFormat::kPts).error(),
-            "FILE:2: a point needs 3 coordinates, here are 1");
+            "FILE:2: a point needs 3 coordinates, got 1");
   EXPECT_EQ(ReadText("1\n1 x 3 4\n", PointFormat::kPts).error(), "FILE:2: \"x\" is not a number");
 }
 

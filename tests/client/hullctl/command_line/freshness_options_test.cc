@@ -59,7 +59,7 @@ TEST_F(FreshnessOptions, EachReadCarriesThem) {
     EXPECT_EQ(fresh.code, 0) << read.front() << ": " << fresh.err;
     const Ran other = AskWith(read, {"--at-least", "another:1"});
     EXPECT_EQ(other.code, 1) << read.front();
-    EXPECT_THAT(other.out + other.err, HasSubstr("is not that of this store")) << read.front();
+    EXPECT_THAT(other.out + other.err, HasSubstr("differs from this store's ID")) << read.front();
   }
   const Ran future = Ask({"get", "cube", "--at-least", header.store_id() + ":1000"});
   EXPECT_EQ(future.code, 1);

@@ -145,7 +145,7 @@ TEST(SimplifyTarget, NonsenseIsRefused) {
   const Hull full = HullOf(Sphere(100, 5));
   using testing::HasSubstr;
   EXPECT_THAT(std::string(SimplifyInside(full, {}).status().message()),
-              HasSubstr("give max_vertices, max_error or both"));
+              HasSubstr("set max_vertices, max_error, or both"));
   EXPECT_THAT(std::string(SimplifyInside(full, {3, 0, {}}).status().message()),
               HasSubstr("needs at least 4"));
   EXPECT_THAT(std::string(SimplifyOutside(full, {7, 0, {}}).status().message()),
@@ -153,11 +153,11 @@ TEST(SimplifyTarget, NonsenseIsRefused) {
   for (const auto simplify : {SimplifyInside, SimplifyOutside}) {
     for (const size_t max_vertices : {0, 20}) {
       EXPECT_THAT(std::string(simplify(full, {max_vertices, -1, {}}).status().message()),
-                  HasSubstr("max_error is negative; give a length above 0, or 0 for no limit"));
+                  HasSubstr("max_error is negative; use a length above 0, or 0 for no limit"));
       EXPECT_THAT(std::string(simplify(full, {max_vertices, std::nan(""), {}}).status().message()),
                   HasSubstr("max_error is NaN"));
       EXPECT_THAT(std::string(simplify(full, {max_vertices, INFINITY, {}}).status().message()),
-                  HasSubstr("max_error is infinite; give 0 for no limit"));
+                  HasSubstr("max_error is infinite; use 0 for no limit"));
     }
   }
 }

@@ -360,7 +360,7 @@ TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
   gate.entered.get_future().wait();
   store.found_by_follow.revision = 7;
   store.found_by_follow.by_id["h"];
-  gate.outcome.set_value(absl::UnavailableError("lost while it committed"));
+  gate.outcome.set_value(absl::UnavailableError("lost the database connection during COMMIT"));
   followed.get_future().wait();
   const std::lock_guard lock(order);
   EXPECT_THAT(events, ElementsAre("refused", "others"));

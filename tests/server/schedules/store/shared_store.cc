@@ -14,7 +14,7 @@ namespace {
 
 Random& Dice() { return Scheduler::Current().random(); }
 
-absl::Status Moved() { return absl::AbortedError("another server changed the hull"); }
+absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
 
 }  // namespace
 

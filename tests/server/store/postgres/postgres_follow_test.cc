@@ -352,8 +352,9 @@ TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
     }
   }
   EndAll();
-  EXPECT_THAT(log.text(), HasSubstr("lost the session that hears when other servers commit"));
-  EXPECT_THAT(log.text(), HasSubstr("it is asked for that every 20 ms"));
+  EXPECT_THAT(log.text(),
+              HasSubstr("lost the session that receives commit notices of peer servers"));
+  EXPECT_THAT(log.text(), HasSubstr("the server polls it every 20 ms"));
 }
 
 // The connection stays open but no notice arrives: the heartbeat finds the missed batch, and the
@@ -386,7 +387,7 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   }));
   watcher = nullptr;
   EndAll();
-  EXPECT_THAT(log.text(), HasSubstr("no notice comes of what other servers commit"));
+  EXPECT_THAT(log.text(), HasSubstr("no commit notices are arriving"));
 }
 
 // The database speaks PostgreSQL's protocol but lacks LISTEN. The log says so a single time.
@@ -406,7 +407,7 @@ TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
   }
   EndAll();
   const std::string text = log.text();
-  const std::string told = "the database does not tell when other servers commit";
+  const std::string told = "the database refused to report commits of peer servers";
   const size_t first = text.find(told);
   ASSERT_NE(first, std::string::npos) << text;
   EXPECT_EQ(text.find(told, first + 1), std::string::npos) << text;
