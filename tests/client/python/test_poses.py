@@ -149,7 +149,7 @@ def test_lists_that_do_not_fit_are_refused() -> None:
         hulld.Placements(["a", "b"], np.zeros((2, 3)), [0, 2])
     with pytest.raises(TypeError, match="one ID"):
         hulld.Placements.of("a")
-    with pytest.raises(TypeError, match="no placement"):
+    with pytest.raises(TypeError, match="not a placement"):
         hulld.Placements.of([3])  # type: ignore[list-item]
 
 

@@ -127,7 +127,7 @@ class AppendState:
             self.opened.hull.create_revision,
         ):
             raise FailedPreconditionError(
-                f'hull "{self.hull_id}" was replaced while the connection was lost; '
+                f'hull "{self.hull_id}" was replaced while the connection was down; '
                 f"{self._acknowledged} acknowledged points were lost with the old one; append all "
                 "points again"
             )
@@ -135,8 +135,8 @@ class AppendState:
         if not first - 1 <= opened.last_sequence < self._next_sequence:
             raise InternalError(
                 f'the server\'s last sequence of writer "{self.writer_id}" is '
-                f"{opened.last_sequence}, which this stream cannot continue; does another client "
-                "use the same writer_id?"
+                f"{opened.last_sequence}, which this stream cannot continue; check that no "
+                "other client uses the same writer_id"
             )
         self._reconnects += 1
         self._drop(opened.last_sequence, recovered=True)
