@@ -110,8 +110,8 @@ bool NeedsMore(const QueryOptions& options) {
 }
 
 // Adds the requested details beyond the relation, the axis and the analysis.
-absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bool cold,
-                             const QueryOptions& options, Answer& answer) {
+absl::Status AddRequestedDetails(const FloatPair& pair, const Decision& decision, bool cold,
+                                 const QueryOptions& options, Answer& answer) {
   if (options.want_certificate) {
     ExactPair exact(pair, options.should_stop);
     absl::StatusOr<Certificate> certificate = MakeCertificate(exact, decision, options.should_stop);
@@ -168,7 +168,7 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
     if (absl::Status s = AddAxis(pair, decision, options, answer); !s.ok()) return s;
   }
   if (NeedsMore(options)) {
-    absl::Status s = AddWhatIsWanted(pair, decision, cache == nullptr, options, answer);
+    absl::Status s = AddRequestedDetails(pair, decision, cache == nullptr, options, answer);
     if (!s.ok()) return s;
   }
   return answer;
