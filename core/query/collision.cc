@@ -213,8 +213,8 @@ absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const Placed
 }
 
 // Completes the textbook's answer with the details that only the search finds.
-absl::StatusOr<Answer> WithTheRest(Answer answer, const PlacedHull& a, const PlacedHull& b,
-                                   const QueryOptions& options) {
+absl::StatusOr<Answer> WithSearchDetails(Answer answer, const PlacedHull& a, const PlacedHull& b,
+                                         const QueryOptions& options) {
   if (!NeedsMore(options)) return answer;
   QueryOptions rest = options;
   rest.want_axis = false;
@@ -231,7 +231,7 @@ absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
                                 const QueryOptions& options) {
   absl::StatusOr<Answer> answer = TextbookSat(a, b, options);
   if (!answer.ok()) return answer;
-  return WithTheRest(*std::move(answer), a, b, options);
+  return WithSearchDetails(*std::move(answer), a, b, options);
 }
 
 Answer AnswerOfEmpty(const QueryOptions& options) {
@@ -289,7 +289,7 @@ absl::StatusOr<Answer> TextbookCheck::Finish() {
   if (!search_.has_value()) return AnswerOfEmpty(*options_);
   const auto start = TextbookSearch::Clock::now();
   absl::StatusOr<Answer> answer = search_->Finish();
-  if (answer.ok()) answer = WithTheRest(*std::move(answer), *a_, *b_, *options_);
+  if (answer.ok()) answer = WithSearchDetails(*std::move(answer), *a_, *b_, *options_);
   time_ += TextbookSearch::Clock::now() - start;
   if (answer.ok() && options_->want_analysis) answer->analysis->time = time_;
   return answer;
