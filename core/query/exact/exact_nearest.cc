@@ -16,7 +16,7 @@ namespace {
 
 // A part of a simplex. The weights, all positive, are those of the point of its affine hull that is
 // nearest to the origin.
-struct Part {
+struct SimplexFace {
   std::vector<ExactCorner> corners;
   std::vector<Integer> weights;
   Integer weight_sum;
@@ -34,21 +34,23 @@ bool AllPositive(const std::vector<Integer>& weights) {
 // The functions below return nothing if the corners are affinely dependent, or if the nearest point
 // of their affine hull is not strictly between them.
 
-std::optional<Part> PartOf(const ExactCorner& p) {
-  return Part{{p}, {1}, 1, -p.w, Dot(p.w, p.w), 1};
+std::optional<SimplexFace> PartOf(const ExactCorner& p) {
+  return SimplexFace{{p}, {1}, 1, -p.w, Dot(p.w, p.w), 1};
 }
 
-std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q) {
+std::optional<SimplexFace> PartOf(const ExactCorner& p, const ExactCorner& q) {
   const IntegerVector e = q.w - p.w;
   std::vector<Integer> weights = {Dot(q.w, e), -Dot(p.w, e)};
   if (!AllPositive(weights)) return std::nullopt;
   const IntegerVector moment = Cross(p.w, q.w);
   IntegerVector toward = -(weights[0] * p.w + weights[1] * q.w);
   Integer length = Dot(e, e);
-  return Part{{p, q}, std::move(weights), length, std::move(toward), Dot(moment, moment), length};
+  return SimplexFace{{p, q}, std::move(weights), length, std::move(toward), Dot(moment, moment),
+                     length};
 }
 
-std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r) {
+std::optional<SimplexFace> PartOf(const ExactCorner& p, const ExactCorner& q,
+                                  const ExactCorner& r) {
   const IntegerVector n = Cross(q.w - p.w, r.w - p.w);
   std::vector<Integer> weights = {Dot(n, Cross(q.w, r.w)), Dot(n, Cross(r.w, p.w)),
                                   Dot(n, Cross(p.w, q.w))};
@@ -57,11 +59,11 @@ std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const Exa
   const int side = Sign(height);
   const IntegerVector toward = side == 0 ? IntegerVector{0, 0, 0} : side > 0 ? -n : n;
   const Integer area = Dot(n, n);
-  return Part{{p, q, r}, std::move(weights), area, toward, height * height, area};
+  return SimplexFace{{p, q, r}, std::move(weights), area, toward, height * height, area};
 }
 
-std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r,
-                           const ExactCorner& s) {
+std::optional<SimplexFace> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r,
+                                  const ExactCorner& s) {
   const auto volume = [](const ExactCorner& u, const ExactCorner& v, const ExactCorner& w) {
     return Dot(u.w, Cross(v.w, w.w));
   };
@@ -72,10 +74,10 @@ std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const Exa
   }
   if (!AllPositive(weights)) return std::nullopt;
   Integer sum = weights[0] + weights[1] + weights[2] + weights[3];
-  return Part{{p, q, r, s}, std::move(weights), std::move(sum), {0, 0, 0}, 0, 1};
+  return SimplexFace{{p, q, r, s}, std::move(weights), std::move(sum), {0, 0, 0}, 0, 1};
 }
 
-std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
+std::optional<SimplexFace> PartOf(const std::vector<ExactCorner>& c) {
   switch (c.size()) {
     case 1:
       return PartOf(c[0]);
@@ -92,7 +94,7 @@ std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
 
 // Returns true if no corner is nearer to the origin than the part, along the direction to the
 // origin.
-bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
+bool IsNearest(const SimplexFace& part, const std::vector<ExactCorner>& corners) {
   const Integer reach = Dot(part.toward_origin, part.corners[0].w);
   return std::all_of(corners.begin(), corners.end(), [&](const ExactCorner& corner) {
     return Dot(part.toward_origin, corner.w) <= reach;
@@ -102,7 +104,7 @@ bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
 // Returns the part of the simplex that contains the point nearest to the origin in its interior.
 // One exists, with affinely independent corners, even if the corners of the simplex are dependent
 // (Caratheodory).
-Part NearestPart(const std::vector<ExactCorner>& corners) {
+SimplexFace NearestPart(const std::vector<ExactCorner>& corners) {
   for (uint32_t size = 1; size <= corners.size(); ++size) {
     for (uint32_t subset = 1; subset < (1u << corners.size()); ++subset) {
       if (static_cast<uint32_t>(__builtin_popcount(subset)) != size) continue;
@@ -110,7 +112,7 @@ Part NearestPart(const std::vector<ExactCorner>& corners) {
       for (size_t i = 0; i < corners.size(); ++i) {
         if (subset >> i & 1) chosen.push_back(corners[i]);
       }
-      std::optional<Part> part = PartOf(chosen);
+      std::optional<SimplexFace> part = PartOf(chosen);
       if (part && IsNearest(*part, corners)) return *std::move(part);
     }
   }
@@ -128,7 +130,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
   StopPoll poll(should_stop, 1);
   for (;;) {
     if (poll.Step()) return absl::CancelledError("stopped in an exact query");
-    Part part = NearestPart(corners);
+    SimplexFace part = NearestPart(corners);
     const IntegerVector& n = part.toward_origin;
     if (!IsZero(n)) {
       ExactCorner farthest = pair.Farthest(n);
