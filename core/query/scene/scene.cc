@@ -33,7 +33,7 @@ constexpr size_t kMostListed = 1024;
 constexpr size_t kWordBits = 64;
 
 // Results of a thread.
-struct Part {
+struct ThreadResults {
   std::vector<SceneAnswer> answers;
   RungCounts rungs;
 };
@@ -126,7 +126,7 @@ class Search {
   SceneTotals totals_;
   // Pending candidates, and their results.
   std::vector<PlacedPair> pairs_;
-  std::vector<Part> parts_;
+  std::vector<ThreadResults> parts_;
 };
 
 }  // namespace
