@@ -155,10 +155,10 @@ class Lookout {
     found_ = false;
     // Rays through corners and edges, common in symmetric hulls, may have no portal of their own.
     // Tries rays slightly to one side or another instead.
-    constexpr double kBeside = 0x1p-24;
-    const Vector beside = d.cwiseAbs().maxCoeff() * kBeside * Vector(0.7, -0.4, 0.9);
-    const Vector across = kBeside * d.cross(Vector(0.9, 0.7, 0.4));
-    for (const Vector& off : {beside, Vector(-beside), across, Vector(-across)}) {
+    constexpr double kOffAxis = 0x1p-24;
+    const Vector along = d.cwiseAbs().maxCoeff() * kOffAxis * Vector(0.7, -0.4, 0.9);
+    const Vector across = kOffAxis * d.cross(Vector(0.9, 0.7, 0.4));
+    for (const Vector& off : {along, Vector(-along), across, Vector(-across)}) {
       const PlainVector ray = Vector(d + off);
       if (!Sees(ray) && !GuessPortal(ray) && !FindPortal(ray)) continue;
       if (!RefinePortal(ray)) continue;
