@@ -117,7 +117,8 @@ class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
     // Overwriting takes no space, so it succeeds on a full disk.
-    if (IOStatus error = system_.WhatFails(false); !error.ok() && !error.IsNoSpace()) return error;
+    if (IOStatus error = system_.InjectedError(false); !error.ok() && !error.IsNoSpace())
+      return error;
     std::string former(data.size(), '\0');
     rocksdb::Slice read;
     IOStatus status = Read(offset, data.size(), options, &read, former.data(), debug);
@@ -129,7 +130,7 @@ class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper
   IOStatus Sync(const IOOptions&, IODebugContext*) override {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
-    if (IOStatus error = system_.WhatFails(true); !error.ok()) return error;
+    if (IOStatus error = system_.InjectedError(true); !error.ok()) return error;
     system_.files_[name_].overwritten.clear();
     return IOStatus::OK();
   }
@@ -239,12 +240,12 @@ std::vector<std::string> FaultyFileSystem::unsynced_directories() const {
 }
 
 IOStatus FaultyFileSystem::Error(bool is_sync) {
-  const IOStatus error = WhatFails(is_sync);
+  const IOStatus error = InjectedError(is_sync);
   if (!error.ok() && --failures_left_ == 0) fault_ = Fault::kNone;
   return error;
 }
 
-IOStatus FaultyFileSystem::WhatFails(bool is_sync) const {
+IOStatus FaultyFileSystem::InjectedError(bool is_sync) const {
   switch (fault_) {
     case Fault::kNone:
       return IOStatus::OK();

@@ -103,7 +103,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   // Returns the current error of an operation and counts the failure. Requires: state_mutex_ (not
   // annotated: std::mutex has no capability attributes).
   rocksdb::IOStatus Error(bool is_sync);
-  rocksdb::IOStatus WhatFails(bool is_sync) const;
+  rocksdb::IOStatus InjectedError(bool is_sync) const;
   // Returns how many of `size` more bytes fit. Requires: state_mutex_.
   uint64_t Fitting(uint64_t size) const;
 
