@@ -274,7 +274,7 @@ class OrderSearch {
 
   // Returns true if the candidate may come next without branching: a read that fits, leaves the
   // state unchanged, and makes no unanswered call too late.
-  bool StandsInNobodysWay(size_t i, const Node& node) const {
+  bool NeedsNoBranching(size_t i, const Node& node) const {
     const Placed& read = operations_[i];
     if (!IsRead(read) || !HoldsAll(i)) return false;
     for (size_t j = first_left_; j < operations_.size() && operations_[j].invoked <= read.invoked;
@@ -305,7 +305,7 @@ class OrderSearch {
     if (seen_.insert(Key(node.state)).second) {
       node.candidates = Candidates(latest);
       for (const size_t i : node.candidates) {
-        if (!StandsInNobodysWay(i, node)) continue;
+        if (!NeedsNoBranching(i, node)) continue;
         node.candidates = {i};
         break;
       }
