@@ -160,9 +160,9 @@ TEST(LinearizabilityCheck, RefusesARevisionThatFalls) {
 // the next.
 TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
   Operation first = AppendAt(3, 20, 0, 5, 0);
-  first.is_untold = true;
+  first.shares_later_ack = true;
   Operation second = AppendAt(4, 21, 3, 6, 2, "w", 2);
-  second.is_told_with_others = true;
+  second.covers_earlier_chunks = true;
   second.received = second.outside = 2;
   const auto fault_of = [&](std::initializer_list<Operation> more) {
     std::vector<Operation> operations = {CreateAt(1, 2), first, second};

@@ -274,7 +274,7 @@ bool HistoryClient::AppendAtOnce(const std::string& hull_id) {
     }
     for (size_t i = first; i + 1 < next; ++i) {
       TakeHeader(ack->header(), sent[i]);
-      sent[i].is_untold = true;
+      sent[i].shares_later_ack = true;
       sent[i].outcome = Outcome::kOk;
       sent[i].returned = history_.Tick();
       history_.Record(hull_id, sent[i]);
@@ -282,7 +282,7 @@ bool HistoryClient::AppendAtOnce(const std::string& hull_id) {
     Operation& last = sent[next - 1];
     TakeHeader(ack->header(), last);
     TakeAck(*ack, last);
-    last.is_told_with_others = next - first > 1;
+    last.covers_earlier_chunks = next - first > 1;
     End(hull_id, last, grpc::Status::OK);
   }
   return true;

@@ -85,7 +85,7 @@ uint64_t ChangedAt(const Operation& operation) {
   switch (operation.kind) {
     case Kind::kAppend:
       // If one ack covers several chunks, any of them may have changed the hull.
-      if (operation.is_untold || operation.is_told_with_others) return 0;
+      if (operation.shares_later_ack || operation.covers_earlier_chunks) return 0;
       return operation.already_applied || operation.outside == 0 ? 0 : operation.revision;
     case Kind::kDelete:
       return operation.store_revision;

@@ -80,11 +80,11 @@ struct Operation {
   uint64_t sequence = 0;
   // Append: the incarnation given when the stream opened.
   uint64_t incarnation = 0;
-  // Append. is_untold: one ack covered this chunk and later ones, so its own effect is unknown.
-  // is_told_with_others: the ack covered earlier chunks too, so its counts and its already-applied
-  // flag are of all of them.
-  bool is_untold = false;
-  bool is_told_with_others = false;
+  // Append. shares_later_ack: one ack covered this chunk and later ones, so its own effect is
+  // unknown. covers_earlier_chunks: the ack covered earlier chunks too, so its counts and its
+  // already-applied flag are of all of them.
+  bool shares_later_ack = false;
+  bool covers_earlier_chunks = false;
   // Append, replace: the number of points sent, and the distinct points.
   uint64_t sent = 0;
   PointSet points = 0;

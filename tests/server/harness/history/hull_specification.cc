@@ -46,7 +46,7 @@ bool Agree(SpecifiedHull& state, uint64_t revision) {
 // Applies a change with this revision, or, if the answer did not contain it, with an unknown later
 // one. Returns false if impossible.
 bool Advance(SpecifiedHull& state, const Operation& operation, uint64_t revision) {
-  if (operation.outcome == Outcome::kUnknown || operation.is_untold) {
+  if (operation.outcome == Outcome::kUnknown || operation.shares_later_ack) {
     state.revision_known = false;
     return true;
   }
@@ -118,18 +118,19 @@ bool StepCreateOrOpen(SpecifiedHull& state, const Operation& operation) {
 bool StepAppend(SpecifiedHull& state, const Operation& operation) {
   if (!state.exists || !AgreeOnIncarnation(state, operation.incarnation)) return false;
   const uint64_t last = state.LastSequence(operation.writer);
-  const bool is_applied_already = operation.is_untold || operation.is_told_with_others
+  const bool is_applied_already = operation.shares_later_ack || operation.covers_earlier_chunks
                                       ? operation.sequence <= last
                                       : operation.already_applied;
   if (operation.outcome == Outcome::kOk && is_applied_already) {
-    return operation.sequence <= last && (operation.is_untold || Agree(state, operation.revision));
+    return operation.sequence <= last &&
+           (operation.shares_later_ack || Agree(state, operation.revision));
   }
   if (operation.sequence != last + 1) return false;
   if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
   if (!Match(state, operation)) return false;
   const PointSet added = operation.points & ~state.points;
   const uint64_t outside = static_cast<uint64_t>(std::popcount(added));
-  const bool lost = operation.outcome == Outcome::kUnknown || operation.is_untold;
+  const bool lost = operation.outcome == Outcome::kUnknown || operation.shares_later_ack;
   if (!lost && operation.outcome != Outcome::kOk) return false;
   if (added != 0) {
     if (!Advance(state, operation, operation.revision)) return false;
@@ -144,7 +145,7 @@ bool StepAppend(SpecifiedHull& state, const Operation& operation) {
   state.writers[operation.writer] = operation.sequence;
   if (lost) return true;
   if (operation.vertex_count != static_cast<uint64_t>(std::popcount(state.points))) return false;
-  if (operation.is_told_with_others) return true;
+  if (operation.covers_earlier_chunks) return true;
   return operation.received == operation.sent && operation.outside == outside &&
          operation.duplicate == operation.sent - outside;
 }
