@@ -134,8 +134,8 @@ std::string Describe(const MigrationCounts& counts) {
 
 // Reopens the target, so that the comparison reads the data that a server will open, and nothing
 // that is still in memory.
-absl::Status CompareAnew(const Place& to, const Migration& migration,
-                         absl::StatusOr<std::unique_ptr<MigrationTarget>>* target) {
+absl::Status CompareReopened(const Place& to, const Migration& migration,
+                             absl::StatusOr<std::unique_ptr<MigrationTarget>>* target) {
   target->value().reset();
   *target = OpenTarget(to);
   if (absl::IsCancelled(target->status())) {
@@ -165,7 +165,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   out << "copied store " << migration->source().store_id << " at revision "
       << migration->source().revision << ": " << Describe(*counts) << std::endl;
   lines.SetPhase("compared");
-  absl::Status compared = CompareAnew(to, *migration, &target);
+  absl::Status compared = CompareReopened(to, *migration, &target);
   if (absl::IsDataLoss(compared) && counts->resumed > 0) {
     // Points that move no vertex do not change the store's revision, so the source may have changed
     // undetected since the earlier run.
@@ -175,7 +175,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
     counts = migration->CopyTo(**target);
     if (!counts.ok()) return counts.status();
     lines.SetPhase("compared");
-    compared = CompareAnew(to, *migration, &target);
+    compared = CompareReopened(to, *migration, &target);
   }
   if (!compared.ok()) return compared;
   if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
