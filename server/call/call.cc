@@ -43,7 +43,7 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
   const auto given = metadata.find(kRequestIdKey);
   if (given != metadata.end()) {
     const std::string id(given->second.data(), given->second.size());
-    request_id_told_ = true;
+    request_id_exposed_ = true;
     if (IsRequestId(id)) std::call_once(request_id_made_, [&] { request_id_ = id; });
   }
   // Ignored if repeated.
@@ -72,7 +72,7 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
 
 const std::string& Call::request_id() const {
   std::call_once(request_id_made_, [this] { request_id_ = NextRequestId(); });
-  request_id_told_ = true;
+  request_id_exposed_ = true;
   return request_id_;
 }
 
@@ -149,7 +149,8 @@ grpc::Status Call::End(const absl::Status& status) {
   if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");
   metrics().CountToken(caller_.name);
   if (trace_.has_value()) context_.AddTrailingMetadata(kTraceKey, trace_->text());
-  if (!status.ok() || request_id_told_) context_.AddTrailingMetadata(kRequestIdKey, request_id());
+  if (!status.ok() || request_id_exposed_)
+    context_.AddTrailingMetadata(kRequestIdKey, request_id());
   if (status.ok()) return grpc::Status::OK;
   CountLimit(status);
   if (absl::IsUnauthenticated(status)) metrics().CountAuthFailure("unauthenticated");

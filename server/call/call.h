@@ -105,7 +105,7 @@ class Call {
   mutable std::string request_id_;
   mutable std::once_flag request_id_made_;
   // The reply must carry the ID: the client supplied it, or a log line or error names it.
-  mutable std::atomic<bool> request_id_told_ = false;
+  mutable std::atomic<bool> request_id_exposed_ = false;
   // Saved at the start: a closed connection has no peer.
   const std::string peer_ = context_.peer();
   std::optional<TraceContext> trace_;
