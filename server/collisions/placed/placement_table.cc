@@ -292,7 +292,7 @@ void PlacementTable::Take(const Store& store, Resolved resolved, const QueryOpti
 void PlacementTable::NoteProblems() {
   is_all_answerable_ =
       malformed_.empty() && std::ranges::all_of(hulls_, [](const auto& hull) { return hull.ok(); });
-  told_placements_ = is_packed_ && is_all_answerable_ ? 0 : size();
+  listed_placements_ = is_packed_ && is_all_answerable_ ? 0 : size();
 }
 
 // If there are bodies, hulls are queried as bodies with a single piece.
@@ -394,7 +394,7 @@ void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header
 }
 
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
-  const size_t placements = named_.size() + told_placements_;
+  const size_t placements = named_.size() + listed_placements_;
   const size_t rows = table_rows();
   size_t bytes = 0;
   size_t row = first;

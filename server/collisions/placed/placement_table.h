@@ -143,7 +143,7 @@ class PlacementTable {
     return EncodeRows(first, {message->mutable_hulls(), message->mutable_placement_problems(),
                               message->mutable_piece_hulls()});
   }
-  size_t table_rows() const { return named_.size() + told_placements_ + hulls_of_pieces_.size(); }
+  size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
@@ -210,7 +210,7 @@ class PlacementTable {
   bool is_all_answerable_ = false;
   // Number of placements, from the first, with rows in the table of hulls. Packed placements have
   // rows only for problems, so the number is 0 without problems.
-  size_t told_placements_ = 0;
+  size_t listed_placements_ = 0;
   bool places_on_demand_ = false;
   // Empty if placed on demand.
   std::vector<PlacedHull> placed_;
