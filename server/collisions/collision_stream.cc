@@ -33,7 +33,7 @@ constexpr size_t kIndexBytes = 5;
 // A relation and a rung.
 constexpr size_t kRelationBytes = 2;
 // Decided pairs that are encoded between two reads of the clock, in some 20 us.
-constexpr size_t kToldPerLook = 4096;
+constexpr size_t kPairsPerClockRead = 4096;
 // Pairs per helper thread: they take at least 20 us, and a thread about as long to arrive.
 // **Observed**: close pairs of UR5 links.
 constexpr size_t kPairsPerHelper = 192;
@@ -371,7 +371,7 @@ void CollisionStream::TellDecided() {
   is_decided_ = true;
   v1::AnswerColumns* const columns = reply().mutable_columns();
   while (next_asked_ < asked_.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
-    if (next_asked_ % kToldPerLook == 0) {
+    if (next_asked_ % kPairsPerClockRead == 0) {
       if (call().ShouldStop()) break;
       if (std::chrono::steady_clock::now() >= end) {
         return RunOn(lane_, [this] { TellDecided(); });
