@@ -42,7 +42,7 @@ TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
   EXPECT_TRUE(ended);
   EXPECT_TRUE(absl::IsUnavailable(former->Create("new").status()));
   EXPECT_TRUE(absl::IsUnavailable(former->Delete("h").status()));
-  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 9);
   EXPECT_EQ(hulls_->registry().Sizes().hull_count, 1);
 }
 

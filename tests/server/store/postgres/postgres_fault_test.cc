@@ -33,7 +33,7 @@ TEST_F(PostgresFault, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
   EXPECT_EQ(Ask(absl::StrCat("SELECT batch - ", batches, " FROM hulld.store")).front(), "1");
   EXPECT_EQ(Received(), 9);
   ASSERT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
-  EXPECT_EQ(ReceivedAnew("h"), 10);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 10);
 }
 
 TEST_F(PostgresFault, ACommitThatDidNotArriveIsRepeated) {
@@ -43,7 +43,7 @@ TEST_F(PostgresFault, ACommitThatDidNotArriveIsRepeated) {
   const auto put = hulls_->Put("h", {{9, 9, 9}});
   ASSERT_TRUE(put.ok()) << put.status();
   EXPECT_EQ(proxy_->cuts(), 1);
-  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 9);
 }
 
 // A delayed transaction arrives after later ones. It adds no vertex, so no table key rejects it.
@@ -57,7 +57,7 @@ TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
   const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
   proxy_->Deliver();
   EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
-  EXPECT_EQ(ReceivedAnew("h"), 10);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 10);
   EXPECT_EQ(hulls_->Open("h")->last_sequence, 3);
 }
 
@@ -85,7 +85,7 @@ TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
     // successor.
     EXPECT_EQ(ended, cut == Cut::kAfterCommit);
     EXPECT_EQ(next.ok(), cut == Cut::kBeforeCommit) << next;
-    EXPECT_EQ(ReceivedAnew(id), cut == Cut::kAfterCommit ? 9 : 8);
+    EXPECT_EQ(ReceivedAfterRestart(id), cut == Cut::kAfterCommit ? 9 : 8);
   }
 }
 
@@ -110,7 +110,7 @@ TEST_F(PostgresFault, ARestartOfTheDatabaseIsNotNoticedByThoseWhoWrite) {
     EXPECT_TRUE(put.ok()) << put.status();
     EXPECT_TRUE(hulls_->store().LoadVertices(cold).ok());
   }
-  EXPECT_EQ(ReceivedAnew("h"), 10);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 10);
 }
 
 TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
@@ -136,7 +136,7 @@ TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
     accepted = hulls_->Append(session, 2, {{9, 9, 9}});
   }
   ASSERT_TRUE(accepted.ok()) << accepted.status();
-  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 9);
 }
 
 // The database neither answers nor closes its connections.
@@ -155,7 +155,7 @@ TEST_F(PostgresFault, ADatabaseThatStandsStillHoldsNoThreadForEver) {
   // If this one stopped, its unanswered changes may be stored or not.
   const bool goes_on = hulls_->Put("h", {{10, 9, 9}}).ok();
   const uint64_t received = Received();
-  const uint64_t stored = ReceivedAnew("h");
+  const uint64_t stored = ReceivedAfterRestart("h");
   if (goes_on) {
     EXPECT_EQ(stored, received);
   } else {
@@ -175,7 +175,7 @@ TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
   EXPECT_EQ(Ask("SELECT batch FROM hulld.store").front(), "2");
   Ask("ALTER TABLE hulld.deltas DROP CONSTRAINT never");
   EXPECT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
-  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 9);
 }
 
 // PostgreSQL reports a commit with a warning that a standby may lack it.
@@ -203,7 +203,7 @@ TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
   Ask("SELECT pg_reload_conf()");
   EXPECT_TRUE(put.get().ok());
   EXPECT_NE(Ask("SELECT epoch FROM hulld.store").front(), epoch);
-  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(ReceivedAfterRestart("h"), 9);
 }
 
 }  // namespace postgres_fault_test

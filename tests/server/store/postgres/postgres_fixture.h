@@ -52,7 +52,7 @@ class PostgresTest : public ::testing::Test {
     return hulls;
   }
   // The points that the hull took, as a server that starts now finds them.
-  uint64_t ReceivedAnew(const std::string& hull_id) {
+  uint64_t ReceivedAfterRestart(const std::string& hull_id) {
     Start();
     const auto view = hulls_->View(hull_id);
     return view.ok() ? view->record.counts.received : 0;
