@@ -34,7 +34,7 @@ class PostgresFollow : public PostgresTest {
     options_.look = options_.beat = kNever;
   }
   // Starts a server that bypasses the proxy.
-  Server StartBeside() {
+  Server StartPeer() {
     const PostgresOptions through_proxy = options_;
     options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
     Server server = MakeRegistry();
@@ -44,7 +44,7 @@ class PostgresFollow : public PostgresTest {
   // The second server has read the hull, of points on a sphere, and answers from memory.
   void StartWithHull(int vertices) {
     Start();
-    other_ = StartBeside();
+    other_ = StartPeer();
     ASSERT_TRUE(other_->Put("h", SpherePoints(vertices)).ok());
     ASSERT_TRUE(hulls_->View("h").ok());
     ASSERT_EQ(hulls_->registry().Cache().loads, 1);
@@ -55,7 +55,7 @@ class PostgresFollow : public PostgresTest {
   }
   // Expects that a server serves the same "h" as a server that just started.
   void ExpectAsReadAnew(PostgresRegistry& server) {
-    const Server fresh = StartBeside();
+    const Server fresh = StartPeer();
     const auto view = server.View("h");
     const auto expected = fresh->View("h");
     ASSERT_TRUE(view.ok() && expected.ok()) << view.status() << expected.status();
@@ -311,7 +311,7 @@ bool Comes(const std::function<bool()>& what) {
 TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
   options_.look = options_.beat = kNever;
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   Watcher here(hulls_->registry());
   Watcher there(other->registry());
   for (int i = 0; i < 20; ++i) {
@@ -327,7 +327,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersLook) {
   options_.notices = false;
   options_.look = std::chrono::milliseconds(10);
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   Watcher watcher(hulls_->registry());
   ASSERT_TRUE(other->Create("h").ok());
   EXPECT_TRUE(watcher.IsToldOf("h"));
@@ -338,7 +338,7 @@ TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(20);
   Start();
-  other_ = StartBeside();
+  other_ = StartPeer();
   {
     Watcher watcher(hulls_->registry());
     for (int i = 1; i <= 3; ++i) {
@@ -364,7 +364,7 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   options_.look = std::chrono::milliseconds(5);
   options_.beat = std::chrono::milliseconds(500);
   Start();
-  other_ = StartBeside();
+  other_ = StartPeer();
   auto watcher = std::make_unique<Watcher>(hulls_->registry());
   const auto looks = [&] { return proxy_->Asked(kLook); };
   const auto beats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
@@ -396,7 +396,7 @@ TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
   options_.look = options_.beat = std::chrono::milliseconds(10);
   proxy_->RefuseToListen();
   Start();
-  other_ = StartBeside();
+  other_ = StartPeer();
   {
     Watcher watcher(hulls_->registry());
     for (int i = 0; i < 3; ++i) {

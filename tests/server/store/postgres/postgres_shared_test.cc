@@ -31,7 +31,7 @@ class PostgresShared : public PostgresTest {
   }
 
   // Starts a server that bypasses the proxy.
-  Server StartBeside() {
+  Server StartPeer() {
     PostgresOptions through_proxy = options_;
     options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
     Server server = MakeRegistry();
@@ -111,7 +111,7 @@ class PostgresShared : public PostgresTest {
 TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
   LookOnlyWhenAsked();
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   EXPECT_EQ(Received(*other, "h"), 8);
   ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
@@ -133,7 +133,7 @@ TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
 
 TEST_F(PostgresShared, RevisionsAreOfOneOrder) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   uint64_t last = 0;
   for (int i = 0; i < 6; ++i) {
     PostgresRegistry& server = i % 2 == 0 ? *hulls_ : *other;
@@ -147,7 +147,7 @@ TEST_F(PostgresShared, RevisionsAreOfOneOrder) {
 
 TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   const auto here = hulls_->Open("h");
   ASSERT_TRUE(here.ok());
   const auto there = other->Open("h");
@@ -170,7 +170,7 @@ TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
 // Each writer sends each chunk through both servers, like a client that lost an answer.
 TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   constexpr int kWriters = 4;
   constexpr uint64_t kChunks = 25;
   const std::vector<Vector> points = SpherePoints(kWriters * kChunks);
@@ -203,7 +203,7 @@ TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
 
 TEST_F(PostgresShared, OneOfTwoConditionsOnOneRevisionHolds) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const uint64_t revision = other->View("h")->record.revision;
   auto first = std::async(std::launch::async,
@@ -218,7 +218,7 @@ TEST_F(PostgresShared, OneOfTwoConditionsOnOneRevisionHolds) {
 
 TEST_F(PostgresShared, CreationsDeletionsAndReplacementsOfOneIdTakeTurns) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   std::vector<std::thread> threads;
   std::atomic<int> balance = 0;
   for (PostgresRegistry* server : {hulls_.get(), other.get()}) {
@@ -246,7 +246,7 @@ TEST_F(PostgresShared, CreationsDeletionsAndReplacementsOfOneIdTakeTurns) {
 
 TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   const auto put = PutBody(*hulls_, "b");
   ASSERT_TRUE(put.ok()) << put.status();
   EXPECT_TRUE(absl::IsAlreadyExists(other->Create("b").status()));
@@ -269,7 +269,7 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
 
 TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   std::promise<absl::Status> gone;
   const auto opened = PostgresRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
     hulls_->registry().OpenAppend(
@@ -286,7 +286,7 @@ TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
 
 TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   std::atomic<int> ready = 0;
   const auto watch = hulls_->registry().OpenWatch(WatchTarget(), {}, [&] {
     ++ready;
@@ -326,7 +326,7 @@ TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
   ASSERT_TRUE(store.ok()) << store.status();
   hulls_ = std::make_unique<PostgresRegistry>(*std::move(store), limits);
   ASSERT_TRUE(hulls_->loaded().ok());
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   const auto opened = hulls_->Open("h");
   ASSERT_TRUE(hulls_->Append(opened->session, 1, CubeCorners()).ok());
   // Exceeds the limit, so that unused hulls are evicted.
@@ -345,7 +345,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
   options_.notices = false;
   options_.look = options_.beat = std::chrono::hours(1);
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(other->Create("was-hull").ok());
   ASSERT_TRUE(PutBody(*other, "was-body").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
@@ -395,7 +395,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
 
 TEST_F(PostgresShared, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   proxy_->CutNext(Cut::kAfterCommit);
   const auto put = hulls_->Put("h", {{9, 9, 9}});
@@ -416,7 +416,7 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
     Start();
-    const Server other = StartBeside();
+    const Server other = StartPeer();
     ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
     const auto opened = hulls_->Open(id);
     proxy_->CutNext(cut);
@@ -438,7 +438,7 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
 // lock.
 TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
   proxy_->Deliver();
   const auto result = put.get();
@@ -451,7 +451,7 @@ TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
 
 TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
   // The store does the same after ten seconds of silence.
   EndSessions("state = 'idle in transaction'");
@@ -466,7 +466,7 @@ TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
 
 TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   proxy_->CutNext(Cut::kHold);
   ASSERT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
@@ -481,7 +481,7 @@ TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
 // A repeated creation or deletion cannot be recognized as a repetition.
 TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   proxy_->CutNext(Cut::kAfterCommit);
   const auto created = hulls_->Create("h");
   EXPECT_TRUE(created.ok()) << created.status();
@@ -499,7 +499,7 @@ TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
 TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
   LookOnlyWhenAsked();
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const StoredHull former = KeptHull("h");
   PostgresStore& store = hulls_->store();
@@ -520,7 +520,7 @@ TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
 TEST_F(PostgresShared, ChangesAreDecidedByWhatOthersDid) {
   LookOnlyWhenAsked();
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Create("h").ok());
   ASSERT_TRUE(other->Delete("h").ok());
   EXPECT_TRUE(hulls_->Create("h").ok());
@@ -600,7 +600,7 @@ TEST_F(PostgresShared, AServerThatFindsNoRoomForItsSessionsWaits) {
 
 TEST_F(PostgresShared, AllGoOnWhenTheDatabaseEndsTheirSessions) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   Ask("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database() "
       "AND pid <> pg_backend_pid()");
@@ -639,7 +639,7 @@ TEST_F(PostgresShared, WithoutSyncItIsRefused) {
 
 TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   const std::string id = hulls_->store().id();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   EXPECT_EQ(Received(*other, "h"), 8);
@@ -681,7 +681,7 @@ TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
 
 TEST_F(PostgresShared, WhoIsTooFarBehindEnds) {
   Start();
-  const Server other = StartBeside();
+  const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   options_.look = std::chrono::hours(1);
   bool ended = false;
