@@ -54,7 +54,7 @@ class PostgresFollow : public PostgresTest {
     hulls_ = nullptr;
   }
   // Expects that a server serves the same "h" as a server that just started.
-  void ExpectAsReadAnew(PostgresRegistry& server) {
+  void ExpectSameAsFreshServer(PostgresRegistry& server) {
     const Server fresh = StartPeer();
     const auto view = server.View("h");
     const auto expected = fresh->View("h");
@@ -107,7 +107,7 @@ TEST_F(PostgresFollow, WhatAnotherServerAddsCostsWhatItAdds) {
     // The messages are the same, and numbers have a fixed size.
     EXPECT_EQ(bytes, bytes_of_the_smallest) << vertices << " vertices";
     EXPECT_LT(bytes, kAppends * 2048);
-    ExpectAsReadAnew(*hulls_);
+    ExpectSameAsFreshServer(*hulls_);
   }
 }
 
@@ -131,7 +131,7 @@ TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
     const auto view = hulls_->View("h");
     ASSERT_TRUE(view.ok()) << view.status();
     EXPECT_EQ(view->record, other_->View("h")->record);
-    if (round % 10 == 9) ExpectAsReadAnew(*hulls_);
+    if (round % 10 == 9) ExpectSameAsFreshServer(*hulls_);
   }
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
   EXPECT_GT(hulls_->registry().Cache().grown, 10);
@@ -160,8 +160,8 @@ TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
   EXPECT_EQ(outside, 20);
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
   EXPECT_EQ(hulls_->registry().Cache().grown, 20);
-  ExpectAsReadAnew(*hulls_);
-  ExpectAsReadAnew(*other_);
+  ExpectSameAsFreshServer(*hulls_);
+  ExpectSameAsFreshServer(*other_);
 }
 
 // Both servers append concurrently, so that chunks being built or in flight conflict and are built
@@ -192,8 +192,8 @@ TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
   }
   for (std::thread& writer : writers) writer.join();
   EXPECT_EQ(hulls_->View("h")->record.counts.outside, 1000 + 2 * kChunks);
-  ExpectAsReadAnew(*hulls_);
-  ExpectAsReadAnew(*other_);
+  ExpectSameAsFreshServer(*hulls_);
+  ExpectSameAsFreshServer(*other_);
 }
 
 TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
@@ -205,7 +205,7 @@ TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
   ASSERT_TRUE(hulls_->View("h").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 2);
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
-  ExpectAsReadAnew(*hulls_);
+  ExpectSameAsFreshServer(*hulls_);
 }
 
 TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
@@ -238,7 +238,7 @@ TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
   ASSERT_TRUE(other_->Delete("h").ok());
   ASSERT_TRUE(other_->Put("h", CubeCorners()).ok());
   EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
-  ExpectAsReadAnew(*hulls_);
+  ExpectSameAsFreshServer(*hulls_);
 }
 
 // The memory for changes that are not yet applied is bounded.
