@@ -275,7 +275,7 @@ class Watcher {
   ~Watcher() { registry_.CloseWatch(watch_); }
 
   // Returns true when an event for this hull arrives; false after kLong.
-  bool IsToldOf(const std::string& id) {
+  bool SeesEvent(const std::string& id) {
     while (true) {
       const auto piece = registry_.TakeChanges(*watch_);
       if (!piece.ok()) return false;
@@ -317,8 +317,8 @@ TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
   for (int i = 0; i < 20; ++i) {
     const std::string id = absl::StrCat("h", i);
     ASSERT_TRUE((i % 2 == 0 ? other : hulls_)->Create(id).ok());
-    ASSERT_TRUE(here.IsToldOf(id)) << i;
-    ASSERT_TRUE(there.IsToldOf(id)) << i;
+    ASSERT_TRUE(here.SeesEvent(id)) << i;
+    ASSERT_TRUE(there.SeesEvent(id)) << i;
   }
   EXPECT_EQ(proxy_->Asked(kLook), 1);
 }
@@ -330,7 +330,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersLook) {
   const Server other = StartPeer();
   Watcher watcher(hulls_->registry());
   ASSERT_TRUE(other->Create("h").ok());
-  EXPECT_TRUE(watcher.IsToldOf("h"));
+  EXPECT_TRUE(watcher.SeesEvent("h"));
 }
 
 // The listening session reconnects by itself.
@@ -347,7 +347,7 @@ TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
       proxy_->CutListeners();
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
-      EXPECT_TRUE(watcher.IsToldOf(id));
+      EXPECT_TRUE(watcher.SeesEvent(id));
       ASSERT_TRUE(Comes([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
     }
   }
@@ -369,16 +369,16 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
   const auto looks = [&] { return proxy_->Asked(kLook); };
   const auto beats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
   ASSERT_TRUE(other_->Create("heard").ok());
-  ASSERT_TRUE(watcher->IsToldOf("heard"));
+  ASSERT_TRUE(watcher->SeesEvent("heard"));
   proxy_->SetDeaf(true);
   ASSERT_TRUE(other_->Create("unheard").ok());
-  EXPECT_TRUE(watcher->IsToldOf("unheard"));
+  EXPECT_TRUE(watcher->SeesEvent("unheard"));
   const int beats_then = beats();
   EXPECT_TRUE(Comes([&] { return beats() > beats_then + 3; }));
   EXPECT_GT(looks(), 3 * beats());
   proxy_->SetDeaf(false);
   ASSERT_TRUE(other_->Create("heard again").ok());
-  EXPECT_TRUE(watcher->IsToldOf("heard again"));
+  EXPECT_TRUE(watcher->SeesEvent("heard again"));
   // Two heartbeats cause two polls, and one poll may already have been running.
   EXPECT_TRUE(Comes([&] {
     const int looks_before = looks();
@@ -402,7 +402,7 @@ TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
     for (int i = 0; i < 3; ++i) {
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
-      EXPECT_TRUE(watcher.IsToldOf(id));
+      EXPECT_TRUE(watcher.SeesEvent(id));
     }
   }
   EndAll();
