@@ -118,18 +118,18 @@ absl::Status ParsePcdHeader(ByteSource* source, PcdHeader* header) {
 }
 
 std::optional<ScalarType> TypeOf(const Field& field) {
-  struct Known {
+  struct TypeCode {
     char type;
     uint64_t size;
     ScalarType scalar;
   };
-  static constexpr Known kKnown[] = {
+  static constexpr TypeCode kKnown[] = {
       {'I', 1, ScalarType::kInt8},   {'U', 1, ScalarType::kUint8},  {'I', 2, ScalarType::kInt16},
       {'U', 2, ScalarType::kUint16}, {'I', 4, ScalarType::kInt32},  {'U', 4, ScalarType::kUint32},
       {'I', 8, ScalarType::kInt64},  {'U', 8, ScalarType::kUint64}, {'F', 4, ScalarType::kFloat},
       {'F', 8, ScalarType::kDouble},
   };
-  for (const Known& known : kKnown) {
+  for (const TypeCode& known : kKnown) {
     if (known.type == field.type && known.size == field.size) return known.scalar;
   }
   return std::nullopt;
