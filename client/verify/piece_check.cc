@@ -166,8 +166,8 @@ absl::Status CheckOne(v1::Relation relation, const v1::PieceCertificate& of, Exa
 }
 
 // Checks that boxes settle every pair without a certificate.
-absl::Status CheckOthers(const Pairs& proven, ExactPieces* a, ExactPieces* b,
-                         const CommonExponent& lengths) {
+absl::Status CheckUncertifiedPairs(const Pairs& proven, ExactPieces* a, ExactPieces* b,
+                                   const CommonExponent& lengths) {
   const std::vector<std::optional<WorldBox>> boxes_a = a->Boxes(lengths);
   const std::vector<std::optional<WorldBox>> boxes_b = b->Boxes(lengths);
   auto next = proven.begin();
@@ -208,7 +208,7 @@ absl::Status CheckPieceCertificates(v1::Relation relation, const PieceCertificat
         absl::StrCat("no certificate shows two pieces that are ", v1::Relation_Name(relation)));
   }
   if (relation == v1::RELATION_OVERLAPPING) return absl::OkStatus();
-  return CheckOthers(proven, &exact_a, &exact_b, lengths);
+  return CheckUncertifiedPairs(proven, &exact_a, &exact_b, lengths);
 }
 
 }  // namespace hulld
