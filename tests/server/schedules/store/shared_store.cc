@@ -56,7 +56,7 @@ absl::Status SharedStore::ForEachHull(const StoredHullVisitor& visit) {
   }
 }
 
-const SimulatedStore::Kept* SharedStore::Find(const HullRecord& record) const {
+const SimulatedStore::StoredVertices* SharedStore::Find(const HullRecord& record) const {
   const auto found = database_.hulls_.find(record.hull_id);
   if (found == database_.hulls_.end()) return nullptr;
   const HullRecord& now = found->second.stored.record;
@@ -71,7 +71,7 @@ absl::StatusOr<std::vector<Vector>> SharedStore::LoadVertices(const StoredHull& 
     ++database_.counts_.failed_reads;
     return absl::UnavailableError("the database does not answer");
   }
-  const SimulatedStore::Kept* const kept = Find(hull.record);
+  const SimulatedStore::StoredVertices* const kept = Find(hull.record);
   // A base replaces everything before it.
   if (kept == nullptr || kept->stored.layout.base_revision != hull.layout.base_revision) {
     scheduler.Note("database: finds another hull than that of revision", hull.record.revision);
@@ -94,7 +94,7 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
     ++database_.counts_.failed_reads;
     return absl::UnavailableError("the database does not answer");
   }
-  const SimulatedStore::Kept* const kept = Find(hull);
+  const SimulatedStore::StoredVertices* const kept = Find(hull);
   absl::StatusOr<uint64_t> sequence = Moved();
   if (kept != nullptr && kept->stored.record == hull) {
     const auto writer = kept->sequences.find(writer_id);

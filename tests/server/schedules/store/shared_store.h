@@ -57,7 +57,7 @@ class SharedStore : public Store {
   absl::Status CommitInTurn(std::span<Change* const> changes);
   void TellTheOthers();
   // Returns the stored data of a hull if it matches the record, or null.
-  const SimulatedStore::Kept* Find(const HullRecord& record) const;
+  const SimulatedStore::StoredVertices* Find(const HullRecord& record) const;
 
   // This server's knowledge of the database.
   struct Known {

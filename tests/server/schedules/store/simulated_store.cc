@@ -233,7 +233,7 @@ void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
     hulls_.erase(record.hull_id);
     return;
   }
-  Kept& kept = hulls_[record.hull_id];
+  StoredVertices& kept = hulls_[record.hull_id];
   if (change.replaced.has_value()) kept = {};
   kept.stored = change.hull;
   if (change.vertex_change == VertexChange::kReplaced) kept.vertices.clear();

@@ -99,7 +99,7 @@ class SimulatedStore : public Store {
   friend class SharedStore;
 
   // Stored data of a hull.
-  struct Kept {
+  struct StoredVertices {
     StoredHull stored;
     // Each with the revision that added it.
     std::vector<std::pair<uint64_t, Vector>> vertices;
@@ -124,7 +124,7 @@ class SimulatedStore : public Store {
   bool finds_records_ = false;
   Ledger ledger_;
   Counts counts_;
-  std::map<std::string, Kept> hulls_;
+  std::map<std::string, StoredVertices> hulls_;
   std::map<std::string, StoredBody> bodies_;
   // Changes of unknown outcome, which the next process may find.
   std::vector<Change> unknown_;
