@@ -89,8 +89,8 @@ class HistoryClient {
   bool ListBodies(const std::vector<std::string>& bodies);
 
  private:
-  struct Asked;
-  struct Told;
+  struct JointQuery;
+  struct JointAnswer;
   struct CollisionStream;
   struct Page;
   struct Stream {
@@ -111,8 +111,9 @@ class HistoryClient {
   void ChooseFreshnessOfSeveral(Operation& operation, v1::Freshness& freshness);
   // Records an answer about several hulls, received now.
   void RecordSeveral(Operation operation, const v1::ResponseHeader& header, std::vector<Seen> seen);
-  std::vector<Seen> SeenIn(const Asked& asked, const Told& told, const v1::Freshness& freshness);
-  void RecordAsked(const Operation& operation, const Asked& asked, const Told& told,
+  std::vector<Seen> SeenIn(const JointQuery& asked, const JointAnswer& told,
+                           const v1::Freshness& freshness);
+  void RecordAsked(const Operation& operation, const JointQuery& asked, const JointAnswer& told,
                    const v1::Freshness& freshness);
   // Returns the next request: it opens the stream or queries again.
   v1::StreamCollisionsRequest NextMessage(const std::vector<std::string>& hulls,

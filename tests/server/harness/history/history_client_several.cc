@@ -34,10 +34,10 @@ bool IsAnswered(const grpc::Status& status) {
 
 // Hulls and bodies at the identity pose, with kProbeHull at each of these points of the cloud.
 // Placements: hulls and bodies first, then probes.
-struct HistoryClient::Asked {
-  static Asked Make(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies,
-                    std::mt19937_64& random) {
-    Asked asked;
+struct HistoryClient::JointQuery {
+  static JointQuery Make(const std::vector<std::string>& hulls,
+                         const std::vector<std::string>& bodies, std::mt19937_64& random) {
+    JointQuery asked;
     asked.ids = hulls;
     asked.ids.insert(asked.ids.end(), bodies.begin(), bodies.end());
     asked.hulls = hulls.size();
@@ -72,7 +72,7 @@ struct HistoryClient::Asked {
 };
 
 // Answers received so far.
-struct HistoryClient::Told {
+struct HistoryClient::JointAnswer {
   template <typename Message>
   void TakeTable(const Message& message) {
     if (message.has_header()) header = message.header();
@@ -98,8 +98,8 @@ struct HistoryClient::CollisionStream {
   std::unique_ptr<
       grpc::ClientReaderWriter<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>>
       stream;
-  Asked asked;
-  Told told;
+  JointQuery asked;
+  JointAnswer told;
   v1::Freshness freshness;
   std::optional<uint64_t> max_staleness;
 };
@@ -122,7 +122,7 @@ bool HistoryClient::CallSeveralAtRandom(const std::vector<std::string>& hulls,
   return choice < 10 || bodies.empty() ? ListHulls(hulls) : ListBodies(bodies);
 }
 
-std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
+std::vector<Seen> HistoryClient::SeenIn(const JointQuery& asked, const JointAnswer& told,
                                         const v1::Freshness& freshness) {
   std::vector<Seen> all;
   for (uint32_t i = 0; i < asked.ids.size(); ++i) {
@@ -155,8 +155,8 @@ std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
   return all;
 }
 
-void HistoryClient::RecordAsked(const Operation& operation, const Asked& asked, const Told& told,
-                                const v1::Freshness& freshness) {
+void HistoryClient::RecordAsked(const Operation& operation, const JointQuery& asked,
+                                const JointAnswer& told, const v1::Freshness& freshness) {
   RecordSeveral(operation, told.header, SeenIn(asked, told, freshness));
 }
 
@@ -173,7 +173,7 @@ void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader&
 
 bool HistoryClient::Batch(const std::vector<std::string>& hulls,
                           const std::vector<std::string>& bodies) {
-  const Asked asked = Asked::Make(hulls, bodies, random_);
+  const JointQuery asked = JointQuery::Make(hulls, bodies, random_);
   Operation operation = Begin(Kind::kBatch);
   v1::BatchCheckCollisionsRequest request;
   asked.AddPlacements(request);
@@ -181,7 +181,7 @@ bool HistoryClient::Batch(const std::vector<std::string>& hulls,
   ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->BatchCheckCollisions(context.get(), request);
-  Told told;
+  JointAnswer told;
   told.touching.resize(asked.pairs());
   v1::BatchCheckCollisionsResponse message;
   while (reader->Read(&message)) {
@@ -198,7 +198,7 @@ bool HistoryClient::Batch(const std::vector<std::string>& hulls,
 
 bool HistoryClient::Scene(const std::vector<std::string>& hulls,
                           const std::vector<std::string>& bodies) {
-  const Asked asked = Asked::Make(hulls, bodies, random_);
+  const JointQuery asked = JointQuery::Make(hulls, bodies, random_);
   Operation operation = Begin(Kind::kBatch);
   v1::FindCollisionsRequest request;
   asked.AddPlacements(request);
@@ -209,7 +209,7 @@ bool HistoryClient::Scene(const std::vector<std::string>& hulls,
   ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->FindCollisions(context.get(), request);
-  Told told;
+  JointAnswer told;
   // Pairs not reported do not touch.
   told.touching.assign(asked.pairs(), false);
   v1::FindCollisionsResponse message;
@@ -234,7 +234,7 @@ v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::st
   if (collision_stream_ == nullptr) {
     collision_stream_ = std::make_shared<CollisionStream>();
     CollisionStream& stream = *collision_stream_;
-    stream.asked = Asked::Make(hulls, bodies, random_);
+    stream.asked = JointQuery::Make(hulls, bodies, random_);
     stream.told.touching.resize(stream.asked.pairs());
     ChooseFreshnessOfSeveral(operation, stream.freshness);
     stream.max_staleness = operation.max_staleness;
