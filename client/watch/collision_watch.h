@@ -11,7 +11,7 @@
 #include <mutex>
 
 #include "client/calls/retry.h"
-#include "client/watch/told_pairs.h"
+#include "client/watch/reported_pairs.h"
 #include "hulld/v1/collision.grpc.pb.h"
 
 namespace hulld {
@@ -63,7 +63,7 @@ class CollisionWatch {
   const std::chrono::milliseconds patience_;
 
   // Used by Next only.
-  ToldPairs told_;
+  ReportedPairs told_;
   std::shared_ptr<Call> call_;
   // True after the first message: a server was reached and has reported pairs.
   bool connected_ = false;

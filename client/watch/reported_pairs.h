@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_WATCH_TOLD_PAIRS_H_
-#define HULLD_CLIENT_WATCH_TOLD_PAIRS_H_
+#ifndef HULLD_CLIENT_WATCH_REPORTED_PAIRS_H_
+#define HULLD_CLIENT_WATCH_REPORTED_PAIRS_H_
 
 #include <cstdint>
 #include <map>
@@ -15,10 +15,10 @@ namespace hulld {
 // Pair states reported by a WatchCollisions call. When another call replaces it and starts with the
 // full state, this removes known events and adds the events of pairs that ended in between, so that
 // both calls together report the same events as one. Memory: the pairs that collide or are near.
-class ToldPairs {
+class ReportedPairs {
  public:
   // `open` is the watch's first message: it names the hulls of placements and any clearance.
-  explicit ToldPairs(const v1::CollisionWatchOpen& open);
+  explicit ReportedPairs(const v1::CollisionWatchOpen& open);
 
   // Marks the next message as the first of another call.
   void StartAnew();
@@ -56,4 +56,4 @@ class ToldPairs {
 
 }  // namespace hulld
 
-#endif  // HULLD_CLIENT_WATCH_TOLD_PAIRS_H_
+#endif  // HULLD_CLIENT_WATCH_REPORTED_PAIRS_H_

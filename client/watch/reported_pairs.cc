@@ -1,4 +1,4 @@
-#include "client/watch/told_pairs.h"
+#include "client/watch/reported_pairs.h"
 
 namespace hulld {
 namespace {
@@ -9,7 +9,7 @@ bool IsCollision(v1::Relation relation) {
 
 }  // namespace
 
-ToldPairs::ToldPairs(const v1::CollisionWatchOpen& open) {
+ReportedPairs::ReportedPairs(const v1::CollisionWatchOpen& open) {
   for (const v1::Placement& placement : open.placements()) {
     open_.add_placements()->set_hull_id(placement.hull_id());
   }
@@ -18,9 +18,9 @@ ToldPairs::ToldPairs(const v1::CollisionWatchOpen& open) {
   if (open.has_clearance()) open_.set_clearance(open.clearance());
 }
 
-void ToldPairs::StartAnew() { retold_.emplace(); }
+void ReportedPairs::StartAnew() { retold_.emplace(); }
 
-void ToldPairs::Take(v1::WatchCollisionsResponse* message) {
+void ReportedPairs::Take(v1::WatchCollisionsResponse* message) {
   TakeHulls(*message);
   TakeProblems(message);
   TakeEvents(message);
@@ -29,7 +29,7 @@ void ToldPairs::Take(v1::WatchCollisionsResponse* message) {
   retold_.reset();
 }
 
-const std::string& ToldPairs::HullOf(uint32_t placement) const {
+const std::string& ReportedPairs::HullOf(uint32_t placement) const {
   const v1::PackedPlacements& packed = open_.packed_placements();
   const size_t i = placement;
   if (i < static_cast<size_t>(open_.placements_size())) {
@@ -45,7 +45,7 @@ const std::string& ToldPairs::HullOf(uint32_t placement) const {
   return none;
 }
 
-void ToldPairs::TakeHulls(const v1::WatchCollisionsResponse& message) {
+void ReportedPairs::TakeHulls(const v1::WatchCollisionsResponse& message) {
   for (const v1::HullVersion& hull : message.hulls()) {
     revisions_[hull.hull_id()] = hull.revision();
     std::erase_if(problems_,
@@ -53,7 +53,7 @@ void ToldPairs::TakeHulls(const v1::WatchCollisionsResponse& message) {
   }
 }
 
-void ToldPairs::TakeProblems(v1::WatchCollisionsResponse* message) {
+void ReportedPairs::TakeProblems(v1::WatchCollisionsResponse* message) {
   v1::WatchCollisionsResponse kept;
   for (const v1::PlacementProblem& problem : message->placement_problems()) {
     std::string& known = problems_[problem.placement()];
@@ -64,7 +64,7 @@ void ToldPairs::TakeProblems(v1::WatchCollisionsResponse* message) {
   message->mutable_placement_problems()->Swap(kept.mutable_placement_problems());
 }
 
-void ToldPairs::TakeEvents(v1::WatchCollisionsResponse* message) {
+void ReportedPairs::TakeEvents(v1::WatchCollisionsResponse* message) {
   v1::WatchCollisionsResponse kept;
   for (v1::CollisionEvent& event : *message->mutable_events()) {
     if (TakeEvent(&event)) *kept.add_events() = std::move(event);
@@ -72,7 +72,7 @@ void ToldPairs::TakeEvents(v1::WatchCollisionsResponse* message) {
   message->mutable_events()->Swap(kept.mutable_events());
 }
 
-bool ToldPairs::TakeEvent(v1::CollisionEvent* event) {
+bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
   const Pair pair(event->placement_a(), event->placement_b());
   const State now = {event->relation(), event->within_clearance()};
   State before;
@@ -91,7 +91,7 @@ bool ToldPairs::TakeEvent(v1::CollisionEvent* event) {
   return now.relation != before.relation || now.within_clearance != before.within_clearance;
 }
 
-void ToldPairs::TellWhatEnded(v1::WatchCollisionsResponse* message) {
+void ReportedPairs::TellWhatEnded(v1::WatchCollisionsResponse* message) {
   for (auto told = told_.begin(); told != told_.end();) {
     if (retold_->contains(told->first)) {
       ++told;
@@ -102,7 +102,7 @@ void ToldPairs::TellWhatEnded(v1::WatchCollisionsResponse* message) {
   }
 }
 
-v1::CollisionEvent ToldPairs::EndOf(const Pair& pair, const State& before) const {
+v1::CollisionEvent ReportedPairs::EndOf(const Pair& pair, const State& before) const {
   v1::CollisionEvent event;
   event.set_placement_a(pair.first);
   event.set_placement_b(pair.second);
