@@ -25,9 +25,9 @@ absl::Status CheckUpdate(const v1::CollisionWatchOpen& open,
                              std::min(packed.hulls_size(), packed.poses_size() / kPoseNumbers));
   for (const uint32_t placement : update.placements()) {
     if (placement >= static_cast<uint32_t>(count)) {
-      return absl::InvalidArgumentError(absl::StrCat("placements: placement ", placement,
-                                                     " does not exist; the number of placements is ",
-                                                     count));
+      return absl::InvalidArgumentError(
+          absl::StrCat("placements: placement ", placement,
+                       " does not exist; the number of placements is ", count));
     }
   }
   return absl::OkStatus();
@@ -68,7 +68,7 @@ CollisionWatch::CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub,
     : stub_(std::move(stub)),
       retry_(std::move(retry)),
       patience_(patience),
-      told_(open),
+      reported_(open),
       open_(std::move(open)) {}
 
 CollisionWatch::~CollisionWatch() {
@@ -86,9 +86,9 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     if (call_ == nullptr) return absl::CancelledError("the watch was cancelled");
     v1::WatchCollisionsResponse message;
     if (call_->stream->Read(&message)) {
-      if (is_new && connected_) told_.StartAnew();
+      if (is_new && connected_) reported_.Restart();
       connected_ = true;
-      told_.Take(&message);
+      reported_.Take(&message);
       message.set_update(call_->updates_before + message.update());
       return message;
     }

@@ -63,7 +63,7 @@ class CollisionWatch {
   const std::chrono::milliseconds patience_;
 
   // Used by Next only.
-  ReportedPairs told_;
+  ReportedPairs reported_;
   std::shared_ptr<Call> call_;
   // True after the first message: a server was reached and has reported pairs.
   bool connected_ = false;

@@ -48,10 +48,10 @@ class HullWatch {
   v1::WatchHullsRequest request_;
   const RetryPolicy retry_;
   const std::chrono::milliseconds patience_;
-  // connected_: a message arrived, so a server was reached. told_: events arrived, which a restart
-  // must revoke.
+  // connected_: a message arrived, so a server was reached. reported_: events arrived, which a
+  // restart must revoke.
   bool connected_ = false;
-  bool told_ = false;
+  bool reported_ = false;
 
   std::mutex mutex_;
   // Guarded by the mutex where it changes.

@@ -18,15 +18,15 @@ ReportedPairs::ReportedPairs(const v1::CollisionWatchOpen& open) {
   if (open.has_clearance()) open_.set_clearance(open.clearance());
 }
 
-void ReportedPairs::StartAnew() { retold_.emplace(); }
+void ReportedPairs::Restart() { reported_again_.emplace(); }
 
 void ReportedPairs::Take(v1::WatchCollisionsResponse* message) {
   TakeHulls(*message);
   TakeProblems(message);
   TakeEvents(message);
-  if (!retold_ || !message->synced()) return;
-  TellWhatEnded(message);
-  retold_.reset();
+  if (!reported_again_ || !message->synced()) return;
+  ReportEnded(message);
+  reported_again_.reset();
 }
 
 const std::string& ReportedPairs::HullOf(uint32_t placement) const {
@@ -57,7 +57,7 @@ void ReportedPairs::TakeProblems(v1::WatchCollisionsResponse* message) {
   v1::WatchCollisionsResponse kept;
   for (const v1::PlacementProblem& problem : message->placement_problems()) {
     std::string& known = problems_[problem.placement()];
-    if (retold_ && known == problem.message()) continue;
+    if (reported_again_ && known == problem.message()) continue;
     known = problem.message();
     *kept.add_placement_problems() = problem;
   }
@@ -76,14 +76,14 @@ bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
   const Pair pair(event->placement_a(), event->placement_b());
   const State now = {event->relation(), event->within_clearance()};
   State before;
-  if (const auto told = told_.find(pair); told != told_.end()) before = told->second;
+  if (const auto told = reported_.find(pair); told != reported_.end()) before = told->second;
   if (IsCollision(now.relation) || now.within_clearance) {
-    told_[pair] = now;
+    reported_[pair] = now;
   } else {
-    told_.erase(pair);
+    reported_.erase(pair);
   }
-  if (!retold_) return true;
-  retold_->insert(pair);
+  if (!reported_again_) return true;
+  reported_again_->insert(pair);
   // The new call has no previous state to compare with.
   if (now.relation == v1::RELATION_SEPARATED && IsCollision(before.relation)) {
     event->set_kind(v1::COLLISION_EVENT_KIND_EXIT);
@@ -91,14 +91,14 @@ bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
   return now.relation != before.relation || now.within_clearance != before.within_clearance;
 }
 
-void ReportedPairs::TellWhatEnded(v1::WatchCollisionsResponse* message) {
-  for (auto told = told_.begin(); told != told_.end();) {
-    if (retold_->contains(told->first)) {
+void ReportedPairs::ReportEnded(v1::WatchCollisionsResponse* message) {
+  for (auto told = reported_.begin(); told != reported_.end();) {
+    if (reported_again_->contains(told->first)) {
       ++told;
       continue;
     }
     *message->add_events() = EndOf(told->first, told->second);
-    told = told_.erase(told);
+    told = reported_.erase(told);
   }
 }
 

@@ -21,7 +21,7 @@ class ReportedPairs {
   explicit ReportedPairs(const v1::CollisionWatchOpen& open);
 
   // Marks the next message as the first of another call.
-  void StartAnew();
+  void Restart();
   // Records a message, after rewriting it to the message that a single call would have sent.
   void Take(v1::WatchCollisionsResponse* message);
 
@@ -41,17 +41,17 @@ class ReportedPairs {
   // dropped.
   bool TakeEvent(v1::CollisionEvent* event);
   // Adds the end events of pairs that the new call did not report.
-  void TellWhatEnded(v1::WatchCollisionsResponse* message);
+  void ReportEnded(v1::WatchCollisionsResponse* message);
   v1::CollisionEvent EndOf(const Pair& pair, const State& before) const;
 
   // Placements and clearance, without poses.
   v1::CollisionWatchOpen open_;
   // Pairs that collide or are within the clearance.
-  std::map<Pair, State> told_;
+  std::map<Pair, State> reported_;
   std::map<uint32_t, std::string> problems_;
   std::map<std::string, uint64_t> revisions_;
-  // From StartAnew until `synced`: the pairs that the current call has reported.
-  std::optional<std::set<Pair>> retold_;
+  // From Restart until `synced`: the pairs that the current call has reported.
+  std::optional<std::set<Pair>> reported_again_;
 };
 
 }  // namespace hulld
