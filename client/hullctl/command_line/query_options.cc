@@ -2,12 +2,12 @@
 
 namespace hulld {
 
-void QueryWishes::Apply(v1::Wanted* file_wanted, double* file_tolerance) const {
+void QueryDetails::Apply(v1::Wanted* file_wanted, double* file_tolerance) const {
   file_wanted->MergeFrom(wanted);
   if (tolerance.has_value()) *file_tolerance = *tolerance;
 }
 
-void AddWantedOptions(Command command, QueryWishes* wishes) {
+void AddWantedOptions(Command command, QueryDetails* wishes) {
   v1::Wanted* const wanted = &wishes->wanted;
   command.AddFlag(
       "--axis", [wanted] { wanted->set_axis(true); },
@@ -37,7 +37,7 @@ void AddWantedOptions(Command command, QueryWishes* wishes) {
                     [wishes](double length) { wishes->tolerance = length; });
 }
 
-void AddQueryOptions(Command command, QueryWishes* wishes) {
+void AddQueryOptions(Command command, QueryDetails* wishes) {
   AddWantedOptions(command, wishes);
   command.AddFlag(
       "--textbook", [wishes] { wishes->method = v1::METHOD_TEXTBOOK_SAT; },

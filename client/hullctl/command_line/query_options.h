@@ -9,7 +9,7 @@
 namespace hulld {
 
 // Requests beyond the relation, as options shared by several commands.
-struct QueryWishes {
+struct QueryDetails {
   v1::Wanted wanted;
   std::optional<double> tolerance;
   v1::Method method = v1::METHOD_UNSPECIFIED;
@@ -22,10 +22,10 @@ struct QueryWishes {
 
 // Declares --axis, --report, --certificate, --separation, --max-error, --witness, --clearance, and
 // --tolerance. `wishes` must outlive the parsing.
-void AddWantedOptions(Command command, QueryWishes* wishes);
+void AddWantedOptions(Command command, QueryDetails* wishes);
 
 // Declares the same options plus --textbook and --verify.
-void AddQueryOptions(Command command, QueryWishes* wishes);
+void AddQueryOptions(Command command, QueryDetails* wishes);
 
 }  // namespace hulld
 

@@ -20,7 +20,7 @@ namespace {
 
 struct BatchArguments {
   std::string file;
-  QueryWishes wishes;
+  QueryDetails wishes;
   bool colliding = false;
 };
 
@@ -304,12 +304,12 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 
 }  // namespace
 
-BodyForm FormFor(const QueryWishes& wishes) {
+BodyForm FormFor(const QueryDetails& wishes) {
   return wishes.method == v1::METHOD_TEXTBOOK_SAT ? BodyForm::kPieces : BodyForm::kWhole;
 }
 
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
-                     const QueryWishes& wishes, bool colliding) {
+                     const QueryDetails& wishes, bool colliding) {
   const BatchArguments arguments{file, wishes, colliding};
   if (colliding && run.json()) {
     return run.FailUsage(absl::InvalidArgumentError(

@@ -16,7 +16,7 @@ namespace {
 
 struct CheckArguments {
   v1::CheckCollisionRequest request;
-  QueryWishes wishes;
+  QueryDetails wishes;
   std::string record;
 };
 

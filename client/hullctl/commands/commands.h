@@ -39,9 +39,9 @@ void AddManCommand(Command program, Invocation* invocation);
 
 // Queries the pairs of a scene read from `file`, as 'hullctl batch' does.
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
-                     const QueryWishes& wishes, bool colliding);
+                     const QueryDetails& wishes, bool colliding);
 // Returns the form of bodies in queries. Certificates and the textbook's test apply to hulls only.
-BodyForm FormFor(const QueryWishes& wishes);
+BodyForm FormFor(const QueryDetails& wishes);
 
 }  // namespace hulld
 

@@ -106,11 +106,11 @@ class SceneRun {
 
 struct SceneArguments {
   std::string file;
-  QueryWishes wishes;
+  QueryDetails wishes;
 };
 
 // Reads a scene that must end the source.
-absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryWishes& wishes) {
+absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& wishes) {
   const auto source = ByteSource::Open(file);
   if (!source.ok()) return source.status();
   auto scene = ReadScene(source->get(), FormFor(wishes));
@@ -119,7 +119,7 @@ absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryWishes& wish
   return scene;
 }
 
-ExitCode Find(const Invocation& run, const QueryWishes& wishes, Scene* read) {
+ExitCode Find(const Invocation& run, const QueryDetails& wishes, Scene* read) {
   double tolerance = read->request.tolerance();
   wishes.Apply(read->request.mutable_wanted(), &tolerance);
   read->request.set_tolerance(tolerance);

@@ -18,7 +18,7 @@ namespace {
 
 struct StreamArguments {
   std::string file;
-  QueryWishes wishes;
+  QueryDetails wishes;
   bool only_changes = false;
 };
 

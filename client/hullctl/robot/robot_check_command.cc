@@ -41,7 +41,7 @@ struct CheckArguments {
   std::vector<std::string> ignored;
   bool adjacent = false;
   bool first = false;
-  QueryWishes wishes;
+  QueryDetails wishes;
 };
 
 // Objects of the queries: the parts of the robot, then its surroundings.
