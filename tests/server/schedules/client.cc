@@ -120,7 +120,7 @@ void Client::Claim(const Call& call, std::optional<size_t> state, const std::str
   if (!ledger().Claim(call.hull, *state)) {
     Fail(call, absl::StrCat(what, ", and another call made that change"));
   }
-  ledger().Tell(call.hull, *state);
+  ledger().Report(call.hull, *state);
   if (!call.if_revision.has_value()) return;
   const State& before = ledger().At(call.hull, *state - 1);
   if (*call.if_revision != (before.exists ? before.record.revision : 0)) {
@@ -148,7 +148,7 @@ void Client::Create() {
     const auto state = ledger().Find(call.hull, call.since, is_it);
     if (result->created) return Claim(call, state, absl::StrCat("created ", Text(result->hull)));
     if (!state.has_value()) Fail(call, absl::StrCat("there is no ", Text(result->hull)));
-    ledger().Tell(call.hull, *state);
+    ledger().Report(call.hull, *state);
   };
   Await<CreateResult>(
       [&](Reply<CreateResult> done) {
@@ -241,9 +241,9 @@ void Client::List() {
     if (!state.has_value()) {
       Fail(call, absl::StrCat("the list of revision ", page.store_revision, " is wrong"));
     }
-    ledger().Tell(call.hull, *state);
+    ledger().Report(call.hull, *state);
   }
-  ledger().TellRevision(page.store_revision);
+  ledger().ReportRevision(page.store_revision);
   ++simulation_.reached.answers;
 }
 
@@ -296,7 +296,7 @@ void Client::Read() {
     call.hull = static_cast<size_t>(ids[i][0] - 'a');
     CheckView(call, resolved->store_revision, resolved->hulls[i]);
   }
-  ledger().TellRevision(resolved->store_revision);
+  ledger().ReportRevision(resolved->store_revision);
   const absl::StatusOr<HullView>& view = resolved->hulls.back();
   if (view.ok() && random().OneIn(2)) MakeCanonical(call, *view);
 }
@@ -318,7 +318,7 @@ void Client::CheckView(const Call& call, uint64_t revision, const absl::StatusOr
     Fail(call, absl::StrCat("at revision ", revision, " a reader is given ",
                             is_there ? Text(view->record) : "no hull"));
   }
-  ledger().Tell(call.hull, *state);
+  ledger().Report(call.hull, *state);
   if (is_there) CheckServed(call, ledger().At(call.hull, *state), *view);
   ++simulation_.reached.reads;
 }
@@ -373,7 +373,7 @@ void Client::Press() {
 
 void Client::CheckAll() {
   for (size_t hull = 0; hull < kHulls; ++hull) {
-    ledger().Tell(hull, ledger().size(hull) - 1);
+    ledger().Report(hull, ledger().size(hull) - 1);
     Call call = Begin(hull);
     const std::vector<std::string> ids = {HullName(hull)};
     const absl::StatusOr<Resolved> resolved = simulation_.registry.Resolve(ids, {});

@@ -69,7 +69,7 @@ void Client::PutBody() {
     const std::string what = absl::StrCat("put a body at ", result->body.revision);
     if (!state.has_value()) Fail(call, absl::StrCat(what, ", and the store keeps none"));
     if (!ledger().Claim(call.hull, *state)) Fail(call, absl::StrCat(what, ", as another call did"));
-    ledger().Tell(call.hull, *state);
+    ledger().Report(call.hull, *state);
     const State& before = ledger().At(call.hull, *state - 1);
     if (result->created == before.is_body) Fail(call, "it is said wrongly that there was none");
     const uint64_t revision = before.is_body ? before.record.revision : 0;
@@ -120,7 +120,7 @@ void Client::CheckBody(const Call& call, std::optional<uint64_t> revision, const
                                             : absl::StrCat("a body at ", body->record().revision),
                             " at revision ", revision.value_or(0)));
   }
-  ledger().Tell(call.hull, *state);
+  ledger().Report(call.hull, *state);
 }
 
 void Client::FindBodies() {
@@ -173,7 +173,7 @@ void Client::ListBodies() {
     });
     CheckBody(call, page->store_revision, listed == page->bodies.end() ? nullptr : listed->get());
   }
-  ledger().TellRevision(page->store_revision);
+  ledger().ReportRevision(page->store_revision);
 }
 
 }  // namespace hulld::server

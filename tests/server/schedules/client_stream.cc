@@ -102,7 +102,7 @@ void Client::CheckOpened(const Call& call, Stream& stream, const OpenResult& res
                             WriterName(stream.writer), " is ", result.last_sequence,
                             " at revision ", result.hull.revision));
   }
-  ledger().Tell(call.hull, *state);
+  ledger().Report(call.hull, *state);
 }
 
 void Client::SendChunk(const std::shared_ptr<Stream>& stream, uint64_t sequence) {
@@ -143,7 +143,7 @@ void Client::CheckChunk(const Call& call, const Stream& stream, uint64_t sequenc
     Fail(call, absl::StrCat("chunk ", sequence, " is said to be applied already at revision ",
                             result->hull_revision));
   }
-  ledger().Tell(call.hull, *state);
+  ledger().Report(call.hull, *state);
 }
 
 void Client::CheckApplied(const Call& before, const Stream& stream, uint64_t sequence,

@@ -174,13 +174,13 @@ bool Ledger::IsCurrentAt(size_t hull, size_t index, uint64_t revision) const {
   return own <= revision && (next == states.size() || states[next].revision > revision);
 }
 
-void Ledger::Tell(size_t hull, size_t index) {
-  told_.states[hull] = std::max(told_.states[hull], index);
-  TellRevision(states_[hull][index].revision);
+void Ledger::Report(size_t hull, size_t index) {
+  reported_.states[hull] = std::max(reported_.states[hull], index);
+  ReportRevision(states_[hull][index].revision);
 }
 
-void Ledger::TellRevision(uint64_t revision) {
-  told_.revision = std::max(told_.revision, revision);
+void Ledger::ReportRevision(uint64_t revision) {
+  reported_.revision = std::max(reported_.revision, revision);
 }
 
 bool Ledger::Claim(size_t hull, size_t index) {

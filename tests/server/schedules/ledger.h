@@ -64,7 +64,7 @@ class Ledger {
   const State& At(size_t hull, size_t index) const { return states_[hull][index]; }
   size_t size(size_t hull) const { return states_[hull].size(); }
 
-  Moment Now() const { return told_; }
+  Moment Now() const { return reported_; }
   // Returns the first state since the moment that explains an answer.
   template <typename Predicate>
   std::optional<size_t> Find(size_t hull, const Moment& since, const Predicate& explains) const {
@@ -84,8 +84,8 @@ class Ledger {
   }
 
   // Record that a state or a revision was reported: later calls are answered from no older one.
-  void Tell(size_t hull, size_t index);
-  void TellRevision(uint64_t revision);
+  void Report(size_t hull, size_t index);
+  void ReportRevision(uint64_t revision);
   // Records that a call was acknowledged to have made this change. Returns false if another call
   // was before.
   bool Claim(size_t hull, size_t index);
@@ -105,7 +105,7 @@ class Ledger {
 
   std::array<std::vector<State>, kHulls> states_;
   uint64_t revision_ = 0;
-  Moment told_;
+  Moment reported_;
 };
 
 }  // namespace hulld::server
