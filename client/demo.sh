@@ -1,12 +1,12 @@
 #!/bin/bash
-# The textbook's collision scenes, end to end, as a new user meets them:
+# Runs the textbook's collision scenes end to end, as a new user meets them:
 #
 #   bash client/demo.sh
 #
-# On a bare Debian 12 it first installs what docker/packages.txt lists (as root) and builds hulld
-# and hullctl into build/demo. Then it starts a server, registers hulls, asks questions whose
-# answers are known, streams points into a live hull while querying it, and writes one picture.
-# It stops what it started, and fails when an answer is not the expected one.
+# On a bare Debian 12, first installs the packages in docker/packages.txt (as root) and builds hulld
+# and hullctl into build/demo. Then starts a server, registers hulls, runs queries with known
+# answers, streams points into a hull while querying it, and writes one picture. Stops everything
+# that it started, and fails if an answer differs from the expected one.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export LC_ALL=C
@@ -37,7 +37,7 @@ heading() { printf '\n== %s\n' "$*"; }
 
 ctl() { "$build/bin/hullctl" --server "$address" "$@"; }
 
-# field NAME: the value of a row of one of hullctl's tables, read from standard input.
+# field NAME: prints the value of a row of a hullctl table read from standard input.
 field() { awk -F '  +' -v name="$1" '$1 == name { print $2 }'; }
 
 # expect WANT GOT: notes a wrong answer.
@@ -75,11 +75,11 @@ install_and_build() {
 
 start_server() {
   local port=50551
-  # The default port, or the next one that nobody listens on.
+  # Uses the default port, or the next free one.
   while (exec 3<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null; do port=$((port + 1)); done
   address=127.0.0.1:$port
   heading "Starting hulld on $address"
-  # Afresh each time: the hulls of the last run would be there otherwise.
+  # Starts empty: the hulls of the last run would still be in the store.
   rm -rf "$work/data"
   "$build/bin/hulld" --listen "$address" --data-dir "$work/data" >"$work/hulld.log" 2>&1 &
   server_pid=$!
@@ -96,7 +96,7 @@ start_server() {
   exit 1
 }
 
-# register NAME FILE: appends the points of a file to a hull and shows what became of them.
+# register NAME FILE: appends the points of a file to a hull and shows the result.
 register() {
   ctl append "$1" "$2" --create >/dev/null
   ctl get "$1" --audit >"$work/hull"
@@ -182,14 +182,14 @@ streaming_scene() {
   mkfifo "$points"
   ctl create live >/dev/null
   last=$(ctl get live | field revision)
-  # Not through ctl: the process itself must be the one to stop.
+  # Runs hullctl directly, not through ctl: the process itself must be stopped.
   "$build/bin/hullctl" --server "$address" append live - --chunk-points 500 \
     <"$points" >"$work/append" &
   writer_pid=$!
   exec 4>"$points"
   for radius in 1 2 3 4 5 6; do
     ctl generate ball 5000 --seed "$radius" --radius "$radius" >&4
-    # The writer works on its own; go on when the hull has changed since the last look.
+    # The writer runs independently; continue after the hull has changed.
     for _ in {1..200}; do
       revision=$(ctl get live | field revision)
       ((revision > last)) && break

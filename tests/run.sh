@@ -1,18 +1,18 @@
 #!/bin/bash
 # Builds hulld and tests it.
 #
-#   bash tests/run.sh            release build; every test but the long ones
-#   bash tests/run.sh --quick    core, query, and one question to a server, end to end
-#   bash tests/run.sh --ci       what continuous integration checks: release and asan-ubsan with the
+#   bash tests/run.sh            release build; every test except the long ones
+#   bash tests/run.sh --quick    core, query, and one call to a server, end to end
+#   bash tests/run.sh --ci       the checks of continuous integration: release and asan-ubsan with the
 #                                long tests, mutants, self-contained headers, clang-tidy over the
 #                                last change, and the Debian packages
 #
-# For one purpose each: --tsan (ThreadSanitizer over what uses threads without gRPC), --fuzz (each
-# fuzzer for a fixed number of inputs under libFuzzer), --arm64 (core's digests by emulation), and
-# --tidy (clang-tidy over the last change). --no-install asks apt for nothing.
+# Single checks: --tsan (ThreadSanitizer over threaded code without gRPC), --fuzz (each fuzzer for a
+# fixed number of inputs under libFuzzer), --arm64 (core's digests by emulation), and --tidy
+# (clang-tidy over the last change). --no-install skips apt.
 #
-# Installs what docker/packages.txt lists (as root, on Debian 12), builds into build/, and ends with
-# a summary of parts and times.
+# Installs the packages in docker/packages.txt (as root, on Debian 12), builds into build/, and ends
+# with a summary of parts and times.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
 
@@ -82,7 +82,7 @@ run_tests() {
 
 # Every source of core and every public header compiles by itself: neither a unity build nor a
 # precompiled header hides a missing include. Each source includes its own header first, so only
-# headers without one, and those of the client, are compiled separately.
+# headers without a source, and client headers, are compiled separately.
 check_includes() {
   cmake --install build/release --component devel --prefix build/includes >/dev/null || return 1
   local headers=$PWD/build/includes/include/hulld
@@ -108,8 +108,8 @@ if [[ $install == yes ]]; then
 fi
 if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache
-  # ccache keeps nothing that uses a precompiled header without the first, and reads these headers,
-  # 400 MB, once for each file without the second.
+  # Without the first, ccache caches nothing that uses a precompiled header; without the second, it
+  # reads these headers, 400 MB, for each file.
   export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
   export CCACHE_INODECACHE=${CCACHE_INODECACHE:-1}
   # A clone in another folder hits the same entries; its debug information may name this folder.

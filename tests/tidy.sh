@@ -1,11 +1,12 @@
 #!/bin/bash
-# Runs clang-tidy over the C++ files that changed, each parsed by itself, without precompiled headers.
+# Runs clang-tidy over the changed C++ files, each parsed by itself, without precompiled headers.
 #
 #   bash tests/tidy.sh [BASE | --all]
 #
-# BASE: the commit to compare with; by default the merge base with origin/main, or the parent of HEAD
-# where that is HEAD itself. Uncommitted changes count. A changed header counts through the files beside
-# it that have its name. Needs what docker/packages.txt lists under [build], [test] and [tidy].
+# BASE: the commit to compare with; by default the merge base with origin/main, or the parent of
+# HEAD if that is HEAD itself. Uncommitted changes count. A changed header counts through the
+# sources of the same name in its folder. Requires the packages in docker/packages.txt under
+# [build], [test], and [tidy].
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -19,7 +20,7 @@ changed_since() {
   git ls-files --others --exclude-standard -- core server client tests
 }
 
-# As tests/bench and the fuzzers are, files outside the preset's build are left out.
+# Omits files outside the preset's build, such as tests/bench and the fuzzers.
 list_files() {
   local base=${1-}
   if [[ $base == --all ]]; then
@@ -42,8 +43,8 @@ list_files() {
 
 cmake --preset tidy >/dev/null
 cmake --build build/tidy --target hulld_proto_sources >/dev/null
-# The sources of the registry are compiled twice, and the second time, in tests/server/schedules, for
-# g++ alone: clang 14 lacks std::source_location.
+# The sources of the registry are compiled twice. The second time, in tests/server/schedules, is for
+# g++ only: clang 14 lacks std::source_location.
 python3 - build/tidy/compile_commands.json <<'PYTHON'
 import json, sys
 with open(sys.argv[1]) as file:
@@ -58,5 +59,5 @@ if [[ -z $files ]]; then
   exit 0
 fi
 echo "$files" | wc -l | sed 's/$/ files/'
-# Warnings are errors; what it says of suppressed warnings in others' headers is noise.
+# Warnings are errors; the summary of suppressed warnings in library headers is noise.
 echo "$files" | xargs -P "$(nproc)" -n 4 clang-tidy-14 -p build/tidy --quiet --warnings-as-errors='*' 2> >(grep -v -e 'warnings generated' -e '^Suppressed' -e '^Use -header-filter' >&2)

@@ -72,7 +72,7 @@ class Parser {
 
   // Returns OK, with `print` set for --help and --version. INVALID_ARGUMENT: the parser's error.
   absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
-    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 consumes arguments from the back.
     try {
       app_.parse(std::move(arguments));
     } catch (const CLI::CallForVersion& version) {
@@ -335,7 +335,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
       return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());
     }
   }
-  // The last value of an option wins and a file only fills what is still unset, hence this order.
+  // The last value of an option wins, and a file only sets unset options; hence this order.
   std::vector<std::string> all = variables;
   all.insert(all.end(), arguments.begin(), arguments.end());
   result = CommandLine();

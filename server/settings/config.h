@@ -35,34 +35,33 @@ struct Limits {
   uint64_t max_writers_per_hull = 100'000;
   // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client takes.
   uint64_t max_pieces_per_body = 10'000;
-  // Bytes that hulls in memory may hold, together with replacements under way, points that wait to
-  // be built or stored, and the placements, pairs and answers of batches, scenes and streams.
-  // Messages of calls and the store's own buffers come on top. 0: half of what the machine or the
-  // control group of the process has.
+  // Memory limit, in bytes, for hulls in memory, replacements in flight, points waiting to be built
+  // or stored, and the placements, pairs, and answers of batches, scenes, and streams. Messages of
+  // calls and the store's buffers are not included. 0: half of the memory of the machine or of the
+  // process's control group.
   uint64_t memory_limit = 0;
-  // Bytes that requests may take from when they are parsed until they are answered, and the same
-  // again for those that are on their way.
+  // Bytes of requests from parsing to reply, and the same number again for arriving requests.
   uint64_t request_memory = 128 << 20;
-  // Open connections: all, and of one address, IPv6 by its first 64 bits. Each takes two
-  // descriptors and some 50 KB. Not bounded by address on a unix socket.
+  // Open connections: total, and per address, IPv6 by its first 64 bits. Each takes two descriptors
+  // and about 50 KB. Unix sockets have no limit per address.
   uint64_t max_connections = 4096;
   uint64_t max_connections_per_address = 512;
-  // Running calls that need no token (reflection); one client may have one in kAnonymousShare of
+  // Running calls that need no token (reflection). One client may have one in kAnonymousShare of
   // them.
   uint64_t max_anonymous_calls = 64;
   static constexpr uint64_t kAnonymousShare = 8;
   // Running calls, including open streams; and running calls that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // One call in this many, of max_calls and of max_calls_per_client, is kept for single calls:
-  // calls that last cannot fill either.
+  // One in this many slots of max_calls and of max_calls_per_client is reserved for single calls,
+  // so that long calls cannot fill either.
   static constexpr uint64_t kKeptForSingleCalls = 4;
   // Running calls of one client, including open streams. Fewer than max_waiting_calls, so that no
   // single client can cause refusals of other clients. A client is a token or, without tokens, a
   // peer address.
   uint64_t max_calls_per_client = 512;
-  // Calls of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and reflection, and watches,
-  // that one client has open.
+  // Open calls of one client to AppendPoints, ReplaceHull, StreamCollisions, SaveBackup,
+  // reflection, and watches.
   uint64_t max_streams_per_client = 256;
   // Running calls of BatchCheckCollisions and FindCollisions, which take turns: in total, and of
   // one client.
@@ -92,22 +91,22 @@ struct Config {
   int threads = 0;
   // Kind of store: "rocksdb", "postgres", or "memory".
   std::string store = "rocksdb";
-  // The directory of "rocksdb". Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state; without a
-  // home, hulld-data where the server is started; ParseCommandLine puts that in its place.
+  // The directory of "rocksdb". If empty, ParseCommandLine sets it to hulld in $XDG_STATE_HOME, or
+  // in ~/.local/state, or, without a home, to ./hulld-data.
   std::string data_dir;
   // The file that holds the connection string of "postgres".
   std::string postgres_conninfo_file;
-  // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
-  // on the command line only, as servers that always did this would take it from each other.
+  // True to replace the active server of a "postgres" store instead of waiting for it. Command line
+  // only: servers that always did this would replace each other in turn.
   bool take_over = false;
-  // Whether servers over one database of "postgres" are active together: "one" or "many".
+  // Number of active servers over one "postgres" database: "one" or "many".
   std::string postgres_servers = "one";
   // Durability of an acknowledged change: "sync" (on disk) or "relaxed" (written, and synced within
   // kRelaxedSyncInterval).
   std::string durability = "sync";
   // The file system of a durable store; null: the operating system's. For tests.
   rocksdb::Env* store_env = nullptr;
-  // How long running calls may take after SIGTERM before they are cancelled.
+  // Time that running calls may take after SIGTERM before they are cancelled.
   std::chrono::milliseconds drain_timeout{10'000};
   // debug, info, warn or error.
   std::string log_level = "info";
@@ -126,21 +125,21 @@ struct Config {
   static constexpr std::chrono::milliseconds kRelaxedSyncInterval{500};
   // Interval of progress messages of a watch without changes.
   static constexpr std::chrono::milliseconds kWatchMarkInterval{1000};
-  // Lists: hulls per page when the request says 0, and at most.
+  // Hulls per page of a list: the default, and the maximum.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
   // Open calls of one connection; its client delays further calls. RFC 9113 (6.5.2) recommends no
   // fewer, and each costs memory from its first header on.
   static constexpr int kCallsPerConnection = 100;
-  // Bound of the time until TLS and the settings of HTTP/2 are agreed on.
+  // Time limit for the TLS handshake and the HTTP/2 settings.
   static constexpr std::chrono::milliseconds kHandshakeTimeout{10'000};
   // Long replies are cut into messages of about this size.
   static constexpr size_t kReplyMessageBytes = 1 << 20;
   // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
   // client takes: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
   static constexpr size_t kMaxFeatureVertices = 1 << 16;
-  // Certificates of pairs of pieces in one answer about bodies, and the bytes of such an answer,
-  // for the same clients. One of SEPARATED takes some 50 bytes, one of TOUCHING some 350.
+  // Limits of one answer about bodies: certificates of pairs of pieces, and bytes, for the same
+  // clients. A certificate of SEPARATED takes about 50 bytes, one of TOUCHING about 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
   // The limit of one row among many, which may end up in a nearly full message.

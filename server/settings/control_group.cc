@@ -11,8 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In a container, the path may be the one that the host knows. Then only its root is there, and is
-// the container's own.
+// In a container, the path may be the host's. Then only the root exists, and it is the container's
+// own group.
 uint64_t LeastAlong(const fs::path& mount, const std::string& group, const GroupLimit& limit) {
   uint64_t least = limit(mount);
   fs::path path = mount;

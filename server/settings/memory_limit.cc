@@ -10,8 +10,8 @@
 namespace hulld::server {
 namespace {
 
-// Reads one of a group's files. "max" is no number, and what is not mounted has no file: both are
-// no limit.
+// Reads one file of a group. "max" is not a number, and an unmounted controller has no file: both
+// mean no limit.
 GroupLimit NumberIn(const char* name) {
   return [name](const std::filesystem::path& directory) {
     std::ifstream file(directory / name);

@@ -21,7 +21,7 @@ namespace hulld::server {
 
 using PostgresRegistry = TestRegistry<PostgresStore>;
 
-// A database of its own for each test, behind a proxy that can fail.
+// A separate database for each test, behind a proxy that can fail.
 class PostgresTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -35,7 +35,7 @@ class PostgresTest : public ::testing::Test {
   static PostgresCluster& cluster() { return PostgresCluster::Shared(); }
 
   absl::StatusOr<std::unique_ptr<PostgresStore>> Open() { return PostgresStore::Open(options_); }
-  // The store must open. Closes the one that was open before.
+  // Opens the store, which must succeed, after closing the previous one.
   PostgresRegistry& Start() {
     hulls_ = nullptr;
     hulls_ = MakeRegistry();
@@ -51,7 +51,7 @@ class PostgresTest : public ::testing::Test {
     EXPECT_TRUE(hulls->loaded().ok()) << hulls->loaded();
     return hulls;
   }
-  // The points that the hull took, as a server that starts now finds them.
+  // Restarts the server and returns the number of points that the hull has received.
   uint64_t ReceivedAfterRestart(const std::string& hull_id) {
     Start();
     const auto view = hulls_->View(hull_id);
@@ -60,7 +60,7 @@ class PostgresTest : public ::testing::Test {
   std::vector<std::string> Ask(const std::string& sql) const {
     return cluster().Ask(database_, sql);
   }
-  // Ends the sessions of hulld for which `condition` holds.
+  // Ends the sessions of hulld that satisfy `condition`.
   void EndSessions(const std::string& condition) const {
     Ask("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = 'hulld' AND "
         "datname = current_database() AND " +
