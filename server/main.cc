@@ -49,7 +49,7 @@ void LogStore(const Config& config) {
   }
 }
 
-// Waits for SIGTERM or SIGINT. Meanwhile checks the files again at each SIGHUP, and periodically
+// Waits for SIGTERM or SIGINT. Reloads certificates and tokens at each SIGHUP, and periodically
 // returns unused memory.
 int WaitForEnd(const sigset_t& signals, Server& server) {
   // A choice: memory is returned soon after a peak, and a check costs 0.1 ms.

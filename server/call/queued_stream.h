@@ -17,9 +17,9 @@
 
 namespace hulld::server {
 
-// A stream with queued replies: any thread makes them, and they are written one by one in the order
-// of the queue. One mutex guards the state; reads, writes and the end are started under it, and
-// gRPC calls back without it.
+// A stream with queued replies: any thread adds them, and they are written one by one in queue
+// order. One mutex guards the state. Reads, writes, and the end are started under it; gRPC calls
+// back without it.
 //
 // The stream ends after an end is set, the earlier replies are written, and no work is in flight.
 // If the client disconnects or is revoked, it ends without the queued replies.

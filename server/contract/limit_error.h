@@ -16,8 +16,8 @@ absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag);
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag);
 
-// As LimitExceeded with the reason OVERLOADED, for a limit used up by other calls at the moment:
-// the same request may succeed after `retry`.
+// As LimitExceeded, with the reason OVERLOADED: other calls use up the limit, and the same request
+// may succeed after `retry`.
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry);
 

@@ -34,10 +34,10 @@ class Migration {
   // DATA_LOSS naming the first damaged hull or body.
   static absl::StatusOr<Migration> Read(Store& source, Progress progress);
 
-  // Copies the hulls and bodies missing in the target, in byte order of the IDs, each as a whole,
-  // so that a run interrupted at any point can be continued. FAILED_PRECONDITION, without any
-  // change: the target is a complete store, or of a migration from another store. DATA_LOSS: a hull
-  // of the source is damaged. Other errors: as the target's.
+  // Copies the hulls and bodies missing in the target, each as a whole, in byte order of the IDs.
+  // An interrupted run can therefore be resumed. FAILED_PRECONDITION, without any change: the
+  // target is a complete store, or belongs to a migration from another store. DATA_LOSS: a hull of
+  // the source is damaged. Other errors: as the target's.
   absl::StatusOr<MigrationCounts> CopyTo(MigrationTarget& target);
 
   // Reads everything back, from both. DATA_LOSS naming the first hull or body that differs: its

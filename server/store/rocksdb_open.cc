@@ -210,8 +210,8 @@ absl::Status RocksDbStore::OpenDbInRoom() {
   return absl::OkStatus();
 }
 
-// RocksDB takes the lock itself, except for reading. A file system that is mounted for reading
-// needs no lock: nobody can write there.
+// RocksDB takes the lock itself, except for read-only access. A read-only file system needs no
+// lock, because no process can write there.
 absl::Status RocksDbStore::Lock() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   if (!env_->FileExists(directory + "/CURRENT").ok()) {
@@ -245,7 +245,7 @@ absl::Status RocksDbStore::CheckLogs() {
   return resumed.ok() ? absl::OkStatus() : OpenError(resumed, options_.data_dir, false);
 }
 
-// Changes after a gap are dropped as well, so that the store is that of one moment.
+// Changes after a gap are dropped, so that the store has the state at one revision.
 absl::Status RocksDbStore::DropLogsFrom(uint64_t number) {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   std::vector<std::string> names;

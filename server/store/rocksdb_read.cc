@@ -40,8 +40,8 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
   return std::string(*value);
 }
 
-// Blocks are left out of the cache, where they would put each other out before they are used again.
-// What was found may be a part of the database, which must stay until it was visited.
+// Bypasses the block cache, where the blocks of a scan would evict each other before reuse. The
+// result may pin a part of the database until it was visited.
 void RocksDbStore::FindValues(std::span<const std::string> keys,
                               const std::function<void(size_t, std::string_view)>& visit) {
   const std::shared_lock lock(db_mutex_);
@@ -176,7 +176,7 @@ absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* asse
 absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, VertexAssembly* assembly) {
   if (hull.layout.delta_count == 0) return absl::OkStatus();
   const uint64_t incarnation = hull.record.create_revision;
-  // A single one mostly came with the last change: one value costs half of what a range does.
+  // A single delta usually came with the last change: reading one value costs half of a range scan.
   if (hull.layout.delta_count == 1) {
     const absl::StatusOr<std::optional<std::string>> delta =
         Read(DeltaKey(incarnation, hull.record.revision));

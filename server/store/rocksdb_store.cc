@@ -23,7 +23,7 @@
 
 namespace hulld::server {
 
-// RocksDB's errors do not tell failed syncs from failed writes.
+// RocksDB's errors do not distinguish failed syncs from failed writes.
 void RocksDbStore::CountWriteFailure() {
   const uint64_t failed_syncs = files_->failed_syncs();
   const bool is_sync = seen_failed_syncs_.exchange(failed_syncs) != failed_syncs;

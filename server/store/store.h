@@ -197,8 +197,8 @@ class Store {
   // None for a store without files. Cost: O(files), some 10 us each.
   virtual std::optional<StoreDisk> disk() const { return std::nullopt; }
 
-  // Makes a consistent copy of the store, as of some moment during the call. Returns its directory,
-  // which the caller removes. FAILED_PRECONDITION: the store keeps nothing.
+  // Makes a consistent copy of the store at some revision during the call. Returns its directory,
+  // which the caller removes. FAILED_PRECONDITION: the store is in memory.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
 
   // True if peer servers may commit to the same store. Then Commit skips the changes of all IDs

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-// Errors of RocksDB, as statuses for clients that say what to do. data_dir: the setting.
+// Converts RocksDB's errors into statuses for clients, with a remedy. data_dir: the setting.
 namespace hulld::server {
 
 // For a failed write that left nothing behind. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE:
@@ -17,7 +17,7 @@ absl::Status WriteError(const rocksdb::Status& status, const std::string& data_d
 // UNAVAILABLE: a write failed, and cutting its remains off the log failed, too (`cut`).
 absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
                             const std::string& data_dir);
-// For a failed read. DATA_LOSS: the value is damaged. UNAVAILABLE: any other cause. what: the
+// Error of a failed read. DATA_LOSS: the value is damaged. UNAVAILABLE: any other cause. what: the
 // failed operation.
 absl::Status ReadError(const rocksdb::Status& status, const std::string& what);
 // UNAVAILABLE: the database could not be reopened after an error, not even for reading.

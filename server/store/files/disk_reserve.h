@@ -17,8 +17,8 @@ class DiskReserve {
   DiskReserve(rocksdb::FileSystem& files, std::string path, uint64_t bytes)
       : files_(files), path_(std::move(path)), bytes_(bytes) {}
 
-  // Makes the file unless it is there. An error: there is no file. Cost: one allocation of the file
-  // system, or writing `bytes` where it has none.
+  // Creates the file if it is missing. On error, no file exists. Cost: one allocation of the file
+  // system, or writing `bytes` if it does not support allocation.
   rocksdb::IOStatus Ensure();
   // Returns true if there was a file.
   bool Release();

@@ -38,7 +38,7 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   // gives the lock back. Set before the first lock.
   void OnLocked(std::function<rocksdb::IOStatus()> locked) { locked_ = std::move(locked); }
 
-  // Keeps the mark in the file of this path from now on. `mark` is what the file holds.
+  // Keeps the mark in the file of this path from now on. `mark` is the file's current content.
   rocksdb::IOStatus ResumeMark(const std::string& path, LogMark mark);
   // Keeps the mark in a new file, which replaces any other. Requires: all committed bytes are on
   // disk.
@@ -54,9 +54,9 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   // Syncs of files and directories that failed so far. RocksDB refuses writes after one in the
   // background, too.
   uint64_t failed_syncs() const { return failed_syncs_.load(std::memory_order_relaxed); }
-  // Cuts off all uncommitted bytes and syncs the logs. Requires that nothing is written to them
-  // meanwhile (unchecked: RocksDbStore, the only caller, holds its log_mutex_ or has closed the
-  // database). An error: some bytes may still be there, and the next call tries again.
+  // Truncates all uncommitted bytes and syncs the logs. Requires: no concurrent writes to the logs
+  // (unchecked: RocksDbStore, the only caller, holds its log_mutex_ or has closed the database). On
+  // error, some bytes may remain, and the next call tries again.
   rocksdb::IOStatus CutUncommitted();
 
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,

@@ -50,7 +50,7 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
                                                    const LogMark& mark);
 
 // The file that keeps the mark. Two slots of one sector each are overwritten in turn, so that one
-// of them is whole whenever the power goes out, and a full disk is no obstacle.
+// is intact after a power failure, and a full disk does not prevent writing.
 class LogMarkFile {
  public:
   // None if there is no file. DATA_LOSS: it holds no mark. UNAVAILABLE: it cannot be read.

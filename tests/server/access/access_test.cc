@@ -1,4 +1,4 @@
-// Tokens over the contract: who may call what, and who sees which hulls.
+// Tokens over the wire: permissions of each role, and visibility of hulls by prefix.
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
@@ -41,8 +41,8 @@ struct CallRule {
   Permission needed;
   // The messages of a request about a hull.
   std::function<std::vector<std::string>(const std::string& hull_id)> request;
-  // How a hull outside of the caller's prefix is refused: by the call's status, inside its reply,
-  // or the call is about no hull.
+  // Form of the refusal of a hull outside the caller's prefix: the call's status, an entry in its
+  // reply, or none because the call names no hull.
   enum { kByStatus, kInReply, kNoHull } refusal;
 };
 
@@ -260,7 +260,7 @@ class Access : public ServerTest {
       grpc::ByteBuffer reply;
       stream->Read(&reply, nullptr);
       more = done();
-      // It would last.
+      // A call that does not end by itself.
       if (more && method.ends_with("WatchHulls")) context.TryCancel();
       std::vector<grpc::Slice> slices;
       if (!more || !reply.Dump(&slices).ok()) continue;
@@ -299,7 +299,8 @@ class Access : public ServerTest {
   std::string path_;
 };
 
-// A body is used by those who may use all of its pieces; others hear of no hull of another prefix.
+// A token may use a body if it may use all of its pieces. Errors never name a hull outside the
+// token's prefix.
 TEST_F(Access, APieceOutsideOfThePrefixIsRefusedUnnamed) {
   v1::PutBodyRequest put;
   put.set_body_id("cell-1/body");

@@ -68,7 +68,7 @@ grpc::StatusCode SendBatch(const std::string& address, const grpc::ByteBuffer& r
 
 class HostileRequest : public ::testing::Test {
  protected:
-  // Many callers at once: what the program holds, at most, above what it held at rest.
+  // Many concurrent callers: limits the server's peak memory above its idle memory.
   static void ExpectLittleMemory(const std::vector<std::string>& settings,
                                  grpc::StatusCode expected) {
     if (kKeepsWhatWasFreed) GTEST_SKIP() << "AddressSanitizer keeps what was freed";
@@ -84,7 +84,7 @@ class HostileRequest : public ::testing::Test {
     for (int i = 0; i < kCallers; ++i) {
       callers.emplace_back([&] {
         const grpc::StatusCode code = SendBatch(address, request);
-        // gRPC itself ends calls whose bytes it has no room for.
+        // gRPC itself ends calls if it has no memory for their messages.
         EXPECT_TRUE(code == expected || code == grpc::RESOURCE_EXHAUSTED ||
                     code == grpc::UNAVAILABLE)
             << code;
@@ -135,7 +135,7 @@ TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
   };
   std::vector<std::unique_ptr<Stream>> streams;
   streams.push_back(std::make_unique<Stream>());
-  // hull.proto, and what it needs: geometry.proto, freshness.proto and Duration.
+  // hull.proto and its dependencies: geometry.proto, freshness.proto, and Duration.
   constexpr int kFiles = 4;
   EXPECT_EQ(open(*streams.back()), kFiles);
   const long before = StatusField(hulld.pid(), "Threads");

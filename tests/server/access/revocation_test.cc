@@ -41,7 +41,7 @@ class Revocation : public ServerTest {
   }
   ~Revocation() override { std::filesystem::remove(path_); }
 
-  // The deadline ends what a server leaves open; no other test waits for it.
+  // The deadline bounds calls that a faulty server leaves open; no passing test waits for it.
   static void Be(grpc::ClientContext& context, const std::string& token) {
     Authorize(context, token);
     context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(1));
@@ -139,7 +139,7 @@ TEST_F(Revocation, EndsWhatIsBeingComputed) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-// A stream that waits for its client to read cannot tell it why, but ends.
+// A stream that waits for its client to read cannot send the reason, but it ends.
 TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 20'000; ++i) *request.add_placements() = PlacementOf("cube");

@@ -1,4 +1,4 @@
-// Over TLS: who gets in, and what happens when the files change.
+// TLS: accepted and rejected clients, and reloading of changed files.
 
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
@@ -102,7 +102,7 @@ TEST_F(Tls, MutualTlsRefusesClientsWithoutACertificateOfTheAuthority) {
             grpc::StatusCode::UNAVAILABLE);
 }
 
-// As with the last token: the authority may have been revoked.
+// Missing files count as revoked, like the last token.
 TEST_F(Tls, WithoutAnAuthorityOfClientsNobodyConnects) {
   config_.tls_client_ca = Write("clients.crt", authority_.certificate());
   Restart(config_);

@@ -276,7 +276,7 @@ TEST_F(StreamBases, AReplyWaitsForOthersUntilOneFollowsOrAllIsSaid) {
           ASSERT_NE(stream->LastWaiting(), nullptr);
           stream->LastWaiting()->set_first_pair(2);
         });
-        // It does not wait behind another: only the last one does.
+        // Only the last one waits behind another.
         stream->Reply(3, 10);
         stream->Do([&] { EXPECT_EQ(stream->LastWaitingBytes(), 10u); });
         stream->SetEnd(absl::OkStatus());

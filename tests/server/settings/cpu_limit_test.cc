@@ -1,5 +1,4 @@
-// How much time of processors the control groups grant, read from a tree of files made for each
-// test.
+// Processor quotas of control groups, read from a tree of files made for each test.
 
 #include "server/settings/cpu_limit.h"
 

@@ -1,4 +1,4 @@
-// How much memory the control groups allow, read from a tree of files made for each test.
+// Memory limits of control groups, read from a tree of files made for each test.
 
 #include "server/settings/memory_limit.h"
 
@@ -79,7 +79,7 @@ TEST_F(MemoryLimit, VersionOneHasAHierarchyOfItsOwn) {
   EXPECT_EQ(ControlGroupMemory(root_), 7000);
 }
 
-// The path is the host's, and what is mounted is the container's own group.
+// The path is the host's, but the mounted tree is the container's own group.
 TEST_F(MemoryLimit, InAContainerOfVersionOneTheRootCounts) {
   Write("proc/self/cgroup", "5:memory:/docker/0123");
   Write("sys/fs/cgroup/memory/memory.limit_in_bytes", "7000");

@@ -44,7 +44,7 @@ class StoreFault : public StoreTest {
         EXPECT_FALSE(hulls_->Create("new").ok());
         EXPECT_FALSE(hulls_->Delete("h").ok());
         EXPECT_FALSE(hulls_->Replace({"h", {}, false, std::make_shared<HullBuilder>(), {}}).ok());
-        // Queries go on, for hulls in memory and for others.
+        // Queries continue, for hulls in memory and for evicted ones.
         EXPECT_EQ(hulls_->View("h")->record, before.record);
         EXPECT_EQ(CanonicalOf(*hulls_->View("h")).vertices().size(), 8);
         EXPECT_EQ(hulls_->View("cold")->record.vertex_count, 8);

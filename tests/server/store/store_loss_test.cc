@@ -180,7 +180,7 @@ TEST_F(StoreLoss, EachOfSeveralLogsIsMissed) {
   }
 }
 
-// Logs after a gap are not replayed: the store is that of one moment.
+// Logs after a gap are not replayed, so the store has the state at one revision.
 TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   fs::resize_file(Logs()[1], 0);
