@@ -5,7 +5,7 @@
 #
 # On a bare Debian 12, first installs the packages in docker/packages.txt (as root) and builds hulld
 # and hullctl into build/demo. Then starts a server, registers hulls, runs queries with known
-# answers, streams points into a hull while querying it, and writes one picture. Stops everything
+# answers, streams points into a hull while querying it, and writes one page. Stops everything
 # that it started, and fails if an answer differs from the expected one.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -213,10 +213,9 @@ streaming_scene() {
 }
 
 draw_picture() {
-  heading "A picture: points, mesh and hull side by side"
-  ctl picture --points "$models/spider.obj" --mesh "$models/spider.obj" --hull spider \
-    -o "$build/scene.svg"
-  echo "  $build/scene.svg"
+  heading "A page: points, mesh, and hull of a file; it needs no server"
+  ctl view "$models/spider.obj" --html "$build/spider.html" >/dev/null
+  echo "  $build/spider.html"
 }
 
 mkdir -p "$work"

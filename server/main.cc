@@ -19,6 +19,7 @@
 #include "server/server.h"
 #include "server/settings/config.h"
 #include "server/settings/cpu_limit.h"
+#include "server/settings/variables.h"
 
 namespace hulld::server {
 namespace {
@@ -156,8 +157,10 @@ int Main(const std::vector<std::string>& arguments) {
     return RunMigrate({arguments.begin() + 1, arguments.end()}, std::cout, std::cerr);
   }
   const absl::StatusOr<CommandLine> command_line = ParseCommandLine(arguments, ProcessEnvironment);
-  if (!command_line.ok()) {
-    std::fprintf(stderr, "hulld: %s\n", std::string(command_line.status().message()).c_str());
+  const absl::Status status =
+      command_line.ok() ? CheckVariables(ProcessVariables()) : command_line.status();
+  if (!status.ok()) {
+    std::fprintf(stderr, "hulld: %s\n", std::string(status.message()).c_str());
     return kExitUsage;
   }
   if (!command_line->print.empty()) {
@@ -165,10 +168,10 @@ int Main(const std::vector<std::string>& arguments) {
     return 0;
   }
   if (command_line->check) return Check(*command_line);
-  const int status = Run(command_line->config);
-  if (status == 0) spdlog::info("ended");
+  const int code = Run(command_line->config);
+  if (code == 0) spdlog::info("ended");
   spdlog::shutdown();
-  return status;
+  return code;
 }
 
 }  // namespace

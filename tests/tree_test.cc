@@ -129,8 +129,6 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/body",
     "client/hullctl/scene",
     "client/hullctl/load",
-    "client/hullctl/picture",
-    "client/hullctl/shell",
     "client/hullctl/view/bridge",
     "client/hullctl/view",
     "client/hullctl/parts",

@@ -43,6 +43,24 @@ bool IsHuge(std::string_view text) {
   return exponent + (negative ? -written : written) > 0;
 }
 
+// Returns the length of the UTF-8 character at the start of the text, which is not empty; 0 if it
+// is malformed. Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
+size_t CharacterLength(std::string_view text) {
+  const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned lead = byte(0);
+  if (lead < 0x80) return 1;
+  if (lead < 0xC2 || lead > 0xF4) return 0;
+  const size_t length = lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : 4;
+  if (text.size() < length) return 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  const bool overlong = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
+  const bool surrogate = lead == 0xED && byte(1) >= 0xA0;
+  const bool too_large = lead == 0xF4 && byte(1) >= 0x90;
+  return overlong || surrogate || too_large ? 0 : length;
+}
+
 }  // namespace
 
 NumberText ParseDouble(std::string_view text, double* value) {
@@ -93,10 +111,30 @@ std::string_view Trim(std::string_view text) {
 
 std::string Quoted(std::string_view text) {
   constexpr size_t kLongest = 40;
+  size_t end = text.size();
+  if (end > kLongest) {
+    // Ends before a whole character.
+    for (end = kLongest; end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80;) --end;
+  }
   std::string quoted = "\"";
-  for (const char c : text.substr(0, kLongest)) quoted += c >= ' ' && c <= '~' ? c : '?';
-  if (text.size() > kLongest) quoted += "...";
-  return quoted + "\"";
+  quoted += Printable(text.substr(0, end));
+  quoted += end < text.size() ? "...\"" : "\"";
+  return quoted;
+}
+
+std::string Printable(std::string_view text) {
+  std::string printable;
+  while (!text.empty()) {
+    const size_t length = CharacterLength(text);
+    const bool is_control = length == 1 && (text[0] < ' ' || text[0] == '\x7F');
+    if (length == 0 || is_control) {
+      printable += '?';
+    } else {
+      printable += text.substr(0, length);
+    }
+    text.remove_prefix(length == 0 ? 1 : length);
+  }
+  return printable;
 }
 
 std::string NumberProblem(NumberText kind, std::string_view text) {

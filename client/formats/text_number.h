@@ -39,6 +39,9 @@ std::string_view Trim(std::string_view text);
 // error message.
 std::string Quoted(std::string_view text);
 
+// Returns the text with "?" in place of control characters and of bytes that are not UTF-8.
+std::string Printable(std::string_view text);
+
 // Returns the defect in the text of a coordinate, such as `"abc" is not a number`.
 std::string NumberProblem(NumberText kind, std::string_view text);
 

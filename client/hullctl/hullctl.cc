@@ -33,7 +33,7 @@ void AddOutputOptions(Command program, Invocation* invocation) {
                                                 : OutputForm::kTable;
             return absl::OkStatus();
           },
-          "How answers are printed (default table)")
+          "Format of answers (default table)")
       .ValueName("FORM")
       .OneOf({"table", "wide", "name", "json"});
   program
@@ -44,7 +44,7 @@ void AddOutputOptions(Command program, Invocation* invocation) {
             invocation->paint = Painter(WantsColor(when, terminal));
             return absl::OkStatus();
           },
-          "Whether to use colors (default auto: on a terminal, unless $NO_COLOR is set)")
+          "Use of colors (default auto: on a terminal, unless $NO_COLOR is set)")
       .ValueName("WHEN")
       .OneOf({"auto", "always", "never"});
 }
@@ -61,9 +61,9 @@ void AddGlobalOptions(Command program, Invocation* invocation) {
             invocation->given_timeout = *timeout;
             return absl::OkStatus();
           },
-          "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
-          "'backup save' take the time that they need unless it is given). A server that cannot be "
-          "reached is retried until then, without the option for less than a second")
+          "Time to wait for an answer, such as 500ms or 2m (default 30s; none for 'replace' and "
+          "'backup save'). An unreachable server is retried during this time; by default, for less "
+          "than a second")
       .ValueName("TIME");
   AddOutputOptions(program, invocation);
 }
@@ -77,13 +77,12 @@ void AddCommands(Command program, Invocation* invocation) {
   AddReplaceCommand(program, invocation);
   AddDeleteCommand(program, invocation);
   AddBodyCommand(program, invocation);
-  program.BeginGroup("Look at hulls");
+  program.BeginGroup("Inspect hulls");
   AddListCommand(program, invocation);
   AddGetCommand(program, invocation);
   AddMeshCommand(program, invocation);
   AddViewCommand(program, invocation);
-  AddPictureCommand(program, invocation);
-  program.BeginGroup("Ask what collides");
+  program.BeginGroup("Check for collision");
   AddCheckCommand(program, invocation);
   AddBatchCommand(program, invocation);
   AddSceneCommand(program, invocation);
@@ -100,7 +99,6 @@ void AddCommands(Command program, Invocation* invocation) {
   AddBenchCommand(program, invocation);
   program.BeginGroup("Work with hullctl");
   AddContextCommand(program, invocation);
-  AddShellCommand(program, invocation);
   AddCompletionCommand(program, invocation);
   AddGenerateCommand(program, invocation);
   AddManCommand(program, invocation);
@@ -118,7 +116,7 @@ std::vector<std::string> WithoutHelpCommand(std::vector<std::string> arguments) 
 void AddProgram(Command program, Invocation* invocation) {
   program.SetDetails(std::string(kExitCodeHelp) +
                      "\nJSON follows the mapping of proto3: 64-bit integers are strings.");
-  program.SetExamples({{"A server, a hull, a question", "hulld --data-dir hulls &"},
+  program.SetExamples({{"A server, a hull, a query", "hulld --data-dir hulls &"},
                        {"", "hullctl generate lattice 27 | hullctl append cube - --create"},
                        {"", "hullctl check cube cube --pose-b 2,0,0"}});
   AddGlobalOptions(program, invocation);
@@ -150,20 +148,7 @@ int CompleteWords(const std::vector<std::string>& words, CommandLine* command_li
   return static_cast<int>(ExitCode::kDone);
 }
 
-// Passes the options of a shell session to its lines. A line with its own server inherits no
-// connection settings.
-void Inherit(const Invocation& session, Invocation* line) {
-  if (!line->flags.contains("server") && line->context.empty()) {
-    line->flags.insert(session.flags.begin(), session.flags.end());
-    line->context = session.context;
-  }
-  if (session.given_timeout.has_value() && !line->given_timeout.has_value()) {
-    line->timeout = session.timeout;
-    line->given_timeout = session.given_timeout;
-  }
-}
-
-ExitCode Act(Invocation* invocation) {
+ExitCode RunAction(Invocation* invocation) {
   if (invocation->needs_server) {
     const absl::Status resolved = ResolveConnection(invocation);
     if (!resolved.ok()) return invocation->FailUsage(resolved);
@@ -173,41 +158,26 @@ ExitCode Act(Invocation* invocation) {
   const ExitCode code = invocation->action();
   invocation->out.flush();
   if (invocation->out) return code;
-  invocation->err << "hullctl: cannot write the answer; is the disk full or the pipe closed?\n";
+  invocation->err << "hullctl: cannot write the answer: the disk is full, or the pipe is closed\n";
   return ExitCode::kUsage;
 }
 
-// Runs one command line; `session` is that of its shell, or null.
-int Run(const std::vector<std::string>& arguments, const Invocation* session, std::ostream& out,
-        std::ostream& err) {
-  CommandLine command_line(
-      "hullctl", HULLD_VERSION,
-      "Keeps convex hulls on a hulld server and asks it whether they collide.");
+}  // namespace
+
+int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+  CommandLine command_line("hullctl", HULLD_VERSION,
+                           "Manages convex hulls on a hulld server and checks them for collision.");
   Invocation invocation(out, err);
   invocation.paint = Painter(WantsColor("auto", &out == &std::cout && isatty(STDOUT_FILENO) != 0));
   invocation.shows_progress = &err == &std::cerr && isatty(STDERR_FILENO) != 0;
-  if (session != nullptr) {
-    invocation.form = session->form;
-    invocation.paint = session->paint;
-  }
   AddProgram(command_line.root(), &invocation);
   if (!arguments.empty() && arguments.front() == kCompleteCommand) {
     return CompleteWords({arguments.begin() + 1, arguments.end()}, &command_line, &invocation);
   }
   const std::optional<ExitCode> ended = command_line.Parse(WithoutHelpCommand(arguments), out, err);
   if (ended.has_value()) return static_cast<int>(*ended);
-  if (session != nullptr) Inherit(*session, &invocation);
   invocation.program = &command_line.description();
-  invocation.run_line = [&invocation](const std::vector<std::string>& line) {
-    return Run(line, &invocation, invocation.out, invocation.err);
-  };
-  return static_cast<int>(Act(&invocation));
-}
-
-}  // namespace
-
-int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
-  return Run(arguments, nullptr, out, err);
+  return static_cast<int>(RunAction(&invocation));
 }
 
 }  // namespace hulld

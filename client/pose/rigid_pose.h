@@ -7,7 +7,8 @@ namespace hulld {
 
 // X_AB, the pose of a frame B in a frame A, as in Pose of the contract: quaternion w x y z, which
 // need not be normalized, then translation x y z. p_A = R(quaternion) p_B + translation.
-using RigidPose = std::array<double, 7>;
+inline constexpr int kPoseNumbers = 7;
+using RigidPose = std::array<double, kPoseNumbers>;
 inline constexpr RigidPose kNoMotion = {1, 0, 0, 0, 0, 0, 0};
 
 // Returns the rotation by `angle` (radians) about `axis`, which need not have unit length. An axis

@@ -14,8 +14,8 @@ namespace {
 absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
                            const std::string& value) {
   return WithReason(absl::PermissionDeniedError(absl::StrCat(
-                        field, " \"", absl::CEscape(value), "\" is outside of \"", caller.prefix,
-                        "\", which token \"", caller.name,
+                        field, " \"", absl::Utf8SafeCEscape(value), "\" is outside of \"",
+                        caller.prefix, "\", which token \"", caller.name,
                         "\" is limited to; use an ID that starts with it, or another token")),
                     v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }

@@ -34,7 +34,7 @@ std::optional<Permission> ReadRole(const std::string& text) {
 absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
   if (text == "*") return "";
   if (!text.ends_with("/")) {
-    return absl::InvalidArgumentError(absl::StrCat("the prefix \"", absl::CEscape(text),
+    return absl::InvalidArgumentError(absl::StrCat("the prefix \"", absl::Utf8SafeCEscape(text),
                                                    "\" must end in \"/\"; use \"*\" for all IDs"));
   }
   const absl::Status valid = CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix");

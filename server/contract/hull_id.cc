@@ -27,12 +27,12 @@ absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field) 
   for (size_t i = 0; i <= id.size(); ++i) {
     const bool at_end = i == id.size() || id[i] == '/';
     if (at_end && segment_start) {
-      return absl::InvalidArgumentError(absl::StrCat(field, " \"", absl::CEscape(id),
+      return absl::InvalidArgumentError(absl::StrCat(field, " \"", absl::Utf8SafeCEscape(id),
                                                      "\" has an empty segment at character ", i));
     }
     if (!at_end && !(segment_start ? IsAlphanumeric(id[i]) : IsInner(id[i]))) {
       return absl::InvalidArgumentError(
-          absl::StrCat(field, " \"", absl::CEscape(id), "\" is malformed at character ", i,
+          absl::StrCat(field, " \"", absl::Utf8SafeCEscape(id), "\" is malformed at character ", i,
                        "; IDs are segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by \"/\""));
     }
     segment_start = at_end;

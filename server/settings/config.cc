@@ -2,14 +2,25 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <memory>
+#include <numeric>
+#include <sstream>
+#include <utility>
+
+#include "server/settings/variables.h"
+
+#define TOML_EXCEPTIONS 0
+#include <toml++/toml.h>
 
 namespace hulld::server {
 namespace {
@@ -19,9 +30,117 @@ constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kMaxPieceIndex = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 
+constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
+// Least --memory-limit: one message of the default largest size.
+constexpr uint64_t kLeastMemory = 16 << 20;
+constexpr char kVariablePrefix[] = "HULLD_";
+
 std::string EnvironmentName(std::string flag) {
   for (char& c : flag) c = c == '-' ? '_' : static_cast<char>(std::toupper(c));
-  return "HULLD_" + flag;
+  return kVariablePrefix + flag;
+}
+
+// Returns the number of insertions, deletions, and replacements that turn `a` into `b`.
+size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (size_t i = 0; i < a.size(); ++i) {
+    size_t diagonal = std::exchange(row[0], i + 1);
+    for (size_t j = 0; j < b.size(); ++j) {
+      const size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
+// Returns the known word nearest to a misspelled one; empty if none is near.
+std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
+  std::string nearest;
+  size_t least = std::max<size_t>(1, word.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    const size_t distance = EditDistance(word, candidate);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+std::string Hint(const std::string& word, const std::vector<std::string>& known,
+                 const std::string& prefix = "") {
+  const std::string nearest = Nearest(word, known);
+  return nearest.empty() ? "" : absl::StrCat("; did you mean ", prefix, nearest, "?");
+}
+
+struct SizeUnit {
+  const char* name;
+  uint64_t bytes;
+};
+constexpr SizeUnit kSizeUnits[] = {{"", 1},
+                                   {"B", 1},
+                                   {"kB", 1000},
+                                   {"MB", 1000 * 1000},
+                                   {"GB", 1000 * 1000 * 1000},
+                                   {"KiB", 1 << 10},
+                                   {"MiB", 1 << 20},
+                                   {"GiB", 1 << 30}};
+
+// Returns the bytes of a size such as "512MiB".
+std::optional<uint64_t> ParseSize(const std::string& text) {
+  uint64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [parsed, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc()) return std::nullopt;
+  for (const SizeUnit& unit : kSizeUnits) {
+    if (std::string(parsed, end) != unit.name) continue;
+    if (number > kAnyNumber / unit.bytes) return std::nullopt;
+    return number * unit.bytes;
+  }
+  return std::nullopt;
+}
+
+// Wraps descriptions, so that lines have at most 100 columns.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_desc(const CLI::Option* option) const override {
+    const size_t width = 100 - get_column_width();
+    std::istringstream words(option->get_description());
+    std::string text;
+    size_t column = 0;
+    for (std::string word; words >> word; column += word.size()) {
+      const bool fits = column + 1 + word.size() <= width;
+      if (!text.empty()) text += fits ? ' ' : '\n';
+      column = text.empty() || !fits ? 0 : column + 1;
+      text += word;
+    }
+    return text;
+  }
+};
+
+// A value from a variable or a file, as an argument, and the text before its errors.
+struct Setting {
+  std::string argument;
+  std::string where;
+};
+
+std::string ValueText(const toml::node& value) {
+  if (const auto text = value.value_exact<std::string>()) return *text;
+  if (const auto number = value.value_exact<int64_t>()) return absl::StrCat(*number);
+  if (const auto truth = value.value_exact<bool>()) return *truth ? "true" : "false";
+  if (const auto number = value.value_exact<double>()) {
+    char text[32];
+    return std::string(text, std::to_chars(text, std::end(text), *number).ptr);
+  }
+  return "";
+}
+
+std::string LineOf(const std::string& path, size_t number) {
+  std::ifstream file(path);
+  std::string line;
+  for (size_t i = 0; i < number && std::getline(file, line);) ++i;
+  return line;
 }
 
 // Returns an empty string if `text` is a number of seconds up to a day; NaN is not.
@@ -41,28 +160,79 @@ class Parser {
     AddServing();
     AddGuard();
     AddLimits();
-    app_.set_config("--config", "", "TOML file with the same settings, as in: max-hulls = 1000")
-        ->envname(EnvironmentName("config"))
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    app_.allow_config_extras(CLI::config_extras_mode::error);
+    Add("config", config_file_, "TOML file with the same settings, as in: max-hulls = 1000")
+        ->configurable(false);
+    app_.formatter(std::make_shared<HelpFormatter>());
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
     app_.footer(
         "Precedence: flag, environment variable, file, default.\n"
-        "See 'hulld doctor --help' to audit a store and 'hulld migrate --help' to copy one.");
+        "A SIZE is a number of bytes, or has a unit: kB, MB, GB, KiB, MiB, GiB, as in 512MiB.\n"
+        "'hulld doctor --help' explains how to audit a store, 'hulld migrate --help' how to move "
+        "one.");
   }
 
-  // Returns the environment variables as arguments.
-  std::vector<std::string> FromEnvironment(const Environment& environment) const {
-    std::vector<std::string> arguments;
+  std::vector<Setting> FromEnvironment(const Environment& environment) const {
+    std::vector<Setting> settings;
     for (const CLI::Option* option : app_.get_options()) {
       const std::string variable = option->get_envname();
       if (variable.empty()) continue;
       const std::optional<std::string> value = environment(variable);
       if (value.has_value() && !value->empty()) {
-        arguments.push_back(option->get_name() + "=" + *value);
+        settings.push_back({option->get_name() + "=" + *value, variable + ": "});
       }
     }
-    return arguments;
+    return settings;
+  }
+
+  // INVALID_ARGUMENT, naming the file and the line: not TOML, an unknown key, or a value that is no
+  // text, number, or boolean.
+  absl::StatusOr<std::vector<Setting>> FromFile(const std::string& path) const {
+    const toml::parse_result table = toml::parse_file(path);
+    if (!table) {
+      const uint32_t line = table.error().source().begin.line;
+      if (line == 0) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("--config: ", path, ": ", std::string(table.error().description())));
+      }
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, ":", line, ": \"", LineOf(path, line), "\" is not TOML: ",
+          std::string(table.error().description()), "; a setting is KEY = VALUE, text in quotes"));
+    }
+    const std::vector<std::string> known =
+        NamesOf([](const CLI::Option& option) { return option.get_configurable(); });
+    std::vector<Setting> settings;
+    for (const auto& [toml_key, value] : table.table()) {
+      const std::string key(toml_key.str());
+      const std::string where = absl::StrCat(path, ":", toml_key.source().begin.line, ": ");
+      if (std::ranges::find(known, key) == known.end()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(where, "unknown key \"", key, "\"", Hint(key, known)));
+      }
+      if (!value.is_value() || value.is_date() || value.is_time() || value.is_date_time()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(where, "the value of ", key, " is no text, number, or boolean"));
+      }
+      // An empty text is the default, as in variables.
+      const std::string text = ValueText(value);
+      if (!text.empty()) settings.push_back({absl::StrCat("--", key, "=", text), where});
+    }
+    return settings;
+  }
+
+  // INVALID_ARGUMENT: a variable of this name is likely a misspelled setting.
+  absl::Status CheckVariable(const std::string& variable) const {
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app_.get_options()) {
+      if (option->get_envname() == variable) return absl::OkStatus();
+      if (!option->get_envname().empty()) {
+        known.push_back(option->get_envname().substr(std::size(kVariablePrefix) - 1));
+      }
+    }
+    const std::string hint =
+        Hint(variable.substr(std::size(kVariablePrefix) - 1), known, kVariablePrefix);
+    if (hint.empty()) return absl::OkStatus();
+    return absl::InvalidArgumentError(
+        absl::StrCat("the environment variable ", variable, " is no setting", hint));
   }
 
   // Restricts Parse to its arguments. CLI11 would also read the variables of all unset options.
@@ -81,11 +251,8 @@ class Parser {
     } catch (const CLI::CallForHelp&) {
       result->print = app_.help();
       return absl::OkStatus();
-    } catch (const CLI::ConfigError& error) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--config: the file has an unknown key: ", error.what()));
-    } catch (const CLI::FileError& error) {
-      return absl::InvalidArgumentError(absl::StrCat("--config: ", error.what()));
+    } catch (const CLI::ExtrasError&) {
+      return UnknownArgument(app_.remaining().front());
     } catch (const CLI::Error& error) {
       return absl::InvalidArgumentError(error.what());
     }
@@ -98,7 +265,32 @@ class Parser {
     return absl::OkStatus();
   }
 
+  // File of --config after Parse; empty for none.
+  const std::string& config_file() const { return config_file_; }
+
  private:
+  // Returns the names, without dashes, of the options that satisfy `predicate`.
+  template <typename Predicate>
+  std::vector<std::string> NamesOf(const Predicate& predicate) const {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app_.get_options()) {
+      if (predicate(*option)) names.push_back(option->get_single_name());
+    }
+    return names;
+  }
+
+  absl::Status UnknownArgument(const std::string& argument) const {
+    if (!argument.starts_with("-")) {
+      return absl::InvalidArgumentError(absl::StrCat("unexpected argument \"", argument, "\"",
+                                                     Hint(argument, {"doctor", "migrate"})));
+    }
+    const std::string flag = argument.substr(0, argument.find('='));
+    const size_t dashes = std::min(flag.find_first_not_of('-'), flag.size());
+    return absl::InvalidArgumentError(absl::StrCat(
+        "unknown flag ", flag,
+        Hint(flag.substr(dashes), NamesOf([](const CLI::Option&) { return true; }), "--")));
+  }
+
   template <typename T>
   CLI::Option* Add(const std::string& name, T& value, const std::string& description) {
     return app_.add_option("--" + name, value, description)
@@ -117,18 +309,20 @@ class Parser {
 
   void AddServing() {
     Add("listen", config_.listen,
-        "Address to listen on: host:port, [v6]:port, or unix:path; port 0 picks a free port");
-    app_.add_flag("--insecure", config_.insecure,
-                  "Allow --listen without TLS on addresses reachable from other machines; the "
-                  "network can then read and change all traffic, including tokens")
+        "Address to listen on: host:port, [v6]:port or unix:path; port 0 picks a free port");
+    app_.add_flag(
+            "--insecure", config_.insecure,
+            "Allow --listen without TLS on addresses that other machines can reach. Anyone on "
+            "the path can then read and change all traffic, including tokens")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("threads", config_.threads, "Query threads; 0: one per available processor")
+    Add("threads", config_.threads, "Threads that compute answers; 0: one per usable processor")
         ->check(CLI::Range(0, 1024));
     AddStore();
     Add("drain-timeout", drain_timeout_seconds_,
-        "Seconds that running calls may take after SIGTERM or SIGINT")
-        ->check(CLI::Validator(CheckSeconds, ""));
+        "Time that running calls may take after SIGTERM or SIGINT")
+        ->check(CLI::Validator(CheckSeconds, ""))
+        ->type_name("SECONDS");
     AddObservation();
     Add("log-level", config_.log_level, "Minimum level of logged messages")
         ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
@@ -138,8 +332,7 @@ class Parser {
 
   void AddStore() {
     Add("store", config_.store,
-        "Where hulls are stored: on disk, in a PostgreSQL database, or in memory until the server "
-        "exits")
+        "Store of hulls: on disk, in a PostgreSQL database, or in memory until the server ends")
         ->check(CLI::IsMember({"rocksdb", "postgres", "memory"}));
     Add("data-dir", config_.data_dir,
         "Directory of --store rocksdb; created if missing. Default: hulld in $XDG_STATE_HOME, or "
@@ -147,126 +340,148 @@ class Parser {
         "~/.local/state, or else ./hulld-data");
     Add("durability", config_.durability,
         "Acknowledge changes when they are on disk (sync), or when the operating system has them "
-        "(relaxed); a crash of the machine can lose relaxed changes")
+        "(relaxed); a crash of the machine can then lose the last ones")
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
-        "File with the connection string of --store postgres; only hulld may be able to read it");
+        "File of the connection string of --store postgres, readable only by hulld");
     Add("postgres-servers", config_.postgres_servers,
-        "With --store postgres: one server is active on a database while further ones wait, or "
-        "many are active, all with this setting")
+        "With --store postgres: one active server per database, with the rest on standby, or many "
+        "active servers, all with this setting")
         ->check(CLI::IsMember({"one", "many"}));
     app_.add_flag("--take-over", config_.take_over,
-                  "With --store postgres: replace the active server, which then exits, instead of "
-                  "waiting for it; command line only")
+                  "With --store postgres: take the store from the active server, which then ends, "
+                  "instead of waiting for its end; only as a flag")
         ->configurable(false);
   }
 
   void AddObservation() {
     Add("metrics-address", config_.metrics_address,
-        "Address of the Prometheus endpoint (/metrics): host:port; empty: disabled");
+        "Address of metrics for Prometheus over HTTP (/metrics): host:port; empty: none");
     app_.add_flag("--metrics-insecure", config_.metrics_insecure,
-                  "Allow --metrics-address on addresses reachable from other machines; metrics are "
+                  "Allow --metrics-address on addresses that other machines can reach; metrics are "
                   "neither encrypted nor authenticated")
         ->envname(EnvironmentName("metrics-insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("slow-request", slow_request_seconds_,
-        "Log requests that take longer than this many seconds; 0: none")
-        ->check(CLI::Validator(CheckSeconds, ""));
+    Add("slow-request", slow_request_seconds_, "Log requests that take longer; 0: none")
+        ->check(CLI::Validator(CheckSeconds, ""))
+        ->type_name("SECONDS");
   }
 
   void AddGuard() {
     Add("tls-cert", config_.tls_cert,
-        "PEM file of the server's certificate chain; reloaded when it changes, like the next "
-        "three");
-    Add("tls-key", config_.tls_key,
-        "PEM file of its private key; only hulld may be able to read it");
+        "PEM file of the server's certificate chain; reloaded when it changes, as are the next "
+        "three files");
+    Add("tls-key", config_.tls_key, "PEM file of its private key, readable only by hulld");
     Add("tls-client-ca", config_.tls_client_ca,
-        "PEM file of the client CAs; clients must then present a certificate");
+        "PEM file of the authorities of client certificates; clients then need one");
     Add("tokens-file", config_.tokens_file,
-        "File of accepted tokens, written by 'hullctl token new'; calls must then carry a token");
-    app_.add_flag("--check-config", check_,
-                  "Check the settings and their files, print them, and exit with 0 or 2")
+        "File of the tokens that callers need, created by 'hullctl token new'");
+    app_.add_flag(
+            "--check-config", check_,
+            "Check the settings and the files that they name, print them, and exit with 0 or 2")
         ->configurable(false);
   }
 
   void AddLimits() {
     Limits& limits = config_.limits;
-    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
     AddLimit("max-points-per-chunk", limits.max_points_per_chunk,
-             "Points in one message of AppendPoints", kAny);
+             "Points in one message of AppendPoints", kAnyNumber);
     AddLimit("max-vertices-per-hull", limits.max_vertices_per_hull, "Vertices of one hull",
              kMaxVertexIndex);
-    AddLimit("max-hulls", limits.max_hulls, "Hulls and bodies in the store", kAny);
+    AddLimit("max-hulls", limits.max_hulls, "Hulls and bodies in the store", kAnyNumber);
     AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch, "Pairs in one BatchCheckCollisions",
-             kAny);
+             kAnyNumber);
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
-             "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
+             "Candidate axes of one pair under TEXTBOOK_SAT", kAnyNumber);
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
-             "Writers of one hull with a stored sequence", kAny);
-    AddLimit("max-pieces-per-body", limits.max_pieces_per_body,
-             "Pieces of one body; answers for more than 10000 may exceed gRPC's default limit of 4 "
-             "MiB for received messages",
-             kMaxPieceIndex);
-    AddLimit("memory-limit", limits.memory_limit,
-             "Bytes of memory for hulls, points and replacements in flight, and the placements, "
-             "pairs, and answers of batches, scenes, and streams; excludes messages of calls and "
-             "the store's buffers; 0: half of the memory of the machine or control group",
-             kAny, 0);
-    AddLimit("request-memory", limits.request_memory,
-             "Bytes for requests in flight, and as many again for arriving requests", kAny);
-    AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
-             kMaxGrpcMessageBytes);
+             "Writers whose sequences are kept for one hull", kAnyNumber);
+    AddLimit(
+        "max-pieces-per-body", limits.max_pieces_per_body,
+        "Pieces of one body; answers beyond 10000 may exceed the default limit of gRPC clients, "
+        "4 MiB",
+        kMaxPieceIndex);
+    AddSize(
+        "memory-limit", limits.memory_limit,
+        "Memory for hulls, points on their way to them, replacements under way, and the "
+        "placements, "
+        "pairs, and answers of batches, scenes, and streams. Messages of calls and the store's own "
+        "buffers come on top. 0: half of the memory of the machine or the control group",
+        kAnyNumber, kLeastMemory);
+    AddSize("request-memory", limits.request_memory,
+            "Memory for requests under way, and the same again for those that arrive", kAnyNumber,
+            1);
+    AddSize("max-message-bytes", limits.max_message_bytes, "Size of one message from a client",
+            kMaxGrpcMessageBytes, 1);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
-             "Points that one hull can receive in total", kAny);
+             "Points that one hull takes in its lifetime", kAnyNumber);
     AddLimit("max-placements", limits.max_placements,
-             "Placements of one batch, scene, or stream of poses", kAny);
+             "Placements of one batch, scene or stream of poses", kAnyNumber);
     AddCallLimits();
   }
 
   void AddCallLimits() {
     Limits& limits = config_.limits;
-    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
     AddLimit("max-connections", limits.max_connections,
-             "Open connections; above the limit, the longest idle one is closed", kAny);
+             "Open connections; beyond the limit, the longest idle one is closed", kAnyNumber);
     AddLimit("max-connections-per-address", limits.max_connections_per_address,
              "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt",
-             kAny);
+             kAnyNumber);
     AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
-             "Open reflection streams, which require no token", kAny);
-    AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams", kAny);
+             "Open streams of reflection, which need no token", kAnyNumber);
+    AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams", kAnyNumber);
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
-             "Calls waiting for a thread; further ones are refused", kAny);
-    AddLimit("max-calls-per-client", limits.max_calls_per_client,
-             "Concurrent calls of one client (a token or, without tokens, an address), including "
-             "open streams",
-             kAny);
+             "Calls waiting for a thread; more are refused", kAnyNumber);
+    AddLimit(
+        "max-calls-per-client", limits.max_calls_per_client,
+        "Concurrent calls of one client (a token or, without tokens, an address), including open "
+        "streams",
+        kAnyNumber);
     AddLimit("max-streams-per-client", limits.max_streams_per_client,
-             "Open streams of points or poses of one client", kAny);
+             "Open streams of points or poses of one client", kAnyNumber);
     AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
-             "Concurrent batches and scenes", kAny);
+             "Concurrent batches and scenes", kAnyNumber);
     AddLimit("max-batches-per-client", limits.max_batches_per_client,
-             "Concurrent batches and scenes of one client", kAny);
+             "Concurrent batches and scenes of one client", kAnyNumber);
     Add("max-request-time", max_request_seconds_,
-        "Seconds per request; streams of points are exempt; for streams of poses, seconds per "
-        "message; 0: unlimited")
-        ->check(CLI::Validator(CheckSeconds, ""));
+        "Time that one request may take; for streams of poses, per message; streams of points "
+        "are exempt; 0: unlimited")
+        ->check(CLI::Validator(CheckSeconds, ""))
+        ->type_name("SECONDS");
   }
 
   // CLI::Range alone would take -1 for the largest number.
   void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
-                uint64_t most, uint64_t least = 1) {
-    const auto check = [most, least](const std::string& text) -> std::string {
+                uint64_t most) {
+    const auto check = [most](const std::string& text) -> std::string {
       uint64_t number = 0;
       const char* end = text.data() + text.size();
       const auto [parsed, error] = std::from_chars(text.data(), end, number);
-      if (error == std::errc() && parsed == end && number >= least && number <= most) return "";
-      return absl::StrCat("\"", text, "\" is not a whole number from ", least, " to ", most);
+      if (error == std::errc() && parsed == end && number >= 1 && number <= most) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
     };
-    Add(name, value, description)->check(CLI::Validator(check, ""));
+    Add(name, value, description)->check(CLI::Validator(check, ""))->type_name("N");
+  }
+
+  // Adds a size in bytes. A default of 0 is also accepted as a value.
+  void AddSize(const std::string& name, uint64_t& value, const std::string& description,
+               uint64_t most, uint64_t least) {
+    const bool takes_zero = value == 0;
+    const auto read = [=](std::string& text) -> std::string {
+      const std::optional<uint64_t> size = ParseSize(text);
+      if (size.has_value() && ((*size >= least && *size <= most) || (takes_zero && *size == 0))) {
+        text = absl::StrCat(*size);
+        return "";
+      }
+      return absl::StrCat("\"", text, "\" is not a size from ", least, " to ", most, " bytes",
+                          takes_zero ? ", or 0" : "",
+                          "; give a number of bytes, or a unit: kB, MB, GB, KiB, MiB, GiB");
+    };
+    Add(name, value, description)->transform(CLI::Validator(read, ""))->type_name("SIZE");
   }
 
   CLI::App app_;
   Config config_;
+  std::string config_file_;
   bool check_ = false;
   double drain_timeout_seconds_ = ToSeconds(Config().drain_timeout);
   double max_request_seconds_ = ToSeconds(Limits().max_request_time);
@@ -307,7 +522,7 @@ absl::Status CheckStore(const Config& config) {
   return absl::OkStatus();
 }
 
-absl::Status WithAdvice(const absl::Status& status, const char* where) {
+absl::Status WithAdvice(const absl::Status& status, const std::string& where) {
   return absl::InvalidArgumentError(
       absl::StrCat(where, status.message(), " (hulld --help lists the settings)"));
 }
@@ -320,27 +535,53 @@ std::optional<std::string> ProcessEnvironment(const std::string& name) {
   return value;
 }
 
+std::vector<std::string> ProcessVariables() {
+  std::vector<std::string> names;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    const std::string entry = *variable;
+    if (entry.starts_with(kVariablePrefix)) names.push_back(entry.substr(0, entry.find('=')));
+  }
+  return names;
+}
+
+absl::Status CheckVariables(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (absl::Status s = Parser().CheckVariable(name); !s.ok()) return WithAdvice(s, "");
+  }
+  return absl::OkStatus();
+}
+
 absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments,
                                              const Environment& environment) {
   CommandLine result;
-  const std::vector<std::string> variables = Parser().FromEnvironment(environment);
-  // Each variable is parsed alone first, so that an error can name it.
-  for (const std::string& variable : variables) {
-    if (variable.starts_with("--config=")) continue;
-    Parser parser;
-    parser.ForgetEnvironment();
-    const absl::Status status = parser.Parse({variable}, &result);
-    if (!status.ok()) {
-      const std::string flag = variable.substr(2, variable.find('=') - 2);
-      return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());
+  // Parses each setting alone first, so that an error can name its source; then adds it to `all`.
+  std::vector<std::string> all;
+  const auto take = [&](const std::vector<Setting>& settings) -> absl::Status {
+    for (const Setting& setting : settings) {
+      Parser parser;
+      parser.ForgetEnvironment();
+      const absl::Status status = parser.Parse({setting.argument}, &result);
+      if (!status.ok()) return WithAdvice(status, setting.where);
+      all.push_back(setting.argument);
     }
-  }
-  // The last value of an option wins, and a file only sets unset options; hence this order.
-  std::vector<std::string> all = variables;
+    return absl::OkStatus();
+  };
+  const std::vector<Setting> from_environment = Parser().FromEnvironment(environment);
+  if (absl::Status s = take(from_environment); !s.ok()) return s;
   all.insert(all.end(), arguments.begin(), arguments.end());
   result = CommandLine();
-  const absl::Status status = Parser().Parse(std::move(all), &result);
-  if (!status.ok()) return WithAdvice(status, "");
+  Parser parser;
+  if (absl::Status s = parser.Parse(all, &result); !s.ok()) return WithAdvice(s, "");
+  if (result.print.empty() && !parser.config_file().empty()) {
+    const auto from_file = parser.FromFile(parser.config_file());
+    if (!from_file.ok()) return WithAdvice(from_file.status(), "");
+    // The last value of an option wins.
+    const std::vector<std::string> stronger = std::exchange(all, {});
+    if (absl::Status s = take(*from_file); !s.ok()) return s;
+    all.insert(all.end(), stronger.begin(), stronger.end());
+    result = CommandLine();
+    if (absl::Status s = Parser().Parse(all, &result); !s.ok()) return WithAdvice(s, "");
+  }
   if (absl::Status s = CheckStore(result.config); !s.ok()) return WithAdvice(s, "");
   if (result.config.data_dir.empty()) result.config.data_dir = DefaultDataDir(environment);
   return result;

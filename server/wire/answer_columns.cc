@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "core/query/terms/answer.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"

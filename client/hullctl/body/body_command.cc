@@ -24,13 +24,13 @@ struct BodyArguments {
   std::optional<uint64_t> if_revision;
 };
 
-ExitCode Put(const Invocation& run, const BodyArguments& arguments) {
+ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   v1::PutBodyRequest request;
   request.set_body_id(arguments.body_id);
   if (arguments.if_revision) request.set_if_revision(*arguments.if_revision);
   if (arguments.pieces.empty() == arguments.file.empty()) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "name the pieces, each HULL or HULL@POSE, or give --pieces FILE, but not both"));
+        "give the pieces as HULL or HULL@POSE, or with --pieces FILE, but not both"));
   }
   for (const std::string& text : arguments.pieces) {
     const absl::StatusOr<v1::Placement> piece = ParsePiece(text);
@@ -50,13 +50,12 @@ ExitCode Put(const Invocation& run, const BodyArguments& arguments) {
   } else {
     run.out << response->body().body_id() << (response->created() ? " created" : " replaced")
             << " at revision " << response->body().revision() << ", "
-            << response->body().piece_count()
-            << (response->body().piece_count() == 1 ? " piece" : " pieces") << "\n";
+            << Counted(response->body().piece_count(), "piece") << "\n";
   }
   return ExitCode::kDone;
 }
 
-ExitCode Get(const Invocation& run, const BodyArguments& arguments) {
+ExitCode GetBody(const Invocation& run, const BodyArguments& arguments) {
   const auto response = run.MakeClient().GetBody(arguments.body_id);
   if (!response.ok()) return run.Fail(response.status());
   if (run.json()) {
@@ -83,7 +82,7 @@ ExitCode Get(const Invocation& run, const BodyArguments& arguments) {
   return ExitCode::kDone;
 }
 
-ExitCode List(const Invocation& run, const BodyArguments& arguments) {
+ExitCode ListBodies(const Invocation& run, const BodyArguments& arguments) {
   const auto response = run.MakeClient().ListAllBodies(arguments.prefix, arguments.limit);
   if (!response.ok()) return run.Fail(response.status());
   if (run.json()) {
@@ -102,12 +101,12 @@ ExitCode List(const Invocation& run, const BodyArguments& arguments) {
     table.Print(run.out);
   }
   if (!response->next_page_token().empty()) {
-    run.err << "hullctl: there are more bodies; raise --limit to see them\n";
+    run.err << "hullctl: there are more bodies; raise --limit to list them\n";
   }
   return ExitCode::kDone;
 }
 
-ExitCode Delete(const Invocation& run, const BodyArguments& arguments) {
+ExitCode DeleteBody(const Invocation& run, const BodyArguments& arguments) {
   const auto response = run.MakeClient().DeleteBody(arguments.body_id, arguments.if_revision);
   if (absl::IsNotFound(response.status()) && arguments.if_exists) return ExitCode::kDone;
   if (!response.ok()) return run.Fail(response.status());
@@ -123,14 +122,14 @@ ExitCode Delete(const Invocation& run, const BodyArguments& arguments) {
 }
 
 using Arguments = std::shared_ptr<BodyArguments>;
-using Act = ExitCode (*)(const Invocation& run, const BodyArguments& arguments);
+using BodyAction = ExitCode (*)(const Invocation& run, const BodyArguments& arguments);
 
-void OnGiven(Command command, Invocation* invocation, const Arguments& arguments, Act act) {
+void OnGiven(Command command, Invocation* invocation, const Arguments& arguments, BodyAction act) {
   command.OnGiven([=] { invocation->action = [=] { return act(*invocation, *arguments); }; });
 }
 
 void AddName(Command command, const Arguments& arguments) {
-  command.AddText("ID", &arguments->body_id, "Name of the body")
+  command.AddText("ID", &arguments->body_id, "ID of the body")
       .Required()
       .Completes(ValueKind::kBody);
 }
@@ -145,20 +144,20 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
   AddName(put, arguments);
   put.AddTexts(
          "HULL[@POSE]", &arguments->pieces,
-         "The pieces: hulls, each at [w,x,y,z,]tx,ty,tz in the frame of the body (default: as "
-         "built)")
+         "Pieces: hulls, each at [w,x,y,z,]tx,ty,tz in the frame of the body (default: no motion)")
       .Completes(ValueKind::kHull);
   put.AddText("--pieces", &arguments->file,
-              "Instead: a JSON file of pieces, as 'body get --output json' writes it; - is "
-              "standard input")
+              "JSON file of pieces, as 'body get --output json' writes it, instead of HULL@POSE; - "
+              "is standard input")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
-  AddIfRevision(put, arguments, "Only if its revision is this one; 0: only if there is none");
+  AddIfRevision(put, arguments,
+                "Only if the body is at this revision; 0: only if it does not exist");
   put.SetExamples(
       {{"", "hullctl body put bracket plate rib@0,0.05,0 rib@0,-0.05,0"},
        {"Turned by a quarter about z", "hullctl body put bracket plate rib@1,0,0,1,0,0,0"},
        {"A copy", "hullctl body get bracket --output json | hullctl body put copy --pieces -"}});
-  OnGiven(put, invocation, arguments, Put);
+  OnGiven(put, invocation, arguments, PutBody);
 }
 
 }  // namespace
@@ -168,31 +167,30 @@ void AddBodyCommand(Command program, Invocation* invocation) {
   body.RequireCommand();
   const auto arguments = std::make_shared<BodyArguments>();
   body.SetDetails(
-      "A body is a list of pieces, hulls at fixed poses, under one name. Bodies and hulls share\n"
-      "their names: 'check', 'batch', 'scene', 'stream', 'watch' and 'view' take either. The\n"
-      "relation of two bodies is the strongest over all pairs of pieces. A piece is its hull as "
-      "it\n"
-      "is when a question is asked.");
+      "A body is a list of pieces, hulls at fixed poses, under one ID. Bodies and hulls share one\n"
+      "name space: 'check', 'batch', 'scene', 'stream', 'watch' and 'view' take either. The\n"
+      "relation of two bodies is the strongest over all pairs of pieces. A query uses the current\n"
+      "version of each piece's hull.");
   AddPut(body, invocation, arguments);
   Command get = body.AddCommand("get", "Show the pieces of a body");
   AddName(get, arguments);
   AddFreshnessOptions(get, invocation);
   get.SetExamples({{"", "hullctl body get bracket"}});
-  OnGiven(get, invocation, arguments, Get);
+  OnGiven(get, invocation, arguments, GetBody);
   Command list = body.AddCommand("list", "List the bodies");
-  list.AddText("PREFIX", &arguments->prefix, "Only names that start with it")
+  list.AddText("PREFIX", &arguments->prefix, "Only IDs with this prefix")
       .Completes(ValueKind::kBody);
   list.AddNumber("--limit", 1, 1000000000, "Stop after N bodies (default: all)",
                  [arguments](uint64_t number) { arguments->limit = number; });
   AddFreshnessOptions(list, invocation);
   list.SetExamples({{"", "hullctl body list cell-3/"}});
-  OnGiven(list, invocation, arguments, List);
+  OnGiven(list, invocation, arguments, ListBodies);
   Command remove = body.AddCommand("delete", "Remove a body; its hulls stay");
   AddName(remove, arguments);
-  remove.AddFlag("--if-exists", &arguments->if_exists, "Accept that it is not there");
-  AddIfRevision(remove, arguments, "Only if its revision is this one");
+  remove.AddFlag("--if-exists", &arguments->if_exists, "Succeed if the body does not exist");
+  AddIfRevision(remove, arguments, "Only if the body is at this revision");
   remove.SetExamples({{"", "hullctl body delete bracket"}});
-  OnGiven(remove, invocation, arguments, Delete);
+  OnGiven(remove, invocation, arguments, DeleteBody);
 }
 
 }  // namespace hulld

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "client/formats/text_number.h"
@@ -17,7 +18,12 @@ absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
     const std::string_view part = Trim(text.substr(0, comma));
     double number = 0;
     const NumberText kind = ParseDouble(part, &number);
-    if (kind != NumberText::kNumber) return absl::InvalidArgumentError(NumberProblem(kind, part));
+    if (kind != NumberText::kNumber) {
+      std::string problem = NumberProblem(kind, part);
+      const bool has_blanks = part.find_first_of(" \t") != std::string_view::npos;
+      if (has_blanks) problem += "; separate numbers with commas, as in 1,0,0";
+      return absl::InvalidArgumentError(std::move(problem));
+    }
     if (!std::isfinite(number)) {
       return absl::InvalidArgumentError(absl::StrCat(Quoted(part), " is not a finite number"));
     }
@@ -57,7 +63,8 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
   absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
   if (!numbers.ok()) return numbers.status();
   if (numbers->size() != 3) {
-    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not three numbers x,y,z"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(text), " is not three numbers x,y,z with commas between them"));
   }
   return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
 }
@@ -65,7 +72,8 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
 absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers) {
   if (numbers.size() != 3 && numbers.size() != 7) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "a pose is 3 numbers tx ty tz or 7 numbers w x y z tx ty tz, here are ", numbers.size()));
+        "a pose has 3 numbers, x,y,z, or 7, w,x,y,z,x,y,z, with commas between them; got ",
+        numbers.size()));
   }
   v1::Pose pose;
   const double* t = numbers.data();
@@ -76,7 +84,8 @@ absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers) {
     q.set_y(t[2]);
     q.set_z(t[3]);
     if (t[0] == 0 && t[1] == 0 && t[2] == 0 && t[3] == 0) {
-      return absl::InvalidArgumentError("the quaternion w x y z is zero; none is 1 0 0 0");
+      return absl::InvalidArgumentError(
+          "the quaternion w,x,y,z is zero; use 1,0,0,0 for no rotation");
     }
     t += 4;
   }

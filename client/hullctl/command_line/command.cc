@@ -200,8 +200,8 @@ CommandLine::CommandLine(const std::string& name, const std::string& version,
   description_.name = name;
   description_.help = help;
   for (const auto& [names, does] :
-       {std::pair<const char*, const char*>{"-h,--help", "Show what the command does, and end"},
-        {"--version", "Show the version, and end"}}) {
+       {std::pair<const char*, const char*>{"-h,--help", "Show this help and exit"},
+        {"--version", "Show the version and exit"}}) {
     OptionDescription& option = description_.options.emplace_back();
     option.names = absl::StrSplit(names, ',');
     option.help = does;
@@ -228,7 +228,7 @@ std::string CommandLine::Explain(const std::string& text) const {
     const std::vector<std::string> known = CommandNames(command);
     std::string hint = Suggestion(rest.front(), known);
     const bool few = command.path != command.name && known.size() < 8;
-    if (hint.empty() && few) hint = absl::StrCat("; there are ", absl::StrJoin(known, ", "));
+    if (hint.empty() && few) hint = absl::StrCat("; commands: ", absl::StrJoin(known, ", "));
     return absl::StrCat("'", command.path, "' has no command ", Quoted(rest.front()), hint);
   }
   for (const std::string& word : rest) {
@@ -240,7 +240,7 @@ std::string CommandLine::Explain(const std::string& text) const {
                         Suggestion(name, known));
   }
   if (needs_command) {
-    return absl::StrCat("which command? ", UsageText(command));
+    return absl::StrCat("no command given; usage: ", UsageText(command));
   }
   if (!rest.empty()) {
     return absl::StrCat("unexpected argument ", Quoted(rest.front()),
@@ -282,7 +282,7 @@ std::optional<ExitCode> CommandLine::Parse(const std::vector<std::string>& argum
     problem = error.what();
   }
   err << description_.name << ": " << Explain(problem) << "\n"
-      << "'" << LastGiven().path << " --help' tells more.\n";
+      << "'" << LastGiven().path << " --help' for usage.\n";
   return ExitCode::kUsage;
 }
 

@@ -49,7 +49,7 @@ absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation
   if (by_option && server != invocation.flags.end() && server->second != context->at("server")) {
     return absl::InvalidArgumentError(absl::StrCat("--server ", server->second, " and --context ",
                                                    named.name, ", which is ", context->at("server"),
-                                                   ", contradict each other; give one of them"));
+                                                   " differ; give one of them"));
   }
   SettingsLayer layer{"context " + named.name, *std::move(context), !by_option};
   if (by_option) layers[1].only_for_its_server = true;
@@ -61,7 +61,9 @@ absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation
 
 void AddConnectionOptions(Command command, Invocation* invocation) {
   ConnectionSettings* const flags = &invocation->flags;
-  command.AddText("--context", &invocation->context, "The server of that name: see 'context'")
+  command
+      .AddText("--context", &invocation->context,
+               "Name of the context to use; see 'hullctl context'")
       .ValueName("NAME")
       .Completes(ValueKind::kContext)
       .Variable(kContextVariable);

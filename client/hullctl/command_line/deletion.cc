@@ -5,6 +5,8 @@
 
 #include <iostream>
 
+#include "client/hullctl/printing/table.h"
+
 namespace hulld {
 namespace {
 
@@ -25,11 +27,11 @@ absl::StatusOr<bool> ConfirmDeletion(const Invocation& run, const std::vector<st
   const bool is_terminal = isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
   if (!is_terminal) {
     return absl::InvalidArgumentError(
-        absl::StrCat("this would delete ", ids.size(), " ", ids.size() == 1 ? one : many, " (",
-                     Naming(ids), "); say --yes if that is meant, as nobody can be asked here"));
+        absl::StrCat("refusing to delete ", Counted(ids.size(), one, many), " (", Naming(ids),
+                     ") without confirmation; pass --yes"));
   }
-  run.err << "Delete " << ids.size() << " " << (ids.size() == 1 ? one : many) << " (" << Naming(ids)
-          << ")? [y/N] " << std::flush;
+  run.err << "Delete " << Counted(ids.size(), one, many) << " (" << Naming(ids) << ")? [y/N] "
+          << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
   return answer == "y" || answer == "Y" || answer == "yes";

@@ -25,12 +25,12 @@ inline constexpr char kExitCodeHelp[] =
     "Exit codes:\n"
     "  0  done (a collision is an answer, not an error)\n"
     "  1  the request failed: the server refused it, or an audit or 'scene diff' found something\n"
-    "  2  the command line or an input file is wrong, or a file cannot be written\n"
-    "  3  no answer: the server cannot be reached, is draining, or took longer than --timeout\n"
-    "  4  some items of a batch have no answer\n"
+    "  2  the command line or an input file is invalid, or a file cannot be written\n"
+    "  3  no answer: the server is unreachable, is draining, or exceeded --timeout\n"
+    "  4  some items of a batch failed\n"
     "  5  a certificate does not prove its answer\n"
-    "  6  a certificate cannot be checked: its hulls have changed or are gone, or it is for an\n"
-    "     answer that has none; what is no record of an answer at all is 2\n";
+    "  6  a certificate cannot be checked: its hulls changed or were deleted, or the answer has\n"
+    "     none; a file that is no record of an answer gives 2\n";
 
 }  // namespace hulld
 

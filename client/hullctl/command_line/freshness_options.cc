@@ -54,8 +54,8 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           [invocation](const std::string& text) {
             return TakeBound(text, FreshnessOf(invocation));
           },
-          "Be content with what a server knew this long ago, such as 200ms, where several serve "
-          "one store (default: all that was acknowledged)")
+          "Accept answers this stale, such as 200ms, from several servers over one store (default: "
+          "every acknowledged change)")
       .ValueName("TIME");
   command
       .AddParsed(
@@ -63,8 +63,8 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           [invocation](const std::string& text) {
             return TakeRevision(text, FreshnessOf(invocation));
           },
-          "Be content with this revision of the store, or a later one, as the header of an earlier "
-          "answer names it")
+          "Accept this revision of the store or a later one; the header of an earlier answer has "
+          "it")
       .ValueName("STORE:REVISION");
 }
 

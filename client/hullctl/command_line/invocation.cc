@@ -16,10 +16,10 @@ std::string ExplainConnectionFailure(const std::string& message, const std::stri
                                      const ConnectionSecurity& security) {
   const std::string reason = DiagnoseTls(server, security);
   if (!reason.empty()) {
-    return absl::StrCat("no connection to the server at ", server, ": ", reason);
+    return absl::StrCat("cannot connect to hulld at ", server, ": ", reason);
   }
   return absl::StrCat("cannot reach hulld at ", server,
-                      ": start it with 'hulld', or name another with --server (", message, ")");
+                      "; start it with 'hulld', or choose another with --server (", message, ")");
 }
 
 std::string Explain(const absl::Status& status, const std::string& server,
@@ -31,13 +31,13 @@ std::string Explain(const absl::Status& status, const std::string& server,
   switch (status.code()) {
     case absl::StatusCode::kUnavailable:
       if (!is_hulld) return ExplainConnectionFailure(message, server, security);
-      return absl::StrCat("hulld at ", server, " is not available: ", message, "; try again later");
+      return absl::StrCat("hulld at ", server, " is unavailable: ", message, "; try again later");
     case absl::StatusCode::kDeadlineExceeded:
       return absl::StrCat("no answer from hulld at ", server, " within ", timeout.count(),
-                          " ms: raise --timeout, or see whether it is well with 'hullctl status' (",
+                          " ms; raise --timeout, or check the server with 'hullctl status' (",
                           message, ")");
     case absl::StatusCode::kUnauthenticated:
-      return WithHint(message, "give it with --token-file or $HULLD_TOKEN");
+      return WithHint(message, "pass one with --token-file or $HULLD_TOKEN");
     case absl::StatusCode::kNotFound:
       return WithHint(message, reason == v1::ERROR_REASON_BODY_NOT_FOUND ? "see 'hullctl body list'"
                                                                          : "see 'hullctl list'");
@@ -45,12 +45,14 @@ std::string Explain(const absl::Status& status, const std::string& server,
       if (reason == v1::ERROR_REASON_BODY_EXISTS) {
         return WithHint(message, "see 'hullctl body delete'");
       }
-      return WithHint(message, "accept it with --if-absent, or see 'hullctl delete'");
+      return WithHint(message, "pass --if-absent to accept it, or see 'hullctl delete'");
     case absl::StatusCode::kAborted:
-      return WithHint(message, "see its revision with 'hullctl get'");
+      return WithHint(message, "'hullctl get' shows the current revision");
     case absl::StatusCode::kUnimplemented:
-      return absl::StrCat(server, " does not know this call; is it a hulld of this version? (",
-                          message, ")");
+      return absl::StrCat(
+          server,
+          " does not implement this call; check that it is hulld and not older than hullctl (",
+          message, ")");
     case absl::StatusCode::kInternal:
     case absl::StatusCode::kUnknown:
     case absl::StatusCode::kDataLoss: {
@@ -61,10 +63,12 @@ std::string Explain(const absl::Status& status, const std::string& server,
     case absl::StatusCode::kResourceExhausted:
       // gRPC rejects oversized messages before the server can name its limit.
       if (is_hulld) return message;
-      return WithHint(message, "the server's --max-message-bytes; send less at once");
+      return WithHint(message,
+                      "the limit is --max-message-bytes of the server; send smaller messages");
     case absl::StatusCode::kFailedPrecondition:
       if (reason != v1::ERROR_REASON_SEQUENCE_GAP) return message;
-      return WithHint(message, "does another program append under the same --writer?");
+      return WithHint(message,
+                      "another program may append with the same --writer; use another name");
     default:
       return message;
   }

@@ -62,9 +62,8 @@ struct Invocation {
   // True if `err` is a terminal.
   bool shows_progress = false;
 
-  // All commands, and a function that runs another command line; set before the action runs.
+  // All commands; set before the action runs.
   const CommandDescription* program = nullptr;
-  std::function<int(const std::vector<std::string>& arguments)> run_line;
   // Set by the given command.
   std::function<ExitCode()> action;
 

@@ -5,14 +5,16 @@
 
 #include <utility>
 
+#include "client/hullctl/printing/table.h"
+
 namespace hulld {
 
 void AddPointInput(Command command, PointInput* input) {
-  command.AddTexts("FILE", &input->files, "Files of points; - is standard input").Required();
+  command.AddTexts("FILE", &input->files, "Files with points; - is standard input").Required();
   command.AddFlag("--skip-nonfinite", &input->skip_nonfinite,
-                  "Leave out and count points with a coordinate that is NaN or infinite");
+                  "Skip and count points with a coordinate that is NaN or infinite");
   command.AddFlag("--skip-zero", &input->skip_zero,
-                  "Leave out and count points at exactly (0, 0, 0), the holes of depth cameras");
+                  "Skip and count points at exactly (0, 0, 0), the holes of depth cameras");
   command
       .AddText("--format", &input->format,
                "Format of the files (default: by extension; standard input: xyz)")
@@ -26,9 +28,9 @@ void AddPointInput(Command command, PointInput* input) {
 std::vector<std::string> SkippedTexts(const ReadCounts& counts) {
   std::vector<std::string> texts;
   if (counts.skipped > 0) {
-    texts.push_back(absl::StrCat(counts.skipped, " points that are not finite"));
+    texts.push_back(Counted(counts.skipped, "point") + " with NaN or infinity");
   }
-  if (counts.zeros > 0) texts.push_back(absl::StrCat(counts.zeros, " points at (0, 0, 0)"));
+  if (counts.zeros > 0) texts.push_back(Counted(counts.zeros, "point") + " at (0, 0, 0)");
   return texts;
 }
 

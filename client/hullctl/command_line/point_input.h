@@ -28,8 +28,8 @@ struct PointInput {
 // outlive the command.
 void AddPointInput(Command command, PointInput* input);
 
-// Returns the numbers of skipped points by reason: "3 points that are not finite", "5 points at (0,
-// 0, 0)".
+// Returns the numbers of skipped points by reason: "3 points with NaN or infinity", "5 points at
+// (0, 0, 0)".
 std::vector<std::string> SkippedTexts(const ReadCounts& counts);
 
 // Returns the files to read, in order. Checks that all are readable before anything is sent, so

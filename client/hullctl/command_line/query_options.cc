@@ -11,30 +11,30 @@ void AddWantedOptions(Command command, QueryDetails* wishes) {
   v1::Wanted* const wanted = &wishes->wanted;
   command.AddFlag(
       "--axis", [wanted] { wanted->set_axis(true); },
-      "Also show the separating or touching axis and the features on it");
+      "Show the separating or touching axis and its features");
   command.AddFlag(
       "--report", [wanted] { wanted->set_analysis(true); },
-      "Also show time, sizes, axes tested and where separation was found");
+      "Show time, sizes, axes tested, and the axis that separates");
   command.AddFlag(
       "--certificate", [wanted] { wanted->set_certificate(true); },
-      "Also show what proves the relation: a direction, vertex pairs");
+      "Show the certificate of the relation: a direction, vertex pairs");
   command.AddFlag(
       "--separation", [wanted] { wanted->set_separation(true); },
-      "Also show the distance, or minus the penetration depth, with its proven bound");
-  command.AddLength("--max-error", "How large the bound of the separation may be",
+      "Show the distance, or minus the penetration depth, with its proven error bound");
+  command.AddLength("--max-error", "Maximum error bound of the separation",
                     [wanted](double length) {
                       wanted->set_separation(true);
                       wanted->set_max_error(length);
                     });
   command.AddFlag(
       "--witness", [wanted] { wanted->set_witness(true); },
-      "Also show a point of each hull that attain the separation");
-  command.AddLength("--clearance", "Also tell whether the separation is at most this",
+      "Show a point of each hull at which the separation is attained");
+  command.AddLength("--clearance", "Show if the separation is at most this",
                     [wanted](double length) { wanted->set_clearance(length); });
-  command.AddLength("--tolerance",
-                    "Allow the answer WITHIN_TOLERANCE where the separation is at most this, for "
-                    "speed (default 0: exact)",
-                    [wishes](double length) { wishes->tolerance = length; });
+  command.AddLength(
+      "--tolerance",
+      "Allow the answer WITHIN_TOLERANCE for separations up to this, for speed (default 0: exact)",
+      [wishes](double length) { wishes->tolerance = length; });
 }
 
 void AddQueryOptions(Command command, QueryDetails* wishes) {
@@ -48,7 +48,7 @@ void AddQueryOptions(Command command, QueryDetails* wishes) {
         wishes->verify = true;
         wishes->wanted.set_certificate(true);
       },
-      "Check the certificate at once, by exact arithmetic of hullctl's own");
+      "Check the certificate with hullctl's own exact arithmetic");
 }
 
 }  // namespace hulld

@@ -90,18 +90,18 @@ std::string ExplainVerification(long result, const ConnectionSecurity& security)
     case X509_V_OK:
       return "";
     case X509_V_ERR_CERT_HAS_EXPIRED:
-      return "its certificate has expired; have it renewed, and check this machine's clock";
+      return "its certificate has expired; renew it, and check this machine's clock";
     case X509_V_ERR_CERT_NOT_YET_VALID:
       return "its certificate is not valid yet; check the clocks";
     case X509_V_ERR_HOSTNAME_MISMATCH:
     case X509_V_ERR_IP_ADDRESS_MISMATCH:
-      return "its certificate is for another name; say --server by that name, or name it with "
+      return "its certificate is for another name; use that name in --server, or pass it with "
              "--server-name";
     default:
       return security.authorities.empty()
-                 ? "its certificate comes from no authority that this system trusts; name its "
+                 ? "its certificate is signed by no authority that this system trusts; pass its "
                    "authority with --ca-cert"
-                 : "its certificate comes from no authority that --ca-cert names";
+                 : "its certificate is signed by no authority in the file of --ca-cert";
   }
 }
 
@@ -110,10 +110,9 @@ std::string ExplainVerification(long result, const ConnectionSecurity& security)
 std::string ExplainRefusal(SSL* ssl, const ConnectionSecurity& security) {
   char byte = 0;
   if (SSL_read(ssl, &byte, 1) > 0 || ERR_GET_LIB(ERR_peek_error()) != ERR_LIB_SSL) return "";
-  return security.certificate.empty()
-             ? "it wants a certificate of ours; give --cert and --key"
-             : "it does not accept our certificate (--cert); it may have expired or come from "
-               "another authority";
+  return security.certificate.empty() ? "it requires a client certificate; pass --cert and --key"
+                                      : "it rejects the client certificate (--cert), which may "
+                                        "have expired or be signed by another authority";
 }
 
 }  // namespace
@@ -135,11 +134,11 @@ std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& sec
   BIO* const transport = bio.release();
   SSL_set_bio(ssl.get(), transport, transport);
   const bool shaken = SSL_connect(ssl.get()) == 1;
-  if (!security.tls) return shaken ? "it wants TLS; give --tls, or --ca-cert" : "";
+  if (!security.tls) return shaken ? "it requires TLS; pass --tls or --ca-cert" : "";
   if (!shaken) {
     const bool is_tls = ERR_GET_REASON(ERR_peek_error()) != SSL_R_WRONG_VERSION_NUMBER;
     return is_tls ? ExplainRefusal(ssl.get(), security)
-                  : "it does not speak TLS; leave out --tls and what goes with it";
+                  : "it does not use TLS; drop --tls and its options";
   }
   std::string reason = ExplainVerification(SSL_get_verify_result(ssl.get()), security);
   if (reason.empty()) reason = ExplainRefusal(ssl.get(), security);

@@ -1,6 +1,8 @@
+#include <atomic>
 #include <memory>
 #include <optional>
 
+#include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/parts/split_append.h"
@@ -38,7 +40,8 @@ class FileAppender {
     bool ok() const { return file.ok() && stream.ok(); }
   };
 
-  Outcome Read(ReadRequest request) {
+  // A set `interrupted` ends the read with CANCELLED.
+  Outcome Read(ReadRequest request, const std::atomic<bool>& interrupted) {
     Outcome outcome;
     uint64_t file_bytes = 0;
     request.progress = [&](uint64_t bytes) {
@@ -46,6 +49,7 @@ class FileAppender {
       bar_.Update(bytes_before_ + bytes, appender_ ? appender_->totals().points_sent : 0);
     };
     const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+      if (interrupted) return absl::CancelledError("interrupted");
       outcome.stream = Take(block);
       return outcome.stream;
     });
@@ -127,7 +131,7 @@ class FileAppender {
 };
 
 // Prints `opened`, then the sum of all acknowledgements, as messages of the contract.
-void PrintJson(const Appender& appender, std::ostream& out) {
+void PrintAppendedJson(const Appender& appender, std::ostream& out) {
   v1::AppendPointsResponse opened;
   *opened.mutable_opened() = appender.opened();
   out << MessageJson(opened) << "\n";
@@ -140,16 +144,16 @@ void PrintJson(const Appender& appender, std::ostream& out) {
 }
 
 // swell: see SwellOf; empty if unknown.
-void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files,
-           const Swell& swell) {
+void PrintAppended(const Invocation& run, const std::string& hull_id, const FileAppender& files,
+                   const Swell& swell) {
   const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
   const std::vector<std::string> skipped = SkippedTexts(files.skipped());
   if (run.form != OutputForm::kTable && !run.wide()) {
-    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were left out\n";
+    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were skipped\n";
   }
-  if (run.json()) return PrintJson(appender, run.out);
+  if (run.json()) return PrintAppendedJson(appender, run.out);
   if (run.names()) {
     run.out << hull_id << "\n";
     return;
@@ -157,18 +161,17 @@ void Print(const Invocation& run, const std::string& hull_id, const FileAppender
   Table table;
   table.Row({"hull", hull_id})
       .Row({"points", std::to_string(totals.points_acknowledged) + " appended in " +
-                          std::to_string(totals.chunks_sent) + " chunks"})
+                          Counted(totals.chunks_sent, "chunk")})
       .Row({"outside", std::to_string(counts.outside())})
       .Row({"duplicate", std::to_string(counts.duplicate())})
       .Row({"inside", std::to_string(counts.inside())});
   for (const std::string& text : skipped) table.Row({"skipped", text});
   if (files.resumed_points() > 0) {
-    table.Row(
-        {"resumed", std::to_string(files.resumed_points()) + " points were committed before"});
+    table.Row({"resumed", Counted(files.resumed_points(), "point") + " committed before"});
   }
   if (totals.chunks_recovered > 0) {
-    table.Row({"reconnected", std::to_string(totals.reconnects) + " times; the counts lack " +
-                                  std::to_string(totals.chunks_recovered) + " chunks"});
+    table.Row({"reconnected", Counted(totals.reconnects, "time") + "; the counts lack " +
+                                  Counted(totals.chunks_recovered, "chunk")});
   }
   table.Row({"vertices", std::to_string(totals.vertex_count)})
       .Row({"revision", std::to_string(totals.hull_revision)});
@@ -176,23 +179,38 @@ void Print(const Invocation& run, const std::string& hull_id, const FileAppender
   table.Print(run.out);
 }
 
+// Reports the committed points after Ctrl-C, and how to add the rest.
+ExitCode ReportInterrupt(const Invocation& run, const AppendArguments& arguments,
+                         const FileAppender& files) {
+  const Appender* const appender = files.appender();
+  const uint64_t points = appender == nullptr ? 0 : appender->totals().points_acknowledged;
+  run.err << "hullctl: interrupted; " << Counted(points, "point") << " committed to "
+          << arguments.hull_id << "; "
+          << (arguments.writer.empty()
+                  ? "run the command again to add the rest, which counts committed points again"
+                  : "add --resume to the command to append the rest")
+          << "\n";
+  if (points == 0) static_cast<void>(files.RemoveIfEmpty());
+  return ExitCode::kRequestFailed;
+}
+
 ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
                     const FileAppender& files, const FileAppender::Outcome& outcome) {
   const Appender* const appender = files.appender();
   const uint64_t points = appender == nullptr ? 0 : appender->totals().points_acknowledged;
   if (points > 0) {
-    run.err << "hullctl: " << points << " points were appended before this error\n";
+    run.err << "hullctl: appended " << Counted(points, "point") << " before this error\n";
   } else if (const absl::Status removed = files.RemoveIfEmpty(); !removed.ok()) {
     run.err << "hullctl: the hull " << arguments.hull_id
-            << ", which this command created, may be left without points\n";
+            << ", created by this command, may be left empty\n";
   }
   if (outcome.stream.ok()) return run.FailUsage(outcome.file);
   if (!absl::IsNotFound(outcome.stream)) return run.Fail(outcome.stream);
   const std::string message(outcome.stream.message().data(), outcome.stream.message().size());
   const char* const advice =
-      arguments.create ? "the files hold no points to create it of; 'hullctl create' makes an "
-                         "empty one"
-                       : "create it with --create, or see 'hullctl list'";
+      arguments.create
+          ? "the files contain no points to create it from; 'hullctl create' creates an empty hull"
+          : "create it with --create, or see 'hullctl list'";
   run.err << "hullctl: " << message << " (" << advice << ")\n";
   return arguments.create ? ExitCode::kUsage : ExitCode::kRequestFailed;
 }
@@ -212,33 +230,36 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
   if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite || input.skip_zero ||
       !input.format.empty() || input.chunk_points != 0) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--split goes with --create alone; the format is that of the file's name"));
+        "--split takes no other option than --create; the file name gives the format"));
   }
   const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
   return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);
 }
 
-ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
+ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
   if (!arguments.split.empty()) return SplitAppend(run, arguments);
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
+  std::atomic<bool> interrupted = false;
+  const Interrupt interrupt([&interrupted] { interrupted = true; });
   FileAppender files(run, arguments, total_bytes);
   FileAppender::Outcome outcome;
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
-    outcome = files.Read(*request);
+    outcome = files.Read(*request, interrupted);
   }
   // Points before a file's error were already sent: waits for them, so that the summary is correct.
   const bool sent = files.appender() != nullptr;
   if (outcome.ok() || (sent && outcome.stream.ok())) outcome.stream = files.Finish();
   files.Clear();
+  if (interrupted && outcome.stream.ok()) return ReportInterrupt(run, arguments, files);
   if (!outcome.stream.ok()) return FailAppend(run, arguments, files, outcome);
   if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
     const bool whole = outcome.file.ok() && files.appender() != nullptr;
     const Swell swell =
         whole ? SwellOfFiles(run, arguments, *plan, files.appender()->totals().points_acknowledged)
               : Swell{};
-    Print(run, arguments.hull_id, files, swell);
+    PrintAppended(run, arguments.hull_id, files, swell);
     WarnOfSwell(run, arguments.hull_id, swell.ratio);
   }
   return outcome.file.ok() ? ExitCode::kDone : FailAppend(run, arguments, files, outcome);
@@ -249,46 +270,44 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
 void AddAppendCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<AppendArguments>();
   Command command = program.AddCommand("append", "Add the points of files to a hull");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+  command.AddText("ID", &arguments->hull_id, "ID of the hull")
       .Required()
       .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
-  command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
-  const Option writer =
-      command.AddText("--writer", &arguments->writer, "Name to write under (default: random)")
-          .ValueName("NAME");
+  command.AddFlag("--create", &arguments->create, "Create the hull if it does not exist");
+  const Option writer = command
+                            .AddText("--writer", &arguments->writer,
+                                     "Name of the writer, for --resume (default: random)")
+                            .ValueName("NAME");
   command
       .AddFlag("--resume", &arguments->resume,
-               "The same command was interrupted: leave out the chunks that this writer has "
-               "committed")
+               "Resume an interrupted command: skip the chunks that this writer has committed")
       .Needs(writer);
   command
-      .AddText(
-          "--split", &arguments->split,
-          "Make a hull ID/PART of each part, and a body ID of them: of what the file names "
-          "(objects and groups of obj, solids of stl, nodes of gltf and dae), or of what hangs "
-          "together")
+      .AddText("--split", &arguments->split,
+               "Append each part to a hull ID/PART, and put these into a body ID. Parts are named "
+               "in the file (objects and groups of obj, solids of stl, nodes of gltf and dae), or "
+               "are connected components")
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl, "
       "gltf,\n"
       "dae.\n"
-      "--create makes the hull when there are points for it; files that are refused leave none.\n"
-      "--resume needs the same files, options and writer as before.\n"
-      "--split may be run again: a body that has the parts stays as it is.\n"
-      "Of meshes (obj, off, stl, gltf, dae) it is said how much larger the hull is: its volume\n"
-      "over that of the mesh, both summed exactly, where the mesh is closed. From 1.5 on there is\n"
-      "a warning.");
-  command.SetExamples(
-      {{"A new hull of a file", "hullctl append spider spider.obj --create"},
-       {"Points as another program makes them", "scanner | hullctl append room - --create"},
-       {"One that can be carried on with after an interruption",
-        "hullctl append ball ball.xyz --create --writer lab"},
-       {"", "hullctl append ball ball.xyz --writer lab --resume"},
-       {"Each object of a file as chair/OBJECT, and all as the body chair",
-        "hullctl append chair chair.obj --split names --create"}});
-  command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
+      "--create creates the hull with its first points; a refused file leaves none behind.\n"
+      "--resume needs the same files, options, and writer as before.\n"
+      "--split can be repeated: a body that has all parts is not changed.\n"
+      "For a closed mesh, the ratio of the volumes of hull and mesh is printed, both summed\n"
+      "exactly; a ratio of 1.5 or more gives a warning.");
+  command.SetExamples({{"A new hull from a file", "hullctl append spider spider.obj --create"},
+                       {"Points from another program", "scanner | hullctl append room - --create"},
+                       {"An append that can be resumed after an interruption",
+                        "hullctl append ball ball.xyz --create --writer lab"},
+                       {"", "hullctl append ball ball.xyz --writer lab --resume"},
+                       {"Each object of a file as chair/OBJECT, and all as the body chair",
+                        "hullctl append chair chair.obj --split names --create"}});
+  command.OnGiven(
+      [=] { invocation->action = [=] { return AppendFiles(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

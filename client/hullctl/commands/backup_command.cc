@@ -15,7 +15,7 @@ struct BackupArguments {
   std::string data_dir;
 };
 
-void Print(const Invocation& run, const std::string& what, const BackupCheck& backup) {
+void PrintBackup(const Invocation& run, const std::string& what, const BackupCheck& backup) {
   const v1::ResponseHeader& header = backup.begin().header();
   const v1::BackupEnd& totals = backup.totals();
   if (run.names()) {
@@ -36,8 +36,8 @@ void Print(const Invocation& run, const std::string& what, const BackupCheck& ba
   table.Row({"backup", what})
       .Row({"store", header.store_id()})
       .Row({"revision", "at least " + std::to_string(header.revision())})
-      .Row({"bytes", std::to_string(totals.byte_count()) + " in " +
-                         std::to_string(totals.file_count()) + " files"});
+      .Row({"bytes",
+            std::to_string(totals.byte_count()) + " in " + Counted(totals.file_count(), "file")});
   table.Print(run.out);
 }
 
@@ -59,14 +59,14 @@ ExitCode Save(const Invocation& run, const BackupArguments& arguments) {
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!called.ok()) return run.Fail(called);
   if (absl::Status s = writer.Finish(); !s.ok()) return run.FailUsage(s);
-  Print(run, "saved to " + arguments.file, writer.check());
+  PrintBackup(run, "saved to " + arguments.file, writer.check());
   return ExitCode::kDone;
 }
 
 ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
   const auto restored = RestoreBackup(arguments.file, arguments.data_dir);
   if (!restored.ok()) return run.FailUsage(restored.status());
-  Print(run, "restored to " + arguments.data_dir, *restored);
+  PrintBackup(run, "restored to " + arguments.data_dir, *restored);
   return ExitCode::kDone;
 }
 
@@ -74,19 +74,18 @@ ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
 
 void AddBackupCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BackupArguments>();
-  Command command = program.AddCommand("backup", "Copies of a whole store in one file");
+  Command command = program.AddCommand("backup", "Save and restore the whole store");
   command.RequireCommand();
-  Command save = command.AddCommand("save", "Save a backup while hulld goes on serving");
+  Command save = command.AddCommand("save", "Save a backup while hulld keeps serving");
   save.AddText("FILE", &arguments->file, "File to make").Required();
   save.SetDetails(
-      "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
-      "early leaves no file.");
+      "Takes as long as needed, unless --timeout bounds it. A failed backup leaves no file.");
   save.SetExamples({{"", "hullctl backup save hulls.backup"}});
   save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
   Command restore =
-      command.AddCommand("restore", "Make a data directory of a backup, for a new hulld");
-  restore.AddText("FILE", &arguments->file, "File that 'backup save' made").Required();
-  restore.AddText("--data-dir", &arguments->data_dir, "Directory to make; must be new or empty")
+      command.AddCommand("restore", "Create a data directory from a backup, for a new hulld");
+  restore.AddText("FILE", &arguments->file, "File of 'backup save'").Required();
+  restore.AddText("--data-dir", &arguments->data_dir, "Directory to create; must be new or empty")
       .ValueName("DIRECTORY")
       .Completes(ValueKind::kDirectory)
       .Required();

@@ -153,7 +153,7 @@ class BatchRun {
   }
 
   const std::string* FindProblem(const Problems& pair_problems, size_t pair) const {
-    static const auto* const kUnknown = new std::string("the server gave no cause");
+    static const auto* const kUnknown = new std::string("the server gave no reason");
     if (const auto found = pair_problems.find(pair); found != pair_problems.end()) {
       return &found->second;
     }
@@ -313,8 +313,8 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
   const BatchArguments arguments{file, wishes, colliding};
   if (colliding && run.json()) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--colliding leaves out pairs, but the messages of --output json answer each; 'hullctl "
-        "scene' finds those that collide"));
+        "--colliding cannot be combined with --output json, which prints every pair; use 'hullctl "
+        "scene' to find colliding pairs"));
   }
   const auto pairs = PairsOf(scene, file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());
@@ -325,9 +325,10 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
     run.err << "hullctl: " << count << " of " << pairs->size() / 2 << " pairs " << what << "\n";
     return true;
   };
-  const bool failed = report(batch.failed(), "have no answer; each names its cause");
-  const bool unchecked = report(batch.unchecked(), "could not be checked; each says why");
-  const bool invalid = report(batch.invalid(), "have a certificate that does not prove them");
+  const bool failed = report(batch.failed(), "failed; each line gives the reason");
+  const bool unchecked =
+      report(batch.unchecked(), "could not be checked; each line gives the reason");
+  const bool invalid = report(batch.invalid(), "have an invalid certificate");
   return invalid     ? ExitCode::kInvalidCertificate
          : failed    ? ExitCode::kSomeFailed
          : unchecked ? ExitCode::kCannotCheck
@@ -336,16 +337,16 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
 
 void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();
-  Command command = program.AddCommand("batch", "Ask about many pairs from a file");
+  Command command = program.AddCommand("batch", "Check many pairs of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddQueryOptions(command, &arguments->wishes);
-  command.AddFlag("--colliding", &arguments->colliding, "Leave out the pairs that are separated");
+  command.AddFlag("--colliding", &arguments->colliding, "Omit separated pairs");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(kSceneFileHelp);
   command.SetExamples(
-      {{"A scene as text", "hullctl batch scene.txt"},
-       {"Only what collides, proven", "hullctl batch scene.txt --colliding --verify"},
-       {"The contract's messages, one a line", "hullctl batch scene.json --output json"}});
+      {{"", "hullctl batch scene.yaml"},
+       {"Only what collides, proven", "hullctl batch scene.yaml --colliding --verify"},
+       {"As messages of the contract, one per line", "hullctl batch scene.yaml --output json"}});
   command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
 }
 

@@ -122,7 +122,7 @@ void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
   }
 }
 
-void PrintTable(const LoadArguments& arguments, const LoadResult& result, std::ostream& out) {
+void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, std::ostream& out) {
   const uint64_t succeeded = result.latencies.count();
   const double seconds = Seconds(result.elapsed);
   Table table;
@@ -136,9 +136,9 @@ void PrintTable(const LoadArguments& arguments, const LoadResult& result, std::o
                        ItemName(arguments.settings.mode) + "/s"});
   }
   if (result.missed > 0) {
-    table.Row({"missed", absl::StrCat(result.missed,
-                                      " requests were due but never sent: the rate "
-                                      "was not kept")});
+    table.Row(
+        {"missed",
+         absl::StrCat(result.missed, " requests were due but not sent; the rate was not reached")});
   }
   for (size_t i = 0; succeeded > 0 && i < std::size(kPercentiles); ++i) {
     table.Row({absl::StrCat("latency ", kPercentileNames[i]),
@@ -165,8 +165,8 @@ std::string JsonArray(const std::vector<std::string>& elements) {
   return text + "]";
 }
 
-void PrintJson(const LoadArguments& arguments, const std::string& mode, bool interrupted,
-               const LoadResult& result, std::ostream& out) {
+void PrintLoadJson(const LoadArguments& arguments, const std::string& mode, bool interrupted,
+                   const LoadResult& result, std::ostream& out) {
   const double seconds = Seconds(result.elapsed);
   JsonObject latency;
   for (size_t i = 0; i < std::size(kPercentiles); ++i) {
@@ -228,7 +228,7 @@ LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubj
 }
 
 // Returns the exit code for a load.
-ExitCode CodeOf(const LoadResult& result) {
+ExitCode LoadExitCode(const LoadResult& result) {
   if (result.failures.empty()) return ExitCode::kDone;
   if (result.latencies.count() > 0) return ExitCode::kSomeFailed;
   const absl::StatusCode code = result.failures.begin()->first;
@@ -256,17 +256,17 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   const bool interrupted = InterruptWatch::interrupted();
   const absl::Status deleted = subjects.Delete();
   if (created.ok() && run.json()) {
-    PrintJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);
+    PrintLoadJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);
   } else if (created.ok()) {
-    PrintTable(arguments, result, run.out);
+    PrintLoadTable(arguments, result, run.out);
   }
   if (!deleted.ok()) {
-    run.err << "hullctl: hulls of the load may be left: see 'hullctl list " << prefix << "'\n";
+    run.err << "hullctl: hulls of the load may remain; see 'hullctl list " << prefix << "'\n";
     return run.Fail(deleted);
   }
   if (!created.ok() && !interrupted) return run.Fail(created);
-  if (interrupted) run.err << "hullctl: interrupted; the hulls of the load are deleted\n";
-  return CodeOf(result);
+  if (interrupted) run.err << "hullctl: interrupted; deleted the hulls of the load\n";
+  return LoadExitCode(result);
 }
 
 void AddPlanOptions(Command command, LoadPlan* plan) {
@@ -278,10 +278,10 @@ void AddPlanOptions(Command command, LoadPlan* plan) {
             if (duration.ok()) plan->duration = *duration;
             return duration.status();
           },
-          "How long, such as 30s (default 10s, unless --requests is given)")
+          "Duration, such as 30s (default 10s, unless --requests is given)")
       .ValueName("TIME");
   command.AddNumber("--requests", 1, uint64_t{1} << 40,
-                    "How many requests, of all clients together",
+                    "Number of requests of all clients together",
                     [plan](uint64_t number) { plan->requests = number; });
   command
       .AddParsed(
@@ -290,12 +290,12 @@ void AddPlanOptions(Command command, LoadPlan* plan) {
             double rate = 0;
             if (ParseDouble(text, &rate) != NumberText::kNumber || !(rate >= 0.01 && rate <= 1e7)) {
               return absl::InvalidArgumentError(
-                  Quoted(text) + " is not a number of requests a second, 0.01 to 1e7");
+                  Quoted(text) + " is not a number of requests per second from 0.01 to 1e7");
             }
             plan->rate = rate;
             return absl::OkStatus();
           },
-          "Requests a second, of all clients together (default: as fast as they are answered)")
+          "Requests per second of all clients together (default: as fast as possible)")
       .ValueName("R");
 }
 
@@ -309,22 +309,22 @@ void AddSettingOptions(Command command, LoadSettings* settings) {
             settings->mode = ModeNames().at(name);
             return absl::OkStatus();
           },
-          "check (default), batch, append, or mixed: of ten requests eight, one and one")
+          "check (default), batch, append, or mixed, in the ratio 8:1:1")
       .OneOf(names)
       .ValueName("MODE");
-  command.AddNumber("--clients", 1, 1000, "Clients, each with a connection (default 1)",
+  command.AddNumber("--clients", 1, 1000, "Number of clients, each with a connection (default 1)",
                     [settings](uint64_t number) { settings->clients = static_cast<int>(number); });
-  command.AddNumber("--hulls", 1, 10000, "Hulls to ask about (default 16)",
+  command.AddNumber("--hulls", 1, 10000, "Number of hulls (default 16)",
                     [settings](uint64_t number) { settings->hulls = number; });
-  command.AddNumber("--vertices", 1, 100000, "Vertices of each, on a sphere (default 64)",
+  command.AddNumber("--vertices", 1, 100000, "Vertices per hull, on a sphere (default 64)",
                     [settings](uint64_t number) { settings->vertices = number; });
-  command.AddNumber("--pairs", 1, 1000000, "Pairs of a batch (default 10000)",
+  command.AddNumber("--pairs", 1, 1000000, "Pairs per batch (default 10000)",
                     [settings](uint64_t number) { settings->pairs = number; });
-  command.AddNumber("--points", 1, 160000, "Points of an append, in a ball (default 10000)",
+  command.AddNumber("--points", 1, 160000, "Points per append, in a ball (default 10000)",
                     [settings](uint64_t number) { settings->points = number; });
   command
       .AddText("--prefix", &settings->prefix,
-               "Of the hulls it creates and deletes (default bench-load/RANDOM/)")
+               "Prefix of the hulls to create and delete (default bench-load/RANDOM/)")
       .ValueName("PREFIX");
 }
 
@@ -334,24 +334,24 @@ void AddBenchCommand(Command program, Invocation* invocation) {
   Command bench = program.AddCommand("bench", "Measure a running server");
   bench.RequireCommand();
   auto arguments = std::make_shared<LoadArguments>();
-  Command load =
-      bench.AddCommand("load", "Ask as many clients would; show throughput, latencies and errors");
+  Command load = bench.AddCommand(
+      "load", "Send requests from several clients; show throughput, latencies, and errors");
   AddSettingOptions(load, &arguments->settings);
   AddPlanOptions(load, &arguments->plan);
   AddFreshnessOptions(load, invocation);
   load.AddFlag(
-      "--json", [invocation] { invocation->form = OutputForm::kJson; },
-      "The same as --output json");
+      "--json", [invocation] { invocation->form = OutputForm::kJson; }, "Same as --output json");
   load.SetDetails(
-      "Creates hulls of its own and deletes them at the end, also after Ctrl-C.\n"
-      "Without --rate each client asks again when it is answered. With --rate requests are due at\n"
-      "fixed times and latencies count from then, so that waiting behind a slow one is not "
-      "hidden.\n"
-      "Nothing is retried; latencies are those of requests that succeeded.");
-  load.SetExamples({{"As fast as four clients go", "hullctl bench load --clients 4 --duration 30s"},
-                    {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},
-                    {"Content with what was known 200 ms ago, of several servers over one store",
-                     "hullctl bench load --clients 64 --max-staleness 200ms"}});
+      "Creates hulls and deletes them at the end, also after Ctrl-C. Without --rate, each client\n"
+      "sends its next request after an answer. With --rate, requests are due at fixed times, and\n"
+      "latencies count from these, so that queueing behind a slow request is visible. Requests "
+      "are\n"
+      "not retried; latencies are those of successful ones.");
+  load.SetExamples(
+      {{"Four clients, as fast as possible", "hullctl bench load --clients 4 --duration 30s"},
+       {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},
+       {"Several servers over one store; answers may be 200 ms stale",
+        "hullctl bench load --clients 64 --max-staleness 200ms"}});
   load.OnGiven([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
 }
 

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-struct CheckArguments {
+struct PairArguments {
   v1::CheckCollisionRequest request;
   QueryDetails wishes;
   std::string record;
@@ -40,7 +40,7 @@ std::string ProofText(const v1::CheckCollisionResponse& response) {
   const int count = response.piece_certificates_size();
   const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
   const bool by_boxes = response.relation() != v1::RELATION_OVERLAPPING;
-  return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes settle the others" : "");
+  return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes decide the rest" : "");
 }
 
 std::string FeatureText(const v1::Feature& feature) {
@@ -68,11 +68,11 @@ void AddAnalysis(const v1::Analysis& analysis, Table* table) {
 
 void AddAxis(const v1::CheckCollisionResponse& response, Table* table) {
   if (!response.has_axis()) {
-    table->Row({"axis", "none separates or touches"});
+    table->Row({"axis", "no separating or touching axis"});
     return;
   }
   const v1::Axis& axis = response.axis();
-  table->Row({"axis", DirectionText(axis.direction()) + "  (" + AxisKindText(axis.kind()) + ")"})
+  table->Row({"axis", VectorText(axis.direction()) + "  (" + AxisKindText(axis.kind()) + ")"})
       .Row({"A reaches", FeatureText(axis.feature_a())})
       .Row({"B reaches", FeatureText(axis.feature_b())});
 }
@@ -84,8 +84,8 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
   }
   if (response.has_witness()) {
     const v1::Witness& witness = response.witness();
-    table->Row({"point of A", DirectionText(witness.point_a())})
-        .Row({"point of B", DirectionText(witness.point_b())})
+    table->Row({"point of A", VectorText(witness.point_a())})
+        .Row({"point of B", VectorText(witness.point_b())})
         .Row({"points within", ShortestText(witness.error())});
   }
   if (response.has_within_clearance()) {
@@ -94,8 +94,9 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
   }
 }
 
-void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
-                const v1::CheckCollisionResponse& response, const Verification* verification) {
+void PrintAnswerTable(const Invocation& run, const v1::CheckCollisionRequest& request,
+                      const v1::CheckCollisionResponse& response,
+                      const Verification* verification) {
   Table table;
   table.Row({"relation", PaintedRelation(response.relation(), run.paint)})
       .Row({"A", VersionText(response.hull_a())})
@@ -132,18 +133,18 @@ std::string RecordJson(const v1::CheckCollisionRequest& request,
       .Close();
 }
 
-void Print(const Invocation& run, const v1::CheckCollisionRequest& request,
-           const v1::CheckCollisionResponse& response, const Verification* verification) {
+void PrintAnswer(const Invocation& run, const v1::CheckCollisionRequest& request,
+                 const v1::CheckCollisionResponse& response, const Verification* verification) {
   if (run.json()) {
     run.out << MessageJson(response) << "\n";
   } else if (run.names()) {
     run.out << RelationText(response.relation()) << "\n";
   } else {
-    PrintTable(run, request, response, verification);
+    PrintAnswerTable(run, request, response, verification);
   }
 }
 
-ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
+ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
   double tolerance = 0;
   arguments.wishes.Apply(request.mutable_wanted(), &tolerance);
@@ -162,7 +163,7 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
     answer.response = *std::move(response);
   }
   // A record on standard output replaces the answer.
-  if (arguments.record != "-") Print(run, request, answer.response, verification);
+  if (arguments.record != "-") PrintAnswer(run, request, answer.response, verification);
   if (!arguments.record.empty()) {
     const absl::Status written = WriteOutput(arguments.record, run.out, [&](std::ostream& out) {
       out << RecordJson(request, answer.response) << "\n";
@@ -181,27 +182,27 @@ void AddPoseOption(Command command, const std::string& name, v1::Placement* plac
             if (pose.ok()) *placement->mutable_pose() = *pose;
             return pose.status();
           },
-          "Where it stands: quaternion and translation, or translation alone (default: as built)")
+          "Pose: quaternion and translation, or translation alone (default: no motion)")
       .ValueName("[w,x,y,z,]tx,ty,tz");
 }
 
 }  // namespace
 
 void AddCheckCommand(Command program, Invocation* invocation) {
-  auto arguments = std::make_shared<CheckArguments>();
+  auto arguments = std::make_shared<PairArguments>();
   v1::CheckCollisionRequest* const request = &arguments->request;
-  Command command = program.AddCommand("check", "Ask whether two hulls or bodies collide");
-  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull or a body")
+  Command command = program.AddCommand("check", "Check two hulls or bodies for collision");
+  command.AddText("A", request->mutable_a()->mutable_hull_id(), "ID of a hull or body")
       .Required()
       .Completes(ValueKind::kPlaced);
-  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull or a body")
+  command.AddText("B", request->mutable_b()->mutable_hull_id(), "ID of a hull or body")
       .Required()
       .Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
   AddQueryOptions(command, &arguments->wishes);
   AddFreshnessOptions(command, invocation);
-  CheckArguments* const checked = arguments.get();
+  PairArguments* const checked = arguments.get();
   command
       .AddParsed(
           "--record",
@@ -210,22 +211,24 @@ void AddCheckCommand(Command program, Invocation* invocation) {
             checked->wishes.wanted.set_certificate(true);
             return absl::OkStatus();
           },
-          "Write question and answer, with its certificate, for 'hullctl verify'; - is standard "
-          "output, in place of the answer")
+          "Write request and answer, with its certificate, for 'hullctl verify'; - is standard "
+          "output, instead of the answer")
       .ValueName("FILE");
   command.SetDetails(
-      "Lengths are in the unit of the points. Of a body ('hullctl body --help') the answer names\n"
-      "the pieces that decided; its certificate is one for each pair of pieces that boxes do not\n"
-      "settle, which --output json shows. --textbook is for hulls alone.");
+      "Lengths are in the unit of the points. For a body ('hullctl body --help'), the answer "
+      "names\n"
+      "the deciding pieces, and its certificate has one part for each pair of pieces that boxes "
+      "do\n"
+      "not decide; --output json shows them. --textbook takes hulls only.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"Prove it", "hullctl check arm box --verify"},
-       {"Record it, and prove it later", "hullctl check arm box --record answer.json"},
+       {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return CheckPair(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -18,7 +18,6 @@ void AddListCommand(Command program, Invocation* invocation);
 void AddGetCommand(Command program, Invocation* invocation);
 void AddMeshCommand(Command program, Invocation* invocation);
 void AddViewCommand(Command program, Invocation* invocation);
-void AddPictureCommand(Command program, Invocation* invocation);
 void AddCheckCommand(Command program, Invocation* invocation);
 void AddBatchCommand(Command program, Invocation* invocation);
 void AddSceneCommand(Command program, Invocation* invocation);
@@ -31,7 +30,6 @@ void AddBackupCommand(Command program, Invocation* invocation);
 void AddTokenCommand(Command program, Invocation* invocation);
 void AddBenchCommand(Command program, Invocation* invocation);
 void AddContextCommand(Command program, Invocation* invocation);
-void AddShellCommand(Command program, Invocation* invocation);
 void AddCompletionCommand(Command program, Invocation* invocation);
 void AddGenerateCommand(Command program, Invocation* invocation);
 // Hidden: writes man pages, for the build.

@@ -31,11 +31,9 @@ std::vector<ManSection> ProgramSections() {
   absl::StrAppend(&variables,
                   "  HULLCTL_CONTEXT       as --context\n"
                   "  HULLD_TOKEN           the token itself\n"
-                  "  NO_COLOR              no colors, unless --color says so");
+                  "  NO_COLOR              no colors, unless --color is given");
   return {{"environment", variables},
-          {"files",
-           "  $XDG_CONFIG_HOME/hullctl/contexts.json   contexts: see hullctl-context(1)\n"
-           "  $XDG_STATE_HOME/hullctl/history          what was typed in hullctl-shell(1)"}};
+          {"files", "  $XDG_CONFIG_HOME/hullctl/contexts.json   contexts: see hullctl-context(1)"}};
 }
 
 ExitCode WriteManPages(const Invocation& run, const std::string& folder) {
@@ -59,13 +57,13 @@ ExitCode WriteManPages(const Invocation& run, const std::string& folder) {
 
 void AddCompletionCommand(Command program, Invocation* invocation) {
   auto shell = std::make_shared<std::string>();
-  Command command = program.AddCommand("completion", "Print what makes a shell complete hullctl");
+  Command command = program.AddCommand("completion", "Print the completion script of a shell");
   command.AddText("SHELL", shell.get(), "The shell").Required().OneOf({"bash", "zsh", "fish"});
   command.SetDetails(
-      "It completes commands, options, values, names of contexts, and IDs of hulls, which it asks\n"
-      "the server for: for half a second at most, and silently when there is no answer.");
+      "The script completes commands, options, values, names of contexts, and IDs of hulls. For\n"
+      "IDs it queries the server, for half a second at most and without error messages.");
   command.SetExamples({{"In ~/.bashrc", "source <(hullctl completion bash)"},
-                       {"In ~/.zshrc, behind compinit", "source <(hullctl completion zsh)"},
+                       {"In ~/.zshrc, after compinit", "source <(hullctl completion zsh)"},
                        {"In ~/.config/fish/config.fish", "hullctl completion fish | source"}});
   command.OnGiven([=] {
     invocation->needs_server = false;

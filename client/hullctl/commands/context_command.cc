@@ -54,12 +54,13 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
   if (const std::string problem = ContextNameProblem(arguments.name); !problem.empty()) {
     return usage(absl::StrCat(Quoted(arguments.name), ": ", problem));
   }
-  if (!run.flags.contains("server")) return usage("say where its server is: --server HOST:PORT");
+  if (!run.flags.contains("server"))
+    return usage("a context needs a server; pass --server HOST:PORT");
   auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
   if (file->contexts.contains(arguments.name) && !arguments.replace) {
-    return usage(absl::StrCat("there is a context ", arguments.name,
-                              " already; say --replace if this one is to take its place"));
+    return usage(
+        absl::StrCat("context ", arguments.name, " already exists; pass --replace to replace it"));
   }
   const ConnectionSettings settings = Lasting(run.flags);
   // Detects a missing file, or a token readable by other users, before saving.
@@ -76,15 +77,14 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
   } else if (run.names()) {
     run.out << arguments.name << "\n";
   } else {
-    run.out << "context " << arguments.name << " added" << (first ? ", and used from now on" : "")
-            << "\n";
+    run.out << "context " << arguments.name << " added" << (first ? " and selected" : "") << "\n";
   }
   return ExitCode::kDone;
 }
 
 ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   if (arguments.none == !arguments.name.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("name a context, or say --none"));
+    return run.FailUsage(absl::InvalidArgumentError("give the name of a context, or --none"));
   }
   auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
@@ -95,15 +95,15 @@ ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   file->current = arguments.name;
   if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
   if (arguments.none) {
-    run.out << "no context is used from now on\n";
+    run.out << "no context is selected\n";
   } else {
     run.out << "context " << arguments.name
-            << " is used from now on: " << file->contexts.at(arguments.name).at("server") << "\n";
+            << " selected: " << file->contexts.at(arguments.name).at("server") << "\n";
   }
   return ExitCode::kDone;
 }
 
-ExitCode List(const Invocation& run) {
+ExitCode ListContexts(const Invocation& run) {
   const auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
   Table table;
@@ -126,7 +126,7 @@ ExitCode List(const Invocation& run) {
   if (run.json() || run.names()) return ExitCode::kDone;
   table.Print(run.out);
   if (file->contexts.empty()) {
-    run.err << "hullctl: there are no contexts; add one with 'hullctl context add'\n";
+    run.err << "hullctl: no contexts; add one with 'hullctl context add'\n";
   }
   return ExitCode::kDone;
 }
@@ -142,7 +142,7 @@ ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
   if (was_used) file->current.clear();
   if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
   run.out << "context " << arguments.name << " removed"
-          << (was_used ? "; no context is used from now on" : "") << "\n";
+          << (was_used ? "; no context is selected" : "") << "\n";
   return ExitCode::kDone;
 }
 
@@ -176,8 +176,7 @@ ExitCode Show(Invocation run, const ContextArguments& arguments) {
 }  // namespace
 
 void AddContextCommand(Command program, Invocation* invocation) {
-  Command command =
-      program.AddCommand("context", "Keep servers under names, and choose among them");
+  Command command = program.AddCommand("context", "Manage named servers");
   command.RequireCommand();
   const auto arguments = std::make_shared<ContextArguments>();
   const auto act = [=](const std::function<ExitCode()>& action) {
@@ -187,30 +186,32 @@ void AddContextCommand(Command program, Invocation* invocation) {
     };
   };
   command.SetDetails(
-      "Contexts stand in $XDG_CONFIG_HOME/hullctl/contexts.json, else ~/.config. The file holds\n"
-      "paths of tokens, never tokens. What holds, in this order: an option; a context that\n"
-      "--context names; the environment; the context that $HULLCTL_CONTEXT names or 'context use'\n"
-      "chose; the default. A context goes with its own server only: where --server or\n"
-      "$HULLCTL_SERVER names another, it is left aside, its token and authorities too.");
-  Command add = command.AddCommand("add", "Keep --server and what goes with it under a name");
-  add.AddText("NAME", &arguments->name, "What to call it").Required();
-  add.AddFlag("--replace", &arguments->replace, "Take the place of one of that name");
+      "Contexts are kept in $XDG_CONFIG_HOME/hullctl/contexts.json, by default below ~/.config, "
+      "with\n"
+      "paths of token files, never tokens. Precedence: an option; the context of --context; the\n"
+      "environment; the context of $HULLCTL_CONTEXT or of 'context use'; the default. A context\n"
+      "applies only to its own server: if --server or $HULLCTL_SERVER gives another, its token "
+      "and\n"
+      "authorities are ignored, too.");
+  Command add = command.AddCommand("add", "Save --server and its options under a name");
+  add.AddText("NAME", &arguments->name, "Name of the context").Required();
+  add.AddFlag("--replace", &arguments->replace, "Replace an existing context of this name");
   add.SetExamples({{"",
                     "hullctl context add cell-3 --server cell-3.example:50551 --tls "
                     "--token-file cell-3.token"},
                    {"", "hullctl context add here --server 127.0.0.1:50551"}});
   add.OnGiven(act([=] { return Add(*invocation, *arguments); }));
-  Command use = command.AddCommand("use", "Use a context from now on");
+  Command use = command.AddCommand("use", "Select a context for later commands");
   use.AddText("NAME", &arguments->name, "Its name").Completes(ValueKind::kContext);
   use.AddFlag("--none", &arguments->none, "Use none");
   use.SetExamples({{"", "hullctl context use cell-3"},
                    {"Another one for one command", "hullctl list --context here"}});
   use.OnGiven(act([=] { return Use(*invocation, *arguments); }));
   Command list = command.AddCommand("list", "List the contexts");
-  list.OnGiven(act([=] { return List(*invocation); }));
-  Command show =
-      command.AddCommand("show", "Show which server is asked, and where each setting comes from");
-  show.AddText("NAME", &arguments->name, "As if --context named it").Completes(ValueKind::kContext);
+  list.OnGiven(act([=] { return ListContexts(*invocation); }));
+  Command show = command.AddCommand("show", "Show the settings in force and the source of each");
+  show.AddText("NAME", &arguments->name, "Show them as with --context NAME")
+      .Completes(ValueKind::kContext);
   show.OnGiven(act([=] { return Show(*invocation, *arguments); }));
   Command remove = command.AddCommand("remove", "Forget a context");
   remove.AddText("NAME", &arguments->name, "Its name").Required().Completes(ValueKind::kContext);

@@ -57,8 +57,8 @@ absl::StatusOr<std::vector<Doomed>> Choose(const Client& client, const DeleteArg
   return doomed;
 }
 
-void Print(const Invocation& run, const std::string& hull_id,
-           const v1::DeleteHullResponse& response) {
+void PrintDeleted(const Invocation& run, const std::string& hull_id,
+                  const v1::DeleteHullResponse& response) {
   if (run.json()) {
     run.out << MessageJson(response) << "\n";
   } else if (run.names()) {
@@ -80,7 +80,7 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
     bar.Clear();
     if (response.ok()) {
       ++deleted;
-      Print(run, hull.hull_id, *response);
+      PrintDeleted(run, hull.hull_id, *response);
       bar.Update(deleted);
       continue;
     }
@@ -95,18 +95,18 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
   return worst;
 }
 
-ExitCode Delete(const Invocation& run, const DeleteArguments& arguments) {
+ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
   const auto usage = [&run](const char* what) {
     return run.FailUsage(absl::InvalidArgumentError(what));
   };
   if (arguments.hull_ids.empty() == !arguments.has_prefix) {
-    return usage("name the hulls to delete, or give --prefix, but not both");
+    return usage("give the IDs of the hulls to delete, or --prefix, but not both");
   }
   if (arguments.if_revision && arguments.hull_ids.size() != 1) {
-    return usage("--if-revision is about one hull; name one");
+    return usage("--if-revision takes exactly one hull");
   }
   if (arguments.has_prefix && arguments.prefix.empty()) {
-    return usage("--prefix is empty, which would mean every hull of the server; name a prefix");
+    return usage("refusing to delete every hull of the server: --prefix is empty");
   }
   const Client client = run.MakeClient();
   const auto doomed = Choose(client, arguments);
@@ -117,7 +117,7 @@ ExitCode Delete(const Invocation& run, const DeleteArguments& arguments) {
   }
   const auto meant = IsMeant(run, arguments, *doomed);
   if (!meant.ok()) return run.FailUsage(meant.status());
-  if (!*meant) return usage("nothing was deleted");
+  if (!*meant) return usage("cancelled; nothing was deleted");
   return DeleteAll(run, client, arguments, *doomed);
 }
 
@@ -126,7 +126,7 @@ ExitCode Delete(const Invocation& run, const DeleteArguments& arguments) {
 void AddDeleteCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<DeleteArguments>();
   Command command = program.AddCommand("delete", "Remove hulls");
-  command.AddTexts("ID", &arguments->hull_ids, "Names of the hulls").Completes(ValueKind::kHull);
+  command.AddTexts("ID", &arguments->hull_ids, "IDs of the hulls").Completes(ValueKind::kHull);
   command
       .AddParsed(
           "--prefix",
@@ -135,22 +135,21 @@ void AddDeleteCommand(Command program, Invocation* invocation) {
             arguments->has_prefix = true;
             return absl::OkStatus();
           },
-          "Instead of names: all that start with it, as they are when they are listed")
+          "Delete all hulls with this prefix, at their listed revisions, instead of IDs")
       .ValueName("PREFIX")
       .Completes(ValueKind::kHull);
-  command.AddFlag("--yes", &arguments->yes, "Do not ask before several are deleted");
-  command.AddFlag("--if-exists", &arguments->if_exists, "Accept that a hull is not there");
-  command.AddNumber("--if-revision", 0, kAnyNumber, "Only if its revision is this one",
+  command.AddFlag("--yes", &arguments->yes, "Delete several hulls without confirmation");
+  command.AddFlag("--if-exists", &arguments->if_exists, "Succeed if a hull does not exist");
+  command.AddNumber("--if-revision", 0, kAnyNumber, "Only if the hull is at this revision",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
   command.SetDetails(
-      "Before several are deleted, a question on the terminal tells how many and which; where "
-      "there\n"
-      "is no terminal, only --yes lets it happen. A hull that changed after it was listed for\n"
-      "--prefix stays, and the exit code is 1.");
+      "Deleting several hulls needs a confirmation on the terminal, or --yes. A hull that changes\n"
+      "after --prefix listed it is kept, and the exit code is 1.");
   command.SetExamples({{"", "hullctl delete arm/3"},
-                       {"All of one cell", "hullctl delete --prefix cell-3/"},
+                       {"All hulls of one cell", "hullctl delete --prefix cell-3/"},
                        {"In a script", "hullctl delete --prefix cell-3/ --yes"}});
-  command.OnGiven([=] { invocation->action = [=] { return Delete(*invocation, *arguments); }; });
+  command.OnGiven(
+      [=] { invocation->action = [=] { return DeleteHulls(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -46,8 +46,7 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
   cloud.shape = ShapeNames().at(arguments.shape);
   if (!IsFinite(cloud)) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "some points would lie beyond the largest double; choose a smaller --radius, --size or "
-        "--center"));
+        "a coordinate exceeds the largest double; use a smaller --radius, --size, or --center"));
   }
   const bool to_file = !arguments.file.empty() && arguments.file != "-";
   ProgressBar bar(run.err, run.shows_progress && to_file, "points", cloud.count);
@@ -70,16 +69,16 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("generate", "Write points as XYZ text; needs no server");
   std::vector<std::string> names;
   for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
-  command.AddText("SHAPE", &arguments->shape, "What the points fill").Required().OneOf(names);
+  command.AddText("SHAPE", &arguments->shape, "Shape that the points fill").Required().OneOf(names);
   command
       .AddNumber("N", 0, uint64_t{1} << 40, "How many points",
                  [cloud](uint64_t number) { cloud->count = number; })
       .Required();
-  command.AddNumber("--seed", 0, kAnyNumber, "Another seed, other points (default 1)",
+  command.AddNumber("--seed", 0, kAnyNumber, "Seed of the points (default 1)",
                     [cloud](uint64_t number) { cloud->seed = number; });
-  command.AddLength("--radius", "Of ball and sphere (default 1)",
+  command.AddLength("--radius", "Radius of ball and sphere (default 1)",
                     [cloud](double length) { cloud->radius = length; });
-  command.AddLength("--size", "Edge of the cube, or step of the lattice (default 1)",
+  command.AddLength("--size", "Edge of the cube, step of the lattice (default 1)",
                     [cloud](double length) { cloud->size = length; });
   command
       .AddParsed(
@@ -89,13 +88,13 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
             if (center.ok()) cloud->center = *center;
             return center.status();
           },
-          "Center; of the lattice its first point (default 0,0,0)")
+          "Center; for the lattice, its first point (default 0,0,0)")
       .ValueName("x,y,z");
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.SetDetails(
       "The same options give the same bytes on every machine. A lattice of N points is the first\n"
-      "N of the smallest cube of k*k*k points; take N = k*k*k for a whole one.");
+      "N of the smallest cube of k*k*k points; N = k*k*k gives a whole cube.");
   command.SetExamples(
       {{"A cube of edge 2", "hullctl generate lattice 27 | hullctl append cube - --create"},
        {"A hundred thousand points in a ball", "hullctl generate ball 100000 -o ball.xyz"}});

@@ -4,15 +4,12 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
 namespace {
-
-std::string PointText(const v1::Vector3& p) {
-  return ShortestText(p.x()) + " " + ShortestText(p.y()) + " " + ShortestText(p.z());
-}
 
 std::string CountsText(const v1::PointCounts& counts) {
   return std::to_string(counts.received()) + " received, " + std::to_string(counts.outside()) +
@@ -44,8 +41,8 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
       .Row({"facets", std::to_string(response.facet_count())})
       .Row({"points", CountsText(hull.counts())});
   if (response.has_box_min()) {
-    table.Row({"box from", PointText(response.box_min())})
-        .Row({"box to", PointText(response.box_max())});
+    table.Row({"box from", VectorText(response.box_min())})
+        .Row({"box to", VectorText(response.box_max())});
   }
   table.Row({"revision", std::to_string(hull.revision())})
       .Row({"created at", std::to_string(hull.create_revision())});
@@ -61,7 +58,7 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
   table.Print(run.out);
 }
 
-ExitCode Get(const Invocation& run, const std::string& hull_id, bool audit) {
+ExitCode GetHull(const Invocation& run, const std::string& hull_id, bool audit) {
   const auto response = run.MakeClient().GetHull(hull_id, audit);
   if (!response.ok()) return run.Fail(response.status());
   if (run.json()) {
@@ -89,10 +86,10 @@ struct HullOptions {
 void AddCreateCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
   Command command = program.AddCommand("create", "Register an empty hull");
-  command.AddText("ID", &options->hull_id, "Name of the hull, such as arm/3").Required();
-  command.AddFlag("--if-absent", &options->flag, "Accept a hull that exists already");
+  command.AddText("ID", &options->hull_id, "ID of the hull, such as arm/3").Required();
+  command.AddFlag("--if-absent", &options->flag, "Succeed if the hull exists");
   command.SetExamples({{"", "hullctl create arm/3"},
-                       {"In a script that may run twice", "hullctl create arm/3 --if-absent"}});
+                       {"In a script that can run twice", "hullctl create arm/3 --if-absent"}});
   command.OnGiven([=] {
     invocation->action = [=] { return Create(*invocation, options->hull_id, options->flag); };
   });
@@ -100,17 +97,15 @@ void AddCreateCommand(Command program, Invocation* invocation) {
 
 void AddGetCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
-  Command command = program.AddCommand("get", "Show size, counts and box of a hull");
-  command.AddText("ID", &options->hull_id, "Name of the hull")
-      .Required()
-      .Completes(ValueKind::kHull);
+  Command command = program.AddCommand("get", "Show size, counts, and box of a hull");
+  command.AddText("ID", &options->hull_id, "ID of the hull").Required().Completes(ValueKind::kHull);
   command.AddFlag("--audit", &options->flag,
-                  "Also let the server check the hull by other means than it was built by");
+                  "Make the server check the hull with independent code");
   AddFreshnessOptions(command, invocation);
   command.SetExamples(
       {{"", "hullctl get arm/3"}, {"As JSON, for a script", "hullctl get arm/3 --output json"}});
   command.OnGiven([=] {
-    invocation->action = [=] { return Get(*invocation, options->hull_id, options->flag); };
+    invocation->action = [=] { return GetHull(*invocation, options->hull_id, options->flag); };
   });
 }
 

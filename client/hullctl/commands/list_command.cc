@@ -73,7 +73,7 @@ void PrintCount(const Invocation& run, const v1::ListHullsResponse& response, ui
   }
 }
 
-void PrintTable(const Invocation& run, const v1::ListHullsResponse& response) {
+void PrintHullTable(const Invocation& run, const v1::ListHullsResponse& response) {
   Table table;
   std::vector<std::string> head = {"HULL", "DIMENSION", "VERTICES", "POINTS", "REVISION"};
   if (run.wide()) head.insert(head.end(), {"CREATED", "OUTSIDE", "DUPLICATE", "INSIDE", "STATE"});
@@ -95,7 +95,7 @@ void PrintTable(const Invocation& run, const v1::ListHullsResponse& response) {
   table.Print(run.out);
 }
 
-ExitCode List(const Invocation& run, const ListArguments& arguments) {
+ExitCode ListHulls(const Invocation& run, const ListArguments& arguments) {
   // Sorting needs the complete list before the limit applies.
   const bool sorts = arguments.reverse || !arguments.sort.empty();
   auto response = run.MakeClient().ListAllHulls(arguments.prefix, sorts ? 0 : arguments.limit);
@@ -121,13 +121,14 @@ ExitCode List(const Invocation& run, const ListArguments& arguments) {
   } else if (run.names()) {
     for (const v1::HullInfo& hull : response->hulls()) run.out << hull.hull_id() << "\n";
   } else {
-    PrintTable(run, *response);
+    PrintHullTable(run, *response);
   }
   for (const v1::HullInfo& hull : response->hulls()) {
     if (!hull.damaged()) continue;
-    run.err << "hullctl: " << hull.hull_id() << " is damaged in the store; only delete helps\n";
+    run.err << "hullctl: " << hull.hull_id()
+            << " is damaged in the store; it can only be deleted\n";
   }
-  if (cut) run.err << "hullctl: there are more hulls; raise --limit to see them\n";
+  if (cut) run.err << "hullctl: there are more hulls; raise --limit to list them\n";
   return ExitCode::kDone;
 }
 
@@ -136,25 +137,24 @@ ExitCode List(const Invocation& run, const ListArguments& arguments) {
 void AddListCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ListArguments>();
   Command command = program.AddCommand("list", "List the hulls and their sizes");
-  command.AddText("PREFIX", &arguments->prefix, "Only names that start with it")
+  command.AddText("PREFIX", &arguments->prefix, "Only IDs with this prefix")
       .Completes(ValueKind::kHull);
   std::vector<std::string> keys;
   for (const auto& [name, key] : SortKeys()) keys.push_back(name);
-  command.AddText("--sort", &arguments->sort, "What comes first: the largest, or the first name")
+  command.AddText("--sort", &arguments->sort, "Sort by size, largest first, or by name")
       .ValueName("BY")
       .OneOf(keys);
-  command.AddFlag("--reverse", &arguments->reverse, "The other way round");
+  command.AddFlag("--reverse", &arguments->reverse, "Reverse the order");
   command.AddNumber("--limit", 1, 1000000000, "Stop after N hulls (default: all)",
                     [arguments](uint64_t number) { arguments->limit = number; });
   command.AddFlag("--count", &arguments->count,
-                  "Only how many there are, with how many vertices and points, and how many "
-                  "bodies");
+                  "Print only the numbers of hulls, vertices, points, and bodies");
   AddFreshnessOptions(command, invocation);
-  command.SetExamples({{"Those of one cell", "hullctl list cell-3/"},
+  command.SetExamples({{"Hulls of one cell", "hullctl list cell-3/"},
                        {"The ten largest", "hullctl list --sort vertices --limit 10"},
-                       {"How many there are", "hullctl list --count"},
-                       {"Names alone, for a script", "hullctl list arm/ --output name"}});
-  command.OnGiven([=] { invocation->action = [=] { return List(*invocation, *arguments); }; });
+                       {"Number of hulls", "hullctl list --count"},
+                       {"IDs only, for a script", "hullctl list arm/ --output name"}});
+  command.OnGiven([=] { invocation->action = [=] { return ListHulls(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -9,6 +9,7 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/mesh_obj.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/printing/table.h"
 #include "client/verify/simplification_check.h"
 
 namespace hulld {
@@ -67,28 +68,27 @@ absl::StatusOr<VerifiedMesh> Fetch(const Invocation& run, const MeshArguments& a
   return VerifiedMesh{*std::move(mesh), {}};
 }
 
-ExitCode Refuse(const Invocation& run, const Verification& verification) {
+ExitCode RefuseSimplification(const Invocation& run, const Verification& verification) {
   const bool invalid = verification.verdict == Verdict::kInvalid;
-  run.err << "hullctl: the simplification "
-          << (invalid ? "is not what it claims" : "cannot be checked")
-          << ", so it is not written: " << verification.reason << "\n";
+  run.err << "hullctl: the simplification " << (invalid ? "is invalid" : "cannot be checked")
+          << "; nothing was written: " << verification.reason << "\n";
   return invalid ? ExitCode::kInvalidCertificate : ExitCode::kCannotCheck;
 }
 
 ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   const bool is_simplified = arguments.max_vertices > 0 || arguments.max_error > 0;
   if (arguments.outside && !is_simplified) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--outside says how to simplify; give --max-vertices, --max-error or both as well"));
+    return run.FailUsage(
+        absl::InvalidArgumentError("--outside needs --max-vertices, --max-error, or both"));
   }
   if (arguments.verify && !is_simplified) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--verify checks a simplification; give --max-vertices, --max-error or both as well"));
+        "--verify checks a simplification; it needs --max-vertices, --max-error, or both"));
   }
   const auto fetched = Fetch(run, arguments);
   if (!fetched.ok()) return run.Fail(fetched.status());
   if (arguments.verify && fetched->verification.verdict != Verdict::kValid) {
-    return Refuse(run, fetched->verification);
+    return RefuseSimplification(run, fetched->verification);
   }
   const HullMesh* const mesh = &fetched->mesh;
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
@@ -96,9 +96,9 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   });
   if (!written.ok()) return run.FailUsage(written);
   if (!arguments.file.empty() && arguments.file != "-") {
-    run.err << arguments.file << ": " << mesh->vertex_count() << " vertices, "
-            << mesh->facet_sizes.size() << " facets of " << arguments.hull_id << " at revision "
-            << mesh->header.hull().revision() << ErrorText(*mesh)
+    run.err << arguments.file << ": " << Counted(mesh->vertex_count(), "vertex", "vertices") << ", "
+            << Counted(mesh->facet_sizes.size(), "facet") << " of " << arguments.hull_id
+            << " at revision " << mesh->header.hull().revision() << ErrorText(*mesh)
             << (arguments.verify ? ", verified" : "") << "\n";
   }
   return ExitCode::kDone;
@@ -109,7 +109,7 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
 void AddMeshCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<MeshArguments>();
   Command command = program.AddCommand("mesh", "Write a hull as OBJ");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+  command.AddText("ID", &arguments->hull_id, "ID of the hull")
       .Required()
       .Completes(ValueKind::kHull);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
@@ -129,7 +129,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
   command.AddFlag("--outside", &arguments->outside,
                   "Simplify to a hull that encloses this one, instead of one inside it");
   command.AddFlag("--verify", &arguments->verify,
-                  "Fetch the hull, too, and check the simplification and its error exactly");
+                  "Fetch the hull as well, and check the simplification and its error exactly");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
@@ -137,9 +137,9 @@ void AddMeshCommand(Command program, Invocation* invocation) {
       "--verify takes nothing from the server but vertices: that the simplification is inside or\n"
       "outside, and how far from the hull it is, is found out by exact arithmetic of hullctl's "
       "own.\n"
-      "One that is not what it claims is not written.");
+      "One that is invalid is not written.");
   command.SetExamples({{"", "hullctl mesh spider -o spider-hull.obj"},
-                       {"At most 16 vertices, all of the hull within",
+                       {"At most 16 vertices, enclosing the hull",
                         "hullctl mesh spider --max-vertices 16 --outside -o simple.obj"}});
   command.OnGiven([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
 }

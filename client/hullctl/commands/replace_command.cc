@@ -21,11 +21,11 @@ struct ReplaceArguments {
   std::optional<uint64_t> if_revision;
 };
 
-void Print(const Invocation& run, const v1::ReplaceHullResponse& response,
-           const ReadCounts& counts) {
+void PrintReplaced(const Invocation& run, const v1::ReplaceHullResponse& response,
+                   const ReadCounts& counts) {
   const std::vector<std::string> skipped = SkippedTexts(counts);
   if (run.form != OutputForm::kTable && !run.wide()) {
-    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were left out\n";
+    for (const std::string& text : skipped) run.err << "hullctl: " << text << " were skipped\n";
   }
   if (run.json()) {
     run.out << MessageJson(response) << "\n";
@@ -46,10 +46,9 @@ void Print(const Invocation& run, const v1::ReplaceHullResponse& response,
 }
 
 absl::Status NoPoints(const ReplaceArguments& arguments) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("there are no points in ", absl::StrJoin(arguments.input.files, ", "),
-                   ", so nothing was changed; to put an empty hull in the place of ",
-                   arguments.hull_id, ", say --allow-empty"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "no points in ", absl::StrJoin(arguments.input.files, ", "),
+      "; nothing was changed; pass --allow-empty to make ", arguments.hull_id, " empty"));
 }
 
 ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
@@ -93,7 +92,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   bar.Clear();
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!response.ok()) return run.Fail(response.status());
-  Print(run, *response, skipped);
+  PrintReplaced(run, *response, skipped);
   return ExitCode::kDone;
 }
 
@@ -102,24 +101,23 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
 void AddReplaceCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ReplaceArguments>();
   Command command = program.AddCommand(
-      "replace", "Put a hull of the points of files in the place of another, all at once");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      "replace", "Replace a hull by the hull of the points of files, atomically");
+  command.AddText("ID", &arguments->hull_id, "ID of the hull")
       .Required()
       .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
-  command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
+  command.AddFlag("--create", &arguments->create, "Create the hull if it does not exist");
   command.AddFlag("--allow-empty", &arguments->allow_empty,
-                  "Accept files without a point: the hull becomes empty");
+                  "Accept files without points: the hull becomes empty");
   command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
   command.SetDetails(
-      "It takes the time that it takes, unless --timeout is given, which then bounds all of it. A\n"
-      "call that ends early leaves the hull as it was, or, when all points were sent, may have\n"
-      "replaced it.");
-  command.SetExamples(
-      {{"", "hullctl replace arm arm-v2.stl"},
-       {"Only if nobody changed it meanwhile", "hullctl replace arm arm-v2.stl --if-revision 7"}});
+      "Takes as long as needed, unless --timeout bounds it. A call that fails leaves the hull\n"
+      "unchanged, or, if all points were sent, may have replaced it.");
+  command.SetExamples({{"", "hullctl replace arm arm-v2.stl"},
+                       {"Only if it is unchanged since revision 7",
+                        "hullctl replace arm arm-v2.stl --if-revision 7"}});
   command.OnGiven([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
 }
 

@@ -11,6 +11,7 @@
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/printing/table.h"
 #include "client/hullctl/scene/scene_commands.h"
 #include "client/hullctl/scene/scene_file.h"
 
@@ -63,7 +64,7 @@ class SceneRun {
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
       if (scene_.HullOf(a) == nullptr || scene_.HullOf(b) == nullptr) {
-        return absl::InternalError("the answer names a placement that there is not");
+        return absl::InternalError("the answer names a placement that does not exist");
       }
       if (!run_.json()) Print(a, b, RowAt(part.columns(), i), cause);
     }
@@ -126,7 +127,8 @@ ExitCode Find(const Invocation& run, const QueryDetails& wishes, Scene* read) {
   SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
   if (scene.failed() == 0) return ExitCode::kDone;
-  run.err << "hullctl: " << scene.failed() << " placements or pairs have no answer\n";
+  run.err << "hullctl: " << Counted(scene.failed(), "placement or pair", "placements or pairs")
+          << " failed\n";
   return ExitCode::kSomeFailed;
 }
 
@@ -140,8 +142,8 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
   if (read->pairs.has_value()) {
     return run.FailUsage(absl::InvalidArgumentError(
         absl::StrCat(arguments.file,
-                     ": it names pairs, but 'scene' finds them itself; ask with "
-                     "'hullctl scene check' or 'hullctl batch', or leave them out")));
+                     ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
+                     "'hullctl scene check' or 'hullctl batch', or remove them")));
   }
   return Find(run, arguments.wishes, &*read);
 }
@@ -157,16 +159,14 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
 
 void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
-  Command command = scene.AddCommand("check", "Answer what a scene file asks");
+  Command command = scene.AddCommand("check", "Answer the queries of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddWantedOptions(command, &arguments->wishes);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
-      "Where the file names pairs, each is answered, as by 'hullctl batch'; else all pairs that\n"
-      "collide, or are within the clearance, are found, as by 'hullctl scene FILE'. Hulls and\n"
-      "bodies are those of the server: 'hullctl scene apply' puts them there. 'hullctl scene apply "
-      "--help'\n"
-      "shows how a scene in YAML asks.");
+      "If the file names pairs, answers each, as 'hullctl batch' does. Otherwise finds all pairs\n"
+      "that collide or are within the clearance, as 'hullctl scene FILE' does. Hulls and bodies\n"
+      "are those of the server; 'hullctl scene apply' creates them.");
   command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
   command.OnGiven([=] {
     invocation->action = [=] {
@@ -181,15 +181,16 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
 void AddSceneCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
   Command command =
-      program.AddCommand("scene", "Find all pairs of a scene that collide; keep scenes as files");
+      program.AddCommand("scene", "Find all colliding pairs of a scene; manage scene files");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input");
   AddWantedOptions(command, &arguments->wishes);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(std::string(kSceneFileHelp) +
-                     "\nWith a clearance, pairs within it are found although they are separated.");
-  command.SetExamples({{"", "hullctl scene scene.json"},
-                       {"What comes within a centimeter",
-                        "hullctl scene scene.txt --clearance 0.01 --separation"}});
+                     "\n"
+                     "With a clearance, separated pairs within it are found, too.");
+  command.SetExamples(
+      {{"", "hullctl scene scene.yaml"},
+       {"Pairs within a centimeter", "hullctl scene scene.yaml --clearance 0.01 --separation"}});
   command.OnGiven([=] {
     // A subcommand has already set the action.
     if (invocation->action == nullptr) {

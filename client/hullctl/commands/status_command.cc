@@ -33,7 +33,8 @@ void AddMoreLimits(const v1::Limits& limits, Table* table) {
   }
 }
 
-void Print(const Invocation& run, const v1::GetStatusResponse& status, const std::string& health) {
+void PrintStatus(const Invocation& run, const v1::GetStatusResponse& status,
+                 const std::string& health) {
   const v1::Limits& limits = status.limits();
   Table table;
   table.Row({"server", run.server})
@@ -70,7 +71,7 @@ ExitCode Status(const Invocation& run) {
   } else if (run.names()) {
     run.out << text << "\n";
   } else {
-    Print(run, *status, text);
+    PrintStatus(run, *status, text);
   }
   if (serving) return ExitCode::kDone;
   return run.Fail(health);
@@ -88,19 +89,17 @@ ExitCode Health(const Invocation& run) {
 
 void AddStatusCommand(Command program, Invocation* invocation) {
   Command command =
-      program.AddCommand("status", "Show what the server is and whether it is serving");
-  command.SetDetails("Exits with 0 only when the server answers and is serving.");
+      program.AddCommand("status", "Show version, sizes, limits, and health of the server");
+  command.SetDetails("Exits with 0 only if the server answers and is serving.");
   command.SetExamples({{"", "hullctl status --server hulls.example:50551 --tls"},
                        {"All limits", "hullctl status --output wide"}});
   command.OnGiven([=] { invocation->action = [=] { return Status(*invocation); }; });
 }
 
 void AddHealthCommand(Command program, Invocation* invocation) {
-  Command health =
-      program.AddCommand("health", "Ask whether the server is serving; needs no token");
-  health.SetDetails("Exits with 0 only when it is.");
-  health.SetExamples(
-      {{"In a script that waits for a server", "until hullctl health; do sleep 1; done"}});
+  Command health = program.AddCommand("health", "Show if the server is serving; needs no token");
+  health.SetDetails("Exits with 0 only if it is.");
+  health.SetExamples({{"Wait for a server in a script", "until hullctl health; do sleep 1; done"}});
   health.OnGiven([=] { invocation->action = [=] { return Health(*invocation); }; });
 }
 

@@ -57,7 +57,7 @@ class StreamRun {
     }
     for (const uint32_t pair : answer->pairs()) {
       if (pair < pairs_.size() / 2) continue;
-      return absl::InternalError("the answer names a pair that there is not");
+      return absl::InternalError("the answer names a pair that does not exist");
     }
     if (run_.json()) {
       run_.out << MessageJson(*answer) << "\n" << std::flush;
@@ -99,7 +99,7 @@ class StreamRun {
       const auto found = problems_.find(placement);
       if (found != problems_.end()) return found->second;
     }
-    return "the server gave no cause";
+    return "the server gave no reason";
   }
 
   const Invocation& run_;
@@ -153,14 +153,14 @@ ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
 
 void AddStreamCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<StreamArguments>();
-  Command command = program.AddCommand("stream", "Ask again and again while poses change");
+  Command command = program.AddCommand("stream", "Check pairs repeatedly while poses change");
   command.AddText("FILE", &arguments->file, "A scene and updates; - is standard input").Required();
   AddWantedOptions(command, &arguments->wishes);
   command.AddFlag("--only-changes", &arguments->only_changes,
-                  "Answer updates only by pairs whose relation changed");
+                  "Answer updates only with pairs whose relation changed");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
-      "FILE starts with a scene, as for 'hullctl batch'. Behind one in JSON, each line is a\n"
+      "FILE starts with a scene, as for 'hullctl batch'. After one in braces, each line is a\n"
       "CollisionStreamUpdate of the contract, answered before the next is read. Poses are seven\n"
       "numbers for each placement named: quaternion w x y z, translation x y z. Only pairs with a\n"
       "placement that moved are answered. --timeout bounds the wait for each answer. A file:\n"
@@ -168,7 +168,7 @@ void AddStreamCommand(Command program, Invocation* invocation) {
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.5,0,0]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.6,0,0],\"refreshHulls\":true}");
   command.SetExamples({{"", "hullctl stream poses.jsonl"},
-                       {"Contacts that begin and end, as messages of the contract",
+                       {"Contacts as they begin and end, as messages of the contract",
                         "simulator | hullctl stream - --only-changes --output json"}});
   command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *arguments); }; });
 }

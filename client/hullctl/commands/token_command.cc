@@ -38,7 +38,7 @@ std::string HashText(const std::string& token) {
 absl::StatusOr<std::string> RandomToken() {
   std::array<char, 32> bytes = {};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    return absl::InternalError("the system gives no random bytes");
+    return absl::InternalError("the system provides no random bytes");
   }
   return absl::StrCat("hulld_",
                       absl::WebSafeBase64Escape(absl::string_view(bytes.data(), bytes.size())));
@@ -78,7 +78,7 @@ ExitCode NewToken(const Invocation& run, const TokenArguments& arguments) {
 ExitCode HashToken(const Invocation& run) {
   std::string token;
   if (!(std::cin >> token)) {
-    return run.FailUsage(absl::InvalidArgumentError("standard input holds no token"));
+    return run.FailUsage(absl::InvalidArgumentError("standard input contains no token"));
   }
   run.out << HashText(token) << "\n";
   return ExitCode::kDone;
@@ -88,11 +88,11 @@ ExitCode HashToken(const Invocation& run) {
 
 void AddTokenCommand(Command program, Invocation* invocation) {
   Command command =
-      program.AddCommand("token", "Make a token and its line for hulld's --tokens-file");
+      program.AddCommand("token", "Create a token and its line for hulld's --tokens-file");
   command.RequireCommand();
   const auto arguments = std::make_shared<TokenArguments>();
-  Command make = command.AddCommand("new", "Make a random token");
-  make.AddText("NAME", &arguments->name, "Whose it is; the server's messages say it")
+  Command make = command.AddCommand("new", "Create a random token");
+  make.AddText("NAME", &arguments->name, "Owner of the token, shown in the server's messages")
       .Required()
       .Check([](const std::string& name) -> std::string {
         const bool valid = name.size() <= 64 && !name.empty() && std::isalnum(name[0]) != 0 &&
@@ -106,7 +106,7 @@ void AddTokenCommand(Command program, Invocation* invocation) {
       .Required()
       .OneOf({"read-only", "read-write", "admin"});
   make.AddText("--prefix", &arguments->prefix,
-               "What the IDs that it sees start with, ending in \"/\" (default: all)")
+               "Prefix of the IDs that it may access, ending in \"/\" (default: all)")
       .ValueName("PREFIX")
       .Check([](const std::string& prefix) -> std::string {
         const bool valid = prefix.size() > 1 && prefix.back() == '/' &&
@@ -114,8 +114,7 @@ void AddTokenCommand(Command program, Invocation* invocation) {
         return valid ? "" : "a prefix ends in \"/\", as in cell-1/";
       });
   make.AddText("--token-out", &arguments->file,
-               "Write the token to this new file, which only you can read, and print only the "
-               "line")
+               "Write the token to this new file, readable only by you, and print only the line")
       .ValueName("FILE");
   make.SetExamples({{"For a robot that may write under cell-1/",
                      "hullctl token new robot-1 --role read-write --prefix cell-1/ "

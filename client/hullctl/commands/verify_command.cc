@@ -51,15 +51,16 @@ ExitCode Verify(const Invocation& run, const std::string& path) {
 
 void AddVerifyCommand(Command program, Invocation* invocation) {
   auto path = std::make_shared<std::string>();
-  Command command =
-      program.AddCommand("verify", "Check that a recorded answer's certificate proves it");
+  Command command = program.AddCommand("verify", "Check the certificate of a recorded answer");
   command.AddText("FILE", path.get(), "The answer; - is standard input").Required();
   command.SetDetails(
-      "FILE is what 'hullctl check A B --record FILE' writes. The vertices are fetched from the\n"
-      "server; the arithmetic is exact and shares no code with it. An answer about a hull that "
-      "has\n"
-      "changed since cannot be checked, which is not the same as wrong: ask again, or let\n"
-      "'hullctl check --verify' do both at once.");
+      "FILE is written by 'hullctl check A B --record FILE'. The vertices come from the server; "
+      "the\n"
+      "arithmetic is exact and shares no code with it. The answer for a hull that has changed "
+      "since\n"
+      "cannot be checked, which does not mean that it is wrong; 'hullctl check --verify' checks "
+      "an\n"
+      "answer immediately.");
   command.SetExamples(
       {{"", "hullctl check arm box --record answer.json"}, {"", "hullctl verify answer.json"}});
   command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });

@@ -11,6 +11,7 @@
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/table.h"
 #include "client/hullctl/view/bridge/bridge.h"
 #include "client/hullctl/view/bridge/page_html.h"
 #include "client/hullctl/view/browser_picture.h"
@@ -134,8 +135,8 @@ class Viewing {
     for (const std::string& thing : things) {
       if (IsSceneName(thing) && IsFile(thing)) {
         if (things.size() > 1) {
-          return run_.FailUsage(absl::InvalidArgumentError(absl::StrCat(
-              thing, " is a whole scene: its groups count its placements; give it alone")));
+          return run_.FailUsage(absl::InvalidArgumentError(
+              absl::StrCat(thing, " is a scene; it cannot be combined with other arguments")));
         }
         const absl::Status added = AddSceneFile(thing, &scene);
         if (!added.ok()) return run_.FailUsage(added);
@@ -175,7 +176,7 @@ class Viewing {
     if (!written.ok()) return run_.FailUsage(written);
     if (arguments_.html_file == "-") return ExitCode::kDone;
     const size_t count = program_.scenes.front().objects.size();
-    run_.out << arguments_.html_file << ": " << count << (count == 1 ? " object" : " objects")
+    run_.out << arguments_.html_file << ": " << Counted(count, "object")
              << "; open it in a browser\n";
     return ExitCode::kDone;
   }
@@ -203,7 +204,7 @@ class Viewing {
     const auto bridge = Bridge::Start(std::move(options));
     if (!bridge.ok()) return run_.FailUsage(bridge.status());
     run_.out << "viewer at " << (*bridge)->Address() << "\n"
-             << "the address lets one browser in, once; Ctrl-C ends the viewer" << std::endl;
+             << "the address works once, in one browser; Ctrl-C ends the viewer" << std::endl;
     std::unique_ptr<AddressFile> address;
     if (!arguments_.no_open && isatty(STDOUT_FILENO) != 0) {
       address = std::make_unique<AddressFile>((*bridge)->Address());
@@ -229,18 +230,19 @@ class Viewing {
 
 ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (arguments.demo && !arguments.things.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("--demo shows scenes of its own; leave out " +
-                                                    arguments.things[0]));
+    return run.FailUsage(
+        absl::InvalidArgumentError("--demo shows its own scenes; remove " + arguments.things[0]));
   }
   if (!arguments.demo && !arguments.scene_key.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("--scene chooses among those of --demo"));
+    return run.FailUsage(absl::InvalidArgumentError("--scene needs --demo"));
   }
   const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
   if (files == 2) {
-    return run.FailUsage(absl::InvalidArgumentError("--html and --png write one file; give one"));
+    return run.FailUsage(absl::InvalidArgumentError("--html and --png cannot be combined"));
   }
   if (files == 1 && arguments.edit) {
-    return run.FailUsage(absl::InvalidArgumentError("--edit is for the page that asks a server"));
+    return run.FailUsage(
+        absl::InvalidArgumentError("--edit cannot be combined with --html or --png"));
   }
   return Viewing(run, arguments).Run();
 }
@@ -249,27 +251,26 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
 
 void AddViewCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ViewArguments>();
-  Command command = program.AddCommand("view", "Look at hulls, bodies and files in a browser");
+  Command command = program.AddCommand("view", "Show hulls, bodies, and files in a browser");
   command
-      .AddTexts(
-          "ID|PREFIX|FILE", &arguments->things,
-          "Hulls and bodies, those whose IDs start so, meshes, points, or a scene (.json, .yaml); "
-          "default: all hulls and bodies")
+      .AddTexts("ID|PREFIX|FILE", &arguments->things,
+                "IDs or prefixes of hulls and bodies, meshes, points, or a scene (.yaml, .json); "
+                "default: all hulls and bodies")
       .Completes(ValueKind::kPlaced);
   command.AddFlag("--demo", &arguments->demo,
-                  "Show the textbook's scenes, keys 0 to 7, with hulls made for them");
-  command.AddText("--scene", &arguments->scene_key, "The scene of --demo to start with")
+                  "Show the demo scenes, keys 0 to 7, with temporary hulls");
+  command.AddText("--scene", &arguments->scene_key, "First scene of --demo")
       .OneOf({"0", "1", "2", "3", "4", "5", "6", "7"});
   command.AddNumber("--port", 0, 65535, "Port on 127.0.0.1 (default 0: any free one)",
                     [arguments](uint64_t port) { arguments->port = static_cast<uint16_t>(port); });
   command.AddFlag("--no-open", &arguments->no_open, "Print the address and open no browser");
   command
       .AddText("--html", &arguments->html_file,
-               "Write one file that shows the scene without a server, and end")
+               "Write one file that shows the scene without a server, and exit")
       .ValueName("FILE");
   command
       .AddText("--png", &arguments->png_file,
-               "Write a picture, drawn by a browser without a window, and end")
+               "Write a picture, drawn by a headless browser, and exit")
       .ValueName("FILE");
   const auto take_size = [arguments](const std::string& text) {
     const auto size = ParsePictureSize(text);
@@ -284,21 +285,20 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
   command.SetDetails(
-      "A body is one thing that is dragged as a whole; hulls that are its pieces are shown by\n"
-      "themselves only when they are named.\n"
-      "The page asks hulld through hullctl: it never sees your token, and without --edit it\n"
-      "changes nothing on the server. The hull of a FILE is made by the server, under view/, and "
-      "deleted at the end;\n"
-      "without the right to write, the file is shown without its hull. Press ? on the page for\n"
-      "its keys. --png runs chromium or another browser of its family; 'hullctl picture' draws\n"
-      "without any, as SVG.");
+      "A body is dragged as a whole; the hulls of its pieces are shown on their own only if "
+      "named.\n"
+      "The page queries hulld through hullctl: it never sees your token, and without --edit it\n"
+      "changes nothing on the server. The hull of a FILE is created on the server, under view/, "
+      "and\n"
+      "deleted at the end; with a read-only token, the file is shown without its hull. Press ? on\n"
+      "the page for its keys. --png runs chromium or another browser of its family.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
-       {"Those whose IDs start so, and those to come", "hullctl view cell-3/"},
-       {"A hull beside the points, mesh and hull of a file", "hullctl view arm part.stl"},
-       {"Placements, as for 'hullctl scene'", "hullctl view scene.json"},
-       {"One file to send to someone", "hullctl view arm --html arm.html"},
-       {"A picture for a report", "hullctl view scene.json --png scene.png --size 1200x800"}});
+       {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
+       {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
+       {"A scene", "hullctl view scene.json"},
+       {"A file to share", "hullctl view arm --html arm.html"},
+       {"A picture for a report", "hullctl view scene.yaml --png scene.png --size 1200x800"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });
 }
 

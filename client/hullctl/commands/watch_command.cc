@@ -13,6 +13,7 @@
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/scene_file.h"
 
@@ -28,10 +29,6 @@ struct WatchOptions {
   // 0: unlimited.
   uint64_t events = 0;
 };
-
-std::string CornerText(const v1::Vector3& p) {
-  return absl::StrCat(ShortestText(p.x()), " ", ShortestText(p.y()), " ", ShortestText(p.z()));
-}
 
 std::string KindText(v1::HullEventKind kind) {
   return std::string(absl::StripPrefix(v1::HullEventKind_Name(kind), "HULL_EVENT_KIND_"));
@@ -54,11 +51,11 @@ std::string EventText(const v1::HullEvent& event) {
   }
   absl::StrAppend(&text, "\t", hull.vertex_count(), " of ", hull.counts().received(), " points");
   if (!event.has_box_min()) return text;
-  return absl::StrCat(text, "\t", CornerText(event.box_min()), " to ", CornerText(event.box_max()));
+  return absl::StrCat(text, "\t", VectorText(event.box_min()), " to ", VectorText(event.box_max()));
 }
 
-void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
-  if (message.anew()) run.out << "# anew: forget what is above\n";
+void PrintHullEvents(const v1::WatchHullsResponse& message, const Invocation& run) {
+  if (message.anew()) run.out << "# restart: discard the lines above\n";
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }
@@ -105,7 +102,7 @@ ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   request.set_bodies(true);
   uint64_t events = 0;
   const auto tell = [&](const v1::WatchHullsResponse& message) {
-    if (!run.json()) Print(message, run);
+    if (!run.json()) PrintHullEvents(message, run);
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) ||
            (options.until_synced && message.synced());
@@ -132,7 +129,7 @@ v1::CollisionWatchOpen OpenOf(const Scene& scene) {
 }
 
 // Returns the deciding pieces of bodies; empty if none decided.
-std::string PiecesOf(const Scene& scene, const v1::CollisionEvent& event) {
+std::string DecidingPieces(const Scene& scene, const v1::CollisionEvent& event) {
   if (!event.has_piece_a() && !event.has_piece_b()) return "";
   const auto index = [](bool has, const v1::DecidingPiece& piece) {
     return has ? static_cast<int32_t>(piece.index()) : -1;
@@ -167,7 +164,7 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
       if (event.kind() != v1::COLLISION_EVENT_KIND_LOST) {
         run.out << "\t" << event.revision_a() << "\t" << event.revision_b();
       }
-      const auto pieces = PiecesOf(*scene, event);
+      const auto pieces = DecidingPieces(*scene, event);
       if (!pieces.empty()) run.out << "\t" << pieces;
       run.out << "\n";
     }
@@ -185,40 +182,42 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
 
 void AddWatchCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<WatchOptions>();
-  Command command = program.AddCommand("watch", "Tell of hulls, or of a scene, as they change");
-  command.AddText("PREFIX", &options->prefix, "Only hulls and bodies whose names start with it")
+  Command command =
+      program.AddCommand("watch", "Print changes of hulls, or of the pairs of a scene");
+  command.AddText("PREFIX", &options->prefix, "Only hulls and bodies with this prefix")
       .Completes(ValueKind::kPlaced);
-  command.AddFlag("--exact", &options->exact, "Only the hull of this very name");
+  command.AddFlag("--exact", &options->exact, "Only the hull with exactly this ID");
   command
       .AddText("--scene", &options->scene,
-               "Tell instead when pairs of a scene begin and end to collide")
+               "Print pairs of a scene as they begin and end to collide, instead")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
-  command.AddFlag("--until-synced", &options->until_synced, "End once what is there has been told");
-  command.AddNumber("--events", 1, kAnyNumber, "End after N events, or a few more at once",
+  command.AddFlag("--until-synced", &options->until_synced, "Exit after the initial state");
+  command.AddNumber("--events", 1, kAnyNumber,
+                    "Exit after N events, or a few more that arrive together",
                     [options](uint64_t number) { options->events = number; });
   command.SetDetails(
-      "Prints a line for each event: what happened, name, revision, vertices and points, box;\n"
-      "of a body, how many pieces it has. First come all hulls and bodies (PRESENT) and a line\n"
-      "'# synced'; then what is CREATED, CHANGED, REPLACED and DELETED, the last state of each\n"
-      "where many changes come at once.\n"
-      "With --scene: what happened (ENTER, TOUCH, EXIT, with a clearance NEAR and FAR, LOST\n"
-      "when a hull goes), the two placements, and the revisions of their hulls or bodies; of a\n"
-      "body, the piece that decided. FILE is as in 'hullctl scene' and 'hullctl batch'; poses\n"
-      "stay, hulls grow and bodies are put anew.\n"
-      "A watch that loses the server looks for it during --timeout, and goes on where it was.\n"
-      "With --output json each message of the contract is one line. Ctrl-C ends it.");
+      "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body, "
+      "its\n"
+      "number of pieces. The initial state comes first (PRESENT) and ends with a line '# synced'.\n"
+      "Then come CREATED, CHANGED, REPLACED, and DELETED; of many changes at once, only the last\n"
+      "state of each hull is printed.\n"
+      "With --scene: kind (ENTER, TOUCH, EXIT; with a clearance, NEAR and FAR; LOST if a hull is\n"
+      "deleted), the two placements, the revisions of their hulls or bodies, and, for bodies, the\n"
+      "deciding pieces. Poses are fixed; pairs change as hulls grow and bodies are replaced.\n"
+      "A watch that loses the server reconnects within --timeout and resumes where it was.\n"
+      "With --output json, each message of the contract is one line. Ctrl-C ends the watch.");
   command.SetExamples(
-      {{"Those of one cell", "hullctl watch cell-3/"},
-       {"What is there, for a script", "hullctl watch --until-synced --output json"},
-       {"What collides while hulls grow", "hullctl watch --scene scene.txt"}});
+      {{"Hulls of one cell", "hullctl watch cell-3/"},
+       {"The current state, for a script", "hullctl watch --until-synced --output json"},
+       {"Collisions while hulls grow", "hullctl watch --scene scene.yaml"}});
   command.OnGiven([=] {
     invocation->action = [=] {
       const Invocation& run = *invocation;
       if (options->scene.empty()) return WatchHulls(run, *options);
       if (options->prefix.empty() && !options->exact) return WatchScene(run, *options);
-      return run.FailUsage(absl::InvalidArgumentError(
-          "--scene names what is watched; leave out PREFIX and --exact"));
+      return run.FailUsage(
+          absl::InvalidArgumentError("--scene cannot be combined with PREFIX and --exact"));
     };
   });
 }

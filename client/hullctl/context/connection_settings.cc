@@ -69,7 +69,7 @@ absl::StatusOr<ConnectionSettings> SettingsOfEnvironment() {
       if (text == "0" || text == "no" || text == "off") text = "false";
       if (text != "true" && text != "false") {
         return absl::InvalidArgumentError(
-            absl::StrCat("$", setting.variable, ": ", Quoted(text), " is neither true nor false"));
+            absl::StrCat("$", setting.variable, ": ", Quoted(text), " is not true or false"));
       }
     }
     settings[setting.name] = text;

@@ -31,21 +31,21 @@ struct ConnectionSetting {
 
 inline constexpr ConnectionSetting kConnectionSettings[] = {
     {"server", "HULLCTL_SERVER", SettingKind::kText, "HOST:PORT",
-     "Where hulld listens, or several over one store: ADDRESS:PORT,ADDRESS:PORT or "
+     "Address of hulld, or of several over one store: ADDRESS:PORT,ADDRESS:PORT or "
      "dns:///NAME:PORT (default 127.0.0.1:50551)"},
     {"tls", "HULLCTL_TLS", SettingKind::kFlag, nullptr,
-     "Encrypt, and trust the authorities of the system; the next four imply it"},
+     "Use TLS with the authorities of the system; the next four options imply it"},
     {"ca-cert", "HULLCTL_CA_CERT", SettingKind::kFile, "FILE",
-     "The authorities that the server's certificate may come from"},
+     "Authorities that may sign the server's certificate"},
     {"cert", "HULLCTL_CERT", SettingKind::kFile, "FILE",
-     "Our certificate, for a server that asks for one"},
+     "Client certificate, for a server that requires one"},
     {"key", "HULLCTL_KEY", SettingKind::kFile, "FILE", "Its private key"},
     {"server-name", "HULLCTL_SERVER_NAME", SettingKind::kText, "NAME",
-     "The name in the server's certificate, where it is not that of --server"},
+     "Name in the server's certificate, if it differs from --server"},
     {"token-file", "HULLCTL_TOKEN_FILE", SettingKind::kFile, "FILE",
-     "The token that the server asks for; or the token itself in $HULLD_TOKEN"},
+     "File of the token; $HULLD_TOKEN holds the token itself"},
     {"insecure", nullptr, SettingKind::kFlag, nullptr,
-     "Let the token go unencrypted to other machines"},
+     "Allow sending the token unencrypted to other machines"},
 };
 
 // A token itself. Only the environment gives it, as all users of the machine can see arguments.

@@ -26,12 +26,12 @@ using google::protobuf::Struct;
 using google::protobuf::Value;
 
 // Maximum size of a context file; a larger one is no context file.
-constexpr size_t kMostBytes = size_t{1} << 20;
+constexpr size_t kMostContextBytes = size_t{1} << 20;
 
 absl::Status Damaged(const std::string& path, const std::string& what) {
   return absl::InvalidArgumentError(
       absl::StrCat(path, ": ", what,
-                   "; mend it, or remove it and add the contexts anew with 'hullctl context add'"));
+                   "; fix it, or delete it and add the contexts again with 'hullctl context add'"));
 }
 
 const ConnectionSetting* SettingNamed(const std::string& name) {
@@ -53,7 +53,7 @@ absl::StatusOr<ConnectionSettings> ReadContext(const std::string& path, const st
     const ConnectionSetting* const setting = SettingNamed(member);
     if (setting == nullptr) {
       return Damaged(path, absl::StrCat(place, " has the member ", Quoted(member),
-                                        ", which is no setting of a context"));
+                                        ", which is not a setting of a context"));
     }
     const bool is_flag = setting->kind == SettingKind::kFlag;
     if (is_flag && text.kind_case() == Value::kBoolValue) {
@@ -118,16 +118,16 @@ absl::StatusOr<ContextFile> ReadContextFile() {
   std::ifstream stream(path, std::ios::binary);
   if (!stream || S_ISDIR(info.st_mode)) {
     return Damaged(path,
-                   absl::StrCat("it cannot be read: ", std::strerror(errno != 0 ? errno : EISDIR)));
+                   absl::StrCat("cannot be read: ", std::strerror(errno != 0 ? errno : EISDIR)));
   }
-  std::string text(kMostBytes + 1, '\0');
+  std::string text(kMostContextBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<size_t>(stream.gcount()));
-  if (text.size() > kMostBytes) return Damaged(path, "it is too large for a file of contexts");
+  if (text.size() > kMostContextBytes) return Damaged(path, "the file is too large");
   Struct json;
   if (const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &json); !parsed.ok()) {
     const std::string message(parsed.message().data(), parsed.message().size());
-    return Damaged(path, "it is not JSON: " + message.substr(0, message.find('\n')));
+    return Damaged(path, "not JSON: " + message.substr(0, message.find('\n')));
   }
   for (const auto& [member, value] : json.fields()) {
     if (member == "current" && value.kind_case() == Value::kStringValue) {
@@ -139,12 +139,12 @@ absl::StatusOr<ContextFile> ReadContextFile() {
         file.contexts[name] = *std::move(settings);
       }
     } else {
-      return Damaged(path, absl::StrCat("the member ", Quoted(member), " does not belong there"));
+      return Damaged(path, absl::StrCat("the member ", Quoted(member), " is unknown"));
     }
   }
   if (!file.current.empty() && !file.contexts.contains(file.current)) {
     return Damaged(path,
-                   absl::StrCat("its current context ", Quoted(file.current), " is not there"));
+                   absl::StrCat("its current context ", Quoted(file.current), " does not exist"));
   }
   return file;
 }
@@ -152,7 +152,7 @@ absl::StatusOr<ContextFile> ReadContextFile() {
 absl::Status WriteContextFile(const ContextFile& file) {
   const std::string path = ContextFilePath();
   if (path.empty()) {
-    return absl::InvalidArgumentError("set HOME or XDG_CONFIG_HOME, where the contexts are kept");
+    return absl::InvalidArgumentError("no folder for contexts; set HOME or XDG_CONFIG_HOME");
   }
   const auto problem = [](const std::string& place, int error) {
     return absl::InvalidArgumentError(
@@ -196,7 +196,7 @@ absl::StatusOr<ConnectionSettings> FindContext(const ContextFile& file, const st
   if (hint.empty()) {
     hint = names.empty() ? "; add it with 'hullctl context add'" : "; see 'hullctl context list'";
   }
-  return absl::InvalidArgumentError(absl::StrCat("there is no context ", Quoted(name), hint));
+  return absl::InvalidArgumentError(absl::StrCat("unknown context ", Quoted(name), hint));
 }
 
 }  // namespace hulld

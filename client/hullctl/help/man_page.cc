@@ -42,7 +42,7 @@ std::string Flowing(const std::string& text) {
   return result + (verbatim ? ".fi\n" : "");
 }
 
-void AppendOptions(const CommandDescription& command, bool arguments, std::string* page) {
+void AppendOptionItems(const CommandDescription& command, bool arguments, std::string* page) {
   for (const OptionDescription& option : command.options) {
     if (option.hidden || option.is_argument() != arguments) continue;
     std::vector<std::string> names;
@@ -61,8 +61,8 @@ void AppendHeading(const std::string& title, std::string* page) {
 
 // Appends options, details, and examples of a command and of its subcommands.
 void AppendCommand(const CommandDescription& command, std::string* page) {
-  AppendOptions(command, true, page);
-  AppendOptions(command, false, page);
+  AppendOptionItems(command, true, page);
+  AppendOptionItems(command, false, page);
   if (!command.details.empty()) absl::StrAppend(page, ".PP\n", Flowing(command.details));
   for (const auto& below : command.commands) {
     if (below->hidden) continue;
@@ -105,7 +105,7 @@ std::string ManPage(const CommandDescription& program, const CommandDescription&
       }
     }
     AppendHeading("options of every command", &page);
-    AppendOptions(command, false, &page);
+    AppendOptionItems(command, false, &page);
     AppendHeading("notes", &page);
     absl::StrAppend(&page, Verbatim(command.details));
   } else {

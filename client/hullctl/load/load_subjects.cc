@@ -161,7 +161,7 @@ absl::Status LoadSubjects::Create(const std::atomic<bool>& stop) {
   if (!there.ok()) return there.status();
   if (there->hulls_size() > 0) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "hull \"", there->hulls(0).hull_id(), "\" is there already, and the load would delete it; ",
+        "hull \"", there->hulls(0).hull_id(), "\" already exists, and the load would delete it; ",
         "choose another --prefix"));
   }
   owns_prefix_ = true;

@@ -10,6 +10,7 @@
 #include "client/enclosure/coverage.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 
@@ -83,11 +84,7 @@ class PieceFetcher {
   std::vector<PlacedHull> pieces_;
 };
 
-std::string PointText(const std::array<double, 3>& p) {
-  return absl::StrCat(ShortestText(p[0]), " ", ShortestText(p[1]), " ", ShortestText(p[2]));
-}
-
-void PrintJson(const Invocation& run, const TriangleMesh& mesh, const Coverage& coverage) {
+void PrintCoverageJson(const Invocation& run, const TriangleMesh& mesh, const Coverage& coverage) {
   JsonObject object;
   object.AddJson("enclosed", coverage.uncovered.empty() ? "true" : "false")
       .Add("triangles", uint64_t{mesh.triangles.size()})
@@ -106,8 +103,8 @@ void PrintJson(const Invocation& run, const TriangleMesh& mesh, const Coverage& 
   run.out << object.AddJson("trianglesOutside", list + "]").Close() << "\n";
 }
 
-void Print(const Invocation& run, const CoverArguments& arguments, const TriangleMesh& mesh,
-           size_t pieces, const Coverage& coverage) {
+void PrintCoverage(const Invocation& run, const CoverArguments& arguments, const TriangleMesh& mesh,
+                   size_t pieces, const Coverage& coverage) {
   if (run.names()) {
     run.out << (coverage.uncovered.empty() ? "ENCLOSED" : "OUTSIDE") << "\n";
     return;
@@ -126,18 +123,18 @@ void Print(const Invocation& run, const CoverArguments& arguments, const Triangl
   for (const UncoveredTriangle& found : coverage.uncovered) {
     if (listed++ == arguments.limit) break;
     run.out << "triangle " << found.triangle << "\tby " << ShortestText(found.distance) << "\tat "
-            << PointText(found.point) << "\n";
+            << VectorText(found.point[0], found.point[1], found.point[2]) << "\n";
   }
   if (coverage.uncovered.size() > arguments.limit) {
     run.out << "# " << coverage.uncovered.size() - arguments.limit
-            << " more; raise --limit to see them\n";
+            << " more; raise --limit to list them\n";
   }
 }
 
 ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   if (arguments.words.size() < 2) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "name hulls or bodies, and the file of the mesh behind them: hullctl cover ID... FILE"));
+        "give IDs of hulls or bodies, then the file of the mesh: hullctl cover ID... FILE"));
   }
   std::vector<std::string> hulls = arguments.words;
   const std::string file = hulls.back();
@@ -145,7 +142,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   const auto mesh = ReadMesh(file);
   if (!mesh.ok()) return run.FailUsage(mesh.status());
   if (mesh->triangles.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(file + ": there is no triangle in it"));
+    return run.FailUsage(absl::InvalidArgumentError(file + ": contains no triangle"));
   }
   const Client client = run.MakeClient();
   PieceFetcher fetcher(client);
@@ -162,9 +159,9 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
                      return a.distance > b.distance;
                    });
   if (run.json()) {
-    PrintJson(run, *mesh, *coverage);
+    PrintCoverageJson(run, *mesh, *coverage);
   } else {
-    Print(run, arguments, *mesh, pieces.size(), *coverage);
+    PrintCoverage(run, arguments, *mesh, pieces.size(), *coverage);
   }
   return ExitCode::kDone;
 }
@@ -173,10 +170,10 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
 
 void AddCoverCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CoverArguments>();
-  Command command = program.AddCommand("cover", "Ask whether hulls or a body enclose a mesh");
+  Command command = program.AddCommand("cover", "Check if hulls or a body enclose a mesh");
   command
       .AddTexts("ID", &arguments->words,
-                "Names of hulls or bodies, then the mesh (obj, off, stl, gltf, dae)")
+                "IDs of hulls or bodies, then the mesh (obj, off, stl, gltf, dae)")
       .Required()
       .Completes(ValueKind::kPlaced);
   command.AddNumber(
@@ -184,19 +181,19 @@ void AddCoverCommand(Command program, Invocation* invocation) {
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),
       [arguments](uint64_t number) { arguments->limit = number; });
   command.SetDetails(
-      "Whether each point of each triangle of the mesh is in one of the hulls, boundaries "
-      "included.\n"
-      "A body stands for its pieces, at their poses, which are not rounded.\n"
-      "That is decided exactly, by cutting triangles in integers of any length: no triangle that\n"
-      "sticks out is missed, none is named that does not. By how much is computed in floating\n"
-      "point: for one hull it is the largest distance, for several it is at least that large. It\n"
-      "is the surface that is asked about: one hull that holds it holds all inside of it; several\n"
-      "may leave a hollow within a solid. A name that ends in / stands for all hulls that start\n"
-      "so. Triangles count from 0, in the order of the file; polygons are fans of them. That\n"
-      "something sticks out is an answer: exit code 0.");
+      "Checks that each point of each triangle of the mesh is in one of the hulls, boundaries\n"
+      "included. A body stands for its pieces at their exact poses. The decision is exact:\n"
+      "triangles are cut in integers of any length, so the list is complete and has no false\n"
+      "entries. Distances are computed in floating point: the largest distance for one hull, a\n"
+      "lower bound of it for several. Only the surface is checked: one hull that holds it holds "
+      "the\n"
+      "interior; several may leave a hollow within a solid. An ID that ends in / stands for all\n"
+      "hulls with this prefix. Triangles count from 0, in the order of the file; polygons are "
+      "fans\n"
+      "of triangles. Triangles that stick out are an answer: exit code 0.");
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
                        {"The pieces of a body together", "hullctl cover chair chair.obj"},
-                       {"All hulls that start so", "hullctl cover chair/ chair.obj"}});
+                       {"All hulls with a prefix", "hullctl cover chair/ chair.obj"}});
   command.OnGiven(
       [=] { invocation->action = [=] { return AnswerCover(*invocation, *arguments); }; });
 }

@@ -63,18 +63,16 @@ absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::st
                                              bool create) {
   const absl::Status hull = client.GetHull(id).status();
   if (hull.ok() || absl::IsDataLoss(hull)) {
-    return absl::AlreadyExistsError(absl::StrCat(
-        "there is a hull ", Quoted(id),
-        "; --split makes a body of the parts under that name, so give another one; nothing was "
-        "changed"));
+    return absl::AlreadyExistsError(absl::StrCat("hull ", Quoted(id),
+                                                 " already exists, but --split creates a body with "
+                                                 "this ID; use another ID; nothing was changed"));
   }
   if (!absl::IsNotFound(hull)) return hull;
   auto body = client.GetBody(id);
   if (!absl::IsNotFound(body.status())) return body;
   if (create) return v1::GetBodyResponse();
-  return absl::NotFoundError(absl::StrCat("body ", Quoted(id),
-                                          " not found; create it, and the hulls of its parts, with "
-                                          "--create"));
+  return absl::NotFoundError(absl::StrCat(
+      "body ", Quoted(id), " not found; pass --create to create it and the hulls of its parts"));
 }
 
 // Returns the body with the parts: existing pieces stay, missing parts are added after them, at the
@@ -104,9 +102,9 @@ absl::Status CheckPieces(const Client& client, const v1::GetBodyResponse& body,
   const auto pieces = static_cast<uint64_t>(request->pieces_size());
   const uint64_t limit = status->limits().max_pieces_per_body();
   if (pieces <= limit) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(
-      "body ", Quoted(id), " would have ", pieces, " pieces; the limit is ", limit,
-      " (--max-pieces-per-body); make several bodies of the parts; nothing was changed"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("body ", Quoted(id), " would have ", pieces, " pieces; the limit is ", limit,
+                   " (--max-pieces-per-body); use several bodies; nothing was changed"));
 }
 
 // Creates or extends the body of the parts, and prints the result.
@@ -117,7 +115,7 @@ ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBod
   if (request.has_value()) {
     const auto put = client.PutBody(*request);
     if (!put.ok()) {
-      run.err << "hullctl: all parts were appended, but not put into the body " << id << "\n";
+      run.err << "hullctl: all parts were appended, but not added to body " << id << "\n";
       return run.Fail(put.status());
     }
     body = put->body();
@@ -134,11 +132,11 @@ ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBod
                    .Close()
             << "\n";
   } else if (added == 0) {
-    run.out << "body " << id << " has them already, at revision " << body.revision() << "\n";
+    run.out << "body " << id << " already has all parts, at revision " << body.revision() << "\n";
   } else {
     run.out << "body " << id << (found.pieces().empty() ? " created" : " extended")
-            << " at revision " << body.revision() << ", " << body.piece_count()
-            << (body.piece_count() == 1 ? " piece" : " pieces") << "\n";
+            << " at revision " << body.revision() << ", " << Counted(body.piece_count(), "piece")
+            << "\n";
   }
   return ExitCode::kDone;
 }

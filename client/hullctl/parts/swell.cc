@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-constexpr off_t kMostBytes = off_t{64} << 20;
+constexpr off_t kMostSwellBytes = off_t{64} << 20;
 
 }  // namespace
 
@@ -22,8 +22,8 @@ std::string SwellText(std::optional<double> ratio) {
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio) {
   if (!ratio.has_value() || *ratio < kSwellToWarn) return;
   run.err << "hullctl: warning: the hull " << hull_id << " has " << absl::StrFormat("%.4g", *ratio)
-          << " times the volume of its mesh; parts of it stand better for it (--split, or a convex "
-             "decomposition)\n";
+          << " times the volume of its mesh; split the mesh into parts with --split or a convex "
+             "decomposition\n";
 }
 
 std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
@@ -36,7 +36,7 @@ std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
     // The --format of a file may contradict its name.
     const auto named = PointFormatOfPath(file.path);
     const bool has_mesh = IsMeshFormat(file.format) && named.ok() && *named == file.format;
-    if (!is_file || !has_mesh || bytes > kMostBytes) return std::nullopt;
+    if (!is_file || !has_mesh || bytes > kMostSwellBytes) return std::nullopt;
     auto mesh = ReadMesh(file.path);
     // The points were read, so broken faces are no error.
     if (!mesh.ok()) return std::nullopt;

@@ -80,16 +80,16 @@ std::string RowText(const AnswerRow& row, const Painter& paint,
   std::vector<std::string> cells = {PaintedRelation(row.relation, paint)};
   if (row.separation) cells.push_back(SeparationText(*row.separation));
   if (row.witness) {
-    cells.push_back(DirectionText(row.witness->point_a()));
-    cells.push_back(DirectionText(row.witness->point_b()));
+    cells.push_back(VectorText(row.witness->point_a()));
+    cells.push_back(VectorText(row.witness->point_b()));
   }
   if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
   if (row.pieces) cells.push_back(PiecesText(*row.pieces, piece_names));
   if (row.axis != nullptr) {
     const bool found = row.axis->kind() != v1::AXIS_KIND_UNSPECIFIED;
-    cells.push_back(found ? absl::StrCat(AxisKindText(row.axis->kind()), " ",
-                                         DirectionText(row.axis->direction()))
-                          : "no axis");
+    cells.push_back(
+        found ? absl::StrCat(AxisKindText(row.axis->kind()), " ", VectorText(row.axis->direction()))
+              : "no axis");
   }
   if (row.proof != nullptr) {
     const int count = row.proof->certificates_size();

@@ -47,9 +47,9 @@ std::string AxisKindText(v1::AxisKind kind) {
 std::string RungText(v1::Rung rung) {
   switch (rung) {
     case v1::RUNG_BOUNDS:
-      return "bounds round the hulls";
+      return "bounding boxes";
     case v1::RUNG_CACHED:
-      return "what decided the step before";
+      return "result of the previous step";
     case v1::RUNG_FLOATING_POINT:
       return "floating point with a proven bound";
     case v1::RUNG_EXACT:
@@ -84,14 +84,13 @@ std::string StageText(const v1::Analysis& analysis) {
   return text;
 }
 
-std::string DirectionText(const v1::Vector3& direction) {
-  return ShortestText(direction.x()) + " " + ShortestText(direction.y()) + " " +
-         ShortestText(direction.z());
+std::string VectorText(double x, double y, double z) {
+  return ShortestText(x) + " " + ShortestText(y) + " " + ShortestText(z);
 }
 
 std::string CertificateText(const v1::Certificate& certificate) {
   std::string text;
-  if (certificate.has_direction()) text = "n = " + DirectionText(certificate.direction());
+  if (certificate.has_direction()) text = "n = " + VectorText(certificate.direction());
   if (certificate.has_integer_direction()) {
     const v1::IntegerDirection& n = certificate.integer_direction();
     text = "n = " + IntegerText(n.x()) + " " + IntegerText(n.y()) + " " + IntegerText(n.z());

@@ -24,7 +24,8 @@ std::string HullSizeText(const v1::HullSize& size);
 // "FACET_B, axis 7 of 30", or "nowhere".
 std::string StageText(const v1::Analysis& analysis);
 // "0.1 0.2 0.3".
-std::string DirectionText(const v1::Vector3& direction);
+std::string VectorText(double x, double y, double z);
+inline std::string VectorText(const v1::Vector3& v) { return VectorText(v.x(), v.y(), v.z()); }
 // "n = 0 0 1; A 3 with B 5, A 0 with B 2"; long integers by their number of digits.
 std::string CertificateText(const v1::Certificate& certificate);
 // "-0.25 within 1e-16".

@@ -5,7 +5,7 @@
 namespace hulld {
 namespace {
 
-const char* CodeOf(Hue hue) {
+const char* EscapeCode(Hue hue) {
   switch (hue) {
     case Hue::kHeading:
       return "1";
@@ -23,7 +23,7 @@ const char* CodeOf(Hue hue) {
 
 std::string Painter::operator()(Hue hue, const std::string& text) const {
   if (!on_) return text;
-  return std::string("\x1b[") + CodeOf(hue) + "m" + text + "\x1b[0m";
+  return std::string("\x1b[") + EscapeCode(hue) + "m" + text + "\x1b[0m";
 }
 
 bool WantsColor(const std::string& when, bool is_terminal) {

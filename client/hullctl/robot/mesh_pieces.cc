@@ -39,9 +39,9 @@ void Scale(const std::array<LengthScale, 3>& scale, TriangleMesh* mesh) {
   }
 }
 
-absl::StatusOr<std::vector<MeshPiece>> PiecesOf(std::vector<MeshPart> parts,
-                                                const CollisionShape& shape,
-                                                const std::string& file) {
+absl::StatusOr<std::vector<MeshPiece>> ScaledPieces(std::vector<MeshPart> parts,
+                                                    const CollisionShape& shape,
+                                                    const std::string& file) {
   std::vector<MeshPiece> pieces;
   for (MeshPart& part : parts) {
     Scale(shape.scale, &part.mesh);
@@ -50,7 +50,7 @@ absl::StatusOr<std::vector<MeshPiece>> PiecesOf(std::vector<MeshPart> parts,
       for (const double x : p) {
         if (!std::isfinite(x)) {
           return absl::InvalidArgumentError(
-              absl::StrCat(file, ": scaled, a coordinate is beyond the largest double"));
+              absl::StrCat(file, ": a scaled coordinate exceeds the largest double"));
         }
         piece.hull.xyz.push_back(x);
       }
@@ -102,13 +102,13 @@ absl::StatusOr<std::vector<MeshPiece>> MeshPieces(const CollisionShape& shape,
   if (has_triangles && (split == MeshSplit::kNames || split == MeshSplit::kComponents)) {
     auto parts = ReadParts(file, split == MeshSplit::kNames ? SplitBy::kName : SplitBy::kComponent);
     if (!parts.ok()) return parts.status();
-    return PiecesOf(*std::move(parts), shape, file);
+    return ScaledPieces(*std::move(parts), shape, file);
   }
   const bool reads_mesh = has_triangles && IsSmall(file);
   if (reads_mesh && split == MeshSplit::kAutomatic) {
     // The points of a file with broken faces still have a hull.
     auto parts = ReadParts(file, SplitBy::kName);
-    if (parts.ok() && AreConvexParts(*parts)) return PiecesOf(*std::move(parts), shape, file);
+    if (parts.ok() && AreConvexParts(*parts)) return ScaledPieces(*std::move(parts), shape, file);
   }
   auto hull = MeshHull(shape, file);
   if (!hull.ok()) return hull.status();

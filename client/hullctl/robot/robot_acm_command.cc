@@ -98,7 +98,7 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
         const LinkPair links =
             MakeLinkPair(model.parts[pairs[2 * pair]].link, model.parts[pairs[2 * pair + 1]].link);
         if (row.relation == v1::RELATION_UNSPECIFIED) {
-          problem = absl::InternalError(absl::StrCat("a pair has no answer: ", cause));
+          problem = absl::InternalError(absl::StrCat("a pair failed: ", cause));
         }
         Tally& tally = (*tallies)[links];
         if (row.relation == v1::RELATION_SEPARATED || tally.last == sample) return;
@@ -158,22 +158,20 @@ void AddRobotAcmCommand(Command robot, Invocation* invocation) {
   Command command = robot.AddCommand("acm", "Write the pairs that never or always collide as SRDF");
   AddRobotArguments(command, &arguments->robot);
   command.AddNumber("--samples", 1, uint64_t{1} << 32,
-                    absl::StrCat("How many configurations (default ", kDefaultSamples, ")"),
+                    absl::StrCat("Number of configurations (default ", kDefaultSamples, ")"),
                     [arguments](uint64_t number) { arguments->samples = number; });
-  command.AddNumber("--seed", 0, kAnyNumber, "Another seed, other configurations (default 1)",
+  command.AddNumber("--seed", 0, kAnyNumber, "Seed of the configurations (default 1)",
                     [arguments](uint64_t number) { arguments->seed = number; });
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.SetDetails(
       std::string(kRobotHelp) +
-      "\nEach joint takes values uniform within its limits, or a whole turn where it has none. "
-      "The\n"
-      "same options sample the same configurations. Links that a joint connects, or joints "
-      "through\n"
-      "links without shapes, are written as Adjacent and not sampled. Links with a planar or "
-      "floating\n"
-      "joint between them are neither sampled nor written: nothing bounds how they move. Touching\n"
-      "counts as colliding.");
+      "\n"
+      "Joint values are uniform within the limits, or over a full turn without limits. The same\n"
+      "options sample the same configurations. Links connected by a joint, or by joints through\n"
+      "links without shapes, are written as Adjacent and not sampled. Links with a planar or\n"
+      "floating joint between them are neither sampled nor written, as their motion is unbounded.\n"
+      "Touching counts as colliding.");
   command.SetExamples({{"", "hullctl robot acm arm.urdf --samples 10000 -o arm.srdf"}});
   command.OnGiven([=] { invocation->action = [=] { return MakeAcm(*invocation, *arguments); }; });
 }

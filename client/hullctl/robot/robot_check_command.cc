@@ -16,6 +16,7 @@
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/printing/table.h"
 #include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
 #include "client/hullctl/robot/waypoint_stream.h"
@@ -29,7 +30,7 @@ namespace {
 // Maximum number of limit violations printed individually; the rest are only counted.
 constexpr size_t kMostWarnings = 5;
 
-struct CheckArguments {
+struct RobotCheckArguments {
   RobotArguments robot;
   std::string srdf;
   std::string joints;
@@ -80,7 +81,7 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
                                       ? &robot.joints[static_cast<size_t>(joint)]
                                       : nullptr;
   if (loose == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is no joint of ", robot.name,
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is not a joint of ", robot.name,
                                                    " with a value", Suggestion(name, known)));
   }
   JointValue value = {};
@@ -102,7 +103,7 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
 // One run: the robot, its sequence of waypoints, and the output about them.
 class RobotCheck {
  public:
-  RobotCheck(const Invocation& run, const CheckArguments& arguments, RobotModel model)
+  RobotCheck(const Invocation& run, const RobotCheckArguments& arguments, RobotModel model)
       : run_(run),
         arguments_(arguments),
         model_(std::move(model)),
@@ -136,7 +137,7 @@ class RobotCheck {
   }
 
   const Invocation& run_;
-  const CheckArguments& arguments_;
+  const RobotCheckArguments& arguments_;
   RobotModel model_;
   const Client client_;
   TemporaryHulls temporary_;
@@ -231,19 +232,19 @@ absl::Status RobotCheck::ChoosePairs() {
       kept.insert(kept.end(), {a, b});
     }
     if (kept.size() == pairs_.size()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "--ignore: ", Quoted(ignored), " is no pair that would be asked about; it takes two ",
-          "names of links or placements, as in forearm_link,table"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("--ignore: ", Quoted(ignored), " is not a checked pair; give two ",
+                       "names of links or placements, as in forearm_link,table"));
     }
     pairs_ = std::move(kept);
   }
   if (!pairs_.empty()) return absl::OkStatus();
-  const std::string hint = !arguments_.ignored.empty() ? "--ignore leaves all of them out"
-                           : left_out_ == 0 ? "two links with shapes, or --scene, make one"
+  const std::string hint = !arguments_.ignored.empty() ? "--ignore excludes all of them"
+                           : left_out_ == 0 ? "a pair needs two links with shapes, or --scene"
                            : arguments_.srdf.empty()
-                               ? "--adjacent asks about adjacent ones, too"
+                               ? "--adjacent includes adjacent links"
                                : absl::StrCat(arguments_.srdf, " disables all of them");
-  return absl::InvalidArgumentError(absl::StrCat("no pair of links is left to ask about; ", hint));
+  return absl::InvalidArgumentError(absl::StrCat("no pair of links is left to check; ", hint));
 }
 
 // Returns the rest values, overridden by --joint.
@@ -263,7 +264,7 @@ absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
   const std::string joint = JointWithoutRotation(model_.robot, values);
   if (!joint.empty()) {
     return absl::InvalidArgumentError(absl::StrCat("--joint: the quaternion of ", Quoted(joint),
-                                                   " is 0 0 0 0, which is no rotation"));
+                                                   " is zero; use 1,0,0,0 for no rotation"));
   }
   return values;
 }
@@ -286,7 +287,7 @@ absl::Status RobotCheck::OpenWaypoints() {
   }
   many_ = pending_.size() > 1;
   if (!pending_.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": there is no waypoint in it"));
+  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": contains no waypoint"));
 }
 
 absl::StatusOr<bool> RobotCheck::ReadWaypoint(Waypoint* free_values) {
@@ -429,7 +430,7 @@ void RobotCheck::PrintHead() {
              << " beyond it\n";
   }
   for (const std::string& note : model_.notes) run_.out << "# " << note << "\n";
-  run_.out << "# " << pairs_.size() / 2 << " pairs";
+  run_.out << "# " << Counted(pairs_.size() / 2, "pair");
   if (left_out_ > 0) run_.out << "; " << left_out_ << " left out by " << left_out_by_;
   if (left_out_bare_ > 0) {
     run_.out << ", " << left_out_bare_ << " of them joined through links without shapes";
@@ -495,42 +496,39 @@ ExitCode RobotCheck::Run() {
   }
   if (stopped_) run_.err << "hullctl: stopped after " << waypoints_ << " waypoints\n";
   if (failed_ == 0) return stopped_ ? ExitCode::kRequestFailed : ExitCode::kDone;
-  run_.err << "hullctl: " << failed_ << " checks have no answer\n";
+  run_.err << "hullctl: " << failed_ << " checks failed\n";
   return ExitCode::kSomeFailed;
 }
 
-ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
+ExitCode CheckRobot(const Invocation& run, const RobotCheckArguments& arguments) {
   auto model = ReadRobot(arguments.robot);
   if (!model.ok()) return run.FailUsage(model.status());
   return RobotCheck(run, arguments, *std::move(model)).Run();
 }
 
 // Adds options that select the pairs of links.
-void AddPairOptions(Command command, CheckArguments* arguments) {
+void AddPairOptions(Command command, RobotCheckArguments* arguments) {
   command
-      .AddText(
-          "--srdf", &arguments->srdf,
-          "Leave out the pairs of links that this semantic description disables, and no others")
+      .AddText("--srdf", &arguments->srdf,
+               "Exclude exactly the pairs of links that this semantic description disables")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command.AddFlag("--adjacent", &arguments->adjacent,
-                  "Without --srdf: ask about links that a joint connects, or joints through links "
-                  "without shapes, too");
+                  "Without --srdf: include links connected by a joint, or by joints through links "
+                  "without shapes");
 }
 
 // Adds options for one configuration of the robot or many.
-void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& arguments) {
+void AddWaypointOptions(Command command, const std::shared_ptr<RobotCheckArguments>& arguments) {
   command
-      .AddText(
-          "--joints", &arguments->joints,
-          "A table of values: a header of joints, a row for each waypoint; - is standard input")
+      .AddText("--joints", &arguments->joints,
+               "CSV table: a header of joints, then a row per waypoint; - is standard input")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command
-      .AddRepeated(
-          "--joint", &arguments->joint_values,
-          "Without --joints: the value of a joint, a pose [w,x,y,z,]x,y,z of a floating one, "
-          "x,y,theta of a planar one; may be given again")
+      .AddRepeated("--joint", &arguments->joint_values,
+                   "Value of a joint, without --joints; a pose [w,x,y,z,]x,y,z for a floating "
+                   "joint, x,y,theta for a planar one; repeatable")
       .ValueName("NAME=VALUE");
   command
       .AddParsed(
@@ -540,41 +538,46 @@ void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& 
             if (pose.ok()) arguments->X_WB = NumbersOf(*pose);
             return pose.status();
           },
-          "Where the robot stands: [w,x,y,z,]x,y,z (default: the origin)")
+          "Pose of the robot: [w,x,y,z,]x,y,z (default: the origin)")
       .ValueName("POSE");
 }
 
 // Adds options for the surroundings of the robot.
-void AddSceneOptions(Command command, CheckArguments* arguments) {
+void AddSceneOptions(Command command, RobotCheckArguments* arguments) {
   command
       .AddText(
           "--scene", &arguments->scene,
-          "What stands around it, as for 'hullctl scene'; its hulls and bodies are on the server")
+          "Scene around the robot, as for 'hullctl scene'; its hulls and bodies are on the server")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command
       .AddRepeated("--ignore", &arguments->ignored,
-                   "Leave out two links, or a link and a placement; may be given again")
+                   "Exclude two links, or a link and a placement; repeatable")
       .ValueName("NAME,NAME");
 }
 
 void DescribeRobotCheck(Command command) {
   command.SetDetails(
       std::string(kRobotHelp) +
-      "\nPairs of shapes on one link are never asked about. Without --srdf, links that a joint\n"
-      "connects, or joints through links without shapes, are left out, too, as MoveIt does: they\n"
-      "touch by design. Planar and floating joints connect nothing in this sense. With --srdf,\n"
-      "exactly the pairs that it disables are left out.\n"
-      "\nA joint without a value is at 0, or in the middle of its limits where they exclude 0. In\n"
+      "\n"
+      "Pairs of shapes on one link are never checked. Without --srdf, links connected by a joint, "
+      "or\n"
+      "by joints through links without shapes, are excluded, too, as in MoveIt: they touch by\n"
+      "design. Planar and floating joints do not count here. With --srdf, exactly the pairs that "
+      "it\n"
+      "disables are excluded.\n"
+      "\n"
+      "A joint without a value is at 0, or in the middle of its limits if these exclude 0. In\n"
       "--joints, a planar joint J has the columns J/x, J/y and J/theta, a floating one J/trans_x,\n"
       "J/trans_y, J/trans_z, J/rot_x, J/rot_y, J/rot_z and J/rot_w, as in MoveIt. A\n"
-      "value beyond limits is warned of, not changed. One configuration prints every pair and its\n"
-      "separation. Several waypoints are one stream: pairs are printed as they begin (ENTER) and\n"
-      "end (LEAVE) to collide or touch, and the first contact is named. Only the waypoints "
-      "themselves are\n"
-      "checked, not the motion between them. A collision is an answer: exit code 0.");
+      "value beyond its limits gives a warning. One configuration prints every pair and its\n"
+      "separation. For several waypoints, pairs are printed as they begin (ENTER) and end (LEAVE) "
+      "to\n"
+      "collide or touch, and the first contact at the end. Only the waypoints are checked, not "
+      "the\n"
+      "motion between them. A collision is an answer: exit code 0.");
   command.SetExamples(
-      {{"As it stands, with all joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
+      {{"All joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
        {"One joint bent", "hullctl robot check arm.urdf --joint elbow_joint=2.5"},
        {"A trajectory within a cell",
         "hullctl robot check arm.urdf --joints path.csv --scene cell.yaml --ignore "
@@ -585,20 +588,22 @@ void DescribeRobotCheck(Command command) {
 }  // namespace
 
 void AddRobotCheckCommand(Command robot, Invocation* invocation) {
-  auto arguments = std::make_shared<CheckArguments>();
-  Command command = robot.AddCommand("check", "Ask what collides on a robot, and with a scene");
+  auto arguments = std::make_shared<RobotCheckArguments>();
+  Command command =
+      robot.AddCommand("check", "Check a robot for collisions with itself and a scene");
   AddRobotArguments(command, &arguments->robot);
   AddPairOptions(command, arguments.get());
   AddWaypointOptions(command, arguments);
   AddSceneOptions(command, arguments.get());
-  command.AddFlag("--first", &arguments->first, "End at the first waypoint in contact");
+  command.AddFlag("--first", &arguments->first, "Stop at the first waypoint in contact");
   AddWantedOptions(command, &arguments->wishes);
   DescribeRobotCheck(command);
-  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+  command.OnGiven(
+      [=] { invocation->action = [=] { return CheckRobot(*invocation, *arguments); }; });
 }
 
 void AddRobotCommand(Command program, Invocation* invocation) {
-  Command command = program.AddCommand("robot", "Ask what collides on a robot (URDF)");
+  Command command = program.AddCommand("robot", "Check a robot (URDF) for collisions");
   AddRobotCheckCommand(command, invocation);
   AddRobotAcmCommand(command, invocation);
   command.SetExamples({{"", "hullctl robot check arm.urdf --srdf arm.srdf"},

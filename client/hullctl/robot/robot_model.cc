@@ -18,17 +18,18 @@
 namespace hulld {
 
 const char kRobotHelp[] =
-    "FILE is a robot description (URDF). Each shape that collides becomes a hull of its own, in "
-    "its\n"
-    "own frame: a mesh its convex hull, a box itself, and cylinders, spheres and capsules "
-    "polyhedra\n"
-    "around them; how far these reach beyond the shape is printed. A mesh file of several named\n"
-    "parts that are all convex, as V-HACD and CoACD write them, becomes a hull for each part;\n"
-    "--split does so with any parts. The hulls are removed at the end unless --prefix keeps them.\n"
-    "Meshes are obj, stl, ply, off, gltf or dae. A package://NAME/ is found by --package, in\n"
-    "ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above FILE.\n"
-    "Meters and radians, as in URDF. Poses are computed in floating point; answers are exact for\n"
-    "those poses.\n";
+    "FILE is a robot description (URDF). Each collision shape becomes a hull in its own frame: a\n"
+    "mesh its convex hull, a box itself, and a cylinder, sphere, or capsule an enclosing "
+    "polyhedron\n"
+    "whose excess is printed. A mesh file of several named parts that are all convex, as V-HACD "
+    "and\n"
+    "CoACD write them, becomes one hull per part; --split does so with any parts. The hulls are\n"
+    "deleted at the end, unless --prefix keeps them. Meshes are obj, stl, ply, off, gltf, or dae. "
+    "A\n"
+    "package://NAME/ is searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and "
+    "in\n"
+    "the folders above FILE. Units are meters and radians, as in URDF. Poses are computed in\n"
+    "floating point; answers are exact for these poses.\n";
 
 namespace {
 
@@ -60,8 +61,8 @@ MeshSplit SplitOf(const RobotArguments& arguments) {
                                            : MeshSplit::kAutomatic;
 }
 
-absl::StatusOr<std::vector<MeshPiece>> PiecesOf(const CollisionShape& shape,
-                                                const PackagePaths& paths, MeshSplit split) {
+absl::StatusOr<std::vector<MeshPiece>> ShapePieces(const CollisionShape& shape,
+                                                   const PackagePaths& paths, MeshSplit split) {
   if (shape.kind != ShapeKind::kMesh) return std::vector<MeshPiece>{{PrimitiveHull(shape), {}}};
   const auto file = ResolveFile(paths, shape.mesh);
   if (!file.ok()) return file.status();
@@ -74,7 +75,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
   const RobotLink& from = model->robot.links[link];
   const size_t first = model->parts.size();
   for (const CollisionShape& shape : from.shapes) {
-    auto pieces = PiecesOf(shape, paths, SplitOf(arguments));
+    auto pieces = ShapePieces(shape, paths, SplitOf(arguments));
     if (!pieces.ok()) {
       const std::string message(pieces.status().message().data(), pieces.status().message().size());
       return absl::Status(pieces.status().code(),
@@ -108,32 +109,28 @@ void WarnOfSwollenPart(const Invocation& run, const Client& client, const RobotP
   // Failure to read the hull does not fail the check; the mesh is only compared.
   const auto swell = SwellOf(client, part.hull_id, part.hull.xyz.size() / 3, part.mesh);
   if (!swell.ok() || swell->ratio.value_or(1) < kSwellToWarn) return;
-  run.err
-      << "hullctl: warning: the hull of " << part.name << " has "
-      << absl::StrFormat("%.4g", *swell->ratio)
-      << " times the volume of its mesh, so it may collide where the mesh does not; use a convex "
-         "decomposition of the mesh, or --split\n";
+  run.err << "hullctl: warning: the hull of " << part.name << " has "
+          << absl::StrFormat("%.4g", *swell->ratio)
+          << " times the volume of its mesh and may collide where the mesh does not; use a convex "
+             "decomposition of the mesh, or --split\n";
 }
 
 }  // namespace
 
 void AddRobotArguments(Command command, RobotArguments* arguments) {
-  command.AddText("FILE", &arguments->urdf, "The robot description (URDF); - is standard input")
+  command.AddText("FILE", &arguments->urdf, "Robot description (URDF); - is standard input")
       .Required();
-  command
-      .AddRepeated("--package", &arguments->packages,
-                   "Where the package of that name is; may be given again")
+  command.AddRepeated("--package", &arguments->packages, "Folder of a package; repeatable")
       .ValueName("NAME=DIR");
   command
-      .AddText(
-          "--split", &arguments->split,
-          "Make a hull of each part of a mesh: of what its file names, or of what hangs "
-          "together; none: one hull of each mesh (default: by names where all parts are convex)")
+      .AddText("--split", &arguments->split,
+               "Split meshes into parts: by names in the file, or by connected components; none: "
+               "one hull per mesh (default: by names, if all parts are convex)")
       .ValueName("HOW")
       .OneOf({"names", "components", "none"});
   command
       .AddText("--prefix", &arguments->prefix,
-               "Keep the hulls of the links under this, such as arm/ (default: remove them)")
+               "Keep the hulls of the links under this prefix, such as arm/ (default: delete them)")
       .ValueName("PREFIX");
 }
 
@@ -171,8 +168,8 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
     if (!added.ok()) return added;
   }
   if (model.parts.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(arguments.urdf, ": no link has a <collision>; nothing can collide"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        arguments.urdf, ": no link has a <collision> element, so nothing can collide"));
   }
   return model;
 }

@@ -6,7 +6,6 @@
 namespace hulld {
 namespace {
 
-constexpr size_t kPoseNumbers = 7;
 // Enough to amortize the round trip. Observed, 18 pairs of a UR5: 2.4 million pairs per second.
 constexpr size_t kPairsPerMessage = 4096;
 constexpr size_t kMostLanes = 1024;
@@ -75,7 +74,7 @@ std::string WaypointStream::ProblemOf(uint32_t lane, size_t pair) const {
     const auto found = placement_problems_.find(placement);
     if (found != placement_problems_.end()) return found->second;
   }
-  return "the server gave no cause";
+  return "the server gave no reason";
 }
 
 absl::Status WaypointStream::Take(const v1::StreamCollisionsResponse& answer, size_t count) {
@@ -93,7 +92,7 @@ absl::Status WaypointStream::Take(const v1::StreamCollisionsResponse& answer, si
   }
   for (size_t i = 0; i < rows; ++i) {
     if (answer.pairs(static_cast<int>(i)) != i) {
-      return absl::InternalError("the answer leaves out a pair that moved");
+      return absl::InternalError("the answer lacks a pair that moved");
     }
     const AnswerRow row = RowAt(answer.columns(), static_cast<int>(i));
     const size_t lane = i / pairs;

@@ -7,6 +7,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/deletion.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
 #include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/scene/yaml_scene.h"
 
@@ -15,33 +16,32 @@ namespace {
 
 constexpr char kYamlHelp[] =
     "A scene in YAML:\n"
-    "  prefix: cell-3/            # in front of the names of hulls, on the server; with a / at "
-    "its\n"
-    "                             # end, all that is under it is the scene's\n"
-    "  scale: mm                  # of files that say none: mm, cm, m, in, ft or a factor\n"
+    "  prefix: cell-3/            # of the IDs on the server; one that ends in / belongs to the\n"
+    "                             # scene alone\n"
+    "  scale: mm                  # default for files: mm, cm, m, in, ft, or a factor\n"
     "  hulls:\n"
     "    bracket: {file: bracket.stl, scale: cm}    # the hull of the file's points\n"
-    "    table: {box: [2, 1, 0.1]}                  # edges; it stands around the origin\n"
+    "    table: {box: [2, 1, 0.1]}                  # edges; centerd on the origin\n"
     "    wedge: {points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}\n"
-    "  bodies:                    # several hulls as one, under one name\n"
+    "  bodies:                    # several hulls as one\n"
     "    corner:\n"
     "      - {hull: bracket}\n"
     "      - {hull: wedge, at: [0, 0, 0.1]}\n"
-    "  place:                     # each thing at a pose; members of a group do not collide\n"
+    "  place:                     # hulls and bodies at poses; pairs within a group are excluded\n"
     "    floor: {hull: table, at: [0, 0, -0.05], group: building}\n"
     "    left: {body: corner, at: {xyz: [1, 0, 0], rpy: [0, 0, 1.57]}}\n"
-    "    arm: {id: arm/upper}     # a hull that is on the server anyway\n"
+    "    arm: {id: arm/upper}     # a hull or body of the server\n"
     "  ignore: [[left, floor]]    # placements or groups\n"
     "  ask: {separation: true, clearance: 0.01}\n"
-    "A pose is [x, y, z], or [w, x, y, z, x, y, z] with a quaternion in front, or {xyz: ..., rpy: "
-    "...}\n"
-    "or {xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and what 'hullctl\n"
-    "check' asks for: separation, witness, axis, certificate, analysis, clearance, max_error,\n"
-    "tolerance. Coordinates of files become meters by `scale`, rounded once. Files stand beside\n"
-    "the scene file.\n";
+    "A pose is [x, y, z], [w, x, y, z, x, y, z] with a quaternion first, {xyz: ..., rpy: ...}, or\n"
+    "{xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and the options of\n"
+    "'hullctl check': separation, witness, axis, certificate, analysis, clearance, max_error,\n"
+    "tolerance. `scale` converts coordinates of files to meters, rounded once. Relative file "
+    "names\n"
+    "start at the folder of the scene file.\n";
 
 // Deletes only the listed revision, if it was listed.
-absl::StatusOr<v1::ResponseHeader> Delete(const Client& client, const Kept& kept) {
+absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& kept) {
   if (kept.is_body) {
     const auto deleted = client.DeleteBody(kept.id, kept.revision);
     return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
@@ -88,7 +88,7 @@ class SceneSync {
     const auto strangers = Strangers(client_, scene_);
     if (!strangers.ok()) return run_.Fail(strangers.status());
     if (prune && changes && !yes) {
-      const absl::Status meant = Confirm(run_, *strangers, "nothing was changed");
+      const absl::Status meant = Confirm(run_, *strangers, "cancelled; nothing was changed");
       if (!meant.ok()) return run_.FailUsage(meant);
     }
     for (const HullDefinition& hull : scene_.hulls) {
@@ -107,9 +107,9 @@ class SceneSync {
     const absl::Status told = TakeStrangers(*strangers, changes, prune);
     if (!told.ok()) return run_.Fail(told);
     if (!run_.json() && !run_.names()) {
-      run_.out << "# " << same_hulls_ << " hulls";
-      if (!scene_.bodies.empty()) run_.out << " and " << same_bodies_ << " bodies";
-      run_.out << " are as the file has them\n";
+      run_.out << "# " << Counted(same_hulls_, "hull");
+      if (!scene_.bodies.empty()) run_.out << " and " << Counted(same_bodies_, "body", "bodies");
+      run_.out << " unchanged\n";
     }
     return ExitCode::kDone;
   }
@@ -137,7 +137,7 @@ class SceneSync {
   absl::Status TakeStrangers(const std::vector<Kept>& strangers, bool changes, bool prune) {
     for (const Kept& stranger : strangers) {
       if (prune && changes) {
-        const absl::Status deleted = Delete(client_, stranger).status();
+        const absl::Status deleted = DeleteKept(client_, stranger).status();
         if (!deleted.ok() && !absl::IsNotFound(deleted)) return deleted;
       }
       Tell(prune ? "-" : "?", stranger,
@@ -176,10 +176,10 @@ ExitCode ApplyScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (arguments.prune && !OwnsItsPrefix(*scene)) {
-    return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
-        arguments.file, ": --prune needs a scene whose prefix ends with \"/\", as in prefix: ",
-        scene->prefix.empty() ? "cell-3" : scene->prefix,
-        "/; what begins with another may be another scene's, as cell-3 begins cell-30/arm")));
+    return run.FailUsage(absl::InvalidArgumentError(
+        absl::StrCat(arguments.file, ": --prune needs a prefix that ends in \"/\", such as ",
+                     scene->prefix.empty() ? "cell-3" : scene->prefix,
+                     "/; \"cell-3\" would also match cell-30/arm")));
   }
   return SceneSync(run, *scene).Run(!arguments.dry_run, arguments.prune, arguments.yes);
 }
@@ -220,7 +220,7 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
   const auto doomed = DefinedAndThere(client, *scene);
   if (!doomed.ok()) return run.Fail(doomed.status());
   if (doomed->empty()) {
-    if (!run.json() && !run.names()) run.out << "# nothing that the file defines is there\n";
+    if (!run.json() && !run.names()) run.out << "# none of the file's hulls and bodies exist\n";
     return ExitCode::kDone;
   }
   if (!arguments.yes && doomed->size() > 1) {
@@ -228,7 +228,7 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
     if (!meant.ok()) return run.FailUsage(meant);
   }
   for (const Kept& kept : *doomed) {
-    const auto header = Delete(client, kept);
+    const auto header = DeleteKept(client, kept);
     if (absl::IsNotFound(header.status())) continue;
     if (!header.ok()) return run.Fail(header.status());
     if (run.json()) {
@@ -263,27 +263,27 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
     const char* example;
   };
   const Declared commands[] = {
-      {"apply", "Make the server's hulls and bodies those of a scene file", ApplyScene,
-       "Creates and replaces hulls, then bodies, until the server has those of the file, one "
-       "after\n"
-       "another, each at once for all readers. A hull that is the same is left alone, which exact\n"
-       "arithmetic decides: each point is in it, and each vertex is one of the points; so is a "
-       "body\n"
-       "of the same hulls at the same poses. So it may be run again, and goes on where it was\n"
-       "interrupted. Where the prefix ends with /, what is under it and not in the file is told "
+      {"apply", "Create and update the hulls and bodies of a scene file", ApplyScene,
+       "Creates and replaces hulls, then bodies, one after another, each atomically. Unchanged "
+       "hulls\n"
+       "and bodies are skipped; exact arithmetic decides: each point of the file is in the hull, "
+       "and\n"
+       "each vertex is one of the points. The command can be repeated, also after an "
+       "interruption.\n"
+       "If the prefix ends in /, hulls and bodies under it that are not in the file are listed "
        "(?),\n"
-       "and deleted with --prune, after a question on the terminal. What changed since it was "
-       "listed\n"
-       "stays, and the exit code is 1.\n",
+       "and deleted with --prune after a confirmation. Those that changed since they were listed "
+       "are\n"
+       "kept, and the exit code is 1.\n",
        "hullctl scene apply cell.yaml --dry-run"},
-      {"diff", "Tell how the server's hulls and bodies differ from a scene file", DiffScene,
-       "Prints what 'hullctl scene apply' would do, and changes nothing. Exit code 1 when there "
-       "is\n"
-       "a difference.\n",
+      {"diff", "Show differences between the server and a scene file", DiffScene,
+       "Prints what 'hullctl scene apply' would do, without changes. Exits with 1 if there are\n"
+       "differences.\n",
        "hullctl scene diff cell.yaml"},
       {"delete", "Delete the hulls and bodies that a scene file defines", DeleteScene,
-       "Bodies go before their hulls. Asks as 'hullctl delete' does. What the file names by id "
-       "stays.\n",
+       "Deletes bodies before their hulls, after a confirmation as in 'hullctl delete'. "
+       "Placements\n"
+       "by id are kept.\n",
        "hullctl scene delete cell.yaml --yes"},
   };
   for (const Declared& declared : commands) {
@@ -291,12 +291,12 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
     Command command = scene.AddCommand(declared.name, declared.help);
     command.AddText("FILE", &arguments->file, "The scene, in YAML; - is standard input").Required();
     if (declared.act == ApplyScene) {
-      command.AddFlag("--dry-run", &arguments->dry_run, "Say what would change; change nothing");
+      command.AddFlag("--dry-run", &arguments->dry_run, "Print the changes without making them");
       command.AddFlag("--prune", &arguments->prune,
-                      "Delete what is under the prefix and the file does not define");
+                      "Delete hulls and bodies under the prefix that are not in the file");
     }
     if (declared.act != DiffScene) {
-      command.AddFlag("--yes", &arguments->yes, "Delete without asking");
+      command.AddFlag("--yes", &arguments->yes, "Delete without confirmation");
     }
     command.SetDetails(absl::StrCat(declared.details, "\n", kYamlHelp));
     command.SetExamples({{"", declared.example}});

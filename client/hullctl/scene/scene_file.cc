@@ -1,24 +1,24 @@
 #include "client/hullctl/scene/scene_file.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <cctype>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/scene/text_scene.h"
 #include "client/hullctl/scene/yaml_scene.h"
+#include "client/pose/rigid_pose.h"
 
 namespace hulld {
 namespace {
 
-constexpr int kPoseNumbers = 7;
-
-// Scans a JSON object incrementally to find its end and the names of its own members. The parser
-// validates it.
+// Scans an object in JSON or flow style of YAML incrementally to find its end and the names of its
+// own members. The parser validates it.
 class ObjectScanner {
  public:
   void Take(std::string_view piece) {
@@ -50,6 +50,7 @@ class ObjectScanner {
       case '[':
         ++depth_;
         begun_ = true;
+        text_.clear();
         break;
       case '}':
       case ']':
@@ -58,7 +59,12 @@ class ObjectScanner {
       case ':':
         if (depth_ == 1) members_.insert(text_);
         break;
+      case ',':
+        text_.clear();
+        break;
       default:
+        // YAML does not require quotes around keys.
+        if (std::isspace(static_cast<unsigned char>(c)) == 0) text_ += c;
         break;
     }
   }
@@ -95,7 +101,7 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
   if (packed.poses_size() != kPoseNumbers * packed.hulls_size()) {
     return absl::InvalidArgumentError(
         absl::StrCat("packedPlacements.poses holds ", packed.poses_size(), " numbers for ",
-                     packed.hulls_size(), " placements; each takes seven"));
+                     packed.hulls_size(), " placements; each needs seven"));
   }
   for (const uint32_t hull : packed.hulls()) {
     if (hull < static_cast<uint32_t>(packed.hull_ids_size())) continue;
@@ -118,8 +124,7 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
     for (const char* name : {"groups", "ignoreSameGroup", "ignoredGroupPairs", "movers"}) {
       if (names_pairs && scanner.has(name)) {
         return absl::InvalidArgumentError(
-            absl::StrCat("\"pairs\" and \"", name,
-                         "\" do not go together: name the pairs, or say which are left out"));
+            absl::StrCat("\"pairs\" and \"", name, "\" cannot be combined; remove one of them"));
       }
     }
     v1::BatchCheckCollisionsRequest batch;
@@ -133,7 +138,7 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
   if (absl::Status fits = CheckPacked(scene.request); !fits.ok()) return fits;
   if (scene.pairs.has_value() && scene.pairs->size() % 2 != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("pairs holds ", scene.pairs->size(), " indices; a pair has two"));
+        absl::StrCat("pairs holds ", scene.pairs->size(), " indices; each pair needs two"));
   }
   for (const uint32_t index : scene.pairs.value_or(std::vector<uint32_t>())) {
     if (index < scene.size()) continue;
@@ -143,7 +148,19 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
   return scene;
 }
 
-absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
+// Parses a YAML scene that starts at line `first_line` of the source.
+absl::StatusOr<Scene> ParseYaml(const ByteSource& source, uint64_t first_line,
+                                const std::string& text, BodyForm form) {
+  // Preceding lines count in error positions.
+  const auto description = ParseYamlScene(
+      absl::StrCat(std::string(static_cast<size_t>(first_line - 1), '\n'), text, "\n"),
+      source.name());
+  if (!description.ok()) return description.status();
+  return ToScene(*description, source.name(), form);
+}
+
+// Reads an object: a scene in YAML, which includes JSON, or a request of the contract.
+absl::StatusOr<Scene> ReadObject(ByteSource* source, std::string text, BodyForm form) {
   ObjectScanner scanner;
   scanner.Take(text);
   const uint64_t first_line = source->line();
@@ -153,6 +170,9 @@ absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
     scanner.Take(line);
   }
   if (!source->status().ok()) return source->status();
+  for (const char* key : kSceneKeys) {
+    if (scanner.has(key)) return ParseYaml(*source, first_line, text, form);
+  }
   absl::StatusOr<Scene> scene = ParseScene(text, scanner);
   if (scene.ok()) return scene;
   const std::string message(scene.status().message().data(), scene.status().message().size());
@@ -162,14 +182,29 @@ absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
 
 // Reads the rest of the source, after `first`, as one YAML document.
 absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first, BodyForm form) {
-  // Preceding lines count in error positions.
-  std::string text(static_cast<size_t>(source->line() - 1), '\n');
-  text.append(first);
+  const uint64_t first_line = source->line();
+  std::string text(first);
   for (std::string_view line; source->ReadLine(&line);) text.append("\n").append(line);
   if (!source->status().ok()) return source->status();
-  const auto description = ParseYamlScene(text + "\n", source->name());
-  if (!description.ok()) return description.status();
-  return ToScene(*description, source->name(), form);
+  return ParseYaml(*source, first_line, text, form);
+}
+
+// Returns the YAML that replaces a line of the former line format, "place NAME HULL [POSE]",
+// "pair NAME NAME", or "all". Empty if the line is none.
+std::string YamlForLine(std::string_view line) {
+  std::vector<std::string> words;
+  std::string_view rest = line.substr(0, line.find('#'));
+  for (std::string_view word; !(word = NextToken(&rest)).empty();) words.emplace_back(word);
+  if (words[0] == "all" && words.size() == 1) return "no \"ask: {pairs: ...}\"";
+  if (words[0] == "pair" && words.size() == 3) {
+    return absl::StrCat("\"ask: {pairs: [[", words[1], ", ", words[2], "]]}\"");
+  }
+  if (words[0] != "place" || words.size() < 3) return "";
+  std::string at;
+  if (words.size() > 3) {
+    at = absl::StrCat(", at: [", absl::StrJoin(words.begin() + 3, words.end(), ", "), "]");
+  }
+  return absl::StrCat("\"place: {", words[1], ": {id: ", words[2], at, "}}\"");
 }
 
 // Decides which pairs of placements are excluded from queries.
@@ -251,25 +286,18 @@ std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,
 }
 
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form) {
-  TextSceneReader text(source);
-  bool first = true;
   for (std::string_view line; source->ReadLine(&line);) {
     const std::string_view trimmed = Trim(line);
-    if (first && !trimmed.empty() && trimmed.front() == '{') {
-      return ReadJsonScene(source, std::string(line));
-    }
-    if (first && !trimmed.empty() && trimmed.front() != '#') {
-      if (LooksLikeYaml(trimmed)) return ReadRestAsYaml(source, line, form);
-      first = false;
-    }
-    if (absl::Status status = text.TakeLine(line); !status.ok()) return status;
+    if (trimmed.empty() || trimmed.front() == '#') continue;
+    if (trimmed.front() == '{') return ReadObject(source, std::string(line), form);
+    const std::string yaml = YamlForLine(trimmed);
+    if (yaml.empty()) return ReadRestAsYaml(source, line, form);
+    return source->ErrorAtLine(absl::StrCat("a scene is YAML, not lines of place and pair; write ",
+                                            yaml, "; --help shows an example"));
   }
   if (!source->status().ok()) return source->status();
-  if (first) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(source->name(), ": there is no scene in it; --help shows what one is"));
-  }
-  return text.Finish();
+  return absl::InvalidArgumentError(
+      absl::StrCat(source->name(), " contains no scene; --help shows an example"));
 }
 
 absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::string& file) {
@@ -287,7 +315,7 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
   const uint64_t movers = request.has_movers() ? std::min<uint64_t>(request.movers(), n) : n;
   const std::string too_many =
       absl::StrCat("more than ", kMostPairs,
-                   " pairs; ask for them in several files, or let 'hullctl scene' find them");
+                   " pairs; split the file, or use 'hullctl scene' to find colliding pairs");
   // Groups may exclude most pairs, but each pair must be examined.
   constexpr uint64_t kMostLooks = uint64_t{16} * kMostPairs;
   if (movers * n > kMostLooks) return problem(too_many);
@@ -300,16 +328,15 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
       pairs.insert(pairs.end(), {a, b});
     }
   }
-  if (pairs.empty()) return problem("there is no pair to ask about");
+  if (pairs.empty()) return problem("no pairs to check");
   return pairs;
 }
 
 absl::Status RefuseUpdates(ByteSource* source, const std::string& command) {
   for (std::string_view line; source->ReadLine(&line);) {
     if (Trim(line).empty()) continue;
-    return source->ErrorAtLine(absl::StrCat("'hullctl ", command,
-                                            "' takes nothing behind the scene; 'hullctl stream' "
-                                            "answers updates"));
+    return source->ErrorAtLine(absl::StrCat(
+        "'hullctl ", command, "' takes no updates after the scene; use 'hullctl stream'"));
   }
   return source->status();
 }

@@ -24,7 +24,7 @@ enum class BodyForm {
   kPieces
 };
 
-// Hulls and bodies at poses, and their queried pairs: the common form of all scene formats.
+// Hulls and bodies at poses, and their queried pairs.
 struct Scene {
   // Placements, in one of their two forms; groups and movers; wanted fields and the tolerance.
   v1::FindCollisionsRequest request;
@@ -34,7 +34,7 @@ struct Scene {
   v1::Method method = v1::METHOD_UNSPECIFIED;
   // For a stream: answer updates by changes only.
   bool only_changes = false;
-  // Names of the placements; empty if the format has none.
+  // Names of the placements; empty for a request of the contract.
   std::vector<std::string> names;
   // For a YAML scene: the file's body of each placement, -1 for none; and the names of the pieces
   // of each body.
@@ -58,32 +58,27 @@ struct Scene {
 // Maximum number of pairs queried from one file.
 inline constexpr uint64_t kMostPairs = uint64_t{1} << 24;
 
-// Text about the formats in --help.
+// Text about scenes in --help.
 inline constexpr char kSceneFileHelp[] =
-    "FILE is a scene, as YAML ('hullctl scene apply --help' shows it), as text or as JSON.\n"
-    "As text, one item a line; # starts a comment:\n"
-    "  place NAME HULL [[w x y z] tx ty tz]   a hull at a pose (none: as built)\n"
-    "  pair NAME NAME                         ask about these two\n"
-    "  all                                    ask about each two, as if no pair was named\n"
-    "Names are free, each for one placement; pairs may come before their placements. As JSON, a\n"
-    "FindCollisionsRequest, BatchCheckCollisionsRequest or CollisionStreamOpen of the contract:\n"
-    "  {\"placements\":[{\"hullId\":\"arm\"},\n"
-    "                 {\"hullId\":\"box\",\"pose\":{\"translation\":{\"x\":2}}},\n"
-    "                 {\"hullId\":\"box\",\"pose\":{\"rotation\":{\"w\":1,\"z\":1}}}],\n"
-    "   \"groups\":[0,1,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}\n"
-    "Optional: \"pairs\", two indices each; or a group for each placement, and which groups never\n"
-    "collide, and \"movers\":N, for only the pairs with one of the first N; tolerance; and what "
-    "is\n"
-    "wanted. Many placements are read faster as packedPlacements: the IDs of the hulls, the index\n"
-    "of each placement's hull, and its pose in seven numbers, w x y z and x y z:\n"
+    "FILE is a scene in YAML, of which JSON is a subset; 'hullctl scene apply --help' lists all "
+    "keys:\n"
+    "  place:\n"
+    "    left: {id: arm}                                 # a hull or body of the server\n"
+    "    right: {id: box, at: [2, 0, 0]}                 # x, y, z\n"
+    "    turned: {id: box, at: [1, 0, 0, 1, 0, 0, 5]}    # w, x, y, z and x, y, z\n"
+    "  ask: {pairs: [[left, right]]}                     # default: all pairs\n"
+    "Programs can write a FindCollisionsRequest, BatchCheckCollisionsRequest or "
+    "CollisionStreamOpen\n"
+    "of the contract as JSON instead, with hulls and poses as flat lists:\n"
     "  {\"packedPlacements\":{\"hullIds\":[\"arm\",\"box\"], \"hulls\":[0,1],\n"
-    "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}\n"
-    "Updates of a stream may follow a JSON scene, one a line: see 'hullctl stream --help'.";
+    "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]},\n"
+    "   \"groups\":[0,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}";
 
-// Reads the scene at the start of the source, and no further: text or YAML to its end, a JSON
-// object to the end of the line of its last brace. INVALID_ARGUMENT "NAME:LINE: message",
-// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for an object of several lines. Opens
-// none of the files named in a YAML scene; 'hullctl scene apply' does.
+// Reads the scene at the start of the source, and no further: an object in braces to the end of the
+// line of its last brace, other YAML to the end. INVALID_ARGUMENT "NAME:LINE: message",
+// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for a request of several lines. A file
+// of the former line format is refused with its YAML equivalent. Opens none of the files named in a
+// YAML scene; 'hullctl scene apply' does.
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kWhole);
 
 // Returns the pairs of the scene, two indices each: the named pairs, or all that groups and movers

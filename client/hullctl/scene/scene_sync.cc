@@ -31,7 +31,7 @@ absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
   });
   if (!counts.ok()) return counts.status();
   if (!xyz.empty()) return xyz;
-  return absl::InvalidArgumentError(absl::StrCat(hull.file, ": holds no point"));
+  return absl::InvalidArgumentError(absl::StrCat(hull.file, ": contains no points"));
 }
 
 std::array<uint64_t, 7> BitsOf(const v1::Pose& pose) {

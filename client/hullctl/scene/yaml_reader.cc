@@ -16,8 +16,8 @@
 namespace hulld {
 namespace {
 
-// Maximum size of a scene. Scenes with many placements use JSON and its packed form.
-constexpr size_t kMostBytes = size_t{64} << 20;
+// Maximum size of a scene. Larger ones use the contract's packed form.
+constexpr size_t kMostSceneBytes = size_t{64} << 20;
 
 std::string PlaceText(const std::string& name, const YAML::Mark& mark) {
   if (mark.is_null()) return name;
@@ -49,9 +49,9 @@ class DocumentStart : public YAML::EventHandler {
 }  // namespace
 
 absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
-  if (text.size() > kMostBytes) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": more than ", kMostBytes, " bytes; write so large a scene as JSON"));
+  if (text.size() > kMostSceneBytes) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, ": more than ", kMostSceneBytes, " bytes; write a larger scene as packedPlacements"));
   }
   // Parses at most two documents: for text such as "," yaml-cpp 0.7 finds documents without end.
   YAML::Node root;
@@ -88,12 +88,13 @@ absl::Status YamlReader::ErrorAt(const YAML::Node& node, const std::string& mess
 
 absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(const YAML::Node& node,
                                                           const std::string& what) const {
-  if (!node.IsMap()) return ErrorAt(node, absl::StrCat(what, " is no mapping of keys to values"));
+  if (!node.IsMap())
+    return ErrorAt(node, absl::StrCat(what, " is not a mapping of keys to values"));
   Entries entries;
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (!entry.first.IsScalar() || entry.first.Scalar().empty()) {
-      return ErrorAt(entry.first, absl::StrCat("a key of ", what, " is no text"));
+      return ErrorAt(entry.first, absl::StrCat("a key of ", what, " is not a string"));
     }
     const std::string& key = entry.first.Scalar();
     if (!seen.insert(key).second) {
@@ -122,7 +123,7 @@ absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(
 
 absl::StatusOr<std::string> YamlReader::Text(const YAML::Node& node, const std::string& key) const {
   if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
-  return ErrorAt(node, absl::StrCat(key, " takes a text"));
+  return ErrorAt(node, absl::StrCat(key, " takes a string"));
 }
 
 absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::string& key) const {
@@ -133,7 +134,7 @@ absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::str
     return ErrorAt(node, absl::StrCat(key, ": ", NumberProblem(kind, node.Scalar())));
   }
   if (!std::isfinite(number)) {
-    return ErrorAt(node, absl::StrCat(key, ": ", Quoted(node.Scalar()), " is not finite"));
+    return ErrorAt(node, absl::StrCat(key, ": ", Quoted(node.Scalar()), " is not a finite number"));
   }
   return number;
 }
@@ -141,7 +142,7 @@ absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::str
 absl::StatusOr<bool> YamlReader::Truth(const YAML::Node& node, const std::string& key) const {
   if (node.IsScalar() && node.Scalar() == "true") return true;
   if (node.IsScalar() && node.Scalar() == "false") return false;
-  return ErrorAt(node, absl::StrCat(key, " is true or false"));
+  return ErrorAt(node, absl::StrCat(key, " takes true or false"));
 }
 
 absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
@@ -159,8 +160,8 @@ absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
   if (counts.empty() || std::find(counts.begin(), counts.end(), numbers.size()) != counts.end()) {
     return numbers;
   }
-  return ErrorAt(node, absl::StrCat(key, " takes ", absl::StrJoin(counts, " or "),
-                                    " numbers, here are ", numbers.size()));
+  return ErrorAt(node, absl::StrCat(key, " takes ", absl::StrJoin(counts, " or "), " numbers, got ",
+                                    numbers.size()));
 }
 
 absl::StatusOr<std::vector<std::string>> YamlReader::Texts(const YAML::Node& node,

@@ -38,8 +38,7 @@ class SceneParser {
 
   absl::StatusOr<SceneDescription> Run() {
     const auto entries =
-        yaml_.EntriesOf(yaml_.root(), "the scene",
-                        {"prefix", "scale", "hulls", "bodies", "place", "ignore", "ask"});
+        yaml_.EntriesOf(yaml_.root(), "the scene", {std::begin(kSceneKeys), std::end(kSceneKeys)});
     if (!entries.ok()) return entries.status();
     using Part = absl::Status (SceneParser::*)(const YAML::Node&);
     // In order of dependency.
@@ -81,9 +80,9 @@ class SceneParser {
       if (*text == unit.name) return *LengthScale::FromText(unit.length);
     }
     if (const auto scale = LengthScale::FromText(*text); scale.has_value()) return *scale;
-    return yaml_.ErrorAt(node, absl::StrCat("scale: ", Quoted(*text),
-                                            " is no unit and no number other than 0; units are "
-                                            "mm, cm, m, in and ft, of a scene in meters"));
+    return yaml_.ErrorAt(
+        node, absl::StrCat("scale: ", Quoted(*text),
+                           " is not a unit or a nonzero number; units are mm, cm, m, in, and ft"));
   }
 
   absl::Status TakeHulls(const YAML::Node& node) {
@@ -128,10 +127,10 @@ class SceneParser {
       if (!taken.ok()) return taken;
     }
     if (sources != 1) {
-      return yaml_.ErrorAt(node, absl::StrCat(what, " takes one of file, points and box"));
+      return yaml_.ErrorAt(node, absl::StrCat(what, " takes exactly one of file, points, and box"));
     }
     if (scaled && hull->file.empty()) {
-      return yaml_.ErrorAt(node, absl::StrCat(what, ": scale goes with a file"));
+      return yaml_.ErrorAt(node, absl::StrCat(what, ": scale needs a file"));
     }
     return absl::OkStatus();
   }
@@ -141,7 +140,7 @@ class SceneParser {
     const auto size = yaml_.Numbers(node, "box", {3});
     if (!size.ok()) return size.status();
     for (const double edge : *size) {
-      if (edge < 0) return yaml_.ErrorAt(node, "box takes edges of at least 0");
+      if (edge < 0) return yaml_.ErrorAt(node, "box takes edges >= 0");
     }
     for (int corner = 0; corner < 8; ++corner) {
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -200,7 +199,7 @@ class SceneParser {
   absl::StatusOr<RigidPose> CheckedPose(const YAML::Node& node, const RigidPose& pose) const {
     const bool turns = pose[0] != 0 || pose[1] != 0 || pose[2] != 0 || pose[3] != 0;
     if (turns) return pose;
-    return yaml_.ErrorAt(node, "at: a quaternion 0 0 0 0 is no rotation");
+    return yaml_.ErrorAt(node, "at: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
   }
 
   // Returns the ID of a hull defined in the file.
@@ -212,10 +211,9 @@ class SceneParser {
     std::vector<std::string> known;
     for (const auto& [defined, id] : hull_ids_) known.push_back(defined);
     const std::string hint = Suggestion(*name, known);
-    return yaml_.ErrorAt(
-        node,
-        absl::StrCat("hull ", Quoted(*name), " is not among hulls",
-                     hint.empty() ? "; one that the server has anyway is named by id" : hint));
+    return yaml_.ErrorAt(node,
+                         absl::StrCat("hull ", Quoted(*name), " is not defined under hulls",
+                                      hint.empty() ? "; use id for a hull of the server" : hint));
   }
 
   absl::Status TakeBodies(const YAML::Node& node) {
@@ -223,8 +221,9 @@ class SceneParser {
     if (!entries.ok()) return entries.status();
     for (const auto& [name, value] : *entries) {
       if (hull_ids_.contains(name)) {
-        return yaml_.ErrorAt(value, absl::StrCat("there is a hull ", Quoted(name),
-                                                 "; hulls and bodies share their names"));
+        return yaml_.ErrorAt(
+            value, absl::StrCat("hull ", Quoted(name),
+                                " has the same name; names of hulls and bodies must differ"));
       }
       BodyDefinition body;
       body.name = name;
@@ -263,7 +262,7 @@ class SceneParser {
       piece.name = value.Scalar();
       piece.hull_id = *std::move(id);
     }
-    if (piece.hull_id.empty()) return yaml_.ErrorAt(node, what + " lacks hull or id");
+    if (piece.hull_id.empty()) return yaml_.ErrorAt(node, what + " needs hull or id");
     const std::string name = piece.name;
     for (int number = 2; !taken->insert(piece.name).second; ++number) {
       piece.name = absl::StrCat(name, "-", number);
@@ -290,8 +289,8 @@ class SceneParser {
     }
     for (const auto& [name, value] : *entries) {
       if (!groups_.contains(name)) continue;
-      return yaml_.ErrorAt(value, absl::StrCat(Quoted(name), " names a placement and a group; ",
-                                               "ignore could not tell which it means"));
+      return yaml_.ErrorAt(
+          value, absl::StrCat(Quoted(name), " names both a placement and a group; ", "rename one"));
     }
     return absl::OkStatus();
   }
@@ -326,7 +325,7 @@ class SceneParser {
       placement->hull_id = *std::move(id);
     }
     if (objects == 1) return absl::OkStatus();
-    return yaml_.ErrorAt(node, what + " takes one of hull, body and id");
+    return yaml_.ErrorAt(node, what + " takes exactly one of hull, body, and id");
   }
 
   absl::StatusOr<int> BodyOf(const YAML::Node& node) const {
@@ -342,15 +341,15 @@ class SceneParser {
     if (found != among.end()) return found->second;
     std::vector<std::string> known;
     for (const auto& [key, index] : among) known.push_back(key);
-    return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not among ", where,
-                                            Suggestion(name, known)));
+    return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not defined under ",
+                                            where, Suggestion(name, known)));
   }
 
   absl::StatusOr<std::vector<std::string>> TwoNames(const YAML::Node& node,
                                                     const std::string& key) const {
     auto names = yaml_.Texts(node, key);
     if (names.ok() && names->size() != 2) {
-      return yaml_.ErrorAt(node, absl::StrCat(key, " takes two names each, as in [[a, b]]"));
+      return yaml_.ErrorAt(node, absl::StrCat(key, " takes pairs of names, as in [[a, b]]"));
     }
     return names;
   }
@@ -368,7 +367,7 @@ class SceneParser {
         std::vector<std::string> known(groups_.begin(), groups_.end());
         for (const auto& [place, index] : places_) known.push_back(place);
         return yaml_.ErrorAt(entry[i],
-                             absl::StrCat("ignore: ", Quoted(name), " is no placement and no group",
+                             absl::StrCat("ignore: ", Quoted(name), " is not a placement or group",
                                           Suggestion(name, known)));
       }
       scene_.ignored.emplace_back((*names)[0], (*names)[1]);
@@ -389,7 +388,7 @@ class SceneParser {
       if (!taken.ok()) return taken;
     }
     if (scene_.pairs.has_value() && !scene_.movers.empty()) {
-      return yaml_.ErrorAt(node, "ask: pairs and movers do not go together");
+      return yaml_.ErrorAt(node, "ask: pairs and movers cannot be combined");
     }
     return absl::OkStatus();
   }
@@ -555,13 +554,6 @@ v1::PutBodyRequest BodyRequest(const BodyDefinition& body) {
     *request.add_pieces() = PlacementAt(piece.hull_id, piece.X_BP);
   }
   return request;
-}
-
-bool LooksLikeYaml(std::string_view line) {
-  if (line.substr(0, 3) == "---" || line.substr(0, 5) == "%YAML") return true;
-  const std::string_view word = NextToken(&line);
-  const size_t colon = word.find(':');
-  return colon != std::string_view::npos && colon > 0;
 }
 
 absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name) {

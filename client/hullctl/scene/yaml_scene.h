@@ -4,7 +4,6 @@
 #include <absl/status/statusor.h>
 
 #include <string>
-#include <string_view>
 
 #include "client/hullctl/scene/scene_description.h"
 #include "client/hullctl/scene/scene_file.h"
@@ -12,8 +11,9 @@
 
 namespace hulld {
 
-// Returns true if a scene with this first line that is not blank is YAML.
-bool LooksLikeYaml(std::string_view line);
+// Keys of a scene.
+inline constexpr const char* kSceneKeys[] = {"prefix", "scale",  "hulls", "bodies",
+                                             "place",  "ignore", "ask"};
 
 // Parses a YAML scene; for the keys see client/guide/SCENES.md. `name` appears in errors, and
 // relative file names start at its folder. Opens none of the named files. INVALID_ARGUMENT

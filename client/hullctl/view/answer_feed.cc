@@ -15,7 +15,7 @@ namespace {
 // During a drag, larger scenes are queried only at rest.
 constexpr size_t kMostObjectsInMotion = 3000;
 // Maximum number of colliding pairs that the page lists and highlights; totals count all.
-constexpr size_t kMostPairs = 5000;
+constexpr size_t kMostListedPairs = 5000;
 
 v1::Pose ToPose(const Pose7& numbers) {
   v1::Pose pose;
@@ -106,10 +106,10 @@ class SceneAnswer {
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
       if (a >= objects_.size() || b >= objects_.size()) {
-        return absl::InternalError("the answer names a placement that there is not");
+        return absl::InternalError("the answer names a placement that does not exist");
       }
       const v1::Relation relation = part.columns().relations(i);
-      if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostPairs) continue;
+      if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) continue;
       absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
                       QuoteJson(v1::Relation_Name(relation)), "]");
     }
@@ -377,8 +377,8 @@ bool AnswerFeed::AnswerScene(const Question& question) const {
   const auto answer = SceneAnswerJson(client_, question.rules, question.objects, question.tolerance,
                                       question.update);
   if (answer.ok()) return page_->SendText(*answer);
-  return page_->SendText(ProblemMessage(
-      absl::StrCat("The pairs that collide are not known: ", answer.status().message())));
+  return page_->SendText(
+      ProblemMessage(absl::StrCat("Colliding pairs are unknown: ", answer.status().message())));
 }
 
 }  // namespace hulld

@@ -43,14 +43,14 @@ absl::StatusOr<std::string> FindBrowser() {
     const std::string program = fs::path(chosen).is_absolute() ? chosen : FindProgram(chosen);
     if (!program.empty() && access(program.c_str(), X_OK) == 0) return program;
     return absl::FailedPreconditionError(
-        absl::StrCat("HULLCTL_BROWSER names \"", chosen, "\", which is no program"));
+        absl::StrCat("HULLCTL_BROWSER names \"", chosen, "\", which is not a program"));
   }
   for (const char* const name : kBrowsers) {
     if (std::string program = FindProgram(name); !program.empty()) return program;
   }
-  return absl::FailedPreconditionError(absl::StrCat(
-      "no browser to draw the picture: none of ", absl::StrJoin(kBrowsers, ", "),
-      " is on the PATH; install one (Debian: chromium) or name it in HULLCTL_BROWSER"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("no browser found to draw the picture: none of ", absl::StrJoin(kBrowsers, ", "),
+                   " is on the PATH; install one (Debian: chromium), or set HULLCTL_BROWSER"));
 }
 
 // Deleted with its content by the destructor.
@@ -157,7 +157,7 @@ absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
     return picture;
   }
   return absl::InternalError(absl::StrCat(
-      *browser, " made no picture: ", started ? LastLine(log) : "it could not be started"));
+      *browser, " produced no picture: ", started ? LastLine(log) : "it could not be started"));
 }
 
 }  // namespace hulld

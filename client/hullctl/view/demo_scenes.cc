@@ -67,8 +67,7 @@ class Workshop {
   std::string Model(const std::string& file) {
     const std::string path = kModels + file;
     if (!IsFile(path)) {
-      Note(absl::NotFoundError(
-          absl::StrCat(path, " is missing, which the scenes show: install assimp-testmodels")));
+      Note(absl::NotFoundError(absl::StrCat(path, " is missing; install assimp-testmodels")));
       return "";
     }
     return Take(hulls_->AddFile(path));

@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-absl::StatusOr<std::string> Append(const Client& client, const ViewEdit& edit) {
+absl::StatusOr<std::string> ApplyAppend(const Client& client, const ViewEdit& edit) {
   const auto appender = client.OpenAppend(edit.hull_id);
   if (!appender.ok()) return appender.status();
   const absl::Status sent = SendInMessages(
@@ -23,7 +23,7 @@ absl::StatusOr<std::string> Append(const Client& client, const ViewEdit& edit) {
                       totals.counts.outside(), " outside; now at revision ", totals.hull_revision);
 }
 
-absl::StatusOr<std::string> Delete(const Client& client, const ViewEdit& edit) {
+absl::StatusOr<std::string> ApplyDelete(const Client& client, const ViewEdit& edit) {
   const auto deleted = client.DeleteHull(edit.hull_id);
   if (!deleted.ok()) return deleted.status();
   return absl::StrCat(edit.hull_id, " is deleted");
@@ -88,11 +88,10 @@ void EditFeed::Ask(ViewEdit edit) {
       return;
     }
   }
-  page_->SendText(
-      EditedMessage(refused, absl::ResourceExhaustedError(absl::StrCat(
-                                 refused.hull_id,
-                                 ": too much waits for the server already, so this was not done;"
-                                 " ask for it again once the server has answered"))));
+  page_->SendText(EditedMessage(refused, absl::ResourceExhaustedError(absl::StrCat(
+                                             refused.hull_id,
+                                             ": too many edits are pending; nothing was changed; "
+                                             "try again after the server has answered"))));
 }
 
 void EditFeed::Run() {
@@ -103,7 +102,8 @@ void EditFeed::Run() {
     const ViewEdit edit = waiting_.Take();
     lock.unlock();
     const bool is_delete = edit.action == ViewEdit::Action::kDelete;
-    page_->SendText(EditedMessage(edit, is_delete ? Delete(client_, edit) : Append(client_, edit)));
+    page_->SendText(
+        EditedMessage(edit, is_delete ? ApplyDelete(client_, edit) : ApplyAppend(client_, edit)));
   }
 }
 

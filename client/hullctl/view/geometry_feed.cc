@@ -17,7 +17,7 @@ std::string MessageOf(const absl::Status& status) {
 std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
                      std::vector<std::string>* pieces) {
   if (wish.file) {
-    if (*wish.file >= files.size()) return MissingFrame(wish, "there is no such file");
+    if (*wish.file >= files.size()) return MissingFrame(wish, "no such file");
     return MeshFrame(*wish.file, *files[*wish.file]);
   }
   if (wish.simplified) {

@@ -48,8 +48,8 @@ void HullFollower::Run() {
     const absl::Status status = Follow(watch_.get());
     const bool is_unknown = absl::IsUnimplemented(status);
     const std::string complaint =
-        absl::StrCat("Changes of hulls are not followed at present: ",
-                     is_unknown ? "this hulld does not know WatchHulls" : status.message());
+        absl::StrCat("Changes of hulls are not shown at present: ",
+                     is_unknown ? "this hulld does not implement WatchHulls" : status.message());
     {
       const std::lock_guard lock(mutex_);
       if (ended_) return;

@@ -10,6 +10,7 @@
 #include "client/formats/byte_source.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
+#include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/scene/scene_file.h"
 
@@ -61,30 +62,8 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
 
 }  // namespace
 
-// Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
 std::string ShownName(const std::string& path) {
-  std::string name = std::filesystem::path(path).filename().string();
-  for (size_t i = 0; i < name.size();) {
-    const auto byte = [&](size_t at) {
-      return at < name.size() ? static_cast<unsigned char>(name[at]) : 0u;
-    };
-    const unsigned lead = byte(i);
-    const size_t length = lead < 0x80   ? 1
-                          : lead < 0xc2 ? 0
-                          : lead < 0xe0 ? 2
-                          : lead < 0xf0 ? 3
-                          : lead < 0xf5 ? 4
-                                        : 0;
-    bool good = length > 0;
-    for (size_t k = 1; k < length; ++k) good = good && (byte(i + k) & 0xc0) == 0x80;
-    if (lead == 0xe0) good = good && byte(i + 1) >= 0xa0;
-    if (lead == 0xed) good = good && byte(i + 1) < 0xa0;
-    if (lead == 0xf0) good = good && byte(i + 1) >= 0x90;
-    if (lead == 0xf4) good = good && byte(i + 1) < 0x90;
-    if (!good) name[i] = '?';
-    i += good ? length : 1;
-  }
-  return name;
+  return Printable(std::filesystem::path(path).filename().string());
 }
 
 absl::StatusOr<FileShape> ReadShape(const std::string& path) {
@@ -121,8 +100,8 @@ absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_pr
   }
   for (const v1::HullInfo& hull : hulls->hulls()) ids.push_back(hull.hull_id());
   if (ids.empty() && !id_or_prefix.empty()) {
-    return absl::NotFoundError(absl::StrCat("there is no hull or body \"", id_or_prefix,
-                                            "\", none whose ID starts so, and no such file"));
+    return absl::NotFoundError(
+        absl::StrCat("no hull, body, prefix, or file \"", id_or_prefix, "\""));
   }
   std::sort(ids.begin(), ids.end());
   const auto add = [scene](const std::string& id) {

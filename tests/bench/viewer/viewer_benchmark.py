@@ -66,10 +66,11 @@ def main():
         for i in range(100):
             hulld.hullctl("generate", "sphere", "64", "--seed", str(i), "-o", "points.xyz")
             hulld.hullctl("append", f"crowd/{i}", "points.xyz", "--create")
-        place = [f"place p{i} crowd/{i % 100} {3 * (i % 22)} {3 * (i // 22 % 22)} {3 * (i // 484)}"
+        place = [f"  p{i}: {{id: crowd/{i % 100}, "
+                 f"at: [{3 * (i % 22)}, {3 * (i // 22 % 22)}, {3 * (i // 484)}]}}"
                  for i in range(10000)]
-        (folder / "crowd.json").write_text("\n".join(place) + "\n")
-        measure(hulld, "10000 hulls of 64", "crowd.json")
+        (folder / "crowd.yaml").write_text("place:\n" + "\n".join(place) + "\n")
+        measure(hulld, "10000 hulls of 64", "crowd.yaml")
         for name, count in (("10000", 10**4), ("100000", 10**5), ("1000000", 10**6)):
             hulld.hullctl("generate", "sphere", name, "-o", "points.xyz")
             hulld.hullctl("append", f"one/{name}", "points.xyz", "--create")

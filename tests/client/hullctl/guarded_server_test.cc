@@ -151,7 +151,7 @@ TEST_F(GuardedServer, AContextHoldsAllThatAServerWants) {
   ASSERT_EQ(setenv("XDG_CONFIG_HOME", (directory_ + "/config").c_str(), 1), 0);
   const Ran added = As("view", {"context", "add", "guarded"});
   EXPECT_EQ(added.code, 0) << added.err;
-  EXPECT_EQ(added.out, "context guarded added, and used from now on\n");
+  EXPECT_EQ(added.out, "context guarded added and selected\n");
   EXPECT_EQ(RunTool({"list"}).code, 0);
   // Its token stays with its server.
   const Ran elsewhere = RunTool({"context", "show", "--server", "127.0.0.1:1"});
@@ -191,10 +191,10 @@ TEST_F(GuardedServer, SaysWhatToTryWhenTheConnectionFails) {
     EXPECT_EQ(ran.code, 3) << hint;
     EXPECT_THAT(ran.err, HasSubstr(hint));
   };
-  expect({}, "it wants TLS; give --tls, or --ca-cert");
+  expect({}, "it requires TLS; pass --tls or --ca-cert");
   const server::TestAuthority other("other authority");
   expect({"--ca-cert", Write("other.crt", other.certificate())},
-         "its certificate comes from no authority that --ca-cert names");
+         "its certificate is signed by no authority in the file of --ca-cert");
   expect({"--ca-cert", authorities_, "--server-name", "elsewhere.example"}, "--server-name");
 
   const server::TestIdentity expired =

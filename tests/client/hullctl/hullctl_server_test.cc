@@ -122,14 +122,14 @@ std::string LatticeScene(uint32_t seed, int placements) {
   std::mt19937 random(seed);
   std::uniform_int_distribution<int> steps(-3, 3);
   constexpr const char* kHulls[] = {"cube", "ball", "square", "needle", "point", "empty"};
-  constexpr const char* kTurns[] = {"1 0 0 0", "1 1 0 0", "1 0 1 1", "2 0 0 1"};
+  constexpr const char* kTurns[] = {"1, 0, 0, 0", "1, 1, 0, 0", "1, 0, 1, 1", "2, 0, 0, 1"};
   std::ostringstream text;
+  text << "place:\n";
   for (int i = 0; i < placements; ++i) {
-    text << "place p" << i << " " << kHulls[i % 6] << " " << kTurns[random() % 4];
-    for (int axis = 0; axis < 3; ++axis) text << " " << 0.5 * steps(random);
-    text << "\n";
+    text << "  p" << i << ": {id: " << kHulls[i % 6] << ", at: [" << kTurns[random() % 4];
+    for (int axis = 0; axis < 3; ++axis) text << ", " << 0.5 * steps(random);
+    text << "]}\n";
   }
-  text << "all\n";
   return text.str();
 }
 
@@ -283,13 +283,17 @@ TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
 
 TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
   Put("cube", server::Cube());
-  const TempFile text("text", "place a cube\nplace b cube 1 0 0\nplace c cube 1.5 0 0\n");
+  const TempFile yaml("yaml",
+                      "place:\n  a: {id: cube}\n  b: {id: cube, at: [1, 0, 0]}\n"
+                      "  c: {id: cube, at: [1.5, 0, 0]}\n");
+  const TempFile flow("flow", R"({"place": {"a": {"id": "cube"},
+      "b": {"id": "cube", "at": [1, 0, 0]}, "c": {"id": "cube", "at": [1.5, 0, 0]}}})");
   const TempFile json("json", R"({"placements":[{"hullId":"cube"},
       {"hullId":"cube","pose":{"translation":{"x":1}}},
       {"hullId":"cube","pose":{"translation":{"x":1.5}}}]})");
   const TempFile packed("packed", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0,0],
       "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,0,0, 1,0,0,0,1.5,0,0]}})");
-  for (const TempFile* file : {&text, &json, &packed}) {
+  for (const TempFile* file : {&yaml, &flow, &json, &packed}) {
     Ran ran = Ask({"batch", file->path(), "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 1 overlapping 1 failed 0\n"));
@@ -301,7 +305,7 @@ TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_EQ(std::count(ran.out.begin(), ran.out.end(), '\n'), 3);
   }
-  const TempFile pairs("pairs", "place a cube\nplace b cube\npair a b\n");
+  const TempFile pairs("pairs", "place: {a: {id: cube}, b: {id: cube}}\nask: {pairs: [[a, b]]}\n");
   const Ran ran = Ask({"scene", pairs.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("it names pairs, but 'scene' finds them itself"));
@@ -323,7 +327,7 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   const TempFile empty("empty.jsonl", "\n");
   ran = Ask({"stream", empty.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("there is no scene in it"));
+  EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
 
 TEST_F(HullctlQuestions, WishesThatExcludeEachOtherAreExplained) {

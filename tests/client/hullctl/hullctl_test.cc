@@ -10,7 +10,6 @@
 #include "tests/client/fake_hulld.h"
 #include "tests/client/formats/point_reading.h"
 #include "tests/client/hullctl/hullctl_on_server.h"
-#include "tests/client/hullctl/xml_check.h"
 
 namespace hulld {
 namespace hullctl_test {
@@ -50,7 +49,7 @@ TEST_F(HullctlTest, CreateGetListAndDelete) {
   EXPECT_THAT(Ask({"list", "a"}).out, AllOf(StartsWith("HULL"), HasSubstr("\na/1 ")));
   const Ran wrong = Ask({"delete", "a/1", "--if-revision", "9"});
   EXPECT_EQ(wrong.code, 1);
-  EXPECT_THAT(wrong.err, HasSubstr("see its revision with 'hullctl get'"));
+  EXPECT_THAT(wrong.err, HasSubstr("'hullctl get' shows the current revision"));
   EXPECT_EQ(Ask({"delete", "a/1", "--if-revision", "1"}).code, 0);
   EXPECT_EQ(fake_.hull("a/1").create_revision, 0u);
 }
@@ -61,7 +60,7 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
   const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1"});
   EXPECT_EQ(unreachable.code, 3);
-  EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1: start it "
+  EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1; start it "
                                           "with 'hulld', or name another with --server"));
   fake_.Hang("GetHull");
   const Ran late = Ask({"get", "x", "--timeout", "50ms"});
@@ -71,11 +70,11 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
                                            v1::ERROR_REASON_DRAINING)});
   const Ran draining = Ask({"create", "x"});
   EXPECT_EQ(draining.code, 3);
-  EXPECT_THAT(draining.err, HasSubstr("is not available: draining; try again later"));
+  EXPECT_THAT(draining.err, HasSubstr("is unavailable: draining; try again later"));
   // The message text does not distinguish errors of gRPC from errors of hulld.
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "cannot connect the disk",
                                            v1::ERROR_REASON_STORE_UNAVAILABLE)});
-  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("is not available: cannot connect the disk"));
+  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("is unavailable: cannot connect the disk"));
   fake_.FailNext("CreateHull", {{grpc::StatusCode::UNAVAILABLE, "no route"}});
   EXPECT_THAT(Ask({"create", "x"}).err, StartsWith("hullctl: cannot reach hulld at "));
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::RESOURCE_EXHAUSTED, "many hulls",
@@ -104,7 +103,6 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
       {"append", "a", "-", "--chunk-points", "0"},
       {"append", "a", "-", "--resume"},
       {"batch", "no-such-file"},
-      {"picture"},
       {"delete", "a", "--if-revision", "-1"},
   };
   for (const auto& arguments : mistakes) {
@@ -135,10 +133,11 @@ TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
   EXPECT_EQ(error({"backup", "sav", "f"}),
             "hullctl: 'hullctl backup' has no command \"sav\"; did you mean \"save\"?");
   EXPECT_EQ(error({"backup", "x"}),
-            "hullctl: 'hullctl backup' has no command \"x\"; there are save, restore");
+            "hullctl: 'hullctl backup' has no command \"x\"; commands: save, restore");
   EXPECT_EQ(error({"fly"}), "hullctl: 'hullctl' has no command \"fly\"");
-  EXPECT_EQ(error({}), "hullctl: which command? hullctl COMMAND [OPTIONS]");
-  EXPECT_EQ(error({"backup"}), "hullctl: which command? hullctl backup COMMAND [OPTIONS]");
+  EXPECT_EQ(error({}), "hullctl: no command given; usage: hullctl COMMAND [OPTIONS]");
+  EXPECT_EQ(error({"backup"}),
+            "hullctl: no command given; usage: hullctl backup COMMAND [OPTIONS]");
   EXPECT_EQ(error({"check", "a"}), "hullctl: B is required; usage: hullctl check A B [OPTIONS]");
   EXPECT_EQ(error({"create", "a", "b"}),
             "hullctl: unexpected argument \"b\"; usage: hullctl create ID [OPTIONS]");
@@ -155,8 +154,8 @@ TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
 TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
   const std::string help = RunTool({"--help"}).out;
   size_t at = 0;
-  for (const char* word : {"\nBuild hulls:\n", "\n  append ", "\nLook at hulls:\n", "\n  list ",
-                           "\nAsk what collides:\n", "\n  check ", "\nRun a server:\n",
+  for (const char* word : {"\nBuild hulls:\n", "\n  append ", "\nInspect hulls:\n", "\n  list ",
+                           "\nCheck for collision:\n", "\n  check ", "\nRun a server:\n",
                            "\n  status ", "\nWork with hullctl:\n", "\n  context ",
                            "\nOptions of every command:\n", "\nExit codes:\n", "\nExamples:\n"}) {
     const size_t found = help.find(word, at);
@@ -165,12 +164,11 @@ TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
   }
   EXPECT_THAT(help, testing::Not(HasSubstr("__")));
   for (const char* command :
-       {"create",    "append",      "replace",     "delete",      "list",
-        "get",       "mesh",        "picture",     "check",       "batch",
-        "scene",     "stream",      "verify",      "status",      "bench load",
-        "generate",  "completion",  "shell",       "backup save", "backup restore",
-        "token new", "context add", "context use", "robot check", "robot acm",
-        "cover",     "scene apply", "scene check", "scene diff",  "scene delete"}) {
+       {"create",      "append",      "replace",     "delete",      "list",        "get",
+        "mesh",        "check",       "batch",       "scene",       "stream",      "verify",
+        "status",      "bench load",  "generate",    "completion",  "backup save", "backup restore",
+        "token new",   "context add", "context use", "robot check", "robot acm",   "cover",
+        "scene apply", "scene check", "scene diff",  "scene delete"}) {
     std::vector<std::string> words = {"help"};
     std::istringstream names(command);
     for (std::string word; names >> word;) words.push_back(word);
@@ -189,11 +187,11 @@ TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
   EXPECT_EQ(help.code, 0);
   for (const char* word :
        {"create", "append", "get", "list", "delete", "mesh", "check", "batch", "scene", "stream",
-        "verify", "generate", "status", "picture", "HULLCTL_SERVER", "Exit codes"}) {
+        "verify", "generate", "status", "HULLCTL_SERVER", "Exit codes"}) {
     EXPECT_THAT(help.out, HasSubstr(word));
   }
   EXPECT_THAT(RunTool({"--version"}).out, StartsWith("hullctl "));
-  EXPECT_THAT(RunTool({"batch", "--help"}).out, HasSubstr("place NAME HULL"));
+  EXPECT_THAT(RunTool({"batch", "--help"}).out, HasSubstr("right: {id: box, at: [2, 0, 0]}"));
 }
 
 TEST_F(HullctlTest, AppendSendsFilesInChunks) {
@@ -231,7 +229,7 @@ TEST_F(HullctlTest, AppendAndReplaceCountPointsAtZero) {
   ran = Ask({"append", "b", "--create", "--skip-zero", "--skip-nonfinite", file.path(), "--output",
              "name"});
   EXPECT_EQ(ran.out, "b\n");
-  EXPECT_THAT(ran.err, HasSubstr("hullctl: 2 points at (0, 0, 0) were left out\n"));
+  EXPECT_THAT(ran.err, HasSubstr("hullctl: 2 points at (0, 0, 0) were skipped\n"));
 }
 
 TEST_F(HullctlTest, AnErrorInAFileLeavesTheChunksBeforeIt) {
@@ -324,12 +322,14 @@ TEST_F(HullctlTest, ACollisionIsNoError) {
 
 TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   fake_.PutHull("box", {});
-  const TempFile good("good", "place a box\nplace b box 1 2 3\npair a b\npair b a\n");
+  const TempFile good(
+      "good",
+      "place: {a: {id: box}, b: {id: box, at: [1, 2, 3]}}\nask: {pairs: [[a, b], [b, a]]}\n");
   const Ran fine = Ask({"batch", good.path()});
   EXPECT_EQ(fine.code, 0) << fine.err;
   EXPECT_EQ(fine.out,
             "a\tb\tTOUCHING\nb\ta\tTOUCHING\n# separated 0 touching 2 overlapping 0 failed 0\n");
-  const TempFile mixed("mixed", "place a box\nplace b box\nplace c nope\nall\n");
+  const TempFile mixed("mixed", "place: {a: {id: box}, b: {id: box}, c: {id: nope}}\n");
   const Ran some = Ask({"batch", mixed.path()});
   EXPECT_EQ(some.code, 4);
   EXPECT_THAT(some.out, HasSubstr("a\tc\tFAILED\thull \"nope\" not found\n"));
@@ -353,9 +353,8 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
 
 TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
   fake_.PutHull("box", {});
-  std::string text = "place extra box\n";
-  for (int i = 0; i < 500; ++i) text += "place p" + std::to_string(i) + " box\n";
-  text += "all\n";
+  std::string text = "place:\n  extra: {id: box}\n";
+  for (int i = 0; i < 500; ++i) text += "  p" + std::to_string(i) + ": {id: box}\n";
   const TempFile file("big", text);
   const Ran ran = Ask({"batch", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -377,7 +376,8 @@ TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
 }
 
 TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
-  const TempFile file("pairs", "place a box\nplace b box\npair a b\npair b a\n");
+  const TempFile file("pairs",
+                      "place: {a: {id: box}, b: {id: box}}\nask: {pairs: [[a, b], [b, a]]}\n");
   v1::BatchCheckCollisionsResponse late;
   late.set_first_pair(1);
   late.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
@@ -511,7 +511,7 @@ TEST_F(HullctlTest, ASimplificationThatIsNotWhatItClaimsIsNotWritten) {
   const Ran many = Ask({"mesh", "a", "--max-vertices", "3", "--verify"});
   EXPECT_EQ(many.code, 5);
   EXPECT_EQ(many.out, "");
-  EXPECT_THAT(many.err, HasSubstr("is not what it claims, so it is not written: the simplification "
+  EXPECT_THAT(many.err, HasSubstr("is invalid; nothing was written: the simplification "
                                   "has 4 vertices; at most 3 were asked for"));
   const Ran whole = Ask({"mesh", "a", "--verify"});
   EXPECT_EQ(whole.code, 2);
@@ -526,24 +526,6 @@ TEST_F(HullctlTest, MeshWritesSegmentsAndPoints) {
   for (int i = 0; i < 6; ++i) vertices.mutable_vertices()->add_xyz(i);
   fake_.mesh_parts = {header, vertices};
   EXPECT_THAT(Ask({"mesh", "a"}).out, HasSubstr("v 0 1 2\nv 3 4 5\nl 1 2\n"));
-}
-
-TEST_F(HullctlTest, PictureShowsPointsMeshAndHull) {
-  fake_.mesh_parts = Tetrahedron();
-  const TempFile points("p.xyz", "0 0 0\n1 1 1\nnan 0 0\n");
-  const TempFile mesh("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const TempFile picture("scene.svg", "");
-  ASSERT_EQ(Ask({"picture", "--points", points.path(), "--mesh", mesh.path(), "--hull", "a", "-o",
-                 picture.path()})
-                .code,
-            0);
-  std::ifstream file(picture.path());
-  const std::string svg((std::istreambuf_iterator<char>(file)), {});
-  EXPECT_EQ(XmlProblem(svg), "");
-  for (const char* text : {">Points<", ">Mesh<", ">Hull<", ">2 points<",
-                           ">3 vertices, 1 triangles<", ">4 vertices, 4 facets<"}) {
-    EXPECT_THAT(svg, HasSubstr(text));
-  }
 }
 
 TEST_F(HullctlTest, GenerateWritesTheSamePointsEachTime) {
@@ -569,7 +551,7 @@ TEST_F(HullctlTest, NamesStandAloneOnALine) {
   EXPECT_EQ(names({"status"}), "SERVING\n");
   fake_.collision_answer.set_relation(v1::RELATION_TOUCHING);
   EXPECT_EQ(names({"check", "a", "b"}), "TOUCHING\n");
-  const TempFile scene("scene", "place x a\nplace y nope\nplace z b\n");
+  const TempFile scene("scene", "place: {x: {id: a}, y: {id: nope}, z: {id: b}}\n");
   EXPECT_EQ(names({"batch", scene.path()}), "x\ty\tFAILED\nx\tz\tTOUCHING\ny\tz\tFAILED\n");
   EXPECT_EQ(names({"delete", "b"}), "b\n");
 }

@@ -408,9 +408,10 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},
       {FileKind::kOffMesh, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n"},
       {FileKind::kBatch,
-       "# c\nplace a arm\nplace b box 1 2 3\nplace c box 1 0 0 0 1 2 3\n"
-       "pair a b\npair b c # d\n"},
-      {FileKind::kBatch, "place a arm\nplace b arm 1 0 0\nall\n"},
+       "# c\nplace: {a: {id: arm}, b: {id: box, at: [1, 0, 0, 0, 1, 2, 3]}}\n"
+       "ask: {pairs: [[a, b]]} # d\n"},
+      {FileKind::kBatch, "{\"place\": {\"a\": {\"id\": \"arm\"}}}\n"},
+      {FileKind::kBatch, "place a arm 1 2 3 # c\n"},
       {FileKind::kBatch, R"({"placements":[{"hullId":"a"},{"hullId":"b"}],)"
                          "\n"
                          R"("pairs":[0,1],"method":1})"},
@@ -562,8 +563,8 @@ const std::vector<std::string>& FileTokens() {
                                                                  "OFF\n",
                                                                  "STCOFF\n",
                                                                  "all\n",
-                                                                 "place a b 1 2\n",
-                                                                 "pair a a\n",
+                                                                 "place: {a: {id: b}}\n",
+                                                                 "ask: {pairs: [[a, a]]}\n",
                                                                  "{",
                                                                  "[",
                                                                  "}",

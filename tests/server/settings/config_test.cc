@@ -7,6 +7,9 @@
 #include <cstdlib>
 #include <fstream>
 #include <map>
+#include <sstream>
+
+#include "server/settings/variables.h"
 
 namespace hulld::server {
 namespace config_test {
@@ -99,7 +102,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"metrics-insecure", "true"},
                                                        {"data-dir", "/tmp/d"},
                                                        {"durability", "relaxed"},
-                                                       {"memory-limit", "17"},
+                                                       {"memory-limit", "17000000"},
                                                        {"max-writers-per-hull", "18"},
                                                        {"max-pieces-per-body", "19"},
                                                        {"tls-cert", "/c"},
@@ -133,7 +136,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.store, "memory");
     EXPECT_EQ(config.data_dir, "/tmp/d");
     EXPECT_EQ(config.durability, "relaxed");
-    EXPECT_EQ(config.limits.memory_limit, 17);
+    EXPECT_EQ(config.limits.memory_limit, 17000000);
     EXPECT_EQ(config.limits.max_writers_per_hull, 18);
     EXPECT_EQ(config.limits.max_pieces_per_body, 19);
     EXPECT_EQ(config.limits.max_message_bytes, 16);
@@ -201,6 +204,54 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--config", WriteFile("max-hull = 3\n")}, "max-hull");
   environment_["HULLD_MAX_HULLS"] = "many";
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
+}
+
+TEST_F(ConfigTest, AMisspelledNameIsRefusedWithTheNearestOne) {
+  ExpectRefused({"--lisen=127.0.0.1:1"}, "unknown flag --lisen; did you mean --listen?");
+  ExpectRefused({"--max-hull", "3"}, "unknown flag --max-hull; did you mean --max-hulls?");
+  ExpectRefused({"docter"}, "unexpected argument \"docter\"; did you mean doctor?");
+  const std::string file = WriteFile("# limits\nmax-hull = 3\n");
+  ExpectRefused({"--config", file}, file + ":2: unknown key \"max-hull\"; did you mean max-hulls?");
+  const auto with_variable = [](const char* name) {
+    return std::string(CheckVariables({name}).message());
+  };
+  EXPECT_THAT(with_variable("HULLD_LISEN"),
+              HasSubstr("variable HULLD_LISEN is no setting; did you mean HULLD_LISTEN?"));
+  EXPECT_THAT(with_variable("HULLD_MAX_HULL"), HasSubstr("did you mean HULLD_MAX_HULLS?"));
+  // Variables of hullctl, and those that Kubernetes sets for a service named hulld.
+  for (const char* name : {"HULLD_TOKEN", "HULLD_PORT", "HULLD_SERVICE_HOST", "HULLD_LISTEN"}) {
+    EXPECT_EQ(with_variable(name), "") << name;
+  }
+}
+
+TEST_F(ConfigTest, ErrorsOfTheFileNameItsLine) {
+  const auto refused = [this](const std::string& text, const std::string& what) {
+    const std::string file = WriteFile(text);
+    ExpectRefused({"--config", file}, file + ":2: " + what);
+  };
+  refused("threads = 1\nstore = memory\n", "\"store = memory\" is not TOML: ");
+  refused("threads = 1\nthreads = 2\n", "\"threads = 2\" is not TOML: ");
+  refused("threads = 1\nstore\n", "\"store\" is not TOML: ");
+  refused("threads = 1\nmax-hulls = [2]\n",
+          "the value of max-hulls is no text, number, or boolean");
+  refused("threads = 1\n[limits]\nmax-hulls = 2\n", "unknown key \"limits\"");
+  refused("threads = 1\nmax-hulls = -2\n", "--max-hulls: \"-2\" is not a whole number");
+  refused("threads = 1\nconfig = \"other.toml\"\n", "unknown key \"config\"");
+}
+
+TEST_F(ConfigTest, SizesTakeUnits) {
+  EXPECT_EQ(Accepted({"--memory-limit=1GB"}).limits.memory_limit, 1'000'000'000);
+  EXPECT_EQ(Accepted({"--memory-limit=64MiB"}).limits.memory_limit, 64 << 20);
+  EXPECT_EQ(Accepted({"--memory-limit=0"}).limits.memory_limit, 0);
+  EXPECT_EQ(Accepted({"--request-memory", "32MB"}).limits.request_memory, 32'000'000);
+  EXPECT_EQ(
+      Accepted({"--config", WriteFile("max-message-bytes = \"4MiB\"\n")}).limits.max_message_bytes,
+      4 << 20);
+  ExpectRefused({"--memory-limit=10"}, "\"10\" is not a size from 16777216 to ");
+  ExpectRefused({"--memory-limit=1XB"}, "or a unit: kB, MB, GB, KiB, MiB, GiB");
+  ExpectRefused({"--memory-limit=-1"}, "\"-1\" is not a size");
+  ExpectRefused({"--request-memory=0"}, "\"0\" is not a size from 1 to ");
+  ExpectRefused({"--memory-limit=99999999999GiB"}, "is not a size");
 }
 
 TEST_F(ConfigTest, TheWrongOneOfSeveralVariablesOfTheProcessIsNamed) {
@@ -281,6 +332,9 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));
+  EXPECT_THAT(help->print, HasSubstr("--memory-limit SIZE"));
+  std::istringstream lines(help->print);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
   EXPECT_EQ(Parse({"--version"})->print, "hulld " HULLD_VERSION "\n");
 }
 

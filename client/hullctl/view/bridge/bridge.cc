@@ -61,14 +61,14 @@ struct Shared {
 };
 
 // Counts a connection during its lifetime.
-class Counted {
+class OpenCount {
  public:
-  explicit Counted(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) {
+  explicit OpenCount(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) {
     ++shared_->connections;
   }
-  ~Counted() { --shared_->connections; }
-  Counted(const Counted&) = delete;
-  Counted& operator=(const Counted&) = delete;
+  ~OpenCount() { --shared_->connections; }
+  OpenCount(const OpenCount&) = delete;
+  OpenCount& operator=(const OpenCount&) = delete;
 
  private:
   std::shared_ptr<Shared> shared_;
@@ -79,7 +79,7 @@ class PageConnection final : public PageChannel,
                              public std::enable_shared_from_this<PageConnection> {
  public:
   PageConnection(beast::tcp_stream stream, std::shared_ptr<Shared> shared,
-                 std::unique_ptr<Counted> counted)
+                 std::unique_ptr<OpenCount> counted)
       : socket_(std::move(stream)), shared_(std::move(shared)), counted_(std::move(counted)) {
     socket_.set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
     socket_.read_message_max(shared_->options.max_message_bytes);
@@ -173,7 +173,7 @@ class PageConnection final : public PageChannel,
 
   websocket::stream<beast::tcp_stream> socket_;
   const std::shared_ptr<Shared> shared_;
-  std::unique_ptr<Counted> counted_;
+  std::unique_ptr<OpenCount> counted_;
   std::unique_ptr<PageHandler> handler_;
   beast::flat_buffer buffer_;
 
@@ -191,7 +191,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   HttpConnection(tcp::socket socket, std::shared_ptr<Shared> shared)
       : stream_(std::move(socket)),
         shared_(std::move(shared)),
-        counted_(std::make_unique<Counted>(shared_)) {}
+        counted_(std::make_unique<OpenCount>(shared_)) {}
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
   ~HttpConnection() { shared_->awaiting.remove(this); }
@@ -300,7 +300,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
 
   beast::tcp_stream stream_;
   const std::shared_ptr<Shared> shared_;
-  std::unique_ptr<Counted> counted_;
+  std::unique_ptr<OpenCount> counted_;
   beast::flat_buffer buffer_{kMaxHeaderBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
 };
@@ -366,9 +366,9 @@ absl::StatusOr<std::unique_ptr<Bridge>> Bridge::Start(BridgeOptions options) {
   try {
     bridge = std::make_unique<BeastBridge>(options.port);
   } catch (const boost::system::system_error& error) {
-    return absl::InvalidArgumentError(absl::StrCat("cannot listen on 127.0.0.1:", options.port,
-                                                   " (", error.code().message(),
-                                                   "); choose another --port, or 0 for any"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot listen on 127.0.0.1:", options.port, " (", error.code().message(),
+                     "); choose another --port, or 0 for any free one"));
   }
   auto guard = SessionGuard::Create(bridge->port());
   if (!guard.ok()) return guard.status();

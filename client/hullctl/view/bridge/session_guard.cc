@@ -22,7 +22,7 @@ bool IsSame(std::string_view given, std::string_view secret) {
          CRYPTO_memcmp(given.data(), secret.data(), secret.size()) == 0;
 }
 
-SessionGuard::Decision Refuse(int http_status, std::string reason) {
+SessionGuard::Decision RefuseRequest(int http_status, std::string reason) {
   return {SessionGuard::Verdict::kRefuse, http_status, std::move(reason)};
 }
 
@@ -64,14 +64,14 @@ bool SessionGuard::HasSession(std::string_view cookies) const {
 
 SessionGuard::Decision SessionGuard::Judge(const PageRequest& request) {
   if (request.host != Host() && request.host != absl::StrCat("localhost:", port_)) {
-    return Refuse(421, absl::StrCat("This is ", Host(), "; open it by that name."));
+    return RefuseRequest(421, absl::StrCat("This is ", Host(), "; open it by that name."));
   }
   const std::string own_origin = absl::StrCat("http://", std::string(request.host));
   if ((request.upgrade || !request.origin.empty()) && request.origin != own_origin) {
-    return Refuse(403, "Only the page that hullctl opened may ask.");
+    return RefuseRequest(403, "Only the page opened by hullctl may connect.");
   }
   if (request.method != "GET" && request.method != "HEAD") {
-    return Refuse(405, "Only GET is answered here.");
+    return RefuseRequest(405, "Only GET is supported.");
   }
   const bool has_session = HasSession(request.cookie);
   if (request.target.starts_with(kTokenTarget) && !request.upgrade) {
@@ -82,11 +82,11 @@ SessionGuard::Decision SessionGuard::Judge(const PageRequest& request) {
     }
     // A browser with a session that opens the address again is admitted again.
     if (has_session) return {Verdict::kExchange, 200, ""};
-    return Refuse(403,
-                  "This address worked once and was used. Run 'hullctl view' again for another.");
+    return RefuseRequest(403,
+                         "This address was already used. Run 'hullctl view' again for a new one.");
   }
   if (!has_session) {
-    return Refuse(403, "Open the address that 'hullctl view' printed; it lets this browser in.");
+    return RefuseRequest(403, "Open the address printed by 'hullctl view'.");
   }
   return {Verdict::kServe, 200, ""};
 }

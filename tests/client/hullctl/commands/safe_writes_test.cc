@@ -82,7 +82,7 @@ TEST_F(SafeWrites, WhatIsNotThereIsNotToBeCreatedToBeDeleted) {
   const Ran ran = Ask({"delete", "nope"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));
-  const TempFile file("scene", "place a nope\nplace b nope\npair a b\n");
+  const TempFile file("scene", "place: {a: {id: nope}, b: {id: nope}}\n");
   EXPECT_THAT(Ask({"batch", file.path()}).out,
               AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));
 }

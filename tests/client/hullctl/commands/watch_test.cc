@@ -125,9 +125,9 @@ TEST_F(HullctlWatch, EndsAtCtrlC) {
 
 TEST_F(HullctlWatch, TellsWhatCollidesInAScene) {
   Put("cube", server::Cube());
-  const TempFile text("scene.txt",
-                      "place left cube\nplace right cube 1 0 0\nplace lost none\n"
-                      "pair left right\npair left lost\n");
+  const TempFile text("scene.yaml",
+                      "place:\n  left: {id: cube}\n  right: {id: cube, at: [1, 0, 0]}\n"
+                      "  lost: {id: none}\nask: {pairs: [[left, right], [left, lost]]}\n");
   Ran ran = Ask({"watch", "--scene", text.path(), "--until-synced"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out, "TOUCH\tleft\tright\t2\t2\n# synced at revision 2\n");

@@ -15,7 +15,7 @@ command -v "$program" >/dev/null || { echo "skipped: there is no $program"; exit
 work=$(mktemp -d)
 server=
 trap '[[ -z $server ]] || { kill "$server"; wait "$server"; }; rm -rf "$work"' EXIT
-export PATH=$programs:$PATH HOME=$work XDG_CONFIG_HOME=$work/config XDG_STATE_HOME=$work/state LC_ALL=C TERM=xterm
+export PATH=$programs:$PATH HOME=$work XDG_CONFIG_HOME=$work/config LC_ALL=C TERM=xterm
 unset HULLCTL_SERVER HULLCTL_CONTEXT HULLD_TOKEN NO_COLOR
 cd "$work" || exit 2
 
@@ -117,16 +117,6 @@ EOF
     contains "colors" $'\e[1mHULL\e[0m' "$(on_terminal '' 'hullctl list')"
     expect "NO_COLOR" "0" "$(NO_COLOR=1 on_terminal '' 'hullctl list' | grep -c $'\e\\[1m')"
     expect "a pipe" "0" "$(hullctl list | grep -c $'\e')"
-    said=$(on_terminal 'get bo\t\nexit\n' 'hullctl shell')
-    contains "completion in the shell" "dimension   -1" "$said"
-    contains "history" "get\\040box" "$(cat state/hullctl/history)"
-    expect "who may read the history" "600" "$(stat -c %a state/hullctl/history)"
-    expect "lines of a file" "box" "$(printf 'list --output name\n\n# nothing\n' | hullctl shell)"
-    expect "options for all lines" "box" "$(hullctl shell --server "$address" --output name <<<list)"
-    expect "a line for another server" "server  127.0.0.1:1  (--server)" \
-      "$(hullctl shell --server "$address" --tls <<<'context show --server 127.0.0.1:1')"
-    printf 'get nope\n' | hullctl shell 2>/dev/null
-    expect "the exit code of the last line" "1" "$?"
     ;;
 esac
 echo "$failures failures"

@@ -110,17 +110,17 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
     EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << ran.err;
     return ran.err;
   };
-  EXPECT_THAT(problem(""), HasSubstr("it is not JSON"));
-  EXPECT_THAT(problem("{\"contexts\":"), HasSubstr("it is not JSON"));
-  EXPECT_THAT(problem(R"({"current":"a"})"), HasSubstr("its current context \"a\" is not there"));
-  EXPECT_THAT(problem(R"({"contexts":[]})"), HasSubstr("\"contexts\" does not belong there"));
+  EXPECT_THAT(problem(""), HasSubstr("not JSON"));
+  EXPECT_THAT(problem("{\"contexts\":"), HasSubstr("not JSON"));
+  EXPECT_THAT(problem(R"({"current":"a"})"), HasSubstr("its current context \"a\" does not exist"));
+  EXPECT_THAT(problem(R"({"contexts":[]})"), HasSubstr("\"contexts\" is unknown"));
   EXPECT_THAT(problem(R"({"contexts":{"a":{}}})"), HasSubstr("context \"a\" has no server"));
   EXPECT_THAT(problem(R"({"contexts":{"a b":{"server":"a:1"}}})"), HasSubstr("a name is up to"));
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","tls":"yes"}}})"),
               HasSubstr("tls is not a true or false"));
   // A token does not belong in this file, and is not repeated in errors.
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","token":"hunter2"}}})"),
-              AllOf(HasSubstr("\"token\", which is no setting"), Not(HasSubstr("hunter2"))));
+              AllOf(HasSubstr("\"token\", which is not a setting"), Not(HasSubstr("hunter2"))));
   // Commands without a server ignore the error.
   EXPECT_EQ(RunTool({"generate", "cube", "1"}).code, 0);
   Write(R"({"contexts":{"a":{"server":"nowhere"}},"current":"a"})");
@@ -130,17 +130,17 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
 
 TEST_F(Contexts, AreAddedUsedListedAndRemoved) {
   EXPECT_EQ(RunTool({"context", "add", "a", "--server", "127.0.0.1:1"}).out,
-            "context a added, and used from now on\n");
+            "context a added and selected\n");
   EXPECT_EQ(RunTool({"context", "add", "b", "--server", "b.example:1", "--tls"}).out,
             "context b added\n");
   EXPECT_THAT(RunTool({"context", "add", "a", "--server", "127.0.0.1:2"}).err,
-              HasSubstr("say --replace"));
+              HasSubstr("pass --replace"));
   EXPECT_EQ(RunTool({"context", "list", "--output", "name"}).out, "a\nb\n");
   EXPECT_EQ(RunTool({"context", "list"}).out,
             "CONTEXT  SERVER       TLS  TOKEN FILE  USED\na        127.0.0.1:1  no   -           "
             "yes\nb        b.example:1  yes  -           no\n");
   EXPECT_THAT(RunTool({"context", "use", "bb"}).err,
-              HasSubstr("there is no context \"bb\"; did you mean \"b\"?"));
+              HasSubstr("unknown context \"bb\"; did you mean \"b\"?"));
   EXPECT_EQ(RunTool({"context", "use", "b"}).code, 0);
   EXPECT_EQ(RunTool({"context", "show", "--output", "name"}).out, "b.example:1\n");
   EXPECT_EQ(RunTool({"context", "show", "a", "--output", "name"}).out, "127.0.0.1:1\n");
@@ -165,9 +165,9 @@ TEST_F(Contexts, OptionThenEnvironmentThenContextThenDefault) {
   EXPECT_EQ(server({}), "env:1");
   EXPECT_EQ(server({"--context", "a"}), "a:1");
   EXPECT_EQ(server({"--server", "c:1"}), "c:1");
-  EXPECT_THAT(server({"--server", "c:1", "--context", "a"}), HasSubstr("contradict each other"));
+  EXPECT_THAT(server({"--server", "c:1", "--context", "a"}), HasSubstr("differ; give one of them"));
   setenv("HULLCTL_CONTEXT", "nope", 1);
-  EXPECT_THAT(server({}), HasSubstr("$HULLCTL_CONTEXT: there is no context \"nope\""));
+  EXPECT_THAT(server({}), HasSubstr("$HULLCTL_CONTEXT: unknown context \"nope\""));
 }
 
 TEST_F(Contexts, WhatCannotWorkIsNotAdded) {

@@ -79,7 +79,7 @@ TEST_F(HullctlParts, SplitMakesABodyOfTheParts) {
   const std::string before = Ask({"body", "get", "l"}).out;
   ran = Ask(split);
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("\nbody l has them already, at revision "));
+  EXPECT_THAT(ran.out, HasSubstr("\nbody l already has all parts, at revision "));
   EXPECT_EQ(Ask({"body", "get", "l"}).out, before);
   // A missing part is appended; a moved one keeps its pose.
   ASSERT_EQ(Ask({"body", "put", "l", "l/back@0,0,9"}).code, 0);
@@ -105,7 +105,7 @@ TEST_F(HullctlParts, SplitChangesNothingWhereAHullHasTheName) {
   const std::string before = Ask({"list"}).out;
   Ran ran = Ask({"append", "l", bracket_.path(), "--split", "names", "--create"});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("there is a hull \"l\""));
+  EXPECT_THAT(ran.err, HasSubstr("hull \"l\" already exists"));
   EXPECT_EQ(Ask({"list"}).out, before);
   ran = Ask({"append", "n", bracket_.path(), "--split", "names"});
   EXPECT_EQ(ran.code, 1);

@@ -39,7 +39,7 @@ TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
   Ran ran = Robot({});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("# c: a cylinder within a polyhedron that reaches at most 0.002"));
-  EXPECT_THAT(ran.out, HasSubstr("# 1 pairs; 2 left out by being adjacent\n"));
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 left out by being adjacent\n"));
   EXPECT_THAT(ran.out, HasSubstr("a\tc\tSEPARATED\t0.9"));
   EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 0 overlapping 0 failed 0\n"));
   // The temporary hulls are deleted.
@@ -116,7 +116,7 @@ TEST_F(HullctlRobot, AcmWritesWhatCheckReads) {
   EXPECT_THAT(ran.out, Not(HasSubstr("link1=\"a\" link2=\"c\"")));
   EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"}).out, ran.out);
   const TempFile srdf("chain.srdf", ran.out);
-  EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pairs; 2 left out by "));
+  EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pair; 2 left out by "));
   EXPECT_EQ(Hulls(), "");
 }
 
@@ -134,7 +134,7 @@ constexpr char kBareUrdf[] = R"(<robot name="bare">
 TEST_F(HullctlRobot, PairsLeftOutThroughLinksWithoutShapesAreCounted) {
   const TempFile bare("bare.urdf", kBareUrdf);
   const Ran ran = Ask({"robot", "check", bare.path()});
-  EXPECT_THAT(ran.out, HasSubstr("# 1 pairs; 2 left out by being adjacent, 1 of them joined "
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 left out by being adjacent, 1 of them joined "
                                  "through links without shapes\n"));
   EXPECT_THAT(Ask({"robot", "check", bare.path(), "--adjacent"}).out,
               HasSubstr("# 3 pairs\na\tb\tOVERLAPPING"));
@@ -156,13 +156,13 @@ TEST_F(HullctlRobot, AdjacentIsHintedAtOnlyWhereItHelps) {
     EXPECT_EQ(ran.code, 2);
     return ran.err;
   };
-  EXPECT_THAT(error({two.path()}), HasSubstr("--adjacent asks about adjacent ones, too"));
+  EXPECT_THAT(error({two.path()}), HasSubstr("--adjacent includes adjacent links"));
   EXPECT_THAT(error({two.path(), "--srdf", srdf.path()}),
               HasSubstr("two.srdf disables all of them"));
   EXPECT_THAT(error({two.path(), "--srdf", srdf.path()}), Not(HasSubstr("--adjacent")));
   EXPECT_THAT(error({two.path(), "--adjacent", "--ignore", "a,b"}),
-              HasSubstr("--ignore leaves all of them out"));
-  EXPECT_THAT(error({one.path()}), HasSubstr("two links with shapes, or --scene, make one"));
+              HasSubstr("--ignore excludes all of them"));
+  EXPECT_THAT(error({one.path()}), HasSubstr("a pair needs two links with shapes, or --scene"));
   EXPECT_THAT(error({one.path()}), Not(HasSubstr("--adjacent")));
 }
 
@@ -179,7 +179,7 @@ TEST_F(HullctlRobot, PlanarAndFloatingJointsTakeValues) {
   const TempFile loose("loose.urdf", kLooseUrdf);
   Ran ran = Ask({"robot", "check", loose.path(), "--joint", "free=1,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("# 1 pairs\ncrate\tcart\tTOUCHING\t0"));
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pair\ncrate\tcart\tTOUCHING\t0"));
   ran = Ask({"robot", "check", loose.path(), "--joint", "wheels=3,0,1.5707963267948966", "--joint",
              "free=1,0,0,0,5.5,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("crate\tcart\tSEPARATED\t1."));

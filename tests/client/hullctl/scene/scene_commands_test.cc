@@ -26,20 +26,17 @@ class HullctlScene : public HullctlOnServer {
 TEST_F(HullctlScene, ApplyMakesTheServerMatchTheFile) {
   Ran ran = Ask({"scene", "diff", cell_.path()});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_EQ(
-      ran.out,
-      "+ cell/part\tto create\n+ cell/table\tto create\n# 0 hulls are as the file has them\n");
+  EXPECT_EQ(ran.out, "+ cell/part\tto create\n+ cell/table\tto create\n# 0 hulls unchanged\n");
   ran = Ask({"scene", "apply", cell_.path(), "--dry-run"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("+ cell/part\tto create\n"));
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
   ran = Ask({"scene", "apply", cell_.path()});
-  EXPECT_EQ(ran.out,
-            "+ cell/part\tcreated\n+ cell/table\tcreated\n# 0 hulls are as the file has them\n");
+  EXPECT_EQ(ran.out, "+ cell/part\tcreated\n+ cell/table\tcreated\n# 0 hulls unchanged\n");
   // A repeated apply has nothing to do; the hulls keep their revisions.
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path()});
-  EXPECT_EQ(ran.out, "# 2 hulls are as the file has them\n");
+  EXPECT_EQ(ran.out, "# 2 hulls unchanged\n");
   EXPECT_EQ(Ask({"list"}).out, before);
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
 }
@@ -52,7 +49,7 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
   Ran ran = Ask({"scene", "apply", cell_.path()});
   EXPECT_EQ(ran.out,
             "~ cell/table\treplaced\n? cell/stray\tnot in the file\n"
-            "# 1 hulls are as the file has them\n");
+            "# 1 hull unchanged\n");
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--dry-run"});
   EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tto delete\n"));
   // Without a terminal no prompt is possible.
@@ -60,12 +57,13 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path(), "--prune"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("this would delete 1 hull (cell/stray); say --yes"));
+  EXPECT_THAT(ran.err,
+              HasSubstr("refusing to delete 1 hull (cell/stray) without confirmation; pass --yes"));
   EXPECT_EQ(Ask({"list"}).out, before);
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--yes"});
   EXPECT_EQ(ran.out,
             "~ cell/table\treplaced\n- cell/stray\tdeleted\n"
-            "# 1 hulls are as the file has them\n");
+            "# 1 hull unchanged\n");
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell/part\ncell/table\n");
   // Without deletions no prompt is needed.
   EXPECT_EQ(Ask({"scene", "apply", cell_.path(), "--prune"}).code, 0);
@@ -86,7 +84,7 @@ TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
   const TempFile scene("s.yaml", "prefix: cell-3/\nhulls:\n  table: {box: [2, 2, 1]}\n");
   EXPECT_EQ(Ask({"scene", "apply", scene.path(), "--prune", "--yes"}).out,
             "+ cell-3/table\tcreated\n- cell-3/stray\tdeleted\n"
-            "# 0 hulls are as the file has them\n");
+            "# 0 hulls unchanged\n");
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell-3/table\ncell-30/stray\ncell-3stray\n");
 }
 
@@ -116,7 +114,7 @@ TEST_F(HullctlScene, DeleteRemovesWhatTheFileDefines) {
   EXPECT_EQ(Ask({"scene", "delete", cell_.path(), "--yes"}).code, 0);
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "other\n");
   EXPECT_EQ(Ask({"scene", "delete", cell_.path(), "--yes"}).out,
-            "# nothing that the file defines is there\n");
+            "# none of the file's hulls and bodies exist\n");
 }
 
 class HullctlSceneBodies : public HullctlOnServer {
@@ -135,7 +133,7 @@ class HullctlSceneBodies : public HullctlOnServer {
 TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
   const std::string to_do =
       "+ cell/bar\tto create\n+ cell/cube\tto create\n+ cell/ell\tbody to create\n"
-      "# 0 hulls and 0 bodies are as the file has them\n";
+      "# 0 hulls and 0 bodies unchanged\n";
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).out, to_do);
   EXPECT_EQ(Ask({"scene", "apply", cell_.path(), "--dry-run"}).out, to_do);
   EXPECT_EQ(Ask({"body", "list", "--output", "name"}).out, "");
@@ -145,8 +143,7 @@ TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
   // A repeated apply puts nothing: the body keeps its revision.
   const std::string before = Ask({"body", "get", "cell/ell"}).out;
   EXPECT_THAT(before, HasSubstr("cell/cube  1.5,1,0"));
-  EXPECT_EQ(Ask({"scene", "apply", cell_.path()}).out,
-            "# 2 hulls and 1 bodies are as the file has them\n");
+  EXPECT_EQ(Ask({"scene", "apply", cell_.path()}).out, "# 2 hulls and 1 body unchanged\n");
   EXPECT_EQ(Ask({"body", "get", "cell/ell"}).out, before);
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
 }
@@ -212,7 +209,7 @@ TEST_F(HullctlSceneBodies, PruneAndDeleteRemoveBodiesBeforeHulls) {
   EXPECT_THAT(Ask({"scene", "diff", cell_.path()}).out,
               HasSubstr("? cell/stray\tbody not in the file\n? cell/a\tnot in the file\n"));
   Ran ran = Ask({"scene", "apply", cell_.path(), "--prune"});
-  EXPECT_THAT(ran.err, HasSubstr("would delete 2 bodies and hulls (cell/stray, cell/a)"));
+  EXPECT_THAT(ran.err, HasSubstr("refusing to delete 2 bodies and hulls (cell/stray, cell/a)"));
   EXPECT_THAT(Ask({"scene", "apply", cell_.path(), "--prune", "--yes"}).out,
               HasSubstr("- cell/stray\tbody deleted\n- cell/a\tdeleted\n"));
   ran = Ask({"scene", "delete", cell_.path()});

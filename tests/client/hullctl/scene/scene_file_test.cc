@@ -33,31 +33,51 @@ std::vector<uint32_t> Pairs(const Scene& scene) {
   return pairs.value_or(std::vector<uint32_t>());
 }
 
-TEST(SceneFile, TextHoldsPlacementsAndPairs) {
-  const auto scene = Read(
-      "# a scene\n\npair b a   # before they are placed\nplace a arm/1\n"
-      "place b box 0.1 -2 3e-310\nplace c box 2 1 0 0 1 2 3\npair c c\n");
-  ASSERT_TRUE(scene.ok()) << scene.status();
-  EXPECT_THAT(scene->names, ElementsAre("a", "b", "c"));
-  EXPECT_THAT(Pairs(*scene), ElementsAre(1, 0, 2, 2));
-  EXPECT_EQ(*scene->HullOf(0), "arm/1");
-  EXPECT_EQ(scene->HullOf(3), nullptr);
-  EXPECT_FALSE(scene->PlacementOf(0).has_pose());
-  EXPECT_EQ(scene->PlacementOf(1).pose().translation().z(), 3e-310);
-  EXPECT_FALSE(scene->PlacementOf(1).pose().has_rotation());
-  EXPECT_EQ(scene->PlacementOf(2).pose().rotation().w(), 2);
+TEST(SceneFile, JsonIsASubsetOfYaml) {
+  for (const char* text :
+       {"# a scene\n\nask:\n  pairs: [[b, a], [c, c]]   # before their placements\nplace:\n"
+        "  a: {id: arm/1}\n  b: {id: box, at: [0.1, -2, 3e-310]}\n"
+        "  c: {id: box, at: [2, 1, 0, 0, 1, 2, 3]}\n",
+        "{place: {a: {id: arm/1}, b: {id: box, at: [0.1, -2, 3e-310]},\n"
+        " c: {id: box, at: [2, 1, 0, 0, 1, 2, 3]}}, ask: {pairs: [[b, a], [c, c]]}}",
+        R"({"ask": {"pairs": [["b", "a"], ["c", "c"]]}, "place": {"a": {"id": "arm/1"},
+           "b": {"id": "box", "at": [0.1, -2, 3e-310]},
+           "c": {"id": "box", "at": [2, 1, 0, 0, 1, 2, 3]}}})"}) {
+    const auto scene = Read(text);
+    ASSERT_TRUE(scene.ok()) << scene.status();
+    EXPECT_THAT(scene->names, ElementsAre("a", "b", "c"));
+    EXPECT_THAT(Pairs(*scene), ElementsAre(1, 0, 2, 2));
+    EXPECT_EQ(*scene->HullOf(0), "arm/1");
+    EXPECT_EQ(scene->HullOf(3), nullptr);
+    EXPECT_FALSE(scene->PlacementOf(0).has_pose());
+    EXPECT_EQ(scene->PlacementOf(1).pose().translation().z(), 3e-310);
+    EXPECT_FALSE(scene->PlacementOf(1).pose().has_rotation());
+    EXPECT_EQ(scene->PlacementOf(2).pose().rotation().w(), 2);
+  }
 }
 
-TEST(SceneFile, AllOrNoPairMeansEachTwoOfAllPlacements) {
-  for (const char* text :
-       {"place a h\nall\nplace b h\nplace c h\n", "place a h\nplace b h\nplace c h\n",
-        "place a h\nplace b h\nplace c h\npair a b\nall\n",
-        R"({"placements":[{"hullId":"h"},{"hullId":"h"},{"hullId":"h"}]})"}) {
+TEST(SceneFile, NoPairMeansEachTwoOfAllPlacements) {
+  for (const char* text : {"place: {a: {id: h}, b: {id: h}, c: {id: h}}\n",
+                           R"({"placements":[{"hullId":"h"},{"hullId":"h"},{"hullId":"h"}]})"}) {
     const auto scene = Read(text);
     ASSERT_TRUE(scene.ok()) << scene.status();
     EXPECT_FALSE(scene->pairs.has_value());
     EXPECT_THAT(Pairs(*scene), ElementsAre(0, 1, 0, 2, 1, 2)) << text;
   }
+}
+
+TEST(SceneFile, TheFormerLineFormatIsRefusedWithItsYaml) {
+  const auto refused = [](int line, const std::string& yaml) {
+    return "FILE:" + std::to_string(line) +
+           ": a scene is YAML, not lines of place and pair; write " + yaml +
+           "; --help shows an example";
+  };
+  EXPECT_EQ(Error("place left cube\nplace right cube 2 0 0\n"),
+            refused(1, "\"place: {left: {id: cube}}\""));
+  EXPECT_EQ(Error("# c\n\nplace a arm/1 1 0 0 1 0 0 5 # d\n"),
+            refused(3, "\"place: {a: {id: arm/1, at: [1, 0, 0, 1, 0, 0, 5]}}\""));
+  EXPECT_EQ(Error("pair a b\nplace a h\nplace b h\n"), refused(1, "\"ask: {pairs: [[a, b]]}\""));
+  EXPECT_EQ(Error("all\nplace a h\n"), refused(1, "no \"ask: {pairs: ...}\""));
 }
 
 TEST(SceneFile, JsonIsOneOfThreeMessages) {
@@ -110,7 +130,7 @@ TEST(SceneFile, GroupsAndMoversLeaveOutPairs) {
               HasSubstr("groups holds 1 groups for 4 placements"));
   const auto none = Read(placements + R"("movers":0})");
   ASSERT_TRUE(none.ok());
-  EXPECT_THAT(std::string(PairsOf(*none, "FILE").status().message()), HasSubstr("no pair"));
+  EXPECT_THAT(std::string(PairsOf(*none, "FILE").status().message()), HasSubstr("no pairs"));
 }
 
 TEST(SceneFile, ASceneIsReadToItsEndAndNoFurther) {
@@ -118,15 +138,15 @@ TEST(SceneFile, ASceneIsReadToItsEndAndNoFurther) {
   const auto source = ByteSource::Open(file.path());
   ASSERT_TRUE(ReadScene(source->get()).ok());
   EXPECT_THAT(std::string(RefuseUpdates(source->get(), "batch").message()),
-              HasSubstr(":4: 'hullctl batch' takes nothing behind the scene"));
+              HasSubstr(":4: 'hullctl batch' takes no updates after the scene"));
 }
 
 TEST(SceneFile, JsonThatIsNoSceneIsExplained) {
   const std::string placements = R"({"placements":[{"hullId":"a"}],)";
   EXPECT_THAT(Error(placements + R"("pairs":[0,1]})"), HasSubstr("pairs names placement 1"));
-  EXPECT_THAT(Error(placements + R"("pairs":[0]})"), HasSubstr("a pair has two"));
+  EXPECT_THAT(Error(placements + R"("pairs":[0]})"), HasSubstr("each pair needs two"));
   EXPECT_THAT(Error(placements + R"("pairs":[0,0],"groups":[1]})"),
-              HasSubstr("\"pairs\" and \"groups\" do not go together"));
+              HasSubstr("\"pairs\" and \"groups\" cannot be combined"));
   EXPECT_THAT(Error(placements + R"("pares":[0,0]})"), HasSubstr("FILE:1: "));
   EXPECT_THAT(Error("{\"placements\":\n[}\n"), HasSubstr("FILE: "));
   EXPECT_THAT(Error(R"({"packedPlacements":{"hullIds":["a"],"hulls":[1],
@@ -134,26 +154,18 @@ TEST(SceneFile, JsonThatIsNoSceneIsExplained) {
               HasSubstr("names hull 1"));
   EXPECT_THAT(Error(R"({"packedPlacements":{"hullIds":["a"],"hulls":[0],"poses":[1]}})"),
               HasSubstr("holds 1 numbers for 1 placements"));
-  EXPECT_THAT(Error(""), HasSubstr("there is no scene in it"));
+  EXPECT_THAT(Error(""), HasSubstr("FILE contains no scene"));
 }
 
 TEST(SceneFile, ErrorsNameFileAndLine) {
-  EXPECT_EQ(Error("place a h\npair a b\n"), "FILE:2: \"b\" is not placed; add: place NAME HULL");
-  EXPECT_EQ(Error("place a h\nplace a h\n"), "FILE:2: the name \"a\" is taken already");
-  EXPECT_EQ(Error("place a\n"), "FILE:1: a placement is: place NAME HULL [[w x y z] tx ty tz]");
-  EXPECT_EQ(Error("place a h 1 2\n"),
-            "FILE:1: a pose is 3 numbers tx ty tz or 7 numbers w x y z tx ty tz, here are 2");
-  EXPECT_EQ(Error("place a h 1 2 x\n"), "FILE:1: \"x\" is not a number");
-  EXPECT_EQ(Error("place a h 1 2 nan\n"), "FILE:1: \"nan\" is not a finite number");
-  EXPECT_THAT(Error("place a h 0 0 0 0 1 2 3\n"), HasSubstr("FILE:1: the quaternion"));
-  EXPECT_EQ(Error("pair a\n"), "FILE:1: a pair is: pair NAME NAME");
-  EXPECT_EQ(Error("\nmove a b\n"), "FILE:2: \"move\" is no item; items are place, pair and all");
+  EXPECT_THAT(Error("\n{\"place\":\n {\"a\": {\"idd\": \"h\"}}}\n"), HasSubstr("FILE:3:9: "));
+  EXPECT_THAT(Error("\nmove a b\n"), HasSubstr("FILE:2:1: "));
 }
 
 TEST(SceneFile, TooManyPairsAreRefusedBeforeTheyAreMade) {
-  std::string text;
-  for (int i = 0; i < 6000; ++i) text += "place n" + std::to_string(i) + " h\n";
-  const auto scene = Read(text + "all\n");
+  std::string text = "place:\n";
+  for (int i = 0; i < 6000; ++i) text += "  n" + std::to_string(i) + ": {id: h}\n";
+  const auto scene = Read(text);
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_THAT(std::string(PairsOf(*scene, "FILE").status().message()),
               HasSubstr("more than 16777216 pairs"));

@@ -12,22 +12,23 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 TEST(ViewScene, TakesEachFormatOfAScene) {
-  const TempFile text("text.json", "place left cube\nplace right cube 1 2 3\n");
+  const TempFile yaml("scene.yaml",
+                      "place: {left: {id: cube}, right: {id: cube, at: [1, 2, 3]}}\n");
   const TempFile json("scene.json", R"({"placements":[{"hullId":"cube"},{"hullId":"cube",
       "pose":{"translation":{"x":1,"y":2,"z":3}}}],"groups":[4,5]})");
   const TempFile packed("packed.json", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0],
       "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,2,3]}})");
-  for (const TempFile* file : {&text, &json, &packed}) {
+  for (const TempFile* file : {&yaml, &json, &packed}) {
     ViewScene scene;
     const absl::Status added = AddSceneFile(file->path(), &scene);
     ASSERT_TRUE(added.ok()) << added;
     ASSERT_EQ(scene.objects.size(), 2U);
     EXPECT_EQ(scene.objects[1].hull_id, "cube");
     EXPECT_THAT(scene.objects[1].pose, ElementsAre(1, 0, 0, 0, 1, 2, 3));
-    EXPECT_EQ(scene.objects[1].name, file == &text ? "right" : "cube");
+    EXPECT_EQ(scene.objects[1].name, file == &yaml ? "right" : "cube");
     // The page moves placements; the rules come from the file.
     EXPECT_EQ(scene.rules.placements_size() + scene.rules.packed_placements().hulls_size(), 0);
-    EXPECT_EQ(scene.rules.groups_size(), file == &json ? 2 : 0);
+    EXPECT_EQ(scene.rules.groups_size(), file == &packed ? 0 : 2);
   }
   const TempFile wrong("wrong.json", "{\"placement\":[]}\n");
   ViewScene scene;
