@@ -2,7 +2,6 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <grpcpp/health_check_service_interface.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -16,7 +15,7 @@
 #include "server/call/transport.h"
 #include "server/config_check.h"
 #include "server/contract/status_map.h"
-#include "server/network/guarded_reads.h"
+#include "server/network/guarded_sockets.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/settings/cpu_limit.h"
@@ -32,10 +31,13 @@ constexpr const char* kServices[] = {
     v1::CollisionService::service_full_name(), v1::StatusService::service_full_name(),
     v1::MaintenanceService::service_full_name()};
 
+std::vector<std::string> OwnServices() { return {std::begin(kServices), std::end(kServices)}; }
+
 // Includes services of gRPC's own protocols.
 std::vector<std::string> AllServices() {
   std::vector<std::string> names = {
-      "grpc.health.v1.Health", grpc::reflection::v1alpha::ServerReflection::service_full_name()};
+      grpc::health::v1::Health::service_full_name(),
+      grpc::reflection::v1alpha::ServerReflection::service_full_name()};
   names.insert(names.begin(), std::begin(kServices), std::end(kServices));
   return names;
 }
@@ -91,6 +93,7 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
       status_service_(registry_, admission_),
       maintenance_service_(*store_, registry_, admission_, long_readers_),
+      health_service_(admission_, OwnServices()),
       reflection_service_(admission_, AllServices()) {
   admission_.SetConnections(connection_table_);
   admission_.SetAuthenticator(guard_->authenticator());
@@ -170,7 +173,6 @@ absl::Status Server::Listen(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
-  grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
   auto acceptor = ConnectionAcceptor::Listen(*address, connection_table_, metrics_);
   if (!acceptor.ok()) return acceptor.status();
@@ -184,15 +186,12 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
   builder.RegisterService(&maintenance_service_);
+  builder.RegisterService(&health_service_);
   builder.RegisterService(&reflection_service_);
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr) return absl::InternalError("gRPC failed to start the server");
   address_ = address->Format(acceptor_->port());
   AddDescriptorsToMetrics();
-  grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
-  for (const char* const service : kServices) {
-    health->SetServingStatus(service, true);
-  }
   const FrameLimits frames;
   acceptor_->Start(std::move(connections), config.has_tls() ? nullptr : &frames);
   if (config.metrics_address.empty()) return absl::OkStatus();
@@ -230,7 +229,7 @@ void Server::AddDescriptorsToMetrics() {
 }
 
 void Server::BeginDrain() {
-  grpc_server_->GetHealthCheckService()->SetServingStatus(false);
+  health_service_.EndServing();
   admission_.BeginDrain();
   registry_.EndWatches();
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/access/guard.h"
+#include "server/admin/health_service.h"
 #include "server/admin/maintenance_service.h"
 #include "server/admin/reflection_service.h"
 #include "server/admin/status_service.h"
@@ -103,6 +104,7 @@ class Server {
   CollisionService collision_service_;
   StatusService status_service_;
   MaintenanceService maintenance_service_;
+  HealthService health_service_;
   ReflectionService reflection_service_;
   std::string address_;
   std::unique_ptr<ConnectionAcceptor> acceptor_;

@@ -122,7 +122,7 @@ absl::Status AddRequestedDetails(const FloatPair& pair, const Decision& decision
     return absl::OkStatus();
   }
   const SeparationRequest request = {options.want_separation, options.want_witness,
-                                     options.max_error, options.clearance};
+                                     options.max_error, options.clearance, options.max_depth_bytes};
   SeparationAnswer found;
   if (absl::Status s = FindSeparation(pair, decision, cold, request, options.should_stop, found);
       !s.ok()) {

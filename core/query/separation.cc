@@ -28,7 +28,7 @@ namespace {
 
 // Expansions of a polytope between two polls. An expansion that creates many facets counts several
 // times.
-constexpr uint64_t kExpansionsPerPoll = 256;
+constexpr uint64_t kExpansionsPerPoll = 32;
 
 // Returns the absolute separation from its bounds: their midpoint, and half their width rounded up.
 // The midpoint is positive because the upper bound is.
@@ -47,9 +47,10 @@ bool IsWithin(Relation relation, int comparison) {
 class SeparationSearch {
  public:
   SeparationSearch(const FloatPair& pair, const Decision& decision, bool cold,
-                   const std::function<bool()>& should_stop)
+                   uint64_t max_depth_bytes, const std::function<bool()>& should_stop)
       : pair_(pair),
         relation_(decision.relation),
+        max_depth_bytes_(max_depth_bytes),
         should_stop_(should_stop),
         poll_(should_stop, kExpansionsPerPoll),
         size_(pair.a().query_hull().radius() + pair.b().query_hull().radius()) {
@@ -151,7 +152,8 @@ class SeparationSearch {
     if (nearest_) return absl::OkStatus();
     exact_.emplace(pair_, should_stop_);
     absl::StatusOr<ExactNearest> nearest =
-        relation_ == Relation::kOverlapping ? FindDepthExactly(*exact_, seed_, should_stop_)
+        relation_ == Relation::kOverlapping
+            ? FindDepthExactly(*exact_, seed_, max_depth_bytes_, should_stop_)
         : relation_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
                                             : FindNearestExactly(*exact_, start_, should_stop_);
     if (!nearest.ok()) return nearest.status();
@@ -229,6 +231,7 @@ class SeparationSearch {
 
   const FloatPair& pair_;
   const Relation relation_;
+  const uint64_t max_depth_bytes_;
   const std::function<bool()>& should_stop_;
   StopPoll poll_;
   const double size_;
@@ -246,7 +249,7 @@ absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, boo
                             const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer) {
   HULLD_CHECK(decision.relation != Relation::kWithinTolerance);
-  SeparationSearch search(pair, decision, cold, should_stop);
+  SeparationSearch search(pair, decision, cold, request.max_depth_bytes, should_stop);
   if (request.separation || request.witness) {
     if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;
   }

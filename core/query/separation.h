@@ -3,7 +3,9 @@
 
 #include <absl/status/status.h>
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 
 #include "core/query/floating/float_pair.h"
@@ -18,6 +20,8 @@ struct SeparationRequest {
   bool witness = false;
   std::optional<double> max_error;
   std::optional<double> clearance;
+  // QueryOptions::max_depth_bytes.
+  uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
 };
 
 struct SeparationAnswer {
@@ -30,7 +34,7 @@ struct SeparationAnswer {
 // from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
 // relation. Requires: a relation other than kWithinTolerance. `cold`: true if no cache helped the
 // decision, so that its pairs may be used. CANCELLED: should_stop, which may be empty, returned
-// true.
+// true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                             const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer);

@@ -38,6 +38,7 @@ const char* RoleName(Permission permission) {
 
 Permission PermissionFor(Rpc rpc) {
   switch (rpc) {
+    case Rpc::kHealthWatch:
     case Rpc::kServerReflectionInfo:
       return Permission::kNone;
     case Rpc::kGetHull:

@@ -46,6 +46,7 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kSaveBackup:
     case Rpc::kWatchHulls:
     case Rpc::kWatchCollisions:
+    case Rpc::kHealthWatch:
     case Rpc::kServerReflectionInfo:
       return CallKind::kStream;
   }
@@ -68,13 +69,15 @@ Admission::Ticket::Ticket(Ticket&& other) noexcept
       rpc_(other.rpc_),
       kind_(other.kind_),
       client_(other.client_),
+      share_(other.share_),
+      is_one_of_many_(other.is_one_of_many_),
       connection_(other.connection_),
       revocable_(other.revocable_),
       is_revocable_(other.is_revocable_),
       watched_(other.watched_),
       is_watched_(other.is_watched_) {}
 
-ClientId Admission::Ticket::client() const { return client_->second.id; }
+ClientId Admission::Ticket::client() const { return {client_->second.number, connection_}; }
 
 Admission::Ticket::~Ticket() {
   if (admission_ != nullptr) admission_->Leave(*this);
@@ -100,19 +103,29 @@ Admission::~Admission() {
   watchman_.join();
 }
 
+Admission::Ticket::Share Admission::ShareOf(const Arrival& arrival, uint64_t connection) const {
+  using Share = Ticket::Share;
+  if (!IsAnonymous(arrival.rpc)) return Share::kCalls;
+  if (arrival.rpc != Rpc::kHealthWatch || connections_ == nullptr) return Share::kAnonymous;
+  // The peer of a unix socket is a program of this machine, such as a proxy for many clients.
+  const bool is_first = connection != 0 && !watching_health_.contains(connection);
+  return is_first || !arrival.peer.has_value() ? Share::kFree : Share::kAnonymous;
+}
+
+absl::Status Admission::CheckAnonymousRoom(const Ticket::Client& client) const {
+  const uint64_t of_client =
+      std::max<uint64_t>(1, limits_.max_anonymous_calls / Limits::kAnonymousShare);
+  if (anonymous_ < limits_.max_anonymous_calls && client.anonymous < of_client) {
+    return absl::OkStatus();
+  }
+  return Overloaded(
+      absl::StrCat(anonymous_, " calls without a token are running, ", client.anonymous,
+                   " of them from this client, whose limit is ", of_client),
+      limits_.max_anonymous_calls, "max-anonymous-calls", kRetryBatch);
+}
+
 absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
   const CallKind kind = KindOf(rpc);
-  if (IsAnonymous(rpc)) {
-    const uint64_t of_client =
-        std::max<uint64_t>(1, limits_.max_anonymous_calls / Limits::kAnonymousShare);
-    if (anonymous_ < limits_.max_anonymous_calls && client.anonymous < of_client) {
-      return absl::OkStatus();
-    }
-    return Overloaded(
-        absl::StrCat(anonymous_, " calls without a token are running, ", client.anonymous,
-                     " of them from this client, whose limit is ", of_client),
-        limits_.max_anonymous_calls, "max-anonymous-calls", kRetryBatch);
-  }
   // Long calls leave a part to single calls.
   const auto room = [kind](uint64_t limit) {
     return kind == CallKind::kUnary ? limit : limit - limit / Limits::kKeptForSingleCalls;
@@ -122,9 +135,8 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
                                 : absl::StrCat(", and ", limit - room(limit),
                                                " slots are reserved for single calls");
   };
-  const size_t counted = running_ - anonymous_;
-  if (counted >= room(limits_.max_calls)) {
-    return Overloaded(absl::StrCat(counted, " calls are running", kept(limits_.max_calls)),
+  if (calls_ >= room(limits_.max_calls)) {
+    return Overloaded(absl::StrCat(calls_, " calls are running", kept(limits_.max_calls)),
                       limits_.max_calls, "max-calls", kRetryCall);
   }
   size_t waiting = backlog_ ? backlog_(rpc) : 0;
@@ -148,9 +160,8 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
         absl::StrCat("this client has ", client.batches, " batches and scenes running"),
         limits_.max_batches_per_client, "max-batches-per-client", kRetryBatch);
   }
-  const uint64_t of_client = client.calls - client.anonymous;
-  if (of_client >= room(limits_.max_calls_per_client)) {
-    return Overloaded(absl::StrCat("this client has ", of_client, " calls running",
+  if (client.calls >= room(limits_.max_calls_per_client)) {
+    return Overloaded(absl::StrCat("this client has ", client.calls, " calls running",
                                    kept(limits_.max_calls_per_client)),
                       limits_.max_calls_per_client, "max-calls-per-client", kRetryCall);
   }
@@ -162,27 +173,44 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   const std::lock_guard lock(mutex_);
   if (draining_) return Draining();
   const auto known = clients_.find(arrival.client);
-  // Operators' status calls must work even if the server is full.
-  if (arrival.rpc != Rpc::kGetStatus) {
-    const absl::Status room =
-        CheckRoom(arrival.rpc, known == clients_.end() ? Ticket::Client{} : known->second);
-    if (!room.ok()) return room;
+  const Ticket::Client before = known == clients_.end() ? Ticket::Client{} : known->second;
+  // A call without a token does not begin one on its connection.
+  if (IsAnonymous(arrival.rpc) && connections_ != nullptr) {
+    ticket.connection_ = connections_->Find(arrival.peer);
   }
+  ticket.share_ = ShareOf(arrival, ticket.connection_);
+  absl::Status room;
+  if (ticket.share_ == Ticket::Share::kAnonymous) room = CheckAnonymousRoom(before);
+  // Operators' status calls must work even if the server is full.
+  if (ticket.share_ == Ticket::Share::kCalls && arrival.rpc != Rpc::kGetStatus) {
+    room = CheckRoom(arrival.rpc, before);
+  }
+  if (!room.ok()) return room;
+  ticket.is_one_of_many_ = before.calls >= kFewCalls;
   ticket.client_ =
       known != clients_.end()
           ? &*known
-          : &*clients_.emplace(arrival.client, Ticket::Client{.id = ++last_client_}).first;
+          : &*clients_.emplace(arrival.client, Ticket::Client{.number = ++last_client_}).first;
   ticket.admission_ = this;
   running_.fetch_add(1, std::memory_order_relaxed);
   running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
   Ticket::Client& client = ticket.client_->second;
-  ++client.calls;
-  if (connections_ != nullptr) ticket.connection_ = connections_->BeginCall(arrival.peer);
-  if (ticket.kind_ == CallKind::kUnary) ++single_calls_;
-  if (IsAnonymous(arrival.rpc)) {
-    ++client.anonymous;
-    ++anonymous_;
+  ++client.running;
+  switch (ticket.share_) {
+    case Ticket::Share::kCalls:
+      ++client.calls;
+      ++calls_;
+      if (connections_ != nullptr) ticket.connection_ = connections_->BeginCall(arrival.peer);
+      break;
+    case Ticket::Share::kAnonymous:
+      ++client.anonymous;
+      ++anonymous_;
+      break;
+    case Ticket::Share::kFree:
+      if (ticket.connection_ != 0) watching_health_.insert(ticket.connection_);
+      break;
   }
+  if (ticket.kind_ == CallKind::kUnary) ++single_calls_;
   if (ticket.kind_ == CallKind::kBatch) {
     ++client.batches;
     ++batches_;
@@ -293,19 +321,28 @@ void Admission::Leave(Ticket& ticket) {
     }
     if (ticket.is_revocable_) ticket.revocable_->list->erase(ticket.revocable_);
     Ticket::Client& client = ticket.client_->second;
-    HULLD_CHECK(client.calls > 0);
+    HULLD_CHECK(client.running > 0);
     if (ticket.kind_ == CallKind::kBatch) {
       --client.batches;
       --batches_;
     }
     if (ticket.kind_ == CallKind::kStream && !IsAnonymous(ticket.rpc_)) --client.streams;
-    if (ticket.connection_ != 0) connections_->EndCall(ticket.connection_);
     if (ticket.kind_ == CallKind::kUnary) --single_calls_;
-    if (IsAnonymous(ticket.rpc_)) {
-      --client.anonymous;
-      --anonymous_;
+    switch (ticket.share_) {
+      case Ticket::Share::kCalls:
+        --client.calls;
+        --calls_;
+        if (ticket.connection_ != 0) connections_->EndCall(ticket.connection_);
+        break;
+      case Ticket::Share::kAnonymous:
+        --client.anonymous;
+        --anonymous_;
+        break;
+      case Ticket::Share::kFree:
+        watching_health_.erase(ticket.connection_);
+        break;
     }
-    if (--client.calls == 0) clients_.erase(clients_.find(ticket.client_->first));
+    if (--client.running == 0) clients_.erase(clients_.find(ticket.client_->first));
     running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();
   }

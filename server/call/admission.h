@@ -18,6 +18,7 @@
 #include <string>
 #include <thread>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "server/access/caller.h"
 #include "server/call/call_lifetime.h"
@@ -55,7 +56,8 @@ bool UsesWriters(Rpc rpc);
 //
 // Each client has a share of calls, streams and batches. A part of all calls, and of each client's,
 // is reserved for single calls, so long calls never keep them out. Calls that need no token have
-// their own share, so they never keep out calls with a token.
+// their own share, so they never keep out calls with a token, and they do not save their connection
+// from eviction. The first watch of health of a connection is free, because clients open one.
 class Admission {
  public:
   // Sets the authenticator. Call before the first call; it must outlive this. Without one, all
@@ -73,17 +75,23 @@ class Admission {
     Ticket& operator=(Ticket&&) = delete;
     ~Ticket();
 
-    // Client charged in fair scheduling of the threads.
+    // Client and connection charged in fair scheduling of the threads.
     ClientId client() const;
+    // True if the client had more than kFewCalls calls running when this one was admitted.
+    bool is_one_of_many() const { return is_one_of_many_; }
 
    private:
     friend class Admission;
+    enum class Share : uint8_t { kCalls, kAnonymous, kFree };
     struct Client {
-      ClientId id;
+      uint64_t number = 0;
+      // All running calls.
+      uint64_t running = 0;
+      // By share: --max-calls-per-client, and the client's part of --max-anonymous-calls.
       uint64_t calls = 0;
+      uint64_t anonymous = 0;
       uint64_t batches = 0;
       uint64_t streams = 0;
-      uint64_t anonymous = 0;
     };
     // Nodes of an unordered_map have stable addresses.
     using Clients = std::unordered_map<std::string, Client>;
@@ -108,7 +116,9 @@ class Admission {
     Rpc rpc_;
     CallKind kind_;
     Clients::value_type* client_ = nullptr;
-    // The caller's connection in the ConnectionTable; 0: none.
+    Share share_ = Share::kCalls;
+    bool is_one_of_many_ = false;
+    // The caller's connection in the ConnectionTable; 0: unknown.
     uint64_t connection_ = 0;
     // Set for calls with a token.
     std::list<Revocable>::iterator revocable_;
@@ -124,6 +134,9 @@ class Admission {
   Admission& operator=(const Admission&) = delete;
   // Requires that no call runs.
   ~Admission();
+
+  // A client with more running calls than this takes turns with its own connections for every call.
+  static constexpr uint64_t kFewCalls = 16;
 
   const Limits& limits() const { return limits_; }
   Metrics& metrics() { return metrics_; }
@@ -172,6 +185,9 @@ class Admission {
  private:
   // Require the mutex (not checked: a std::mutex does not know its holder).
   absl::Status CheckRoom(Rpc rpc, const Ticket::Client& client);
+  absl::Status CheckAnonymousRoom(const Ticket::Client& client) const;
+  // Returns the share of a call, given its connection.
+  Ticket::Share ShareOf(const Arrival& arrival, uint64_t connection) const;
   void Watch(grpc_call* call, Ticket* ticket);
   static void MoveTo(std::list<Ticket::Revocable>& list,
                      std::list<Ticket::Revocable>::iterator call);
@@ -199,9 +215,13 @@ class Admission {
   // Running calls of these kinds.
   size_t single_calls_ = 0;
   size_t anonymous_ = 0;
+  // Running calls that count towards --max-calls.
+  size_t calls_ = 0;
+  // Connections with a free watch of health.
+  std::unordered_set<uint64_t> watching_health_;
   // Only clients with running calls.
   Ticket::Clients clients_;
-  ClientId last_client_ = kNoClient;
+  uint64_t last_client_ = 0;
   // Calls with a valid token; revoked calls in the order of their cancellation; and cancelled
   // revoked calls.
   std::list<Ticket::Revocable> revocable_;

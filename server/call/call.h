@@ -41,10 +41,16 @@ class Call {
   // calls succeed without a log line. Every log line about the call carries it. The reply carries
   // it if the call is logged or fails, or if the client supplied it.
   const std::string& request_id() const;
-  // Client charged in fair scheduling of the threads. Requires that Begin succeeded.
+  // Client and connection charged in fair scheduling of the threads. Requires that Begin succeeded.
   ClientId client() const {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
+  }
+  // True if its client had many calls running when it arrived (Admission::kFewCalls). Requires that
+  // Begin succeeded.
+  bool is_one_of_many() const {
+    HULLD_CHECK(ticket_.has_value());
+    return ticket_->is_one_of_many();
   }
   // Arrival of the call; and, in a stream that calls BeginMessage, of the message being processed.
   std::chrono::steady_clock::time_point arrival() const { return arrival_; }

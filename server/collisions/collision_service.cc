@@ -319,18 +319,20 @@ void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, C
   if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
   EncodeVersions(registry_.store(), resolved.as_of(), *resolved.hulls[0], *resolved.hulls[1],
                  &call->response());
-  BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
-                      *std::move(resolved.hulls[1]), query.X_WB, query.options,
-                      call->call().client(),
-                      [this, call](const absl::StatusOr<BodyAnswer>& answer,
-                                   const BodyQuestion::Side& a, const BodyQuestion::Side& b) {
-                        if (!answer.ok()) return call->End(NameProofLimit(answer.status()));
-                        RungCounts counts;
-                        counts.Add(answer->answer.rung);
-                        call->call().metrics().CountPairs(counts);
-                        call->End(EncodeBodyAnswer(registry_.store(), *answer, a, b,
-                                                   call->request().wanted(), &call->response()));
-                      });
+  BodyQuestion::Start(
+      pool_, *std::move(resolved.hulls[0]), query.X_WA, *std::move(resolved.hulls[1]), query.X_WB,
+      query.options, call->call().client(),
+      [this, call](const absl::StatusOr<BodyAnswer>& answer, const BodyQuestion::Side& a,
+                   const BodyQuestion::Side& b) {
+        if (!answer.ok()) {
+          return call->End(NameProofLimit(answer.status(), registry_.limits().request_memory));
+        }
+        RungCounts counts;
+        counts.Add(answer->answer.rung);
+        call->call().metrics().CountPairs(counts);
+        call->End(EncodeBodyAnswer(registry_.store(), *answer, a, b, call->request().wanted(),
+                                   &call->response()));
+      });
 }
 
 void CollisionService::Compute(PairQuery query, CheckCall* call) {
@@ -348,7 +350,10 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
     call->End(pair.Encode(hulld::CheckCollision(pair.placed_a(), pair.placed_b(), pair.options),
                           wanted, metrics, response));
   };
-  if (query.options.WantsRelationOnly() && query.IsQuick()) return answer(query);
+  // Answers of a client with many calls take turns in the pool, because gRPC's threads take calls
+  // in the order of arrival.
+  const bool is_quick = query.options.WantsRelationOnly() && query.IsQuick();
+  if (is_quick && !call->call().is_one_of_many()) return answer(query);
   pool_.Submit([answer, query = std::move(query)] { answer(query); }, call->call().client());
 }
 

@@ -44,6 +44,8 @@ const char* RpcName(Rpc rpc) {
       return "ListBodies";
     case Rpc::kDeleteBody:
       return "DeleteBody";
+    case Rpc::kHealthWatch:
+      return "HealthWatch";
     case Rpc::kServerReflectionInfo:
       return "ServerReflectionInfo";
   }

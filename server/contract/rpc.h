@@ -26,7 +26,8 @@ enum class Rpc {
   kGetBody,
   kListBodies,
   kDeleteBody,
-  // gRPC's own reflection protocol.
+  // gRPC's own protocols: Watch of grpc.health.v1, and reflection.
+  kHealthWatch,
   kServerReflectionInfo,
 };
 

@@ -15,10 +15,11 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
-#include "server/network/guarded_reads.h"
+#include "server/network/guarded_sockets.h"
 #include "server/process/descriptors.h"
 
 namespace hulld::server {
@@ -27,19 +28,18 @@ namespace {
 // Descriptors reserved for the store and everything else: this many, or a quarter of the limit if
 // it is low. A store has some hundreds of files.
 constexpr uint64_t kReservedDescriptors = 256;
-// gRPC's descriptor and the duplicate.
-constexpr uint64_t kDescriptorsOfConnection = 2;
 constexpr int kBacklog = 4096;
-// Connections accepted before ended ones are handled.
+// Connections accepted from a listener before the next listener's turn.
 constexpr int kMostAtOnce = 64;
+// Longest wait for gRPC to close evicted connections, so that a stuck one never stops the acceptor.
+constexpr std::chrono::seconds kLongestWait(1);
 // Pause if even the reserve descriptor does not help.
 constexpr int kPauseMilliseconds = 50;
 // As set by gRPC with its keepalive: a peer that does not acknowledge for this long is gone.
 constexpr int kUserTimeoutMs = 20'000;
 
-// Event keys: connections use their ID, other events these.
-constexpr uint64_t kWake = 0;
-constexpr uint64_t kFirstListener = uint64_t{1} << 62;
+// Event key of `wake_`; listeners use their index.
+constexpr uint64_t kWake = ~uint64_t{0};
 
 bool IsOutOfDescriptors(int error) {
   return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
@@ -47,10 +47,10 @@ bool IsOutOfDescriptors(int error) {
 
 Descriptor OpenReserve() { return Descriptor(open("/dev/null", O_RDONLY | O_CLOEXEC)); }
 
-void Register(const Descriptor& epoll, int descriptor, uint32_t events, uint64_t id) {
+void Register(const Descriptor& epoll, int descriptor, uint64_t key) {
   epoll_event event = {};
-  event.events = events;
-  event.data.u64 = id;
+  event.events = EPOLLIN;
+  event.data.u64 = key;
   epoll_ctl(epoll.number(), EPOLL_CTL_ADD, descriptor, &event);
 }
 
@@ -124,11 +124,9 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
   const uint64_t most = MostDescriptors();
   const uint64_t reserved = std::min(kReservedDescriptors, most / 4);
   first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMostGuardedDescriptors));
-  first_refused_ =
-      static_cast<int>(std::min<uint64_t>(most - reserved / 2, kMostGuardedDescriptors));
-  table_.LimitTo(
-      std::max<size_t>(1, static_cast<size_t>(first_reserved_) / kDescriptorsOfConnection));
-  Register(epoll_, wake_.number(), EPOLLIN, kWake);
+  most_closing_ = std::max<uint64_t>(1, reserved / 2);
+  table_.LimitTo(static_cast<size_t>(std::max(1, first_reserved_)));
+  Register(epoll_, wake_.number(), kWake);
 }
 
 absl::Status ConnectionAcceptor::BindUnix() {
@@ -170,41 +168,52 @@ absl::Status ConnectionAcceptor::Bind() {
 
 ConnectionAcceptor::~ConnectionAcceptor() {
   Stop();
-  while (!connections_.empty()) End(connections_.begin()->first);
+  std::map<uint64_t, Connection> open;
+  {
+    const std::lock_guard lock(mutex_);
+    open = connections_;
+  }
+  for (const auto& [id, connection] : open) {
+    Unguard(connection.descriptor, id);
+    table_.Remove(id);
+  }
 }
 
 void ConnectionAcceptor::Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc,
                                const FrameLimits* frames) {
   grpc_ = std::move(grpc);
   if (frames != nullptr) frames_ = *frames;
-  for (size_t i = 0; i < listeners_.size(); ++i) {
-    Register(epoll_, listeners_[i].number(), EPOLLIN, kFirstListener + i);
-  }
+  for (size_t i = 0; i < listeners_.size(); ++i) Register(epoll_, listeners_[i].number(), i);
   thread_ = std::thread([this] { Run(); });
 }
 
 void ConnectionAcceptor::Stop() {
   if (listeners_.empty()) return;
-  stopping_ = true;
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  room_.notify_all();
   eventfd_write(wake_.number(), 1);
   if (thread_.joinable()) thread_.join();
   listeners_.clear();
   if (address_.is_unix()) unlink(address_.path.c_str());
 }
 
+bool ConnectionAcceptor::AwaitRoom() {
+  std::unique_lock lock(mutex_);
+  room_.wait_for(lock, kLongestWait, [this] { return stopping_ || closing_ < most_closing_; });
+  return !stopping_;
+}
+
 void ConnectionAcceptor::Run() {
-  while (!stopping_) {
-    std::array<epoll_event, 256> events;
+  while (AwaitRoom()) {
+    std::array<epoll_event, 16> events;
     const int count = epoll_wait(epoll_.number(), events.data(), events.size(), -1);
-    // Handles ended connections first, because they make room.
-    for (int i = 0; i < count; ++i) {
-      const uint64_t id = events[i].data.u64;
-      if (id != kWake && id < kFirstListener && (events[i].events & EPOLLHUP) != 0) End(id);
-    }
     bool pause = false;
-    for (int i = 0; i < count && !stopping_; ++i) {
-      const uint64_t id = events[i].data.u64;
-      if (id >= kFirstListener) pause |= !AcceptFrom(listeners_[id - kFirstListener].number());
+    for (int i = 0; i < count; ++i) {
+      const uint64_t key = events[i].data.u64;
+      if (key != kWake) pause |= !AcceptFrom(listeners_[key].number());
     }
     pollfd wake = {.fd = wake_.number(), .events = POLLIN, .revents = 0};
     if (pause) poll(&wake, 1, kPauseMilliseconds);
@@ -212,7 +221,7 @@ void ConnectionAcceptor::Run() {
 }
 
 bool ConnectionAcceptor::AcceptFrom(int listener) {
-  for (int i = 0; i < kMostAtOnce; ++i) {
+  for (int i = 0; i < kMostAtOnce && AwaitRoom(); ++i) {
     sockaddr_storage name = {};
     socklen_t size = sizeof name;
     Descriptor socket(
@@ -232,7 +241,11 @@ bool ConnectionAcceptor::AcceptFrom(int listener) {
 }
 
 bool ConnectionAcceptor::RefuseWithReserve(int listener) {
-  Shut(table_.Evict());
+  if (const uint64_t evicted = table_.Evict(); evicted != 0) {
+    Evict(evicted);
+    // The new connection is accepted after an evicted one is closed.
+    return true;
+  }
   reserve_ = Descriptor();
   Descriptor refused(accept4(listener, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   const bool drained = refused.number() >= 0;
@@ -243,15 +256,11 @@ bool ConnectionAcceptor::RefuseWithReserve(int listener) {
 }
 
 void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) {
-  Descriptor duplicate(fcntl(socket.number(), F_DUPFD_CLOEXEC, 0));
-  const int highest = std::max(socket.number(), duplicate.number());
-  if (highest >= first_reserved_ || duplicate.number() < 0) {
-    // The new connection uses reserved descriptors until gRPC closes the evicted one.
+  if (socket.number() >= first_reserved_) {
+    // The new connection holds a reserved descriptor until gRPC closes the evicted one.
     const uint64_t evicted = table_.Evict();
-    Shut(evicted);
-    if (evicted == 0 || duplicate.number() < 0 || highest >= first_refused_) {
-      return refused_descriptors_.Increment();
-    }
+    if (evicted == 0) return refused_descriptors_.Increment();
+    Evict(evicted);
   }
   const uint64_t id = ++last_id_;
   const std::optional<PeerAddress> peer = PeerAddress::FromSocket(name);
@@ -264,37 +273,44 @@ void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) 
     case ConnectionTable::Refusal::kNone:
       break;
   }
-  Shut(outcome.evicted);
+  Evict(outcome.evicted);
   if (peer.has_value()) {
     SetOption(socket.number(), IPPROTO_TCP, TCP_NODELAY, 1);
     SetOption(socket.number(), IPPROTO_TCP, TCP_USER_TIMEOUT, kUserTimeoutMs);
   }
-  if (frames_.has_value()) GuardReads(socket.number(), id, *frames_);
-  const int watched = duplicate.number();
-  connections_.emplace(id, Connection{std::move(duplicate), socket.number()});
-  // Reports one event when both directions are shut down, as gRPC does before it closes a
-  // connection.
-  Register(epoll_, watched, EPOLLET, id);
+  {
+    const std::lock_guard lock(mutex_);
+    connections_.emplace(id, Connection{socket.number()});
+  }
+  GuardSocket(socket.number(), id, frames_.has_value() ? &*frames_ : nullptr,
+              [this, id] { OnClosed(id); });
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
   parameters.fd = socket.Release();
   grpc_->HandleNewConnection(&parameters);
 }
 
-void ConnectionAcceptor::Shut(uint64_t id) {
-  const auto found = connections_.find(id);
-  if (found == connections_.end()) return;
+void ConnectionAcceptor::Evict(uint64_t id) {
+  int descriptor = -1;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = connections_.find(id);
+    if (found == connections_.end()) return;
+    found->second.is_evicted = true;
+    ++closing_;
+    descriptor = found->second.descriptor;
+  }
   closed_idle_.Increment();
   // gRPC reads the end of the connection and closes its descriptor.
-  shutdown(found->second.descriptor.number(), SHUT_RDWR);
-  End(id);
+  ShutDown(descriptor, id);
 }
 
-void ConnectionAcceptor::End(uint64_t id) {
+void ConnectionAcceptor::OnClosed(uint64_t id) {
   table_.Remove(id);
+  const std::lock_guard lock(mutex_);
   const auto found = connections_.find(id);
-  if (found == connections_.end()) return;
-  Unguard(found->second.guarded, id);
+  if (found->second.is_evicted) --closing_;
   connections_.erase(found);
+  room_.notify_all();
 }
 
 }  // namespace hulld::server

@@ -5,10 +5,12 @@
 #include <grpcpp/server_builder.h>
 #include <prometheus/counter.h>
 
-#include <atomic>
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -45,8 +47,9 @@ class Descriptor {
 // stops accepting: connections above a limit are accepted and closed immediately, so that the
 // backlog drains.
 //
-// gRPC owns the accepted connections; this keeps a duplicate of each descriptor to detect the end
-// of the connection and to shut it down.
+// An idle connection is evicted to make room for a new one. gRPC closes evicted connections, a
+// little later. Until it does, they hold reserved descriptors; if they hold too many, new
+// connections stay in the backlog.
 class ConnectionAcceptor {
  public:
   // Listens at the address; port 0 picks a free one. TCP: on every address of the host name; a
@@ -72,10 +75,9 @@ class ConnectionAcceptor {
 
  private:
   struct Connection {
-    // The duplicate.
-    Descriptor descriptor;
-    // Number of gRPC's descriptor.
-    int guarded;
+    // Owned by gRPC.
+    int descriptor;
+    bool is_evicted = false;
   };
 
   ConnectionAcceptor(const ListenAddress& address, ConnectionTable& table, Metrics& metrics);
@@ -83,13 +85,17 @@ class ConnectionAcceptor {
   absl::Status Bind();
   absl::Status BindUnix();
   void Run();
+  // Blocks while evicted connections hold too many descriptors. Returns false after Stop.
+  bool AwaitRoom();
   // Accepts pending connections, a few per call. Returns false to pause.
   bool AcceptFrom(int listener);
   // Accepts a connection with the reserve descriptor and closes it.
   bool RefuseWithReserve(int listener);
   void Admit(Descriptor socket, const sockaddr_storage& name);
-  void Shut(uint64_t id);
-  void End(uint64_t id);
+  // Shuts down a connection that the table evicted; id 0: none.
+  void Evict(uint64_t id);
+  // Called by the thread that has closed the connection.
+  void OnClosed(uint64_t id);
 
   const ListenAddress address_;
   ConnectionTable& table_;
@@ -97,8 +103,8 @@ class ConnectionAcceptor {
   // First descriptor number reserved for everything except connections. The system assigns the
   // lowest free number, so a higher one shows that all below are open.
   int first_reserved_;
-  // A connection that replaces an evicted one may use a reserved descriptor below this number.
-  int first_refused_;
+  // Maximum number of evicted connections that gRPC has not closed yet.
+  size_t most_closing_;
   std::vector<Descriptor> listeners_;
   Descriptor epoll_;
   Descriptor wake_;
@@ -106,8 +112,14 @@ class ConnectionAcceptor {
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_;
   std::optional<FrameLimits> frames_;
   uint64_t last_id_ = 0;
+  std::mutex mutex_;
+  // The mutex guards the members below. It is never held during calls of gRPC or of
+  // guarded_sockets.h, which call OnClosed.
   std::map<uint64_t, Connection> connections_;
-  std::atomic<bool> stopping_ = false;
+  // Number of evicted ones among them.
+  size_t closing_ = 0;
+  bool stopping_ = false;
+  std::condition_variable room_;
   std::thread thread_;
 
   prometheus::Counter& accepted_;

@@ -68,6 +68,13 @@ void ConnectionTable::EndIdle(Connection& connection) {
   connection.network->idle.erase(connection.idle_in_network);
 }
 
+uint64_t ConnectionTable::Find(const std::optional<PeerAddress>& peer) const {
+  if (!peer.has_value()) return 0;
+  const std::lock_guard lock(mutex_);
+  const auto known = by_peer_.find(*peer);
+  return known == by_peer_.end() ? 0 : known->second;
+}
+
 uint64_t ConnectionTable::BeginCall(const std::optional<PeerAddress>& peer) {
   if (!peer.has_value()) return 0;
   const std::lock_guard lock(mutex_);

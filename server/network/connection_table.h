@@ -35,6 +35,8 @@ class ConnectionTable {
   uint64_t Evict();
   void Remove(uint64_t id);
 
+  // Returns the connection of a peer; 0: none.
+  uint64_t Find(const std::optional<PeerAddress>& peer) const;
   // Records the start of a call on a peer's connection, and returns the connection; 0: none.
   uint64_t BeginCall(const std::optional<PeerAddress>& peer);
   void EndCall(uint64_t id);

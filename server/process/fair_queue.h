@@ -11,14 +11,22 @@
 
 namespace hulld::server {
 
-// Unit of fair scheduling: a token or, without tokens, an address.
-using ClientId = uint64_t;
+// Unit of fair scheduling: a client, which is a token or, without tokens, an address; and one of
+// its connections, 0 if unknown.
+struct ClientId {
+  constexpr ClientId(uint64_t client = 0, uint64_t of_client = 0)
+      : number(client), connection(of_client) {}
+
+  uint64_t number;
+  uint64_t connection;
+};
 // The server itself.
 inline constexpr ClientId kNoClient = 0;
 
-// A queue with fair scheduling: clients take turns, one item each, and the items of a client stay
-// in order. A client with many items therefore delays only itself. All operations cost O(1). Not
-// thread-safe.
+// A queue with fair scheduling: clients take turns, one item each, and so do the connections of a
+// client. The items of a connection stay in order. A client with many items therefore delays only
+// itself, and a connection with many items delays the other connections of its client by one item
+// at a time. All operations cost O(1). Not thread-safe.
 template <typename Item>
 class FairQueue {
  public:
@@ -26,33 +34,54 @@ class FairQueue {
   size_t size() const { return size_; }
 
   void Push(ClientId client, Item item) {
-    std::deque<Item>& waiting = waiting_[client];
-    if (waiting.empty()) turns_.push_back(client);
-    waiting.push_back(std::move(item));
+    clients_.At(client.number).At(client.connection).push_back(std::move(item));
     ++size_;
   }
 
   // Removes and returns the next item. Requires a non-empty queue.
   Item Pop() {
-    HULLD_CHECK(!turns_.empty());
-    const ClientId client = turns_.front();
-    turns_.pop_front();
-    const auto waiting = waiting_.find(client);
-    Item item = std::move(waiting->second.front());
-    waiting->second.pop_front();
-    if (waiting->second.empty()) {
-      waiting_.erase(waiting);
-    } else {
-      turns_.push_back(client);
-    }
+    HULLD_CHECK(size_ > 0);
+    auto& client = clients_.Next();
+    auto& connection = client.Next();
+    Item item = std::move(connection.front());
+    connection.pop_front();
+    client.EndTurn();
+    clients_.EndTurn();
     --size_;
     return item;
   }
 
  private:
-  // Holds only clients with queued items.
-  std::unordered_map<ClientId, std::deque<Item>> waiting_;
-  std::deque<ClientId> turns_;
+  // Queues that take turns. Holds only those with items, except during Push and Pop.
+  template <typename Queue>
+  class Turns {
+   public:
+    bool empty() const { return turns_.empty(); }
+    // Returns the queue of a key, to which the caller adds an item.
+    Queue& At(uint64_t key) {
+      Queue& queue = queues_[key];
+      if (queue.empty()) turns_.push_back(key);
+      return queue;
+    }
+    // Returns the queue that has its turn.
+    Queue& Next() { return queues_.find(turns_.front())->second; }
+    // Moves on to the next turn, after an item was removed.
+    void EndTurn() {
+      const auto queue = queues_.find(turns_.front());
+      if (queue->second.empty()) {
+        queues_.erase(queue);
+      } else {
+        turns_.push_back(turns_.front());
+      }
+      turns_.pop_front();
+    }
+
+   private:
+    std::unordered_map<uint64_t, Queue> queues_;
+    std::deque<uint64_t> turns_;
+  };
+
+  Turns<Turns<std::deque<Item>>> clients_;
   size_t size_ = 0;
 };
 

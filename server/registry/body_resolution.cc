@@ -75,12 +75,14 @@ absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<con
                       std::move(charge)})};
 }
 
-// Builds canonical snapshots of the resolved hulls. CANCELLED: should_stop returned true.
+// Builds canonical snapshots of the resolved hulls, and their query structures. CANCELLED:
+// should_stop returned true.
 absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& should_stop,
                            std::vector<absl::StatusOr<HullView>>& hulls) {
   for (absl::StatusOr<HullView>& hull : hulls) {
     if (!hull.ok()) continue;
-    const absl::Status made = registry.Canonical(*hull, should_stop).status();
+    absl::Status made = registry.Canonical(*hull, should_stop).status();
+    if (made.ok()) made = hull->served->MakeCanonicalQueryHull(should_stop);
     if (absl::IsCancelled(made)) return made;
     if (!made.ok()) hull = made;
   }

@@ -427,7 +427,9 @@ class Parser {
              "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt",
              kAnyNumber);
     AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
-             "Open streams of reflection, which need no token", kAnyNumber);
+             "Open streams without a token: reflection, and watches of health after a connection's "
+             "first",
+             kAnyNumber);
     AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams", kAnyNumber);
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
              "Calls waiting for a thread; more are refused", kAnyNumber);

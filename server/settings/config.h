@@ -42,12 +42,12 @@ struct Limits {
   uint64_t memory_limit = 0;
   // Bytes of requests from parsing to reply, and the same number again for arriving requests.
   uint64_t request_memory = 128 << 20;
-  // Open connections: total, and per address, IPv6 by its first 64 bits. Each takes two descriptors
+  // Open connections: total, and per address, IPv6 by its first 64 bits. Each takes a descriptor
   // and about 50 KB. Unix sockets have no limit per address.
   uint64_t max_connections = 4096;
   uint64_t max_connections_per_address = 512;
-  // Running calls that need no token (reflection). One client may have one in kAnonymousShare of
-  // them.
+  // Running calls that need no token: reflection, and watches of health beyond the first of a
+  // connection. One client may have one in kAnonymousShare of them.
   uint64_t max_anonymous_calls = 64;
   static constexpr uint64_t kAnonymousShare = 8;
   // Running calls, including open streams; and running calls that wait for a thread.

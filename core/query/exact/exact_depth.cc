@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/floating/expanding_surface.h"
+#include "core/query/terms/query_options.h"
 
 namespace hulld {
 namespace {
@@ -42,8 +44,8 @@ int CompareDistance(const Plane& f, const Plane& g) {
 
 class ExactExpansion {
  public:
-  ExactExpansion(ExactPair& pair, const std::function<bool()>& should_stop)
-      : pair_(pair), poll_(should_stop) {}
+  ExactExpansion(ExactPair& pair, uint64_t max_bytes, const std::function<bool()>& should_stop)
+      : pair_(pair), max_bytes_(max_bytes), poll_(should_stop) {}
 
   absl::StatusOr<ExactNearest> Run(std::span<const VertexPair> seed) {
     if (!Start(seed)) return Stopped();
@@ -53,7 +55,9 @@ class ExactExpansion {
     }
     for (;;) {
       if (poll_.Poll()) return Stopped();
+      if (MemoryBytes() > max_bytes_) return DepthTooLarge(max_bytes_);
       const uint32_t nearest = Nearest();
+      if (poll_.stopped()) return Stopped();
       ExactCorner farthest = pair_.Farthest(planes_[nearest].n);
       if (pair_.stopped()) return Stopped();
       if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) {
@@ -67,7 +71,17 @@ class ExactExpansion {
  private:
   static absl::Status Stopped() { return absl::CancelledError("stopped in an exact query"); }
 
-  static bool IsNearer(const Plane& f, const Plane& g) {
+  // Approximate memory of the growing polytope, in bytes.
+  size_t MemoryBytes() const {
+    return pair_.MemoryBytes() + corners_.capacity() * sizeof(ExactCorner) +
+           planes_.size() * sizeof(Plane) +
+           surface_.facets().capacity() * sizeof(ExpandingSurface::Facet) +
+           heap_.capacity() * sizeof(uint32_t);
+  }
+
+  // After a stop, the order of planes is arbitrary.
+  bool IsNearer(const Plane& f, const Plane& g) const {
+    if (poll_.Step()) return false;
     const double slack =
         kDepthKeyErrorFactor * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
     if (f.key < g.key - slack) return true;
@@ -77,10 +91,11 @@ class ExactExpansion {
 
   // The order of the heap. Its front is the nearest facet, the first of several.
   struct IsLater {
-    const std::vector<Plane>& planes;
+    const ExactExpansion& expansion;
     bool operator()(uint32_t f, uint32_t g) const {
-      if (IsNearer(planes[g], planes[f])) return true;
-      return g < f && !IsNearer(planes[f], planes[g]);
+      const std::deque<Plane>& planes = expansion.planes_;
+      if (expansion.IsNearer(planes[g], planes[f])) return true;
+      return g < f && !expansion.IsNearer(planes[f], planes[g]);
     }
   };
 
@@ -170,7 +185,7 @@ class ExactExpansion {
       const double key = KeyOf(n, offset);
       planes_.push_back({std::move(n), std::move(offset), key});
       heap_.push_back(i);
-      std::push_heap(heap_.begin(), heap_.end(), IsLater{planes_});
+      std::push_heap(heap_.begin(), heap_.end(), IsLater{*this});
     }
   }
 
@@ -210,13 +225,13 @@ class ExactExpansion {
     planes_.resize(surface_.facets().size());
     heap_.resize(planes_.size());
     std::iota(heap_.begin(), heap_.end(), 0u);
-    std::make_heap(heap_.begin(), heap_.end(), IsLater{planes_});
+    std::make_heap(heap_.begin(), heap_.end(), IsLater{*this});
   }
 
   // Returns the first of the facets at the least signed distance.
   uint32_t Nearest() {
     while (!surface_.facets()[heap_.front()].alive) {
-      std::pop_heap(heap_.begin(), heap_.end(), IsLater{planes_});
+      std::pop_heap(heap_.begin(), heap_.end(), IsLater{*this});
       heap_.pop_back();
       HULLD_CHECK(!heap_.empty());
     }
@@ -224,13 +239,14 @@ class ExactExpansion {
   }
 
   // Returns the foot of the perpendicular from the origin onto the facet's plane. The plane
-  // supports A - B, and the foot lies in a triangle of that plane.
-  ExactNearest PointOn(uint32_t facet) const {
+  // supports A - B, and the foot lies in a triangle of that plane. CANCELLED: as for Run.
+  absl::StatusOr<ExactNearest> PointOn(uint32_t facet) const {
     const Plane& plane = planes_[facet];
     const auto on_plane = [&](uint32_t corner) {
       return Dot(plane.n, corners_[corner].w) == plane.offset;
     };
     for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (poll_.Step()) return Stopped();
       const auto& c = surface_.facets()[i].corners;
       if (!surface_.facets()[i].alive || !std::all_of(c.begin(), c.end(), on_plane)) continue;
       const IntegerVector& n = planes_[i].n;
@@ -256,10 +272,12 @@ class ExactExpansion {
   }
 
   ExactPair& pair_;
+  const uint64_t max_bytes_;
   mutable StopPoll poll_;
   std::vector<ExactCorner> corners_;
   ExpandingSurface surface_;
-  std::vector<Plane> planes_;
+  // A deque, because copying a vector of many planes when it grows delays the next poll.
+  std::deque<Plane> planes_;
   // Facets by distance, including some dead ones.
   std::vector<uint32_t> heap_;
   int unit_exponent_ = INT32_MIN / 2;
@@ -268,8 +286,9 @@ class ExactExpansion {
 }  // namespace
 
 absl::StatusOr<ExactNearest> FindDepthExactly(ExactPair& pair, std::span<const VertexPair> seed,
+                                              uint64_t max_bytes,
                                               const std::function<bool()>& should_stop) {
-  return ExactExpansion(pair, should_stop).Run(seed);
+  return ExactExpansion(pair, max_bytes, should_stop).Run(seed);
 }
 
 }  // namespace hulld

@@ -3,6 +3,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <functional>
 #include <span>
 
@@ -19,8 +20,9 @@ namespace hulld {
 // of the boundary is nearer. Every step adds a vertex, so the search terminates. Requires: the
 // relation OVERLAPPING; otherwise no tetrahedron is found, or the final plane has the origin
 // outside, and the process aborts. `seed`: initial pairs, which save steps. CANCELLED: should_stop,
-// which may be empty, returned true.
+// which may be empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::StatusOr<ExactNearest> FindDepthExactly(ExactPair& pair, std::span<const VertexPair> seed,
+                                              uint64_t max_bytes,
                                               const std::function<bool()>& should_stop);
 
 }  // namespace hulld

@@ -55,6 +55,7 @@ class Expansion {
       while (Step()) {
       }
     }
+    if (poll_.stopped()) return bounds_;
     bounds_.low = ProvenLow();
     if (want_point && bounds_.low > 0) FindPoint();
     return bounds_;
@@ -218,6 +219,7 @@ class Expansion {
     if (!(low > 0)) return 0;
     bool some = false;
     for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (planes_.size() > kUsualFacets && poll_.Step()) return 0;
       if (!surface_.facets()[i].alive) continue;
       if (planes_[i].outward) {
         some = true;
@@ -238,6 +240,7 @@ class Expansion {
     double least = INFINITY;
     uint32_t nearest = 0;
     for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (planes_.size() > kUsualFacets && poll_.Step()) return;
       if (!surface_.facets()[i].alive || planes_[i].distance * unit_ > bounds_.high) continue;
       const double length = Norm(NearestOn(i).point);
       if (!(length < least)) continue;

@@ -21,12 +21,14 @@ double RadiusTo(const Vector& difference) {
   return kRootOfThree * difference.cwiseAbs().maxCoeff() * kRadiusRoundUp + kLeastPositive;
 }
 
-HullBase::HullBase(const Hull& hull) : points_(hull.vertices()), prepared_(true) {
+HullBase::HullBase(const Hull& hull, const std::function<bool()>& should_stop)
+    : points_(hull.vertices()), prepared_(true) {
   HULLD_CHECK(!hull.empty());
   Measure();
   HULLD_DCHECK(center_ == hull.center() && max_abs_ == hull.max_abs_coordinate());
   Span(hull.dimension());
-  support_ = SupportMap(points_);
+  support_ = SupportMap(points_, should_stop);
+  if (support_.stopped()) return;
   center_bounds_ = CenterBounds(hull, support_);
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -32,8 +33,8 @@ struct MappedPoints {
 class HullBase {
  public:
   // Takes the vertices of a canonical snapshot, which must outlive the base. The result is
-  // prepared.
-  explicit HullBase(const Hull& hull);
+  // prepared. should_stop: as for SupportMap, whose stopped() tells if the base is usable.
+  HullBase(const Hull& hull, const std::function<bool()>& should_stop);
   // Takes one or more points with a hull of this dimension. The result is prepared.
   HullBase(MappedPoints mapped, int dimension);
   // Takes points for scanning: computes only the data that scanning queries need. Cost: O(V),

@@ -1,5 +1,7 @@
 #include "core/query/placed/query_hull.h"
 
+#include <absl/status/status.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -8,9 +10,10 @@
 
 namespace hulld {
 
-QueryHull::QueryHull(const Hull& hull) : canonical_(&hull) {
+QueryHull::QueryHull(const Hull& hull, const std::function<bool()>& should_stop)
+    : canonical_(&hull) {
   if (hull.empty()) return;
-  auto base = std::make_shared<const HullBase>(hull);
+  auto base = std::make_shared<const HullBase>(hull, should_stop);
   dimension_ = hull.dimension();
   point_count_ = static_cast<uint32_t>(base->points().size());
   exponent_ = base->exponent();
@@ -18,6 +21,15 @@ QueryHull::QueryHull(const Hull& hull) : canonical_(&hull) {
   radius_ = base->radius();
   center_ = base->center();
   base_ = std::move(base);
+}
+
+absl::StatusOr<QueryHull> QueryHull::Prepare(const Hull& hull,
+                                             const std::function<bool()>& should_stop) {
+  QueryHull prepared(hull, should_stop);
+  if (!prepared.empty() && prepared.base_->support().stopped()) {
+    return absl::CancelledError("stopped while a hull was prepared for queries");
+  }
+  return prepared;
 }
 
 Vector QueryHull::GrownPoint(uint32_t i) const {

@@ -1,9 +1,12 @@
 #ifndef HULLD_CORE_QUERY_PLACED_QUERY_HULL_H_
 #define HULLD_CORE_QUERY_PLACED_QUERY_HULL_H_
 
+#include <absl/status/statusor.h>
+
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -29,7 +32,11 @@ struct LiveParts;
 class QueryHull {
  public:
   // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.
-  explicit QueryHull(const Hull& hull);
+  explicit QueryHull(const Hull& hull) : QueryHull(hull, {}) {}
+  // CANCELLED: should_stop, which may be empty, returned true. It is polled every few milliseconds,
+  // and the memory needed meanwhile is O(V).
+  static absl::StatusOr<QueryHull> Prepare(const Hull& hull,
+                                           const std::function<bool()>& should_stop);
 
   // Null for a version of a LiveHull.
   const Hull* canonical() const { return canonical_; }
@@ -118,6 +125,8 @@ class QueryHull {
   };
 
   QueryHull() = default;
+  // The result is not usable if its support map has stopped.
+  QueryHull(const Hull& hull, const std::function<bool()>& should_stop);
 
   Vector GrownPoint(uint32_t i) const;
   SupportPoint FartherInGrowth(const PlainVector& n, SupportPoint found) const;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/simd_path.h"
 
@@ -84,6 +85,15 @@ struct FacePoints {
     b.resize(n + 4);
     c.resize(n + 4);
     ids.resize(n + 4);
+  }
+  void CopyFrom(const FacePoints& from) {
+    Reserve(from.size);
+    size = from.size;
+    std::copy_n(from.a.begin(), size, a.begin());
+    std::copy_n(from.b.begin(), size, b.begin());
+    std::copy_n(from.c.begin(), size, c.begin());
+    std::copy_n(from.ids.begin(), size, ids.begin());
+    Pad();
   }
   void Pad() {
     for (size_t i = size; i % 4 != 0; ++i) {
@@ -218,15 +228,15 @@ void Filter(const FacePoints& from, const Square& square, double bound, FacePoin
 // Fills the cells of a map.
 class SupportMap::Filling {
  public:
-  explicit Filling(SupportMap& map)
-      : map_(map), may_need_tree_(map.points_.size() > kMostWithoutTree) {}
+  Filling(SupportMap& map, StopPoll& poll)
+      : map_(map), poll_(poll), may_need_tree_(map.points_.size() > kMostWithoutTree) {}
 
-  // `bound`: see Filter.
+  // `bound`: see Filter. The cells are incomplete if stopped.
   void Fill(double bound) {
     bound_ = bound;
     most_cells_ = map_.cells_.size() + kMostCellsPerPoint * map_.points_.size();
     const uint32_t side = map_.side_;
-    for (uint32_t face = 0; face < 6; ++face) {
+    for (uint32_t face = 0; face < 6 && !poll_.stopped(); ++face) {
       SeeFrom(face);
       FillRange(seen_, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0, 1);
     }
@@ -286,23 +296,37 @@ class SupportMap::Filling {
     return *lists_[index];
   }
 
+  // Filters into a list that takes memory for the result alone.
+  void FilterInto(const FacePoints& from, const Square& square, FacePoints& to) {
+    if (poll_.Step(1 + from.size / kPointsPerStep)) return;
+    Filter(from, square, bound_, filtered_);
+    to.CopyFrom(filtered_);
+  }
+  // Frees a long list that is no longer needed. Without this, a set with many points in one cell
+  // takes a copy of them for each division.
+  static void Release(FacePoints& list) {
+    if (list.size > kMostKept) list = FacePoints();
+  }
+
   // Fills the cells of a range, given a superset of their farthest points.
   void FillRange(const FacePoints& points, const Grid& grid, const Range& range, size_t depth,
                  double copies) {
     FacePoints& found = ListAt(2 * depth);
-    Filter(points, Widened(grid, range), bound_, found);
+    FilterInto(points, Widened(grid, range), found);
     FillFiltered(found, grid, range, depth, copies);
   }
 
-  // FillRange for points that have been filtered. `copies`: the average number of times that each
-  // point is listed in all ranges made by the divisions down to this one.
+  // FillRange for points that have been filtered, which may be released. `copies`: the average
+  // number of times that each point is listed in all ranges made by the divisions down to this one.
   void FillFiltered(FacePoints& found, const Grid& grid, const Range& range, size_t depth,
                     double copies) {
+    if (poll_.stopped()) return;
     const uint32_t rows = range.i_end - range.i_begin;
     const uint32_t columns = range.j_end - range.j_begin;
     if (found.size <= 4) return FillAll(found, grid, range);
     if (may_need_tree_ && found.size > kMostCompared && copies > kMostCopies) {
-      return LeaveToTree(grid, range);
+      LeaveToTree(grid, range);
+      return Release(found);
     }
     if (rows == 1 && columns == 1) return FillCell(found, grid, range, depth, copies);
     Range low = range;
@@ -314,9 +338,10 @@ class SupportMap::Filling {
     }
     FacePoints& of_low = ListAt(2 * depth + 2);
     FacePoints& of_high = ListAt(2 * depth + 3);
-    Filter(found, Widened(grid, low), bound_, of_low);
-    Filter(found, Widened(grid, high), bound_, of_high);
+    FilterInto(found, Widened(grid, low), of_low);
+    FilterInto(found, Widened(grid, high), of_high);
     copies *= static_cast<double>(of_low.size + of_high.size) / static_cast<double>(found.size);
+    Release(found);
     FillFiltered(of_low, grid, low, depth + 1, copies);
     FillFiltered(of_high, grid, high, depth + 1, copies);
   }
@@ -355,14 +380,18 @@ class SupportMap::Filling {
       cell.ids[3] = kLong + static_cast<uint32_t>(map_.lists_.size());
       map_.lists_.push_back(static_cast<uint32_t>(found.size - 3));
       map_.lists_.insert(map_.lists_.end(), others, found.ids.begin() + found.size);
-      return;
+      return Release(found);
     }
     const auto first = static_cast<uint32_t>(map_.cells_.size());
     cell.ids[3] = kDivided + first;
     map_.cells_.resize(first + 4);
     const Grid quarters = {first, 2, grid.s + grid.width * range.i_begin,
                            grid.t + grid.width * range.j_begin, 0.5 * grid.width};
-    FillRange(found, quarters, {0, 2, 0, 2}, depth + 1, copies);
+    const Range all = {0, 2, 0, 2};
+    FacePoints& inner = ListAt(2 * depth + 2);
+    FilterInto(found, Widened(quarters, all), inner);
+    Release(found);
+    FillFiltered(inner, quarters, all, depth + 1, copies);
   }
 
   // Drops every point that another point leads all over the square.
@@ -384,12 +413,20 @@ class SupportMap::Filling {
     found.Pad();
   }
 
+  // Filtering this many points takes about 10 us.
+  static constexpr size_t kPointsPerStep = 4096;
+  // Lists of at most this many points keep their memory for reuse.
+  static constexpr size_t kMostKept = 4096;
+
   SupportMap& map_;
+  StopPoll& poll_;
   const bool may_need_tree_;
   double bound_ = 0;
   size_t most_cells_ = 0;
   // All points, as seen on the face being filled.
   FacePoints seen_;
+  // The result of the last filter.
+  FacePoints filtered_;
   // Two for each depth.
   std::vector<std::unique_ptr<FacePoints>> lists_;
   bool needs_tree_ = false;
@@ -401,7 +438,8 @@ SupportMap SupportMap::ForScanning(std::span<const Vector> points) {
   return map;
 }
 
-SupportMap::SupportMap(std::span<const Vector> points) : points_(points) {
+SupportMap::SupportMap(std::span<const Vector> points, const std::function<bool()>& should_stop)
+    : points_(points) {
   HULLD_CHECK(points_.size() < kLong);
   if (points_.size() <= kMostScanned) {
     BuildBlocks();
@@ -426,9 +464,11 @@ SupportMap::SupportMap(std::span<const Vector> points) : points_(points) {
   half_ = 0.5 * side_;
   below_side_ = std::nextafter(static_cast<double>(side_), 0.0);
   cells_.resize(size_t{6} * side_ * side_);
-  Filling filling(*this);
+  StopPoll poll(should_stop);
+  Filling filling(*this, poll);
   filling.Fill(kLeadErrorFactor * extents.cwiseQuotient(scale).maxCoeff());
-  if (filling.needs_tree()) tree_ = SupportTree(points_);
+  if (filling.needs_tree() && !poll.stopped()) tree_ = SupportTree(points_, poll);
+  stopped_ = poll.stopped();
   cells_.shrink_to_fit();
   lists_.shrink_to_fit();
 }

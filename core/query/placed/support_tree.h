@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/plain_vector.h"
 #include "core/query/placed/support_blocks.h"
@@ -21,8 +22,8 @@ namespace hulld {
 class SupportTree {
  public:
   SupportTree() = default;
-  // Requires: at least one point. Cost: O(V log V).
-  explicit SupportTree(std::span<const Vector> points);
+  // Requires: at least one point. The tree is not usable if stopped. Cost: O(V log V).
+  SupportTree(std::span<const Vector> points, StopPoll& poll);
 
   bool empty() const { return nodes_.empty(); }
 
@@ -61,7 +62,7 @@ class SupportTree {
     }
   };
 
-  void Build(std::span<const Vector> points, uint32_t first, uint32_t end);
+  void Build(std::span<const Vector> points, uint32_t first, uint32_t end, StopPoll& poll);
   void Search(std::span<const Vector> points, uint32_t at, const PlainVector& n,
               SupportPoint& best) const;
 

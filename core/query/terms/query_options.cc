@@ -1,5 +1,6 @@
 #include "core/query/terms/query_options.h"
 
+#include <absl/strings/cord.h>
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
@@ -24,7 +25,22 @@ const char* ExactOption(const QueryOptions& options, const OptionNames& names) {
                                                 : nullptr;
 }
 
+// Payload of the error of DepthTooLarge.
+constexpr char kDepthPayload[] = "hulld/depth-bytes";
+
 }  // namespace
+
+absl::Status DepthTooLarge(uint64_t max_depth_bytes) {
+  absl::Status status = absl::ResourceExhaustedError(
+      absl::StrCat("the exact depth of this overlap needs more than ", max_depth_bytes,
+                   " bytes; ask with a max_error that rounding allows, or simplify the hulls"));
+  status.SetPayload(kDepthPayload, absl::Cord());
+  return status;
+}
+
+bool IsDepthTooLarge(const absl::Status& status) {
+  return status.GetPayload(kDepthPayload).has_value();
+}
 
 absl::Status ValidateOptions(const QueryOptions& options, const OptionNames& names) {
   if (absl::Status s = CheckLength(names.tolerance, options.tolerance); !s.ok()) return s;

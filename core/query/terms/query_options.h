@@ -37,6 +37,9 @@ struct QueryOptions {
   double tolerance = 0;
   // Textbook only: the most candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
+  // The most memory of the exact search for a depth, in bytes; more is refused. A search may need
+  // some 10 KB for each vertex near the deepest contact, as in a disc pierced at its centre.
+  uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
   // Bodies only: the most certificates of pieces; more are refused.
   uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
   // Polled in long loops, possibly from several threads; true ends the query with CANCELLED. May be
@@ -59,6 +62,11 @@ struct QueryOptions {
     return method == Method::kCertifiedSearch && !WantsDetails() && !clearance.has_value();
   }
 };
+
+// Returns the RESOURCE_EXHAUSTED error of a query that exceeds QueryOptions::max_depth_bytes.
+absl::Status DepthTooLarge(uint64_t max_depth_bytes);
+// Returns true for that error.
+bool IsDepthTooLarge(const absl::Status& status);
 
 // Option names for error messages, as spelled in the caller's interface.
 struct OptionNames {

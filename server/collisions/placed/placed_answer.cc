@@ -75,7 +75,8 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 
 absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
                        const absl::Status& status, const QueryOptions& options) {
-  return IsLongToAsk(table, a, b) ? NameProofLimit(status) : NameQueryLimit(status, options);
+  return IsLongToAsk(table, a, b) ? NameProofLimit(status, options.max_depth_bytes)
+                                  : NameQueryLimit(status, options);
 }
 
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,

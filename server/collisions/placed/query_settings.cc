@@ -43,6 +43,8 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                                    "; it must be a length of at least 0"));
   }
   options.max_textbook_axes = limits.max_textbook_axes;
+  // One question computes on a thread at a time.
+  options.max_depth_bytes = limits.request_memory;
   options.max_piece_certificates = Config::kMaxPieceCertificates;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;
@@ -78,11 +80,13 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
 
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
+  if (IsDepthTooLarge(status)) return AtLimit(status, options.max_depth_bytes, "request-memory");
   return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
 }
 
-absl::Status NameProofLimit(const absl::Status& status) {
+absl::Status NameProofLimit(const absl::Status& status, uint64_t max_depth_bytes) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
+  if (IsDepthTooLarge(status)) return AtLimit(status, max_depth_bytes, "request-memory");
   return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
                     {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
 }

@@ -40,8 +40,8 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const P
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
 
 // As above for a query with bodies: RESOURCE_EXHAUSTED means that it would need too many
-// certificates.
-absl::Status NameProofLimit(const absl::Status& status);
+// certificates, or more memory than QueryOptions::max_depth_bytes.
+absl::Status NameProofLimit(const absl::Status& status, uint64_t max_depth_bytes);
 
 // RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces take more than `limit` bytes.
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);

@@ -42,33 +42,52 @@ void CanonicalHull::Count() const {
   if (part_ != nullptr) part_->SetBytes(MemoryBytes());
 }
 
-absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& record,
-                                 const std::function<bool()>& should_stop) {
+absl::Status CanonicalHull::MakeOnce(const std::function<bool()>& should_stop,
+                                     const std::function<bool()>& is_done,
+                                     const std::function<absl::Status()>& make) {
   std::unique_lock lock(mutex_);
   while (making_) {
     changed_.wait_for(lock, kStopPoll);
     if (Stopped(should_stop)) return Cancelled();
   }
-  if (is_made()) return absl::OkStatus();
+  if (is_done()) return absl::OkStatus();
   making_ = true;
   lock.unlock();
-  absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
+  const absl::Status status = make();
   lock.lock();
   making_ = false;
-  const absl::Status status = made.status();
-  if (status.ok()) Keep(*std::move(made));
   lock.unlock();
   changed_.notify_all();
   return status;
 }
 
+absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& record,
+                                 const std::function<bool()>& should_stop) {
+  return MakeOnce(
+      should_stop, [this] { return is_made(); },
+      [&] {
+        absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
+        if (made.ok()) Keep(*std::move(made));
+        return made.status();
+      });
+}
+
+absl::Status CanonicalHull::MakeQueryHull(const std::function<bool()>& should_stop) {
+  HULLD_CHECK(is_made());
+  return MakeOnce(
+      should_stop, [this] { return has_query_hull(); },
+      [&] {
+        absl::StatusOr<QueryHull> made = QueryHull::Prepare(*hull_, should_stop);
+        if (!made.ok()) return made.status();
+        query_hull_.emplace(*std::move(made));
+        query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
+        Count();
+        return absl::OkStatus();
+      });
+}
+
 const QueryHull& CanonicalHull::query_hull() {
-  std::call_once(query_hull_once_, [this] {
-    HULLD_CHECK(is_made());
-    query_hull_.emplace(*hull_);
-    query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
-    Count();
-  });
+  if (!has_query_hull()) HULLD_CHECK(MakeQueryHull({}).ok());
   return *query_hull_;
 }
 

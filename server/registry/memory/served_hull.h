@@ -39,6 +39,9 @@ class CanonicalHull {
   absl::Status Make(const QueryHull& version, const HullRecord& record,
                     const std::function<bool()>& should_stop);
 
+  // Builds the query structure if needed; waits if another thread does. Requires hull() != nullptr.
+  // CANCELLED: as for Make. Cost: QueryHull::Prepare.
+  absl::Status MakeQueryHull(const std::function<bool()>& should_stop);
   // Returns the query structure, built by the first call. Requires hull() != nullptr.
   const QueryHull& query_hull();
   // True if query_hull() returns without building.
@@ -52,6 +55,10 @@ class CanonicalHull {
   }
 
  private:
+  // Runs `make` unless is_done() returns true, on one thread at a time.
+  absl::Status MakeOnce(const std::function<bool()>& should_stop,
+                        const std::function<bool()>& is_done,
+                        const std::function<absl::Status()>& make);
   bool is_made() const { return hull_bytes_.load(std::memory_order_acquire) > 0; }
   // Requires: is_made() is false, and no other thread builds it (not checked; making_ ensures it).
   void Keep(Hull hull);
@@ -60,11 +67,11 @@ class CanonicalHull {
   const std::shared_ptr<MemoryPart> part_;
   Mutex mutex_;
   ConditionVariable changed_;
-  // A thread is building it. Guarded by the mutex.
+  // A thread is building the snapshot or the query structure. Guarded by the mutex.
   bool making_ = false;
   // Written once, before hull_bytes_ becomes positive.
   std::optional<Hull> hull_;
-  std::once_flag query_hull_once_;
+  // Likewise before query_hull_bytes_ becomes positive.
   std::optional<QueryHull> query_hull_;
   // Positive after each is built.
   std::atomic<size_t> hull_bytes_ = 0;
@@ -98,6 +105,10 @@ class ServedHull {
   }
   // For all queries. Built by the first call. Requires canonical() != nullptr.
   const QueryHull& canonical_query_hull() const { return canonical_->query_hull(); }
+  // Builds it if needed (CanonicalHull::MakeQueryHull). Not for gRPC threads.
+  absl::Status MakeCanonicalQueryHull(const std::function<bool()>& should_stop) const {
+    return canonical_->MakeQueryHull(should_stop);
+  }
   bool has_canonical_query_hull() const { return canonical_->has_query_hull(); }
 
  private:

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
@@ -276,6 +277,61 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.method = Method::kTextbookSat; }),
             start + "the textbook method" + rest);
   EXPECT_EQ(message([](QueryOptions& o) { o.max_error = kInfinity; }), "OK");
+}
+
+// A disc pierced at its centre: all sides of the difference are equally near, so the search for the
+// depth visits all of them.
+class PiercedDisc : public testing::Test {
+ protected:
+  static constexpr int kCorners = 2048;
+
+  static Hull Disc() {
+    std::vector<Vector> points;
+    for (int i = 0; i < kCorners; ++i) {
+      const double angle = 2 * M_PI * i / kCorners;
+      points.emplace_back(std::cos(angle), std::sin(angle), 0);
+    }
+    return BuildHull(points);
+  }
+
+  absl::StatusOr<Answer> Ask(const QueryOptions& options) const {
+    return CheckCollision(disc_, Pose(), needle_, Pose(), options);
+  }
+
+  const Hull disc_ = Disc();
+  const Hull needle_ = BuildHull(std::vector<Vector>{Vector(0, 0, -2), Vector(0, 0, 2)});
+};
+
+TEST_F(PiercedDisc, TheSearchForItsDepthPollsOften) {
+  uint64_t polls = 0;
+  uint64_t most = UINT64_MAX;
+  QueryOptions options = WantSeparation(0);
+  options.should_stop = [&] { return ++polls >= most; };
+  const absl::StatusOr<Answer> answer = Ask(options);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  EXPECT_NEAR(answer->separation->value, -1, 1e-5);
+  // The exact search polls at each corner, and so often that a stop may come anywhere in it.
+  EXPECT_GT(polls, kCorners);
+  const uint64_t all = polls;
+  for (most = 1; most < all; most *= 2) {
+    polls = 0;
+    EXPECT_TRUE(absl::IsCancelled(Ask(options).status()));
+    EXPECT_EQ(polls, most);
+  }
+}
+
+TEST_F(PiercedDisc, TheSearchForItsDepthTakesNoMoreMemoryThanAllowed) {
+  QueryOptions options = WantSeparation(0);
+  options.max_depth_bytes = 100 << 20;
+  EXPECT_TRUE(Ask(options).ok());
+  options.max_depth_bytes = 1 << 20;
+  const absl::Status refused = Ask(options).status();
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_TRUE(IsDepthTooLarge(refused));
+  EXPECT_NE(refused.message().find("more than 1048576 bytes"), std::string::npos) << refused;
+  // Floating point needs little.
+  options.max_error = 1e-6;
+  EXPECT_TRUE(Ask(options).ok());
 }
 
 }  // namespace separation_test

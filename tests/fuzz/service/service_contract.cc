@@ -47,6 +47,7 @@ Codes CodesOf(Rpc rpc) {
     case Rpc::kServerReflectionInfo:
       return {grpc::INVALID_ARGUMENT};
     case Rpc::kGetStatus:
+    case Rpc::kHealthWatch:
       return {};
   }
   return {};

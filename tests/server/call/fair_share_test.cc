@@ -6,12 +6,15 @@
 #include <chrono>
 #include <list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "server/call/admission.h"
 #include "server/call/call_lifetime.h"
 #include "server/contract/limit_error.h"
+#include "server/network/connection_table.h"
+#include "server/network/peer_address.h"
 
 namespace hulld::server {
 namespace fair_share_test {
@@ -21,8 +24,10 @@ using ::testing::HasSubstr;
 class FairShare : public testing::Test {
  protected:
   // Returns the limit that refuses a call; empty if admitted, and then it keeps running.
-  std::string Refusal(Rpc rpc, const std::string& client) {
-    absl::StatusOr<Admission::Ticket> ticket = admission_->Admit({.rpc = rpc, .client = client});
+  std::string Refusal(Rpc rpc, const std::string& client,
+                      const std::optional<PeerAddress>& peer = std::nullopt) {
+    absl::StatusOr<Admission::Ticket> ticket =
+        admission_->Admit({.rpc = rpc, .client = client, .peer = peer});
     if (!ticket.ok()) {
       last_message_ = std::string(ticket.status().message());
       return ExceededLimit(ticket.status()).value_or("none");
@@ -34,6 +39,7 @@ class FairShare : public testing::Test {
   void Begin(const Limits& limits) { admission_ = std::make_unique<Admission>(limits, metrics_); }
 
   Metrics metrics_;
+  ConnectionTable connections_{100, 100};
   std::unique_ptr<Admission> admission_;
   std::list<Admission::Ticket> tickets_;
   std::string last_message_;
@@ -127,6 +133,54 @@ TEST_F(FairShare, CallsWithoutATokenHaveAShareOfTheirOwn) {
   EXPECT_EQ(Refusal(Rpc::kAppendPoints, "token:a"), "max-calls");
   tickets_.pop_front();
   EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, "ipv4:192.0.2.0"), "");
+}
+
+// Clients open one watch for each connection, and fail without it.
+TEST_F(FairShare, AConnectionHasAWatchOfHealthOutsideOfAllShares) {
+  Limits limits;
+  limits.max_anonymous_calls = 8;
+  limits.max_calls = 1;
+  Begin(limits);
+  admission_->SetConnections(connections_);
+  const std::string client = "ipv4:192.0.2.1";
+  const auto peer = [](uint16_t port) {
+    return PeerAddress::FromGrpc("ipv4:192.0.2.1:" + std::to_string(port));
+  };
+  for (uint16_t port = 1; port <= 20; ++port) {
+    connections_.Add(port, peer(port));
+    EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(port)), "");
+  }
+  EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(1)), "");
+  EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(1)), "max-anonymous-calls");
+  EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(2)), "max-anonymous-calls");
+  EXPECT_EQ(Refusal(Rpc::kCheckCollision, client, peer(1)), "");
+  // After the end of its watch, a connection may have another one.
+  tickets_.pop_front();
+  EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(1)), "");
+  // A proxy on this machine has the watches of all its clients.
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(Refusal(Rpc::kHealthWatch, "unix:"), "");
+}
+
+TEST_F(FairShare, CallsWithoutATokenKeepNoConnectionFromEviction) {
+  Begin(Limits());
+  admission_->SetConnections(connections_);
+  const auto peer = PeerAddress::FromGrpc("ipv4:192.0.2.1:1");
+  connections_.Add(1, peer);
+  EXPECT_EQ(Refusal(Rpc::kHealthWatch, "ipv4:192.0.2.1", peer), "");
+  EXPECT_EQ(Refusal(Rpc::kServerReflectionInfo, "ipv4:192.0.2.1", peer), "");
+  EXPECT_EQ(connections_.Evict(), 1);
+}
+
+TEST_F(FairShare, CallsOfAClientWithManyAreMarked) {
+  Begin(Limits());
+  for (uint64_t i = 0; i < Admission::kFewCalls; ++i) {
+    EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "");
+    EXPECT_FALSE(tickets_.back().is_one_of_many());
+  }
+  EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "");
+  EXPECT_TRUE(tickets_.back().is_one_of_many());
+  EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "");
+  EXPECT_FALSE(tickets_.back().is_one_of_many());
 }
 
 TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {

@@ -101,6 +101,18 @@ TEST(TaskPool, LanesTakeTurnsWhateverTheirLength) {
   EXPECT_THAT(order.names(), ElementsAre("a1", "b1", "a2", "b2", "a3", "a4"));
 }
 
+TEST(TaskPool, ConnectionsOfAClientTakeTurns) {
+  HeldPool held;
+  Order order;
+  for (const char* name : {"a1", "a2", "a3"}) held.pool().Submit(order.Task(name), {1, 10});
+  held.pool().Submit(order.Task("A1"), {1, 11});
+  // Another client has a turn for each turn of all connections of the first.
+  for (const char* name : {"b1", "b2", "b3"}) held.pool().Submit(order.Task(name), {2, 12});
+  held.Release();
+  held.End();
+  EXPECT_THAT(order.names(), ElementsAre("a1", "b1", "A1", "b2", "a2", "b3", "a3"));
+}
+
 TEST(TaskPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
   HeldPool held;
   Order order;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -252,6 +254,26 @@ TEST(SupportMap, MemoryIsLinearForPointsAlongCurves) {
     const double many = static_cast<double>(SupportMap(large[i].points).MemoryBytes());
     EXPECT_LT(many, 24 * few) << large[i].name;
     EXPECT_LT(many, 600.0 * 64000) << large[i].name;
+  }
+}
+
+// A flat hull prepares slowest: all of its points are farthest along the normal of its plane.
+TEST(SupportMap, PreparationPollsOftenAndStopsAtOnce) {
+  std::vector<Vector> polygon;
+  for (int i = 0; i < 1 << 16; ++i) {
+    const double x = i * 0x1p-16;
+    polygon.emplace_back(x, x * x, 0);
+  }
+  uint64_t polls = 0;
+  uint64_t most = UINT64_MAX;
+  const std::function<bool()> should_stop = [&] { return ++polls >= most; };
+  EXPECT_FALSE(SupportMap(polygon, should_stop).stopped());
+  // Each face filters all points some 30 times, in steps of 4096 points, with a poll in 1024 steps.
+  EXPECT_GT(polls, 10);
+  for (most = 1; most <= 8; most *= 2) {
+    polls = 0;
+    EXPECT_TRUE(SupportMap(polygon, should_stop).stopped());
+    EXPECT_EQ(polls, most);
   }
 }
 

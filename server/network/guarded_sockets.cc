@@ -1,7 +1,8 @@
-#include "server/network/guarded_reads.h"
+#include "server/network/guarded_sockets.h"
 
 #include <dlfcn.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "core/base/check.h"
 
@@ -21,8 +23,16 @@ struct Slot {
   // 0 without a guarded connection; read first, without the mutex.
   std::atomic<uint64_t> connection = 0;
   std::mutex mutex;
-  // Guarded by the mutex.
+  // The mutex guards the members below.
   std::optional<FrameGuard> guard;
+  std::function<void()> on_closed;
+
+  // Requires the mutex.
+  void Clear() {
+    connection = 0;
+    guard.reset();
+    on_closed = nullptr;
+  }
 };
 
 std::array<std::atomic<Slot*>, kMostGuardedDescriptors> slots;
@@ -55,7 +65,8 @@ bool Inspect(Slot& slot, const msghdr& message, size_t bytes) {
 
 }  // namespace
 
-void GuardReads(int descriptor, uint64_t connection, const FrameLimits& limits) {
+void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
+                 std::function<void()> on_closed) {
   HULLD_CHECK(descriptor >= 0 && descriptor < kMostGuardedDescriptors && connection != 0);
   std::atomic<Slot*>& place = slots[static_cast<size_t>(descriptor)];
   Slot* slot = place.load(std::memory_order_acquire);
@@ -64,17 +75,24 @@ void GuardReads(int descriptor, uint64_t connection, const FrameLimits& limits) 
     if (place.compare_exchange_strong(slot, made.get())) slot = made.release();
   }
   const std::lock_guard lock(slot->mutex);
-  slot->guard.emplace(limits, half_open_streams, FrameGuard::Clock::now());
+  slot->Clear();
+  if (limits != nullptr) slot->guard.emplace(*limits, half_open_streams, FrameGuard::Clock::now());
+  slot->on_closed = std::move(on_closed);
   slot->connection = connection;
+}
+
+void ShutDown(int descriptor, uint64_t connection) {
+  Slot* const slot = SlotOf(descriptor);
+  if (slot == nullptr) return;
+  const std::lock_guard lock(slot->mutex);
+  if (slot->connection == connection) shutdown(descriptor, SHUT_RDWR);
 }
 
 void Unguard(int descriptor, uint64_t connection) {
   Slot* const slot = SlotOf(descriptor);
   if (slot == nullptr) return;
   const std::lock_guard lock(slot->mutex);
-  if (slot->connection != connection) return;
-  slot->connection = 0;
-  slot->guard.reset();
+  if (slot->connection == connection) slot->Clear();
 }
 
 std::array<uint64_t, FrameGuard::kVerdictCount> ClosedByGuard() {
@@ -87,7 +105,8 @@ size_t HalfOpenStreams() { return half_open_streams; }
 
 }  // namespace hulld::server
 
-// Replaces the C library's function; guarded_reads.h explains the reason.
+// The functions below replace the C library's; guarded_sockets.h explains the reason.
+
 extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
   using Function = ssize_t (*)(int, msghdr*, int);
   static const auto next = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "recvmsg"));
@@ -99,4 +118,20 @@ extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
   shutdown(descriptor, SHUT_RDWR);
   errno = ECONNRESET;
   return -1;
+}
+
+extern "C" int close(int descriptor) {
+  using Function = int (*)(int);
+  static const auto next = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "close"));
+  hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
+  if (slot == nullptr || slot->connection == 0) return next(descriptor);
+  // Holds the mutex during the close, so that ShutDown never meets another socket of this number.
+  const std::lock_guard lock(slot->mutex);
+  const int result = next(descriptor);
+  const int error = errno;
+  const std::function<void()> on_closed = std::move(slot->on_closed);
+  slot->Clear();
+  if (on_closed) on_closed();
+  errno = error;
+  return result;
 }

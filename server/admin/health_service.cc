@@ -1,0 +1,127 @@
+#include "server/admin/health_service.h"
+
+#include <absl/status/status.h>
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "server/call/message_bytes.h"
+#include "server/call/queued_stream.h"
+#include "server/call/request_memory.h"
+#include "server/contract/error_info.h"
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+using grpc::health::v1::HealthCheckRequest;
+using grpc::health::v1::HealthCheckResponse;
+
+std::vector<std::string> WithWholeServer(std::vector<std::string> services) {
+  services.emplace_back();
+  return services;
+}
+
+HealthCheckResponse ResponseOf(HealthCheckResponse::ServingStatus status) {
+  HealthCheckResponse response;
+  response.set_status(status);
+  return response;
+}
+
+}  // namespace
+
+// One Watch: reports the status at its start and at the end of service.
+class HealthService::WatchCall
+    : public RequestStream<QueuedStream<WriteReactor, HealthCheckResponse>, HealthCheckRequest> {
+ public:
+  WatchCall(grpc::CallbackServerContext& context, HealthService& service,
+            const grpc::ByteBuffer& bytes)
+      : RequestStream(bytes, context, service.admission_, Rpc::kHealthWatch), service_(service) {}
+  ~WatchCall() override {
+    const std::lock_guard lock(service_.mutex_);
+    service_.watches_.erase(this);
+  }
+
+  // Queues a report, and the end of the call if `then` is given.
+  void Report(Status status, const std::optional<absl::Status>& then) {
+    Locked([&] {
+      if (end().has_value()) return;
+      Queue(ResponseOf(status));
+      if (then.has_value()) End(*then);
+    });
+  }
+
+ private:
+  void Open() override {
+    Status status;
+    {
+      const std::lock_guard lock(service_.mutex_);
+      status = service_.StatusOf(request().service());
+      if (status == HealthCheckResponse::UNKNOWN) status = HealthCheckResponse::SERVICE_UNKNOWN;
+      service_.watches_.emplace(this, std::static_pointer_cast<WatchCall>(shared_from_this()));
+    }
+    Report(status, std::nullopt);
+  }
+  void StartWork() override {}
+  bool IsWorking() const override { return false; }
+
+  HealthService& service_;
+};
+
+HealthService::HealthService(Admission& admission, std::vector<std::string> services)
+    : admission_(admission), services_(WithWholeServer(std::move(services))) {}
+
+HealthService::Status HealthService::StatusOf(const std::string& service) const {
+  if (std::find(services_.begin(), services_.end(), service) == services_.end()) {
+    return HealthCheckResponse::UNKNOWN;
+  }
+  return serving_ ? HealthCheckResponse::SERVING : HealthCheckResponse::NOT_SERVING;
+}
+
+grpc::ServerUnaryReactor* HealthService::Check(grpc::CallbackServerContext* context,
+                                               const grpc::ByteBuffer* request,
+                                               grpc::ByteBuffer* response) {
+  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+  HealthCheckRequest question;
+  RequestMemory::Share share;
+  grpc::ByteBuffer bytes = TakenFrom(*request);
+  const absl::Status parsed = ParseRequest(bytes, admission_.request_memory(), &question, share);
+  if (!parsed.ok()) {
+    reactor->Finish(ToGrpc(parsed));
+    return reactor;
+  }
+  Status status;
+  {
+    const std::lock_guard lock(mutex_);
+    status = StatusOf(question.service());
+  }
+  if (status == HealthCheckResponse::UNKNOWN) {
+    reactor->Finish({grpc::StatusCode::NOT_FOUND, "the server has no service of this name"});
+    return reactor;
+  }
+  *response = SerializeReply(ResponseOf(status));
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+WriteReactor* HealthService::Watch(grpc::CallbackServerContext* context,
+                                   const grpc::ByteBuffer* request) {
+  return WatchCall::Launch(std::make_shared<WatchCall>(*context, *this, *request));
+}
+
+void HealthService::EndServing() {
+  std::vector<std::shared_ptr<WatchCall>> open;
+  {
+    const std::lock_guard lock(mutex_);
+    serving_ = false;
+    for (const auto& [call, watch] : watches_) {
+      if (std::shared_ptr<WatchCall> held = watch.lock()) open.push_back(std::move(held));
+    }
+  }
+  for (const std::shared_ptr<WatchCall>& watch : open) {
+    watch->Report(HealthCheckResponse::NOT_SERVING, Draining());
+  }
+}
+
+}  // namespace hulld::server
