@@ -22,7 +22,6 @@
 #include "server/hulls/hull_service.h"
 #include "server/network/connection_acceptor.h"
 #include "server/network/connection_table.h"
-#include "server/process/executor.h"
 #include "server/process/metrics.h"
 #include "server/process/metrics_endpoint.h"
 #include "server/process/task_pool.h"
@@ -98,7 +97,6 @@ class Server {
   WorkerPool long_readers_;
   // Compute answers.
   TaskPool pool_;
-  Executor executor_;
   HullService hull_service_;
   BodyService body_service_;
   CollisionService collision_service_;

@@ -94,7 +94,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry/memory",
     "server/registry/commit",
     "server/registry/catalog",
-    "server/registry/others",
+    "server/registry/peers",
     "server/registry/records",
     "server/registry/read",
     "server/registry/changes",

@@ -12,12 +12,12 @@ namespace hulld {
 // points to, 0 if the four points are coplanar, -1 otherwise. Exact for all finite input.
 //
 // Stages: a floating-point filter with a proven bound almost always decides. Next, the same filter
-// seen from one of the points decides if points lie close together, and at extreme magnitudes,
-// which a power of two brings into range. Integers of fixed size decide if the coordinates fit, at
-// 60 bits a coordinate on one scale. Expansions decide within the exponent range of kExpansionMin
-// and kExpansionMax; a power of two brings all points with exponents no further apart into it.
-// Integers of any size decide the rest. Cost: ~10 ns by the filter; ~30 ns from the nearest point
-// or in fixed size; ~1 us by expansions; some us by integers, growing with the spread of exponents.
+// runs relative to one of the points; this decides if points lie close together and, after scaling
+// by a power of two, at extreme magnitudes. Integers of fixed size decide if all coordinates, on
+// one scale, fit into 60 bits. Expansions decide if the exponents, after scaling by a power of two,
+// lie within the range of kExpansionMin and kExpansionMax. Integers of arbitrary size decide the
+// rest. Cost: ~10 ns by the filter; ~30 ns from the nearest point or in fixed size; ~1 us by
+// expansions; several us by integers of arbitrary size, growing with the spread of exponents.
 // Source: Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic.
 //
 // Laws, for all finite points:

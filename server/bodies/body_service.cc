@@ -126,24 +126,24 @@ void BodyService::Put(PutCall* call) {
   absl::StatusOr<StoredBody> body =
       DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  registry_.PutBody(*std::move(body), IfRevision(call->request()),
-                    [this, call](const absl::StatusOr<PutBodyResult>& result) {
-                      if (!result.ok()) return call->End(result.status());
-                      const BodyRecord& record = result->body;
-                      call->call().LogChange(result->created ? "body created" : "body replaced",
-                                             {"body", record.body_id}, record.revision);
-                      v1::PutBodyResponse& response = call->response();
-                      EncodeHeader(registry_.store(), result->store_revision,
-                                   response.mutable_header());
-                      v1::BodyInfo* const info = response.mutable_body();
-                      info->set_body_id(record.body_id);
-                      info->set_create_revision(record.create_revision);
-                      info->set_revision(record.revision);
-                      info->set_piece_count(result->piece_count);
-                      response.set_created(result->created);
-                      response.set_durability(EncodeDurability(registry_.store().durability()));
-                      call->End(absl::OkStatus());
-                    });
+  registry_.bodies().Put(
+      *std::move(body), IfRevision(call->request()),
+      [this, call](const absl::StatusOr<PutBodyResult>& result) {
+        if (!result.ok()) return call->End(result.status());
+        const BodyRecord& record = result->body;
+        call->call().LogChange(result->created ? "body created" : "body replaced",
+                               {"body", record.body_id}, record.revision);
+        v1::PutBodyResponse& response = call->response();
+        EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());
+        v1::BodyInfo* const info = response.mutable_body();
+        info->set_body_id(record.body_id);
+        info->set_create_revision(record.create_revision);
+        info->set_revision(record.revision);
+        info->set_piece_count(result->piece_count);
+        response.set_created(result->created);
+        response.set_durability(EncodeDurability(registry_.store().durability()));
+        call->End(absl::OkStatus());
+      });
 }
 
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
@@ -153,10 +153,11 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   const absl::StatusOr<Freshness> freshness =
       DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
   if (!freshness.ok()) return freshness.status();
-  const auto staleness = registry_.AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
+  const auto staleness =
+      registry_.barrier().AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
   if (!staleness.ok()) return staleness.status();
   const FoundBodies found =
-      registry_.FindBodies(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+      registry_.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
@@ -184,8 +185,8 @@ absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call&
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
   const absl::StatusOr<BodyPage> page =
-      registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                           [&call] { return call.ShouldStop(); });
+      registry_.bodies().List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                              [&call] { return call.ShouldStop(); });
   if (!page.ok()) return page.status();
   EncodeHeader(registry_.store(), AsOf{page->store_revision, staleness},
                response->mutable_header());
@@ -204,7 +205,7 @@ void BodyService::Delete(DeleteCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), id, "body_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.DeleteBody(
+  registry_.bodies().Delete(
       id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
         call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);

@@ -159,7 +159,7 @@ class Admission {
     grpc_call* call = nullptr;
     // Owner of the call's token, if any, and the lifetime that ends when the token is revoked; it
     // must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after the
-    // ticket is gone: it ends a call that waits without polling.
+    // ticket is destroyed. It ends a call that waits without polling.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
     std::function<void()> on_revoked = {};

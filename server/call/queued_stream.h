@@ -93,7 +93,7 @@ class QueuedStream : public CallStream<Reactor> {
     if (!end_.has_value()) end_ = status;
   }
   // Replaces the end by a more specific one.
-  void EndInsteadWith(const absl::Status& status) {
+  void OverrideEnd(const absl::Status& status) {
     CheckLocked();
     end_ = status;
   }

@@ -42,8 +42,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
     return call;
   }
 
-  // Ends the call with the result of `work`, run on `pool`. Requires that it has not ended (not
-  // checked: an ended call may be gone).
+  // Ends the call with the result of `work`, run on `pool`. Requires: the call has not ended
+  // (unchecked: an ended call may have been destroyed).
   template <typename Work>
   void EndOn(WorkerPool& pool, Work work) {
     pool.Submit(

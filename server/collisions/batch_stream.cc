@@ -34,18 +34,16 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 
 WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
                                  Registry& registry, const PieceThreads& threads,
-                                 Executor& executor, const grpc::ByteBuffer& request) {
+                                 const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BatchStream>(
-      new BatchStream(context, admission, registry, threads, executor, request)));
+      new BatchStream(context, admission, registry, threads, request)));
 }
 
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Registry& registry, const PieceThreads& threads, Executor& executor,
+                         Registry& registry, const PieceThreads& threads,
                          const grpc::ByteBuffer& request)
     : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry, threads,
-                    {kFirstPairs, kMostPairs}),
-      team_threads_(executor.threads()),
-      team_lane_(executor.opener()) {}
+                    {kFirstPairs, kMostPairs}) {}
 
 bool BatchStream::IsShort() const {
   return request().placements_size() + request().packed_placements().hulls_size() <=
@@ -62,8 +60,6 @@ absl::Status BatchStream::Validate() {
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   options_ = *std::move(options);
-  team_options_ = options_;
-  team_options_.threads = team_threads_;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
                            call().caller(), registry().limits().max_placements, "the batch");
@@ -112,34 +108,11 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
   return table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
 }
 
-bool BatchStream::IsForTeam(const PlacedPair& pair) const {
-  if (options_.method != Method::kTextbookSat) return false;
-  if (table_.is_body(pair.a) || table_.is_body(pair.b)) return false;
-  return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
-}
-
-// A pair for the team gets its own piece.
-uint64_t BatchStream::EndOfPiece(uint64_t begin, uint64_t end) const {
-  if (options_.method != Method::kTextbookSat) return end;
-  for (uint64_t i = begin; i < end; ++i) {
-    if (IsForTeam(PairAt(i))) return std::max(i, begin + 1);
-  }
-  return end;
-}
-
-// The team works on a single pair. Started pairs hold memory, so a batch starts only one.
-bool BatchStream::MayRunAhead(const PairsPiece& piece) const {
-  return !IsForTeam(PairAt(piece.next));
-}
-
-void BatchStream::Submit(PairsPiece& piece) {
-  if (!IsForTeam(PairAt(piece.next))) return PiecedReplies::Submit(piece);
-  RunOn(team_lane_, [this, &piece] { RunSlice(piece); });
-}
+// A started textbook pair holds memory, so a batch starts only one.
+bool BatchStream::MayRunAhead() const { return options_.method != Method::kTextbookSat; }
 
 absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
   const bool is_textbook = options_.method == Method::kTextbookSat;
-  if (is_textbook && IsForTeam(PairAt(piece.next))) end = Clock::now() + Executor::kSliceTime;
   const uint64_t first = piece.next;
   BatchColumns columns({}, request().wanted(), first);
   RungCounts counts;
@@ -197,12 +170,12 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
   const bool is_for_hulls = !table_.is_body(pair.a) && !table_.is_body(pair.b);
   if (!IsAnswerable(pair) || !is_for_hulls) return Answer(piece, columns, counts);
   if (!piece.check.has_value()) {
-    const bool is_for_team = IsForTeam(pair);
-    if (is_for_team) {
+    const PlacedHull& a = table_.placed()[pair.a];
+    const PlacedHull& b = table_.placed()[pair.b];
+    if (HoldsMuchForTextbook(a, b)) {
       if (absl::Status s = registry().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
     }
-    absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(
-        table_.placed()[pair.a], table_.placed()[pair.b], is_for_team ? team_options_ : options_);
+    absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(a, b, options_);
     if (!begun.ok()) return Add({begun.status()}, piece, columns, counts);
     piece.check = *std::move(begun);
   }

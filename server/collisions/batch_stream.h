@@ -15,7 +15,6 @@
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
-#include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
@@ -36,12 +35,12 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, const PieceThreads& threads, Executor& executor,
+                             Registry& registry, const PieceThreads& threads,
                              const grpc::ByteBuffer& request);
 
  private:
   BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-              const PieceThreads& threads, Executor& executor, const grpc::ByteBuffer& request);
+              const PieceThreads& threads, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
   absl::Status Validate() override;
@@ -53,9 +52,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // The functions below require the mutex.
   bool QueueHead() override;
   uint64_t CountUnits() override { return pair_count_; }
-  uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
-  bool MayRunAhead(const PairsPiece& piece) const override;
-  void Submit(PairsPiece& piece) override;
+  bool MayRunAhead() const override;
   void Deliver(PairsPiece& piece) override;
   bool Join(const v1::BatchCheckCollisionsResponse& reply,
             v1::BatchCheckCollisionsResponse* waiting) override;
@@ -64,7 +61,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // Without the mutex.
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
-  bool IsForTeam(const PlacedPair& pair) const;
   // Answers the next pair of the piece; by the textbook, at least a part of it. CANCELLED.
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerRelation(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
@@ -73,16 +69,10 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
                    RungCounts* counts);
 
-  // Size of the team, and this call's lane on it.
-  const int team_threads_;
-  TaskPool::Lane team_lane_;
-
   // Written before the first piece.
   uint64_t pair_count_ = 0;
   Freshness freshness_;
   QueryOptions options_;
-  // Options for a pair that justifies the team.
-  QueryOptions team_options_;
   PlacementTable table_;
   // All pairs are of hulls, and only relations are wanted: AnswerRelation.
   bool is_plain_ = false;

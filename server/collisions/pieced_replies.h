@@ -148,20 +148,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual bool QueueHead() = 0;
   // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
-  // Returns the end of the piece that starts at `begin`, at most `end`; for units of known cost.
-  virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
-    static_cast<void>(begin);
-    return end;
-  }
-  // True if a slice of the piece may start while earlier pieces are in flight.
-  virtual bool MayRunAhead(const Work& piece) const {
-    static_cast<void>(piece);
-    return true;
-  }
-  // Starts a slice of the piece. Override to run some pieces elsewhere.
-  virtual void Submit(Work& piece) {
-    this->RunOn(lane_, [this, &piece] { RunSlice(piece); });
-  }
+  // True if a slice of a piece may start while earlier pieces are in flight.
+  virtual bool MayRunAhead() const { return true; }
   // Queues replies of the front piece; called one last time with is_done.
   virtual void Deliver(Work& piece) = 0;
   // Merges a small reply into the queued one; returns false if they do not fit.
@@ -299,18 +287,17 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     while (pieces_.size() < most_pieces_ && next_unit_ < unit_count_) {
       auto piece = std::make_unique<Work>();
       piece->next = next_unit_;
-      piece->end = EndOfPiece(next_unit_, std::min(unit_count_, next_unit_ + piece_units_));
-      HULLD_CHECK(piece->end > piece->next);
+      piece->end = std::min(unit_count_, next_unit_ + piece_units_);
       next_unit_ = piece->end;
       pieces_.push_back(std::move(piece));
     }
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done) continue;
       const bool is_front = piece == pieces_.front();
-      if (!is_front && (piece->bytes >= kMostHeldBytes || !MayRunAhead(*piece))) continue;
+      if (!is_front && (piece->bytes >= kMostHeldBytes || !MayRunAhead())) continue;
       piece->is_running = true;
       ++running_;
-      Submit(*piece);
+      this->RunOn(lane_, [this, each = piece.get()] { RunSlice(*each); });
     }
   }
 

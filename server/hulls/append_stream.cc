@@ -49,7 +49,7 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry_.CloseAppend(*session_);
+    registry_.hulls().CloseAppend(*session_);
   });
 }
 
@@ -97,7 +97,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  registry_.OpenAppend(
+  registry_.hulls().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -137,7 +137,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const auto self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   const auto arrival = std::chrono::steady_clock::now();
-  registry_.Append(
+  registry_.hulls().Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
@@ -189,7 +189,7 @@ void AppendStream::FailAt(uint64_t sequence, const absl::Status& status) {
     return Fail(status);
   }
   // The client may have half-closed before the chunk was refused.
-  if (end()->ok() || end_sequence_ > sequence) EndInsteadWith(status);
+  if (end()->ok() || end_sequence_ > sequence) OverrideEnd(status);
 }
 
 }  // namespace hulld::server

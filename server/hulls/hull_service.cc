@@ -93,7 +93,7 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.Create(
+  registry_.hulls().Create(
       request.hull_id(), request.if_absent(),
       [this, call](const absl::StatusOr<CreateResult>& created) {
         if (!created.ok()) return call->End(created.status());
@@ -126,7 +126,7 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   EncodeBox(*view.served, response);
   if (request.without_facets() && !request.audit()) return absl::OkStatus();
   const auto should_stop = [&call] { return call.ShouldStop(); };
-  const absl::StatusOr<const Hull*> hull = registry_.Canonical(view, should_stop);
+  const absl::StatusOr<const Hull*> hull = registry_.reader().Canonical(view, should_stop);
   if (!hull.ok()) return hull.status();
   if (!request.without_facets()) {
     response->set_edge_count((*hull)->edges().size());
@@ -174,7 +174,7 @@ void HullService::Delete(DeleteCall* call) {
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  registry_.Delete(
+  registry_.hulls().Delete(
       request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
         call->call().LogChange("hull deleted", {"hull", call->request().hull_id()}, *revision);

@@ -45,7 +45,8 @@ absl::Status MeshStream::MakeHeader() {
   if (!freshness.ok()) return freshness.status();
   const auto resolved = registry_.Resolve(request().hull_id(), should_stop, *freshness);
   if (!resolved.ok()) return resolved.status();
-  const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
+  const absl::StatusOr<const Hull*> hull =
+      registry_.reader().Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();
   mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
   v1::MeshHeader* header = reply().mutable_header();

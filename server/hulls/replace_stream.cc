@@ -119,7 +119,7 @@ void ReplaceStream::Commit() {
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   };
-  registry_.Replace(std::move(replacement_), done);
+  registry_.hulls().Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

@@ -72,7 +72,7 @@ void WatchStream::Open() {
 // What the server has acknowledged by now, or another one over the same store, is told.
 void WatchStream::Begin(const WatchTarget& target, const WatchStart& start) {
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::Status fresh = registry_.AwaitOthers(should_stop);
+  const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
   absl::StatusOr<std::shared_ptr<ChangeWatch>> watch =
@@ -136,7 +136,7 @@ absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
   for (HullChange& change : piece->changes) {
     if (WantsBox(change)) {
       const auto resolved = registry_.Resolve(
-          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::OfWhatIsHere());
+          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::AnyStaleness());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
       if (!status.ok() && !absl::IsDataLoss(status)) return status;

@@ -81,7 +81,7 @@ absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& shou
                            std::vector<absl::StatusOr<HullView>>& hulls) {
   for (absl::StatusOr<HullView>& hull : hulls) {
     if (!hull.ok()) continue;
-    absl::Status made = registry.Canonical(*hull, should_stop).status();
+    absl::Status made = registry.reader().Canonical(*hull, should_stop).status();
     if (made.ok()) made = hull->served->MakeCanonicalQueryHull(should_stop);
     if (absl::IsCancelled(made)) return made;
     if (!made.ok()) hull = made;
@@ -98,7 +98,7 @@ ReadPlan PlanOf(const PlacedLookup& lookup) {
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop) {
   if (!registry.has_bodies()) return Bodies();
-  FoundBodies found = registry.FindBodies(ids, should_stop);
+  FoundBodies found = registry.bodies().Find(ids, should_stop);
   if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
   if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
     return Bodies();
@@ -175,9 +175,9 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   do {
     if (!bodies.ok()) return bodies.status();
     known.SetBodies(ids, *std::move(bodies));
-    hulls =
-        registry.Refresh(known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids,
-                         known.hulls_, should_stop, PlanOf(lookup));
+    hulls = registry.reader().Refresh(
+        known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids, known.hulls_,
+        should_stop, PlanOf(lookup));
     if (!hulls.ok()) return hulls;
     bodies = BodiesAmong(registry, ids, should_stop);
   } while (!bodies.ok() || !known.AreBodies(*bodies));
@@ -204,12 +204,12 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
   if (registry.has_bodies()) {
-    const std::optional<FoundBodies> found = registry.TryFindBodies(ids);
+    const std::optional<FoundBodies> found = registry.bodies().TryFind(ids);
     if (!found.has_value()) return std::nullopt;
     const auto is_none = [](const auto& body) { return body == nullptr; };
     if (!std::ranges::all_of(found->bodies, is_none)) return std::nullopt;
   }
-  std::optional<Resolved> resolved = registry.TryResolve(ids, PlanOf(lookup));
+  std::optional<Resolved> resolved = registry.reader().TryResolve(ids, PlanOf(lookup));
   if (!resolved.has_value()) return resolved;
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     // A body may have been put under the ID since the lookup of bodies.

@@ -4,101 +4,67 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <memory>
 #include <mutex>
 #include <utility>
 
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/cpu_limit.h"
-#include "server/settings/memory_limit.h"
 
 namespace hulld::server {
-namespace {
-
-Limits WithMemoryLimit(Limits limits) {
-  if (limits.memory_limit == 0) limits.memory_limit = DefaultMemoryLimit();
-  return limits;
-}
-
-// The rest is reserved for writers: without a store that keeps hulls, their hulls stay in memory.
-uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
-  return memory_limit / (store.keeps_hulls() ? 2 : 4);
-}
-
-}  // namespace
 
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
                    std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
-    : store_(store),
-      limits_(WithMemoryLimit(limits)),
-      memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
-      catalog_(store, limits_, memory_),
-      feed_(mutex_, memory_, Config::kWatchMarkInterval),
-      committer_(store, mutex_),
-      preparer_(mutex_, catalog_, memory_, preparers),
+    : state_(store, limits, preparers),
+      committer_(store, state_.mutex),
       loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
-      freshness_(store, mutex_, catalog_, committer_),
-      gate_(mutex_, catalog_, committer_, freshness_),
-      records_(store, mutex_, catalog_, memory_, gate_, *loaders_),
-      lister_(store, mutex_, catalog_, memory_, feed_, gate_, *loaders_),
-      reader_(store, limits_, mutex_, catalog_, memory_, freshness_, records_, preparer_,
-              *loaders_),
-      bodies_(store, mutex_, catalog_, memory_, committer_, feed_, after_others_, freshness_,
-              records_, lister_),
-      changes_(catalog_, memory_, committer_, after_others_, writers),
-      lifecycle_(store, catalog_, memory_, feed_, freshness_, records_, changes_),
-      appender_(store, limits_, writers, mutex_, catalog_, memory_, feed_, freshness_, records_,
-                preparer_, lifecycle_, changes_),
-      takeover_(catalog_, memory_, feed_, after_others_, records_, preparer_, changes_),
-      watches_(store, mutex_, catalog_, memory_, feed_, lister_) {
-  if (!store.is_shared()) return;
-  committer_.SetOthers(
-      [this](Locked& locked, const OtherChanges& others) { takeover_.Take(locked, others); },
-      [this](Locked&, const OtherChanges& others) { return takeover_.GrownHulls(others); });
-}
+      barrier_(store.peers() == nullptr
+                   ? std::make_unique<ReadBarrier>(state_, committer_)
+                   : std::make_unique<PeerSync>(state_, committer_, *store.peers())),
+      records_(state_, committer_, *barrier_, *loaders_),
+      reader_(state_, *barrier_, records_, *loaders_),
+      bodies_(state_, committer_, *barrier_, records_),
+      changes_(state_, committer_, *barrier_, records_, writers),
+      watches_(store, state_.mutex, state_.catalog, state_.memory, state_.feed, records_) {}
 
 Registry::~Registry() {
-  store_.OnOthers(nullptr);
+  barrier_->End();
   {
-    const Locked locked(mutex_);
-    preparer_.Stop(locked);
+    const Locked locked(state_.mutex);
+    state_.preparer.Stop(locked);
   }
-  // The committer's thread applies peer changes to the parts that are destroyed below.
+  // Its thread applies peer changes to the parts that are destroyed below.
   committer_.End();
-  preparer_.End();
+  state_.preparer.End();
   loaders_.reset();
   // Closed sessions may outlive this while they hold hulls.
-  const std::lock_guard lock(mutex_);
-  for (const auto& [id, hull] : catalog_.hulls().entries()) {
+  const std::lock_guard lock(state_.mutex);
+  for (const auto& [id, hull] : state_.catalog.hulls().entries()) {
     if (hull.awake() != nullptr) hull.awake()->account.Close();
   }
 }
 
 absl::Status Registry::Load() {
-  Locked locked(mutex_);
-  catalog_.Begin(store_.revision());
-  feed_.Begin(catalog_.revision());
+  Locked locked(state_.mutex);
+  Catalog& catalog = state_.catalog;
+  catalog.Begin(state_.store.revision());
+  state_.feed.Begin(catalog.revision());
   absl::Status status;
-  if (catalog_.is_cache()) {
-    catalog_.SetTotals(store_.totals());
+  if (catalog.is_cache()) {
+    catalog.SetTotals(state_.store.totals());
   } else {
-    status = store_.ForEachHull([this](const std::string& id, absl::StatusOr<StoredHull> stored) {
-      catalog_.AddStored(id, stored);
-    });
+    status =
+        state_.store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+          catalog.AddStored(id, stored);
+        });
   }
-  if (catalog_.statistics().damaged > 0) {
-    spdlog::error("{} of {} hulls are damaged", catalog_.statistics().damaged,
-                  catalog_.hulls().size());
+  if (catalog.statistics().damaged > 0) {
+    spdlog::error("{} of {} hulls are damaged", catalog.statistics().damaged,
+                  catalog.hulls().size());
   }
-  if (!status.ok()) return status;
-  if (!catalog_.is_cache()) status = bodies_.Load(locked);
-  if (!status.ok() || !store_.is_shared()) return status;
-  // The pages read span more than one revision.
-  const SteadyClock::time_point asked = SteadyClock::now();
-  const absl::Status followed = store_.Follow();
-  takeover_.Take(locked, store_.TakeOthers());
-  if (followed.ok()) committer_.NoteCaughtUp(locked, asked);
-  store_.OnOthers([this] { committer_.FollowSoon(); });
-  return followed;
+  if (status.ok() && !catalog.is_cache()) status = bodies_.Load(locked);
+  if (status.ok()) status = barrier_->Begin(locked, {&changes_, &records_});
+  return status;
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
@@ -121,11 +87,11 @@ absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
 absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
                                         size_t page_size,
                                         const std::function<bool()>& should_stop) {
-  if (catalog_.is_cache()) return lister_.ListHulls(prefix, after, page_size, should_stop);
+  if (state_.catalog.is_cache()) return records_.ListHulls(prefix, after, page_size, should_stop);
   HullPage page;
-  const std::lock_guard lock(mutex_);
-  page.store_revision = catalog_.revision();
-  const HullTable::Entries& all = catalog_.hulls().entries();
+  const std::lock_guard lock(state_.mutex);
+  page.store_revision = state_.catalog.revision();
+  const HullTable::Entries& all = state_.catalog.hulls().entries();
   auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
   for (; next != all.end() && next->first.starts_with(prefix); ++next) {
     if (!next->second.visible()) continue;
@@ -140,19 +106,19 @@ absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::st
 }
 
 HoldStatistics Registry::Holds() const {
-  const std::lock_guard lock(mutex_);
-  return mutex_.Statistics();
+  const std::lock_guard lock(state_.mutex);
+  return state_.mutex.Statistics();
 }
 
 RegistrySizes Registry::Sizes() const {
-  const std::lock_guard lock(mutex_);
-  return catalog_.Sizes();
+  const std::lock_guard lock(state_.mutex);
+  return state_.catalog.Sizes();
 }
 
 CacheStatistics Registry::Cache() const {
-  const std::lock_guard lock(mutex_);
-  const MemoryStatistics memory = memory_.Statistics();
-  CacheStatistics cache = catalog_.statistics();
+  const std::lock_guard lock(state_.mutex);
+  const MemoryStatistics memory = state_.memory.Statistics();
+  CacheStatistics cache = state_.catalog.statistics();
   cache.bytes = memory.bytes;
   cache.reading_bytes = memory.reading;
   cache.writing_bytes = memory.writing;
@@ -162,8 +128,8 @@ CacheStatistics Registry::Cache() const {
 }
 
 absl::Status Registry::CheckMemory(MemoryUse use) {
-  Locked locked(mutex_);
-  return memory_.Check(locked, use);
+  Locked locked(state_.mutex);
+  return state_.memory.Check(locked, use);
 }
 
 }  // namespace hulld::server

@@ -16,7 +16,7 @@ WaitingCalls::Wait::Done WaitingCalls::Wait::Take() {
   return std::exchange(done_, nullptr);
 }
 
-void WaitingCalls::Wait::Tell(const absl::Status& status) {
+void WaitingCalls::Wait::Finish(const absl::Status& status) {
   if (const Done done = Take(); done != nullptr) done(status);
 }
 
@@ -29,7 +29,7 @@ bool WaitingCalls::Wait::EndIfStopped() {
     if (done_ == nullptr) return false;
     if (!Stopped(should_stop_)) return true;
   }
-  Tell(Cancelled());
+  Finish(Cancelled());
   return false;
 }
 
@@ -61,10 +61,10 @@ std::shared_ptr<WaitingCalls::Wait> WaitingCalls::Add(
 bool WaitingCalls::AwaitFresh(Registry& registry, const Freshness& freshness,
                               std::function<bool()> should_stop,
                               std::function<void(const absl::Status&)> done) {
-  if (!registry.store().is_shared()) return false;
+  if (!registry.has_peers()) return false;
   const std::shared_ptr<Wait> wait = Add(std::move(should_stop), std::move(done));
-  const bool asks =
-      registry.StartFresh(freshness, [wait](const absl::Status& status) { wait->Tell(status); });
+  const bool asks = registry.barrier().StartFresh(
+      freshness, [wait](const absl::Status& status) { wait->Finish(status); });
   // If the wait is already over, it was cancelled and `done` was called.
   return asks || !wait->Withdraw();
 }

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_WAITING_CALLS_H_
-#define HULLD_SERVER_COLLISIONS_WAITING_CALLS_H_
+#ifndef HULLD_SERVER_REGISTRY_WAITING_CALLS_H_
+#define HULLD_SERVER_REGISTRY_WAITING_CALLS_H_
 
 #include <absl/status/status.h>
 
@@ -20,11 +20,11 @@ namespace hulld::server {
 // calls; it sleeps while no call waits. Thread-safe.
 class WaitingCalls {
  public:
-  // A waiting call. It is over after Tell or Withdraw; its functions are not called after that.
+  // A waiting call. It is over after Finish or Withdraw; its functions are not called after that.
   class Wait {
    public:
     // Calls `done` unless the wait is over.
-    void Tell(const absl::Status& status);
+    void Finish(const absl::Status& status);
     // Ends the wait without calling `done`. Returns false if it was already over.
     bool Withdraw();
 
@@ -52,7 +52,7 @@ class WaitingCalls {
   // Requires: all waits are over.
   ~WaitingCalls();
 
-  // Calls `done` exactly once: with the status passed to Tell, or with CANCELLED on the polling
+  // Calls `done` exactly once: with the status passed to Finish, or with CANCELLED on the polling
   // thread after should_stop returns true. Cost: some 100 ns.
   std::shared_ptr<Wait> Add(std::function<bool()> should_stop,
                             std::function<void(const absl::Status&)> done);
@@ -80,4 +80,4 @@ class WaitingCalls {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_WAITING_CALLS_H_
+#endif  // HULLD_SERVER_REGISTRY_WAITING_CALLS_H_

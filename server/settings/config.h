@@ -142,7 +142,7 @@ struct Config {
   // clients. A certificate of SEPARATED takes about 50 bytes, one of TOUCHING about 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
-  // The limit of one row among many, which may end up in a nearly full message.
+  // The limit of one row of several, which may be the last row of a nearly full message.
   static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;

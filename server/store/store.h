@@ -16,7 +16,7 @@
 #include "core/hull/hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
-#include "server/store/other_changes.h"
+#include "server/store/peer_feed.h"
 
 namespace hulld::server {
 
@@ -201,29 +201,8 @@ class Store {
   // which the caller removes. FAILED_PRECONDITION: the store is in memory.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
 
-  // True if peer servers may commit to the same store. Then Commit skips the changes of all IDs
-  // that are in the next result of TakeOthers, since they were made from a stale state, and
-  // LoadVertices and LoadSequence return ABORTED for a hull that changed since. Follow fetches the
-  // changes that peers committed before the call. Not concurrent with Commit or Recover.
-  // UNAVAILABLE: the store cannot be reached.
-  virtual bool is_shared() const { return false; }
-  virtual absl::Status Follow() { return absl::OkStatus(); }
-  // Sends the query of the next Follow, which then fetches the changes committed before this call.
-  // Does not block, so any thread may call it. The next call that excludes Follow must
-  // be Follow. If the query cannot be sent, Follow sends it.
-  virtual void StartFollow() {}
-  // Returns the peers' changes that Commit and Follow found since the last call, also if they
-  // failed.
-  virtual OtherChanges TakeOthers() { return {}; }
-  // Returns for each hull the points of its deltas between the two versions, in order; none if the
-  // deltas are gone, for example after a new base, or cannot be read. Sends one query for all
-  // hulls. Not concurrent with Commit, Recover, or Follow.
-  virtual std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
-      std::span<const HullGrowth> hulls) {
-    return std::vector<std::optional<std::vector<Vector>>>(hulls.size());
-  }
-  // Registers a callback that runs, on any thread, soon after a peer committed: a reason to Follow.
-  virtual void OnOthers(std::function<void()> /*others*/) {}
+  // The commits of peer servers; null if no other server can commit to this store.
+  virtual PeerFeed* peers() { return nullptr; }
 
   // Registers a callback that runs, on any thread, when a peer has taken over the store, so that
   // this server can neither commit nor read; immediately if that has happened. The process must end

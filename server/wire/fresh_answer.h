@@ -23,11 +23,12 @@ void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answ
       DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
   if (is_quick) {
-    if (const auto staleness = registry.TryFresh(*freshness)) return call->End(answer(*staleness));
+    if (const auto staleness = registry.barrier().TryFresh(*freshness))
+      return call->End(answer(*staleness));
   }
   call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        registry.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        registry.barrier().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }

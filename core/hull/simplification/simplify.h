@@ -40,11 +40,11 @@ struct SimplifiedHull {
 // that is negative, infinite or NaN, or fewer vertices than needed to preserve the dimension
 // (dimension + 1). CANCELLED: should_stop returned true.
 //
-// Guarantee: never more vertices for an error, nor a larger error for max_vertices, than farthest
-// first. For smooth bodies, farthest first alone needs vertices within a constant factor of the
-// fewest of any method (Kamenev 1992). **Observed** on spheres: less than 1.5 times the fewest
-// (SimplifyQuality). Cost: O((V + n) log n) for n choices of V vertices of round shapes;
-// **observed** two to six times that of farthest first.
+// Guarantee: for a given max_error, at most as many vertices as farthest first needs; for a given
+// max_vertices, at most its error. For smooth bodies, farthest first alone needs vertices within a
+// constant factor of the fewest of any method (Kamenev 1992). **Observed** on spheres: less than
+// 1.5 times the fewest (SimplifyQuality). Cost: O((V + n) log n) for n choices of V vertices of
+// round shapes; **observed** two to six times that of farthest first.
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target);
 
 // Returns a hull that encloses the given one, exactly for the doubles returned. It is the best of

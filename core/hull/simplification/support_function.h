@@ -31,7 +31,7 @@ class SupportFunction {
   // Returns a **proven** bound of the distance of p from the hull; usually within one in 10^9,
   // except that a bound below `enough` is returned at once. Maintains a triangle of vertices, and
   // replaces one of them by the support point toward p while that brings the triangle nearer.
-  // Source: Gilbert, Johnson and Keerthi 1988. Cost: some 5 support points.
+  // Source: Gilbert, Johnson and Keerthi 1988. Cost: about 5 support points.
   double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 
  private:

@@ -69,8 +69,8 @@ struct SceneTotals {
 class SceneSearch {
  public:
   // Both arguments must outlive this object; bodies, if any, are one for each placement. Computes
-  // boxes on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for each
-  // placement. CANCELLED: should_stop returned true. Cost: O(n log n).
+  // boxes on options.threads. INVALID_ARGUMENT: `groups` is not empty and does not have one entry
+  // per placement. CANCELLED: should_stop returned true. Cost: O(n log n).
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
   // Takes precomputed boxes: BoundingBox of each placement.
@@ -167,9 +167,9 @@ inline constexpr size_t kMostEmittedAnswers = 4096;
 // intersecting boxes, and each of these is answered like CheckCollision. Calls `emit` on the
 // calling thread, in ascending order of (a, b); neither the answers nor their order depend on the
 // number of threads. `emit` may block, which holds the search back. At most kMostEmittedAnswers
-// answers are buffered, for any number of collisions. INVALID_ARGUMENT: `groups` is neither empty
-// nor one for each placement. CANCELLED: should_stop returned true; answers emitted before remain
-// valid. Cost: O(n log n) plus the candidates.
+// answers are buffered, for any number of collisions. INVALID_ARGUMENT: `groups` is not empty and
+// does not have one entry per placement. CANCELLED: should_stop returned true; answers emitted
+// before remain valid. Cost: O(n log n) plus the candidates.
 absl::StatusOr<SceneTotals> FindCollisions(
     std::span<const PlacedHull> placements, const SceneOptions& options,
     const std::function<void(std::span<const SceneAnswer>)>& emit);

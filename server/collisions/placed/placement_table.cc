@@ -229,7 +229,7 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
   absl::StatusOr<Resolved> resolved =
-      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::OfWhatIsHere()}),
+      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::AnyStaleness()}),
                     options.should_stop);
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);

@@ -62,20 +62,10 @@ bool IsQuickToRelate(const QueryHull& hull) {
   return hull.point_count() <= kMostPoints;
 }
 
-bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
-                       const PlacedHull& placed_b) {
-  if (options.method != Method::kTextbookSat) return false;
-  const Hull& a = placed_a.hull();
-  const Hull& b = placed_b.hull();
-  // Some 10 ms of a single thread: far longer than a team waits for its slowest thread, and short
-  // enough that other calls do not notice one busy thread of the pool.
-  constexpr double kTeamProjections = 1e7;
-  const auto edges_a = static_cast<double>(a.edges().size());
-  const auto edges_b = static_cast<double>(b.edges().size());
-  // Edges count once more, because a flat difference has an axis for each.
-  const double axes = edges_a * edges_b + edges_a + edges_b +
-                      static_cast<double>(a.facet_count() + b.facet_count());
-  return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;
+bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b) {
+  // Some 400 bytes each.
+  constexpr size_t kMostVertices = 4096;
+  return a.hull().vertices().size() + b.hull().vertices().size() > kMostVertices;
 }
 
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {

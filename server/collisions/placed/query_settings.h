@@ -31,9 +31,9 @@ inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTab
 // response, so that a gRPC thread may compute it.
 bool IsQuickToRelate(const QueryHull& hull);
 
-// True if the textbook's axes of this pair justify a team of threads (Executor); always false for
-// other methods. Requires canonical hulls for the textbook. Cost: O(1).
-bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const PlacedHull& b);
+// True if the textbook keeps so much of the pair between its slices that the readers' share of
+// --memory-limit is checked first. Requires canonical hulls.
+bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b);
 
 // Returns the server's error for an error of a query with these options: RESOURCE_EXHAUSTED names
 // the limit and its flag.

@@ -213,7 +213,7 @@ absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
-  const FoundBodies found = registry_.FindBodies(ids, [this] { return call().ShouldStop(); });
+  const FoundBodies found = registry_.bodies().Find(ids, [this] { return call().ShouldStop(); });
   if (!found.status.ok()) return found.status;
   FollowedPieces::Difference difference;
   for (size_t n = 0; n < hulls.size(); ++n) {

@@ -37,28 +37,29 @@ absl::Status HullHasTheId(const std::string& id) {
 }  // namespace
 
 absl::Status BodyRegistry::Load(Locked& locked) {
-  return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
+  return state_.store.ForEachBody([&](const std::string& id,
+                                      const absl::StatusOr<StoredBody>& stored) {
     // The server never writes two records for one ID. The hull wins: its vertices cannot be
     // restored.
-    if (catalog_.hulls().contains(id)) {
+    if (state_.catalog.hulls().contains(id)) {
       spdlog::error(
           "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of "
           "the two",
           id);
       return;
     }
-    catalog_.AddBody(locked, id, stored);
-    catalog_.NoteBodyFound();
+    state_.catalog.AddBody(locked, id, stored);
+    state_.catalog.NoteBodyFound();
   });
 }
 
 void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
-  const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
-  freshness_.WhenFresh(done, [=, this](Locked& locked) {
+  const auto shared = std::make_shared<Body>(std::move(body), state_.memory, MemoryUse::kWriting);
+  barrier_.WhenFresh(done, [=, this](Locked& locked) {
     // The body is counted by now. A retry after a wait does not count it twice.
-    if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
+    if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) {
       return Answer<PutBodyResult>(locked, done, s);
     }
     PutLocked(locked, shared, if_revision, done);
@@ -67,41 +68,28 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
 
 // OK if the body may be put, also as a replacement.
 absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
-  if (catalog_.hulls().contains(id)) return HullHasTheId(id);
-  const std::shared_ptr<const Body> body = catalog_.FindBody(id);
+  if (state_.catalog.hulls().contains(id)) return HullHasTheId(id);
+  const std::shared_ptr<const Body> body = state_.catalog.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;
   if (if_revision.has_value() && *if_revision != revision) {
     return BodyMismatch(id, revision, *if_revision);
   }
-  return body == nullptr ? catalog_.CheckHullCount() : absl::OkStatus();
+  return body == nullptr ? state_.catalog.CheckHullCount() : absl::OkStatus();
 }
 
 void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
                              std::optional<uint64_t> if_revision,
                              const Reply<PutBodyResult>& done) {
   const std::string& id = body->record().body_id;
-  if (BodyTable::Entry* const entry = catalog_.BodyInFlight(id); entry != nullptr) {
-    entry->waiting.push_back(
-        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
-    return;
-  }
-  if (!catalog_.IsKnown(id)) {
-    return records_.WhenKnown(
-        locked, id, done, [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
-  }
-  const Catalog::HullPointer hull = catalog_.Find(id);
-  if (hull != nullptr && hull->state.changing_life()) {
-    hull->exclusive.push_back(
-        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
-    return;
-  }
+  LockedTask again = [=, this](Locked& later) { PutLocked(later, body, if_revision, done); };
+  if (records_.MustWait(locked, id, RecordReader::For::kLife, done, again)) return;
   if (absl::Status s = CheckPut(id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
-  const bool is_new = !catalog_.bodies().contains(id);
-  const BodyTable::Entry& entry = catalog_.bodies().Add(id);
-  catalog_.hulls().ForgetAbsent(id);
-  if (is_new) catalog_.BeginCreatingBody();
+  const bool is_new = !state_.catalog.bodies().contains(id);
+  const BodyTable::Entry& entry = state_.catalog.bodies().Add(id);
+  state_.catalog.hulls().ForgetAbsent(id);
+  if (is_new) state_.catalog.BeginCreatingBody();
   Change change;
   change.body = body->stored();
   uint64_t& created = change.body->record.create_revision;
@@ -110,46 +98,36 @@ void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
   change.begins = created == 0;
   change.replaces_body = change.begins && !is_new;
   Submit(locked, std::move(change),
-         [=, this](Locked& later, const absl::Status& status, const Change&) {
-           if (is_new) catalog_.EndCreatingBody(status.ok());
-           if (Committer::IsSuperseded(status)) {
-             return later.AfterwardsLocked(
-                 [=, this](Locked& again) { PutLocked(again, body, if_revision, done); });
-           }
-           const BodyRecord& record = body->record();
+         [=, this](Locked& later, const absl::Status& status, const Change& put) {
+           if (is_new) state_.catalog.EndCreatingBody(status.ok());
+           if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
            if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
-           catalog_.bodies().Set(later, record.body_id, body);
+           const BodyRecord& record = body->record();
+           state_.ApplyBody(later, record.body_id, body, put.revision);
            Answer<PutBodyResult>(
                later, done,
-               PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
+               PutBodyResult{state_.catalog.revision(), record, body->pieces().size(), is_new});
          });
 }
 
 void BodyRegistry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
                           Reply<uint64_t> done) {
-  freshness_.WhenFresh(done,
-                       [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
+  barrier_.WhenFresh(done,
+                     [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
 }
 
 void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
                                 std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
-  if (!catalog_.IsKnown(id)) {
-    return records_.WhenKnown(
-        locked, id, done, [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
-  }
-  BodyTable::Entry* const entry = catalog_.bodies().Find(id);
+  LockedTask again = [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); };
+  if (records_.MustWait(locked, id, RecordReader::For::kLife, done, again)) return;
+  BodyTable::Entry* const entry = state_.catalog.bodies().Find(id);
   if (entry == nullptr) {
     const absl::Status missing =
-        catalog_.hulls().contains(id)
+        state_.catalog.hulls().contains(id)
             ? WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
                          v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}})
             : BodyNotFound(id);
     return Answer<uint64_t>(locked, done, missing);
-  }
-  if (entry->in_flight) {
-    entry->waiting.push_back(
-        [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
-    return;
   }
   const std::shared_ptr<const Body> body = entry->committed();
   if (if_revision.has_value() && *if_revision != body->record().revision) {
@@ -160,13 +138,9 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
   change.body = body->stored();
   Submit(locked, std::move(change),
          [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
-           if (Committer::IsSuperseded(status)) {
-             return later.AfterwardsLocked(
-                 [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
-           }
+           if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
            if (!status.ok()) return Answer<uint64_t>(later, done, status);
-           catalog_.NoteBodyEnded();
-           catalog_.bodies().Set(later, id, nullptr);
+           state_.ApplyBody(later, id, nullptr, deletion.revision);
            Answer<uint64_t>(later, done, deletion.revision);
          });
 }
@@ -175,7 +149,7 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
 // resume.
 void BodyRegistry::Submit(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
-  HULLD_CHECK(!std::exchange(catalog_.bodies().Find(id)->in_flight, true));
+  HULLD_CHECK(!std::exchange(state_.catalog.bodies().Find(id)->in_flight, true));
   committer_.Submit(locked, std::move(change),
                     [this, id, finish = std::move(finish)](
                         Locked& later, const absl::Status& status, Change& committed) {
@@ -186,40 +160,30 @@ void BodyRegistry::Submit(Locked& locked, Change change, Committer::Completion f
 void BodyRegistry::Complete(Locked& locked, const std::string& id,
                             const Committer::Completion& finish, const absl::Status& status,
                             Change& change) {
-  const std::shared_ptr<const Body> former = catalog_.FindBody(id);
-  if (status.ok()) catalog_.Publish(change.revision);
-  // For readers that look for a hull with this ID.
-  if (status.ok()) catalog_.recent_changes().Note(id);
   finish(locked, status, change);
-  BodyTable::Entry& entry = *catalog_.bodies().Find(id);
-  if (status.ok() && entry.committed() != nullptr) {
-    const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
-    feed_.NoteBodyPut(locked, before, entry.committed());
-  } else if (status.ok()) {
-    feed_.NoteBodyDeleted(locked, former->record(), change.revision);
-  }
+  BodyTable::Entry& entry = *state_.catalog.bodies().Find(id);
   entry.in_flight = false;
   std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
   // Either a creation was refused, or a deletion was committed.
-  if (entry.committed() == nullptr) catalog_.EraseBody(locked, id);
+  if (entry.committed() == nullptr) state_.catalog.EraseBody(locked, id);
   for (LockedTask& next : waiting) {
     if (Committer::IsSuperseded(status)) {
-      after_others_.Add(std::move(next));
+      barrier_.Defer(std::move(next));
     } else {
       next(locked);
     }
   }
-  catalog_.bodies().DropSome(locked);
+  state_.catalog.bodies().DropSome(locked);
 }
 
 absl::StatusOr<BodyPage> BodyRegistry::List(const std::string& prefix, const std::string& after,
                                             size_t page_size,
                                             const std::function<bool()>& should_stop) {
-  if (catalog_.is_cache()) return lister_.ListBodies(prefix, after, page_size, should_stop);
+  if (state_.catalog.is_cache()) return records_.ListBodies(prefix, after, page_size, should_stop);
   BodyPage page;
-  const std::lock_guard lock(mutex_);
-  page.store_revision = catalog_.revision();
-  const BodyTable::Entries& all = catalog_.bodies().entries();
+  const std::lock_guard lock(state_.mutex);
+  page.store_revision = state_.catalog.revision();
+  const BodyTable::Entries& all = state_.catalog.bodies().entries();
   auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
   for (; next != all.end() && next->first.starts_with(prefix); ++next) {
     const std::shared_ptr<const Body>& body = next->second.committed();
@@ -248,27 +212,27 @@ std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const st
     }
     const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
-      while (found.status.ok() && !catalog_.IsKnown(ids[i])) {
+      while (found.status.ok() && !state_.catalog.IsKnown(ids[i])) {
         if (!may_wait) return std::nullopt;
         found.status = records_.AwaitMissing(locked, ids.subspan(i, end - i), should_stop);
       }
       // A body that could not be read may be known by now.
-      found.bodies[i] = catalog_.FindBody(ids[i]);
+      found.bodies[i] = state_.catalog.FindBody(ids[i]);
       locked.NoteLookup();
     }
   }
-  found.store_revision = catalog_.revision();
+  found.store_revision = state_.catalog.revision();
   return found;
 }
 
 FoundBodies BodyRegistry::Find(std::span<const std::string> ids,
                                const std::function<bool()>& should_stop) {
-  Locked locked(mutex_);
+  Locked locked(state_.mutex);
   return *Find(locked, ids, should_stop, true);
 }
 
 std::optional<FoundBodies> BodyRegistry::TryFind(std::span<const std::string> ids) {
-  Locked locked(mutex_);
+  Locked locked(state_.mutex);
   return Find(locked, ids, {}, false);
 }
 

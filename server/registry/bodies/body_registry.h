@@ -13,17 +13,12 @@
 #include <string>
 
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/catalog.h"
-#include "server/registry/catalog/change_feed.h"
+#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/memory/memory_budget.h"
-#include "server/registry/others/after_others.h"
-#include "server/registry/others/freshness_gate.h"
-#include "server/registry/records/record_lister.h"
+#include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
-#include "server/store/store.h"
 
 namespace hulld::server {
 
@@ -33,43 +28,45 @@ namespace hulld::server {
 // Invariants:
 //   - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
 //     the ID wait in the entry and resume in order after it, or, if a peer server committed first,
-//     after its change is applied (AfterOthers).
+//     after its change is applied
+//     (ReadBarrier::Defer).
 //   - A body becomes visible to all readers atomically after its commit. A refusal leaves the
-//   former
-//     state.
+//     former state.
 //   - A hull and a body never share an ID: a put is refused if a hull has it, and waits if the
 //     creation or end of a hull is in flight.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class BodyRegistry {
  public:
-  // All must outlive this. The mutex is the registry's.
-  BodyRegistry(Store& store, FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
-               Committer& committer, ChangeFeed& feed, AfterOthers& after_others,
-               FreshnessGate& freshness, RecordReader& records, RecordLister& lister)
-      : store_(store),
-        mutex_(mutex),
-        catalog_(catalog),
-        memory_(memory),
-        committer_(committer),
-        feed_(feed),
-        after_others_(after_others),
-        freshness_(freshness),
-        records_(records),
-        lister_(lister) {}
+  // All must outlive this.
+  BodyRegistry(RegistryState& state, Committer& committer, ReadBarrier& barrier,
+               RecordReader& records)
+      : state_(state), committer_(committer), barrier_(barrier), records_(records) {}
   BodyRegistry(const BodyRegistry&) = delete;
   BodyRegistry& operator=(const BodyRegistry&) = delete;
 
   // Loads all bodies of a store that does not find records. Call after loading the hulls.
   absl::Status Load(Locked& locked);
 
-  // As PutBody, DeleteBody, FindBodies, TryFindBodies and ListBodies in Registry.
+  // Creates or replaces a body atomically for all readers, and assigns its revisions. Replies as
+  // above. Requires: valid IDs and poses (not checked), and between one and --max-pieces-per-body
+  // pieces. The hulls of the pieces need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED:
+  // if_revision does not match; RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is
+  // full; UNAVAILABLE: as above.
   void Put(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
+  // Removes a body. Replies with the store's revision, as above.
+  // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
-  FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop);
+  // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
+  // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
+  // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
+  // query per kMostLookupsPerHold; the mutex is released in between.
+  FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop = {});
+  // As Find, but returns nullopt without blocking if the store would have to be read.
   std::optional<FoundBodies> TryFind(std::span<const std::string> ids);
+  // As Registry::List. A page may hold fewer than page_size bodies although more follow.
   absl::StatusOr<BodyPage> List(const std::string& prefix, const std::string& after,
-                                size_t page_size, const std::function<bool()>& should_stop);
+                                size_t page_size, const std::function<bool()>& should_stop = {});
 
  private:
   void PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
@@ -83,16 +80,10 @@ class BodyRegistry {
   std::optional<FoundBodies> Find(Locked& locked, std::span<const std::string> ids,
                                   const std::function<bool()>& should_stop, bool may_wait);
 
-  Store& store_;
-  FairMutex& mutex_;
-  Catalog& catalog_;
-  MemoryBudget& memory_;
+  RegistryState& state_;
   Committer& committer_;
-  ChangeFeed& feed_;
-  AfterOthers& after_others_;
-  FreshnessGate& freshness_;
+  ReadBarrier& barrier_;
   RecordReader& records_;
-  RecordLister& lister_;
 };
 
 }  // namespace hulld::server

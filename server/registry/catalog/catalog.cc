@@ -93,7 +93,7 @@ void Catalog::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
 }
 
 void Catalog::NoteChange(const RegisteredHull& hull) {
-  recent_changes_.Note(hull.committed.record.hull_id);
+  recent_changes_.Note(hull.committed().record.hull_id);
 }
 
 void Catalog::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {

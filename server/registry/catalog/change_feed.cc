@@ -82,19 +82,19 @@ ChangeFeed::~ChangeFeed() {
 void ChangeFeed::Begin(uint64_t revision) { revision_ = deletions_begin_ = revision; }
 
 void ChangeFeed::NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  const HullRecord& record = hull->committed.record;
+  const HullRecord& record = hull->committed().record;
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kBegan, false, hull});
 }
 
 void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  const HullRecord& record = hull->committed.record;
+  const HullRecord& record = hull->committed().record;
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kChanged, false, hull});
 }
 
 void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  const HullRecord& record = hull->committed.record;
+  const HullRecord& record = hull->committed().record;
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kReplaced, false, hull});
 }
@@ -132,7 +132,7 @@ void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
 
 void ChangeFeed::NoteBecameHull(Locked& locked, const BodyRecord& former,
                                 const std::shared_ptr<RegisteredHull>& hull) {
-  const HullRecord& record = hull->committed.record;
+  const HullRecord& record = hull->committed().record;
   RememberDeletion(record.hull_id, {record.revision, former.create_revision, Life::kEnded, true});
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr,

@@ -33,7 +33,7 @@ bool HullTable::Entry::visible() const {
 }
 
 uint64_t HullTable::Entry::revision() const {
-  return awake_ == nullptr ? resting_.revision : awake_->committed.record.revision;
+  return awake_ == nullptr ? resting_.revision : awake_->committed().record.revision;
 }
 
 HullChange HullTable::Entry::Describe(const std::string& id) const {
@@ -68,9 +68,7 @@ std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
     const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
     entry.awake_ =
         std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
-    entry.awake_->has_box = resting.has_box;
-    entry.awake_->low = resting.low;
-    entry.awake_->high = resting.high;
+    if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
   }
   return entry.awake_;
 }
@@ -107,11 +105,11 @@ HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullSta
 }
 
 void HullTable::Insert(const HullPointer& hull) {
-  Add(hull->committed.record.hull_id).awake_ = hull;
+  Add(hull->committed().record.hull_id).awake_ = hull;
 }
 
 void HullTable::Erase(const HullPointer& hull) {
-  const auto found = entries_.find(hull->committed.record.hull_id);
+  const auto found = entries_.find(hull->committed().record.hull_id);
   HULLD_CHECK(found != entries_.end() && found->second.awake_ == hull);
   --size_;
   if (!is_cache()) {
@@ -124,11 +122,7 @@ void HullTable::Erase(const HullPointer& hull) {
 
 // True if the record alone can restore the hull.
 bool HullTable::IsUnused(const HullPointer& hull) const {
-  const RegisteredHull& h = *hull;
-  return hull.use_count() == 1 && h.state.life() == HullState::Life::kPresent && h.state.quiet() &&
-         !h.state.damaged() && h.live == nullptr && h.builder == nullptr &&
-         h.canonical == nullptr && !h.loading && !h.preparing && h.writers.empty() &&
-         h.sequence_readers == 0 && h.watches.empty() && h.chunks.empty() && h.exclusive.empty();
+  return hull.use_count() == 1 && hull->IsAtRest();
 }
 
 void HullTable::RestSome() {
@@ -143,10 +137,11 @@ void HullTable::RestSome() {
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
       if (!IsUnused(entry.awake_)) continue;
-      RestingHull resting(entry.awake_->committed);
-      resting.has_box = entry.awake_->has_box;
-      resting.low = entry.awake_->low;
-      resting.high = entry.awake_->high;
+      RestingHull resting(entry.awake_->committed());
+      const HullChange described = entry.awake_->Describe();
+      resting.has_box = described.has_box;
+      resting.low = described.low;
+      resting.high = described.high;
       entry.resting_ = resting;
       entry.awake_ = nullptr;
     }

@@ -20,7 +20,7 @@
 
 namespace hulld::server {
 
-struct RegisteredHull;
+class RegisteredHull;
 
 // Recent changes of what readers see of hulls, in order, each stored as a hash of the hull's ID.
 // Not thread-safe.

@@ -13,117 +13,68 @@ namespace hulld::server {
 RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                                MemoryBudget& budget)
     : state(initial),
-      readable_from_store(readable),
-      committed(stored),
-      head(stored),
-      account(budget, [this](Locked& locked) { DropUnused(locked); }) {}
-
-void RegisteredHull::DiscardBuilder(Locked& locked) {
-  builder_lacks = {};
-  if (builder == nullptr) return;
-  locked.Discard(std::move(builder));
-  builder_bytes = 0;
-}
-
-uint64_t RegisteredHull::HeadSequence(const std::string& writer_id) const {
-  const auto writer = writers.find(writer_id);
-  return writer == writers.end() ? 0 : writer->second.head;
-}
-
-void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
-  HULLD_CHECK(live == nullptr && served == nullptr && builder == nullptr);
-  live = std::move(points);
-  committed_mark = live->Now();
-  live_is_ahead = false;
-  points_since_prepared = 0;
-  KeepBox();
-}
-
-// Records the bounding box at the mark, if it has one.
-void RegisteredHull::KeepBox() {
-  if (committed_mark.low()[0] > committed_mark.high()[0]) return;
-  has_box = true;
-  low = committed_mark.low();
-  high = committed_mark.high();
+      readable_from_store_(readable),
+      account(budget, [this](Locked& locked) { DropUnused(locked); }) {
+  committed_.stored = in_flight_.head = stored;
 }
 
 HullChange RegisteredHull::Describe() const {
   HullChange change;
-  change.record = committed.record;
+  change.record = committed().record;
   change.damaged = state.damaged();
-  change.has_box = has_box && !change.damaged;
-  change.low = low;
-  change.high = high;
+  change.has_box = committed_.has_box && !change.damaged;
+  change.low = committed_.low;
+  change.high = committed_.high;
   return change;
 }
 
-bool RegisteredHull::HoldsMuchElse() const {
-  constexpr uint64_t kFewPoints = 1 << 14;
-  return points_since_prepared > 2 * committed.record.vertex_count + kFewPoints;
+void RegisteredHull::SetStored(const StoredHull& stored) {
+  HULLD_CHECK(committed().record.revision == 0);
+  committed_.stored = in_flight_.head = stored;
+}
+
+void RegisteredHull::SetBox(const Vector& low, const Vector& high) {
+  committed_.has_box = true;
+  committed_.low = low;
+  committed_.high = high;
+}
+
+// Records the bounding box at the mark, if it has one.
+void RegisteredHull::KeepBox() {
+  const LiveHull::Mark& mark = committed_.mark;
+  if (mark.low()[0] <= mark.high()[0]) SetBox(mark.low(), mark.high());
 }
 
 // The old mark may hold the last reference to a previous preparation.
 void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
-  locked.Afterwards([before = std::exchange(committed_mark, mark)] {});
+  locked.Afterwards([before = std::exchange(committed_.mark, mark)] {});
   KeepBox();
 }
 
-std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
-  if (committed.record.vertex_count == 0) return EmptyServedHull();
-  if (live == nullptr) return nullptr;
-  if (served == nullptr) {
-    if (canonical == nullptr) {
-      canonical =
-          std::make_shared<CanonicalHull>(std::make_shared<MemoryPart>(account.budget(), nullptr));
-    }
-    served = std::make_shared<const ServedHull>(
-        live->VersionAt(committed_mark), committed_mark.low(), committed_mark.high(), canonical);
+void RegisteredHull::Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
+                            const WriterSequence& writer, uint64_t points) {
+  const bool is_changed = stored.record.revision != committed().record.revision;
+  committed_.stored = stored;
+  *in_flight_.revisions = RevisionsOf(stored);
+  SetRevisions(*in_flight_.revisions, &in_flight_.head);
+  SetCommittedMark(locked, mark);
+  if (is_changed) {
+    DiscardServed(locked);
+    DiscardCanonical(locked);
   }
-  std::shared_ptr<const Reading> reading = read_.lock();
-  if (reading == nullptr) {
-    CountParts();
-    reading = std::make_shared<const Reading>(account.parts(), served);
-    read_ = reading;
-  }
-  const ServedHull* const shown = reading->served.get();
-  return {std::move(reading), shown};
-}
-
-void RegisteredHull::DiscardServed(Locked& locked) {
-  read_.reset();
-  locked.Discard(std::exchange(served, nullptr));
-}
-
-void RegisteredHull::RevertLive(Locked& locked) {
-  if (!std::exchange(live_is_ahead, false)) return;
-  HULLD_CHECK(live != nullptr);
-  // A thread that builds on refused points keeps the former LiveHull, now as its only owner.
-  auto reverted = std::make_shared<LiveHull>(*live, committed_mark);
-  locked.Discard(std::exchange(live, std::move(reverted)));
-  DiscardServed(locked);
-}
-
-void RegisteredHull::DiscardAll(Locked& locked) {
-  DiscardBuilder(locked);
-  DiscardServed(locked);
-  locked.Discard(std::exchange(canonical, nullptr));
-  locked.Discard(std::exchange(live, nullptr));
-  live_is_ahead = false;
-  SetCommittedMark(locked, {});
-}
-
-void RegisteredHull::Requeue(PendingChunk chunk) {
-  const auto next = std::ranges::find_if(
-      chunks, [&](const PendingChunk& each) { return each.place > chunk.place; });
-  chunks.insert(next, std::move(chunk));
+  Sequences& sequences = in_flight_.writers[writer.writer_id];
+  HULLD_CHECK(writer.sequence == sequences.committed + 1 && writer.sequence <= sequences.head);
+  sequences.committed = writer.sequence;
+  served_.points_since_prepared += points;
+  NoteUse();
 }
 
 // Growth in dimension moves all points, so it does not qualify.
 bool RegisteredHull::GrewInto(const StoredHull& stored) const {
   const HullRecord& now = stored.record;
-  const HullRecord& before = committed.record;
-  const VertexLayout& layout = committed.layout;
-  return live != nullptr && state.visible() && !state.damaged() &&
+  const HullRecord& before = committed().record;
+  const VertexLayout& layout = committed().layout;
+  return live() != nullptr && state.visible() && !state.damaged() &&
          now.create_revision == before.create_revision && now.dimension == before.dimension &&
          now.revision > before.revision && stored.layout.base_revision == layout.base_revision &&
          stored.layout.delta_count > layout.delta_count &&
@@ -135,18 +86,18 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
                                const std::vector<Vector>* growth) {
   state.Supersede();
   RevertLive(locked);
-  const bool is_same = stored.record.revision == committed.record.revision;
-  const bool grows = !is_same && growth != nullptr && live != nullptr;
-  const bool is_built_here = builder != nullptr;
+  const bool is_same = stored.record.revision == committed().record.revision;
+  const bool grows = !is_same && growth != nullptr && live() != nullptr;
+  const bool is_built_here = builder() != nullptr;
   if (grows) {
     Grow(locked, *growth, stored.record.dimension);
   } else if (!is_same) {
     DiscardAll(locked);
-    has_box = false;
+    committed_.has_box = false;
   }
-  committed = head = stored;
-  writers.clear();
-  ++supersessions;
+  committed_.stored = in_flight_.head = stored;
+  in_flight_.writers.clear();
+  ++committed_.supersessions;
   // No local caller requested the points of a peer server: they are no reason to keep the hull in
   // memory, unless it is also appended to here.
   if (grows && !is_built_here) {
@@ -160,28 +111,184 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
 // Readers keep their versions. A building thread owns the builder and, because `live` was reverted,
 // a LiveHull other than this one.
 void RegisteredHull::Grow(Locked& locked, const std::vector<Vector>& points, int dimension) {
-  SetCommittedMark(locked, live->Append(points, dimension));
+  SetCommittedMark(locked, live()->Append(points, dimension));
   DiscardServed(locked);
-  locked.Discard(std::exchange(canonical, nullptr));
-  points_since_prepared += points.size();
-  if (builder == nullptr) return;
-  builder_lacks.insert(builder_lacks.end(), points.begin(), points.end());
-  if (builder_lacks.size() > kMostGrowth) DiscardBuilder(locked);
+  DiscardCanonical(locked);
+  served_.points_since_prepared += points.size();
+  if (builder() == nullptr) return;
+  std::vector<Vector>& backlog = in_flight_.backlog;
+  backlog.insert(backlog.end(), points.begin(), points.end());
+  if (backlog.size() > kMostGrowth) DiscardBuilder(locked);
+}
+
+void RegisteredHull::Vanish() {
+  state.Vanish();
+  ++committed_.supersessions;
+}
+
+uint64_t RegisteredHull::HeadSequence(const std::string& writer_id) const {
+  const auto writer = in_flight_.writers.find(writer_id);
+  return writer == in_flight_.writers.end() ? 0 : writer->second.head;
+}
+
+std::optional<uint64_t> RegisteredHull::CommittedSequence(const std::string& writer_id) const {
+  const auto writer = in_flight_.writers.find(writer_id);
+  if (writer == in_flight_.writers.end()) return std::nullopt;
+  return writer->second.committed;
+}
+
+void RegisteredHull::KeepSequence(const std::string& writer_id, uint64_t sequence) {
+  in_flight_.writers.emplace(writer_id, Sequences{sequence, sequence});
+}
+
+void RegisteredHull::DropUnusedWriters() {
+  const bool unused =
+      watches.empty() && state.quiet() && chunks.empty() && in_flight_.sequence_readers == 0;
+  if (unused && readable_from_store_) in_flight_.writers.clear();
+}
+
+void RegisteredHull::SetBuilder(std::unique_ptr<HullBuilder> builder) {
+  in_flight_.builder_bytes = builder->MemoryBytes();
+  in_flight_.builder = std::move(builder);
+}
+
+LentBuilder RegisteredHull::LendBuilder() {
+  in_flight_.live_is_ahead = true;
+  HULLD_CHECK(builder() != nullptr || state.in_flight() == 0);
+  return {std::move(in_flight_.builder), std::exchange(in_flight_.backlog, {}), committed_.mark};
+}
+
+void RegisteredHull::ReturnBuilder(std::unique_ptr<HullBuilder> builder, uint64_t bytes) {
+  in_flight_.builder = std::move(builder);
+  in_flight_.builder_bytes = bytes;
+}
+
+void RegisteredHull::DiscardBuilder(Locked& locked) {
+  in_flight_.backlog = {};
+  if (builder() == nullptr) return;
+  locked.Discard(std::move(in_flight_.builder));
+  in_flight_.builder_bytes = 0;
+}
+
+void RegisteredHull::AddToHead(const PointCounts& added, const WriterSequence& writer,
+                               Change* change) {
+  if (state.in_flight() == 0) {
+    in_flight_.revisions = std::make_shared<HullRevisions>(RevisionsOf(committed()));
+  }
+  HullRecord& record = change->hull.record;
+  record.counts += added;
+  change->before = in_flight_.revisions;
+  change->takes_revision = added.outside > 0;
+  if (change->takes_revision) {
+    record.vertex_count = builder()->vertex_count();
+    record.dimension = builder()->dimension();
+    VertexLayout& layout = change->hull.layout;
+    if (change->vertex_change == VertexChange::kReplaced) {
+      layout = {.base_vertices = record.vertex_count};
+    } else if (change->vertex_change == VertexChange::kAdded) {
+      ++layout.delta_count;
+      layout.delta_vertices += change->vertices.size();
+    }
+  }
+  Sequences& sequences = in_flight_.writers[writer.writer_id];
+  if (sequences.head == 0) ++change->hull.writer_count;
+  sequences.head = writer.sequence;
+  change->writer = writer;
+  in_flight_.head = change->hull;
+}
+
+void RegisteredHull::Revert(Locked& locked) {
+  in_flight_.head = committed();
+  for (auto& [writer_id, sequences] : in_flight_.writers) sequences.head = sequences.committed;
+  DiscardBuilder(locked);
+  RevertLive(locked);
+  NoteUse();
+}
+
+void RegisteredHull::RevertLive(Locked& locked) {
+  if (!std::exchange(in_flight_.live_is_ahead, false)) return;
+  HULLD_CHECK(live() != nullptr);
+  // A thread that builds on refused points keeps the former LiveHull, now as its only owner.
+  auto reverted = std::make_shared<LiveHull>(*live(), committed_.mark);
+  locked.Discard(std::exchange(served_.live, std::move(reverted)));
+  DiscardServed(locked);
+}
+
+void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
+  HULLD_CHECK(live() == nullptr && served_.version == nullptr && builder() == nullptr);
+  served_.live = std::move(points);
+  committed_.mark = live()->Now();
+  in_flight_.live_is_ahead = false;
+  ResetWear();
+  KeepBox();
+}
+
+std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
+  if (committed().record.vertex_count == 0) return EmptyServedHull();
+  if (live() == nullptr) return nullptr;
+  if (served_.version == nullptr) {
+    if (served_.canonical == nullptr) {
+      served_.canonical =
+          std::make_shared<CanonicalHull>(std::make_shared<MemoryPart>(account.budget(), nullptr));
+    }
+    const LiveHull::Mark& mark = committed_.mark;
+    served_.version = std::make_shared<const ServedHull>(live()->VersionAt(mark), mark.low(),
+                                                         mark.high(), served_.canonical);
+  }
+  std::shared_ptr<const Reading> reading = served_.readers.lock();
+  if (reading == nullptr) {
+    CountParts();
+    reading = std::make_shared<const Reading>(account.parts(), served_.version);
+    served_.readers = reading;
+  }
+  const ServedHull* const shown = reading->served.get();
+  return {std::move(reading), shown};
+}
+
+uint64_t RegisteredHull::SharedBytes() const {
+  return (live() == nullptr ? 0 : live()->MemoryBytes()) +
+         (served_.canonical == nullptr ? 0 : served_.canonical->MemoryBytes());
+}
+
+void RegisteredHull::EndLoading() {
+  served_.is_loading = false;
+  changed.notify_all();
+}
+
+void RegisteredHull::NotePrepared(Locked& locked) {
+  // Nothing was appended since: the new mark releases the previous preparation.
+  if (state.quiet() && !state.damaged()) SetCommittedMark(locked, live()->Now());
+  DiscardServed(locked);
+  NoteUse();
+}
+
+bool RegisteredHull::IsWorn() const {
+  constexpr uint64_t kFewPoints = 1 << 14;
+  return served_.points_since_prepared > 2 * committed().record.vertex_count + kFewPoints;
+}
+
+void RegisteredHull::DiscardServed(Locked& locked) {
+  served_.readers.reset();
+  locked.Discard(std::exchange(served_.version, nullptr));
+}
+
+void RegisteredHull::DiscardCanonical(Locked& locked) {
+  locked.Discard(std::exchange(served_.canonical, nullptr));
 }
 
 void RegisteredHull::NoteUse() {
   CountParts();
-  const bool is_for_writing = !readable_from_store || !state.quiet() || !chunks.empty();
-  account.Set(builder_bytes + builder_lacks.capacity() * sizeof(Vector) +
-                  (live == nullptr ? 0 : LiveHull::OwnBytes()),
+  const bool is_for_writing = !readable_from_store_ || !state.quiet() || !chunks.empty();
+  account.Set(in_flight_.builder_bytes + in_flight_.backlog.capacity() * sizeof(Vector) +
+                  (live() == nullptr ? 0 : LiveHull::OwnBytes()),
               is_for_writing);
 }
 
 // A part at a repeated address reuses free memory: the former part had no holder.
 void RegisteredHull::CountParts() {
   std::vector<std::shared_ptr<MemoryPart>> parts;
-  if (live != nullptr) {
-    for (const LiveHull::Shared& shared : live->SharedBy(committed_mark)) {
+  if (live() != nullptr) {
+    for (const LiveHull::Shared& shared : live()->SharedBy(committed_.mark)) {
       const auto known = std::ranges::find(account.parts(), shared.what, &MemoryPart::what);
       parts.push_back(known != account.parts().end()
                           ? *known
@@ -189,28 +296,45 @@ void RegisteredHull::CountParts() {
       parts.back()->SetBytes(shared.bytes);
     }
   }
-  if (canonical != nullptr) parts.push_back(canonical->part());
+  if (served_.canonical != nullptr) parts.push_back(served_.canonical->part());
   account.Hold(std::move(parts));
 }
 
-uint64_t RegisteredHull::SharedBytes() const {
-  return (live == nullptr ? 0 : live->MemoryBytes()) +
-         (canonical == nullptr ? 0 : canonical->MemoryBytes());
+bool RegisteredHull::IsAtRest() const {
+  return state.life() == HullState::Life::kPresent && state.quiet() && !state.damaged() &&
+         live() == nullptr && builder() == nullptr && served_.canonical == nullptr &&
+         !is_loading() && !is_preparing() && in_flight_.writers.empty() &&
+         in_flight_.sequence_readers == 0 && watches.empty() && chunks.empty() && exclusive.empty();
+}
+
+void RegisteredHull::DiscardAll(Locked& locked) {
+  DiscardBuilder(locked);
+  DiscardServed(locked);
+  DiscardCanonical(locked);
+  locked.Discard(std::exchange(served_.live, nullptr));
+  in_flight_.live_is_ahead = false;
+  SetCommittedMark(locked, {});
 }
 
 void RegisteredHull::DropUnused(Locked& locked) {
   if (state.quiet() && chunks.empty()) {
     // Memory referenced by a reader would not be freed, and the next reader would duplicate it.
     const bool is_read = IsRead();
-    if (readable_from_store) {
+    if (readable_from_store_) {
       DiscardBuilder(locked);
       if (!is_read) DiscardAll(locked);
     } else if (!is_read) {
       DiscardServed(locked);
-      locked.Discard(std::exchange(canonical, nullptr));
+      DiscardCanonical(locked);
     }
   }
   NoteUse();
+}
+
+void RegisteredHull::Requeue(PendingChunk chunk) {
+  const auto next = std::ranges::find_if(
+      chunks, [&](const PendingChunk& each) { return each.place > chunk.place; });
+  chunks.insert(next, std::move(chunk));
 }
 
 const std::shared_ptr<const ServedHull>& EmptyServedHull() {

@@ -9,12 +9,12 @@
 #include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "core/base/check.h"
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
@@ -24,6 +24,7 @@
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
 #include "server/store/hull_record.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 
@@ -40,20 +41,25 @@ struct PendingChunk {
   uint64_t place = 0;
 };
 
+// A builder lent to the thread that builds a chunk.
+struct LentBuilder {
+  // Null: it must be built from the points at `committed`.
+  std::unique_ptr<HullBuilder> builder;
+  // Committed points of peer servers that are missing from `builder`.
+  std::vector<Vector> backlog;
+  LiveHull::Mark committed;
+};
+
 // One incarnation of a hull, guarded by the registry's mutex. The thread that HullState makes its
 // owner uses the builder without the mutex, and appends to the thread-safe LiveHull while other
 // threads prepare it.
 //
-// The vertices are in `live` while needed, and are otherwise read from the store. Without `live`,
-// there is no builder and no change in flight.
-struct RegisteredHull {
-  // Last sequences of a writer.
-  struct Sequences {
-    uint64_t committed = 0;
-    // Includes the chunks in flight.
-    uint64_t head = 0;
-  };
-
+// Its data is in three groups. *Committed*: the stored state, changed only by SetStored, Commit,
+// and Supersede. *In flight*: the state with all changes in flight, and the builder; Revert returns
+// it to the committed state. *Served*: the vertices, shared with readers; in memory while needed,
+// and otherwise read from the store. Without vertices there is no builder and no change in flight.
+class RegisteredHull {
+ public:
   // Maximum number of a peer server's points that are added to a hull in memory: some 100 us. With
   // more, the hull is reloaded at its next use, and its builder is rebuilt.
   static constexpr uint64_t kMostGrowth = 1 << 12;
@@ -62,115 +68,132 @@ struct RegisteredHull {
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
 
+  // ---- Committed ----
+
+  const StoredHull& committed() const { return committed_.stored; }
+  // Committed prefix of live().
+  const LiveHull::Mark& committed_mark() const { return committed_.mark; }
+  // Number of changes by peer servers; detects stale reads from the store.
+  uint64_t supersessions() const { return committed_.supersessions; }
+  // Describes the committed hull for watches. The bounding box survives eviction of the points.
+  HullChange Describe() const;
+
   // Sets the stored state after the hull's first change. Requires: none was set before.
-  void SetStored(const StoredHull& stored) {
-    HULLD_CHECK(committed.record.revision == 0);
-    committed = head = stored;
-  }
-  // True if most points of `live` are no longer vertices. Preparing drops them, which bounds memory
-  // when points swallow each other and no reader asks. It costs a fraction of appending those
-  // points.
-  bool HoldsMuchElse() const;
-  // Updates the memory account and the time of last use. Cost: O(log n).
-  void NoteUse();
+  void SetStored(const StoredHull& stored);
+  // Restores the bounding box of a hull that was at rest.
+  void SetBox(const Vector& low, const Vector& high);
+  // Commits the oldest chunk in flight, of `points` new vertices. mark: the prefix of live() with
+  // it.
+  void Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
+              const WriterSequence& writer, uint64_t points);
+  // True if a peer server's `stored` is the committed hull plus a few points, all of them in
+  // deltas, so that adding them to live() costs less than reloading the hull.
+  bool GrewInto(const StoredHull& stored) const;
+  // Applies a peer server's `stored` to the committed hull. growth: null, or the added points if
+  // GrewInto is true; they are added to live() if it exists. Without growth, changed vertices are
+  // dropped from memory. Requires: nothing is in flight. Returns true if the points were added.
+  bool Supersede(Locked& locked, const StoredHull& stored, const std::vector<Vector>* growth);
+  // A peer server ended the hull. Requires: nothing is in flight.
+  void Vanish();
+
+  // ---- In flight ----
+
+  // State including changes in flight. Their revisions are unknown, so it has the committed ones.
+  const StoredHull& head() const { return in_flight_.head; }
+  // Last sequence of a writer, including chunks in flight; 0 if it is not in memory.
+  uint64_t HeadSequence(const std::string& writer_id) const;
+  // Last committed sequence of a writer; nullopt if it must be read from the store.
+  std::optional<uint64_t> CommittedSequence(const std::string& writer_id) const;
+  // Bracket a read of a writer's sequence from the store without the mutex. Commits during the read
+  // are newer, so the sequences in memory are kept.
+  void StartReadingSequence() { ++in_flight_.sequence_readers; }
+  void EndReadingSequence() { --in_flight_.sequence_readers; }
+  // Keeps a sequence that was read from the store. Requires: none is in memory.
+  void KeepSequence(const std::string& writer_id, uint64_t sequence);
+  // Drops the sequences of writers, which the store can restore, if nothing depends on them.
+  void DropUnusedWriters();
+
+  // Sets the builder of a hull that is not committed yet.
+  void SetBuilder(std::unique_ptr<HullBuilder> builder);
+  // Lends the builder to a thread that may append to live() until it returns it. bytes: memory of
+  // the returned builder.
+  LentBuilder LendBuilder();
+  void ReturnBuilder(std::unique_ptr<HullBuilder> builder, uint64_t bytes);
+  const HullBuilder* builder() const { return in_flight_.builder.get(); }
+  const std::vector<Vector>& builder_backlog() const { return in_flight_.backlog; }
   // Drops the builder unless a thread owns it.
   void DiscardBuilder(Locked& locked);
+  // Adds a built chunk to the head, and completes its change. added: counts of its points.
+  void AddToHead(const PointCounts& added, const WriterSequence& writer, Change* change);
+  // Returns to the committed state after a chunk in flight, and with it all later ones, was
+  // refused. The first refusal reverts; the later ones find it done. A thread building on refused
+  // chunks drops the builder itself (kReverting).
+  void Revert(Locked& locked);
+
+  // ---- Served ----
+
+  // Points of the hull in order of arrival, including those of changes in flight and of the chunk
+  // being built; null if they are not in memory.
+  const std::shared_ptr<LiveHull>& live() const { return served_.live; }
   // Sets the points of the committed hull. Requires: nothing is in flight.
   void SetLive(std::shared_ptr<LiveHull> points);
-  // Marks `live` as committed up to `mark`.
-  void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
   // True if Serve returns a version; false if the points must be read from the store first.
-  bool IsReady() const { return committed.record.vertex_count == 0 || live != nullptr; }
+  bool IsReady() const { return committed().record.vertex_count == 0 || live() != nullptr; }
   // Returns the committed version for readers; null if it must be read from the store first. It
   // counts as held for readers until the last of them releases it, even if the hull ends first.
   // Cost: O(log n) for the first reader, O(1) for later ones.
   std::shared_ptr<const ServedHull> Serve();
-  // True if a reader holds a reference.
-  bool IsRead() const { return !read_.expired() || live.use_count() > 1; }
   // Approximate bytes that the current version shares with readers.
   uint64_t SharedBytes() const;
-  // Drops the served version; the next reader rebuilds it. Keeps the canonical snapshot.
-  void DiscardServed(Locked& locked);
-  // Drops the points beyond the committed mark after their refusal.
-  void RevertLive(Locked& locked);
+  // A reader reads the points from the store. EndLoading notifies `changed`.
+  bool is_loading() const { return served_.is_loading; }
+  void StartLoading() { served_.is_loading = true; }
+  void EndLoading();
+  // A thread prepares live(), or is about to.
+  bool is_preparing() const { return served_.is_preparing; }
+  void SetPreparing(bool prepares) { served_.is_preparing = prepares; }
+  // Preparing starts with all points committed so far.
+  void ResetWear() { served_.points_since_prepared = 0; }
+  // live() was prepared: the next reader gets a new version.
+  void NotePrepared(Locked& locked);
+  // True if most points of live() are no longer vertices. Preparing drops them, which bounds memory
+  // when points swallow each other and no reader asks. It costs a fraction of appending those
+  // points.
+  bool IsWorn() const;
+  uint64_t points_since_prepared() const { return served_.points_since_prepared; }
+
+  // ---- Memory, sessions, and waiting tasks ----
+
+  // Updates the memory account and the time of last use. Cost: O(log n).
+  void NoteUse();
+  // True if the stored record alone can restore the hull.
+  bool IsAtRest() const;
+  // Drops all memory of a hull that is gone.
+  void DiscardAll(Locked& locked);
   // Returns a chunk to the queue, before all later chunks.
   void Requeue(PendingChunk chunk);
   // True if an earlier chunk than this one, which is not queued, is queued.
   bool IsQueuedBefore(const PendingChunk& chunk) const {
     return !chunks.empty() && chunks.front().place < chunk.place;
   }
-  // Drops all memory of a hull that is gone.
-  void DiscardAll(Locked& locked);
-  // True if a peer server's `stored` is the committed hull plus a few points, all of them in
-  // deltas, so that adding them to `live` costs less than reloading the hull.
-  bool GrewInto(const StoredHull& stored) const;
-  // Applies a peer server's `stored` to the committed hull. growth: null, or the added points if
-  // GrewInto is true; they are added to `live` if it exists. Without growth, changed vertices are
-  // dropped from memory. Requires: nothing is in flight. Returns true if the points were added.
-  bool Supersede(Locked& locked, const StoredHull& stored, const std::vector<Vector>* growth);
-  // Describes the committed hull for watches.
-  HullChange Describe() const;
-  // Returns the last sequence of a writer, including chunks in flight; 0 if it is not in `writers`.
-  uint64_t HeadSequence(const std::string& writer_id) const;
 
   HullState state;
-  const bool readable_from_store;
-  StoredHull committed;
-  // State including changes in flight. Their revisions are unknown, so it has those of `committed`.
-  StoredHull head;
-  // Revisions of `committed` while chunks are in flight; each chunk builds on them after its
-  // predecessors commit. Written only by the completions of the chunks.
-  std::shared_ptr<HullRevisions> revisions;
-  // Points of the hull in order of arrival, including those of changes in flight and of the chunk
-  // being built.
-  std::shared_ptr<LiveHull> live;
-  // Committed prefix of `live`.
-  LiveHull::Mark committed_mark;
-  // Bounding box of the committed hull; survives eviction of `live`.
-  bool has_box = false;
-  Vector low;
-  Vector high;
-  // `live` may hold uncommitted points.
-  bool live_is_ahead = false;
-  // A reader is reading the points from the store.
-  bool loading = false;
-  // A thread prepares `live`, or is about to.
-  bool preparing = false;
-  // Points committed since the last preparation, or since `live` was made.
-  uint64_t points_since_prepared = 0;
-  // Version of `live` at committed_mark; null until the first read after a change.
-  std::shared_ptr<const ServedHull> served;
-  // Canonical snapshot, shared by all served versions of committed.record.revision.
-  std::shared_ptr<CanonicalHull> canonical;
-  // Writers in use; the store holds the rest.
-  std::unordered_map<std::string, Sequences> writers;
-  // Number of threads reading a writer's sequence from the store without the mutex. Commits during
-  // the read are newer, so `writers` keeps them.
-  int sequence_readers = 0;
-  // Number of changes by peer servers; detects stale reads from the store.
-  uint64_t supersessions = 0;
-  // One per open session.
-  std::map<uint64_t, std::function<void(const absl::Status&)>> watches;
-
-  // Hull including the changes in flight; null if it must be rebuilt from the points of `live`, or
-  // if a thread owns it.
-  std::unique_ptr<HullBuilder> builder;
-  // Bytes held by the builder, including while a thread owns it.
-  uint64_t builder_bytes = 0;
-  // Committed points of peer servers that are missing from `builder`; the next chunk adds them
-  // first. Empty without `builder`.
-  std::vector<Vector> builder_lacks;
   // Notified of each transition of `state`, and when points were read from the store.
   ConditionVariable changed;
+  // Callback of each open session.
+  std::map<uint64_t, std::function<void(const absl::Status&)>> watches;
   std::list<PendingChunk> chunks;
   uint64_t last_place = 0;
   // Tasks that wait until the hull is quiet; they precede `chunks`.
   std::list<std::function<void(Locked&)>> exclusive;
 
-  // Last member, so that it closes before anything that it counts is destroyed.
-  MemoryBudget::Account account;
-
  private:
+  // Last sequences of a writer.
+  struct Sequences {
+    uint64_t committed = 0;
+    // Includes the chunks in flight.
+    uint64_t head = 0;
+  };
   // A served version while a reader holds it. Its memory counts until it is freed.
   struct Reading {
     Reading(std::vector<std::shared_ptr<MemoryPart>> parts,
@@ -180,15 +203,69 @@ struct RegisteredHull {
     const std::shared_ptr<const ServedHull> served;
   };
 
+  struct Committed {
+    StoredHull stored;
+    LiveHull::Mark mark;
+    bool has_box = false;
+    Vector low;
+    Vector high;
+    uint64_t supersessions = 0;
+  };
+  struct InFlight {
+    StoredHull head;
+    // Revisions of the committed hull while chunks are in flight; each chunk builds on them after
+    // its predecessors commit. Written only by the completions of the chunks.
+    std::shared_ptr<HullRevisions> revisions;
+    // Writers in use; the store holds the rest.
+    std::unordered_map<std::string, Sequences> writers;
+    int sequence_readers = 0;
+    // Hull including the changes in flight; null if it must be rebuilt from the points of `live`,
+    // or if a thread owns it.
+    std::unique_ptr<HullBuilder> builder;
+    // Bytes held by the builder, including while a thread owns it.
+    uint64_t builder_bytes = 0;
+    // Committed points of peer servers that are missing from `builder`; the next chunk adds them
+    // first. Empty without `builder`.
+    std::vector<Vector> backlog;
+    // `live` may hold uncommitted points.
+    bool live_is_ahead = false;
+  };
+  struct Served {
+    std::shared_ptr<LiveHull> live;
+    bool is_loading = false;
+    bool is_preparing = false;
+    // Points committed since the last preparation, or since `live` was made.
+    uint64_t points_since_prepared = 0;
+    // Version of `live` at the committed mark; null until the first read after a change.
+    std::shared_ptr<const ServedHull> version;
+    // Canonical snapshot, shared by all served versions of the committed revision.
+    std::shared_ptr<CanonicalHull> canonical;
+    // Readers' reference to `version`.
+    std::weak_ptr<const Reading> readers;
+  };
+
   void KeepBox();
+  void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
+  // Drop the served version, and the canonical snapshot; the next reader rebuilds them.
+  void DiscardServed(Locked& locked);
+  void DiscardCanonical(Locked& locked);
+  // Drops the points beyond the committed mark after their refusal.
+  void RevertLive(Locked& locked);
   void Grow(Locked& locked, const std::vector<Vector>& points, int dimension);
+  bool IsRead() const { return !served_.readers.expired() || live().use_count() > 1; }
   // Updates the account's shared parts.
   void CountParts();
   // Drops unused memory that can be rebuilt.
   void DropUnused(Locked& locked);
 
-  // Readers' reference to `served`.
-  std::weak_ptr<const Reading> read_;
+  const bool readable_from_store_;
+  Committed committed_;
+  InFlight in_flight_;
+  Served served_;
+
+ public:
+  // Last member, so that it closes before anything that it counts is destroyed.
+  MemoryBudget::Account account;
 };
 
 // Shared served version of a hull without vertices; not counted.

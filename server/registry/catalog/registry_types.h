@@ -40,7 +40,7 @@ struct HullView {
 struct Freshness {
   // Accepts any staleness without a store query: for readers notified of a change by the registry,
   // which has applied it.
-  static Freshness OfWhatIsHere() { return {0, std::nullopt, std::nullopt}; }
+  static Freshness AnyStaleness() { return {0, std::nullopt, std::nullopt}; }
 
   uint64_t at_least_revision = 0;
   // Bound on staleness: commits older than this at the start of the read are visible. nullopt: any.
@@ -193,7 +193,7 @@ struct ChunkResult {
 };
 
 // A hull and all of its state; private to the registry.
-struct RegisteredHull;
+class RegisteredHull;
 
 // A writer's open stream into one incarnation of a hull.
 struct AppendSession {

@@ -1,5 +1,4 @@
-#include "server/registry/changes/hull_appender.h"
-
+// Growth of hulls: writers' sessions and their chunks.
 #include <absl/strings/str_cat.h>
 
 #include <utility>
@@ -10,11 +9,12 @@
 #include "server/contract/status_map.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
+#include "server/registry/changes/hull_changes.h"
 #include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 
-struct HullAppender::OpenRequest {
+struct HullChanges::OpenRequest {
   std::string hull_id;
   std::string writer_id;
   bool create_if_absent = false;
@@ -27,10 +27,10 @@ struct HullAppender::OpenRequest {
 };
 
 // Result of checking a chunk that is allowed.
-enum class HullAppender::Verdict { kNew, kAlreadyApplied };
+enum class HullChanges::Verdict { kNew, kAlreadyApplied };
 
 // A chunk added to the builder, and its change to commit.
-struct HullAppender::BuiltChunk {
+struct HullChanges::BuiltChunk {
   Change change;
   PointCounts counts;
   // Prefix of the LiveHull that includes this chunk.
@@ -79,9 +79,9 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
 
 // Adds the points missing from a builder. Returns false if the result differs from the record; the
 // builder must then be rebuilt.
-bool BringUp(HullBuilder& builder, std::span<const Vector> lacks, const HullRecord& record) {
-  if (lacks.empty()) return true;
-  return builder.Add(lacks).ok() && builder.vertex_count() == record.vertex_count &&
+bool BringUp(HullBuilder& builder, std::span<const Vector> backlog, const HullRecord& record) {
+  if (backlog.empty()) return true;
+  return builder.Add(backlog).ok() && builder.vertex_count() == record.vertex_count &&
          builder.dimension() == record.dimension;
 }
 
@@ -93,71 +93,51 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 
 }  // namespace
 
-HullAppender::HullAppender(Store& store, const Limits& limits, WorkerPool& writers,
-                           FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
-                           ChangeFeed& feed, FreshnessGate& freshness, RecordReader& records,
-                           Preparer& preparer, HullLifecycle& lifecycle, HullChanges& changes)
-    : store_(store),
-      limits_(limits),
-      writers_(writers),
-      mutex_(mutex),
-      catalog_(catalog),
-      memory_(memory),
-      feed_(feed),
-      freshness_(freshness),
-      records_(records),
-      preparer_(preparer),
-      lifecycle_(lifecycle),
-      changes_(changes) {
-  changes_.SetChunkTasks([this](const HullPointer& hull) { RunNextChunk(hull); },
-                         [this](const HullPointer& hull) { RefuseChunks(hull); });
-}
-
-void HullAppender::OpenAppend(const std::string& id, const std::string& writer_id,
-                              bool create_if_absent,
-                              std::function<void(const absl::Status&)> on_gone,
-                              Reply<OpenResult> done, ClientId client) {
+void HullChanges::OpenAppend(const std::string& id, const std::string& writer_id,
+                             bool create_if_absent,
+                             std::function<void(const absl::Status&)> on_gone,
+                             Reply<OpenResult> done, ClientId client) {
   const auto request = std::make_shared<OpenRequest>(OpenRequest{
       id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
   // May read the store.
-  if (!store_.is_shared()) return RunOpen(request);
-  freshness_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
+  barrier_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
 
-void HullAppender::RunOpen(const std::shared_ptr<OpenRequest>& request) {
+void HullChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
   writers_.Submit(
       [this, request] {
-        Locked locked(mutex_);
+        Locked locked(state_.mutex);
         OpenLocked(locked, request);
       },
       request->client);
 }
 
 // Runs on a thread of `writers_`. May release the mutex to query the store.
-void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
+void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
   };
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
-  if (!catalog_.IsKnown(id)) {
+  if (!state_.catalog.IsKnown(id)) {
     return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = catalog_.IsKnown(request->hull_id);
-      if (is_known) request->known = catalog_.Find(request->hull_id);
+      const bool is_known = state_.catalog.IsKnown(request->hull_id);
+      if (is_known) request->known = state_.catalog.Find(request->hull_id);
       // Without a hull, no further store read is needed.
       if (is_known && request->known == nullptr) return OpenLocked(later, request);
       RunOpen(request);
     });
   }
-  if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
-    body->waiting.push_back([this, request](Locked&) { RunOpen(request); });
+  if (records_.MustWait(locked, id, RecordReader::For::kLife, request->done,
+                        [this, request](Locked&) { RunOpen(request); })) {
     return;
   }
-  const HullPointer hull = catalog_.Find(id);
+  const HullPointer hull = state_.catalog.Find(id);
   if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, catalog_.NoSuchHull(request->hull_id));
+    if (!request->create_if_absent)
+      return refuse(locked, state_.catalog.NoSuchHull(request->hull_id));
     // The session opens in the completion of the creation: the hull may be gone right after.
-    return lifecycle_.CreateNew(
+    return CreateNew(
         locked, request->hull_id,
         [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
           if (Committer::IsSuperseded(created.status())) return RunOpen(request);
@@ -166,91 +146,79 @@ void HullAppender::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>
           OpenSession(later, *created, request, 0);
         });
   }
-  if (hull->state.changing_life()) {
-    hull->exclusive.push_back([this, request](Locked&) { RunOpen(request); });
-    return;
-  }
   if (hull->state.damaged()) return refuse(locked, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
   if (!last.ok()) return refuse(locked, last.status());
   // The end of a hull removes its sequences from the store before the registry learns of it.
   if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
-  if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
-    return refuse(locked, TooManyWriters(hull->head, limits_.max_writers_per_hull));
+  if (*last == 0 && hull->head().writer_count >= state_.limits.max_writers_per_hull) {
+    return refuse(locked, TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
   }
   OpenSession(locked, hull, request, *last);
 }
 
-void HullAppender::OpenSession(Locked& locked, const HullPointer& hull,
-                               const std::shared_ptr<OpenRequest>& request,
-                               uint64_t last_sequence) {
+void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
+                              const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
-  result.store_revision = catalog_.revision();
-  result.hull = hull->committed.record;
+  result.store_revision = state_.catalog.revision();
+  result.hull = hull->committed().record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
   Answer<OpenResult>(locked, request->done, std::move(result));
 }
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.
-absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                                         const std::string& writer_id) {
-  auto writer = hull.writers.find(writer_id);
-  if (writer != hull.writers.end()) return writer->second.committed;
-  if (!store_.keeps_hulls() || hull.committed.writer_count == 0) return 0;
-  const HullRecord record = hull.committed.record;
-  const uint64_t supersessions = hull.supersessions;
-  ++hull.sequence_readers;
+absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
+                                                        const std::string& writer_id) {
+  if (const auto known = hull.CommittedSequence(writer_id)) return *known;
+  if (!state_.store.keeps_hulls() || hull.committed().writer_count == 0) return 0;
+  const HullRecord record = hull.committed().record;
+  const uint64_t supersessions = hull.supersessions();
+  hull.StartReadingSequence();
   locked.Unlock();
-  const absl::StatusOr<uint64_t> sequence = store_.LoadSequence(record, writer_id);
+  const absl::StatusOr<uint64_t> sequence = state_.store.LoadSequence(record, writer_id);
   locked.Lock();
-  --hull.sequence_readers;
+  hull.EndReadingSequence();
   if (absl::IsAborted(sequence.status())) {
-    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
+    if (absl::Status s = barrier_.AwaitPeers(locked, {}); !s.ok()) return s;
     // Every caller checks for this.
     if (hull.state.gone()) return 0;
-    if (hull.supersessions == supersessions && hull.committed.record == record) {
+    if (hull.supersessions() == supersessions && hull.committed().record == record) {
       return StoreDisagrees(record);
     }
     return CommittedSequence(locked, hull, writer_id);
   }
   if (!sequence.ok()) return sequence.status();
   // A peer server may have committed a chunk of the writer since.
-  if (hull.supersessions != supersessions) return CommittedSequence(locked, hull, writer_id);
+  if (hull.supersessions() != supersessions) return CommittedSequence(locked, hull, writer_id);
   // A commit during the read is newer and still in the map.
-  writer = hull.writers.find(writer_id);
-  if (writer != hull.writers.end()) return writer->second.committed;
+  if (const auto known = hull.CommittedSequence(writer_id)) return *known;
   // A writer that has not written yet gets no entry.
-  if (*sequence > 0) {
-    hull.writers.emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence});
-  }
+  if (*sequence > 0) hull.KeepSequence(writer_id, *sequence);
   return *sequence;
 }
 
-void HullAppender::CloseAppend(const AppendSession& session) {
-  const std::lock_guard lock(mutex_);
-  RegisteredHull& hull = *session.hull;
-  hull.watches.erase(session.watch);
-  const bool unused = hull.watches.empty() && hull.state.quiet() && hull.chunks.empty() &&
-                      hull.sequence_readers == 0;
-  if (unused && store_.keeps_hulls()) hull.writers.clear();
+void HullChanges::CloseAppend(const AppendSession& session) {
+  const std::lock_guard lock(state_.mutex);
+  session.hull->watches.erase(session.watch);
+  session.hull->DropUnusedWriters();
 }
 
-void HullAppender::Append(const AppendSession& session, Chunk chunk,
-                          std::function<bool()> should_stop, std::function<void()> on_built,
-                          Reply<ChunkResult> done) {
-  Locked locked(mutex_);
+void HullChanges::Append(const AppendSession& session, Chunk chunk,
+                         std::function<bool()> should_stop, std::function<void()> on_built,
+                         Reply<ChunkResult> done) {
+  Locked locked(state_.mutex);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
   session.hull->chunks.push_back(
       {session, std::move(chunk), std::move(should_stop), std::move(on_built), std::move(done),
-       MemoryCharge(memory_, MemoryUse::kWriting, bytes), ++session.hull->last_place});
-  changes_.Advance(locked, session.hull);
+       MemoryCharge(state_.memory, MemoryUse::kWriting, bytes), ++session.hull->last_place});
+  Advance(locked, session.hull);
 }
 
-void HullAppender::RunNextChunk(const HullPointer& hull) {
-  Locked locked(mutex_);
+void HullChanges::RunNextChunk(const HullPointer& hull) {
+  Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.work() == HullState::Work::kScheduled && !hull->chunks.empty());
   PendingChunk pending = std::move(hull->chunks.front());
   hull->chunks.pop_front();
@@ -260,16 +228,16 @@ void HullAppender::RunNextChunk(const HullPointer& hull) {
   if (pending.on_built) locked.Afterwards(std::exchange(pending.on_built, nullptr));
   hull->state.EndWork();
   hull->NoteUse();
-  memory_.Evict(locked);
-  changes_.Advance(locked, hull);
+  state_.memory.Evict(locked);
+  Advance(locked, hull);
 }
 
 // Refuses the chunks of a hull that can no longer grow.
-void HullAppender::RefuseChunks(const HullPointer& hull) {
-  Locked locked(mutex_);
+void HullChanges::RefuseChunks(const HullPointer& hull) {
+  Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
   const absl::Status reason =
-      hull->state.gone() ? GoneWhileStreaming(hull->committed.record) : hull->state.damage();
+      hull->state.gone() ? GoneWhileStreaming(hull->committed().record) : hull->state.damage();
   for (PendingChunk& pending : std::exchange(hull->chunks, {})) {
     AnswerChunk(locked, pending.done, pending.chunk.sequence, reason);
     if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
@@ -278,13 +246,13 @@ void HullAppender::RefuseChunks(const HullPointer& hull) {
 
 // Answers a chunk, or submits its change, the completion of which answers it. Releases the mutex
 // while building.
-void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
+void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
   // Without a commit, no store write detects a stale state, so compare explicitly.
   const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
-  if (!is_new && store_.is_shared()) {
-    const absl::Status fresh = freshness_.AwaitOthers(locked, pending.should_stop);
+  if (!is_new && barrier_.has_peers()) {
+    const absl::Status fresh = barrier_.AwaitPeers(locked, pending.should_stop);
     verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // An earlier chunk must be rebuilt first.
     if (hull->IsQueuedBefore(pending)) {
@@ -294,10 +262,10 @@ void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   }
   if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
   if (*verdict == Verdict::kAlreadyApplied) {
-    const HullRecord& record = hull->committed.record;
+    const HullRecord& record = hull->committed().record;
     return AnswerChunk(
         locked, pending.done, sequence,
-        ChunkResult{catalog_.revision(), true, record.revision, record.vertex_count, {}});
+        ChunkResult{state_.catalog.revision(), true, record.revision, record.vertex_count, {}});
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
@@ -313,14 +281,14 @@ void HullAppender::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
 }
 
 // Checks a chunk before building. May release the mutex to query the store.
-absl::StatusOr<HullAppender::Verdict> HullAppender::CheckChunk(Locked& locked, RegisteredHull& hull,
-                                                               const PendingChunk& pending) {
-  if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
+absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
+                                                             const PendingChunk& pending) {
+  if (hull.state.gone()) return GoneWhileStreaming(hull.committed().record);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
   const absl::StatusOr<uint64_t> committed = CommittedSequence(locked, hull, writer_id);
   if (!committed.ok()) return committed.status();
-  if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
+  if (hull.state.gone()) return GoneWhileStreaming(hull.committed().record);
   if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
@@ -328,53 +296,47 @@ absl::StatusOr<HullAppender::Verdict> HullAppender::CheckChunk(Locked& locked, R
                           "the expected sequence is ", last + 1,
                           "; open the stream again and continue after its last_sequence")),
                       v1::ERROR_REASON_SEQUENCE_GAP,
-                      {{"hull_id", hull.committed.record.hull_id},
+                      {{"hull_id", hull.committed().record.hull_id},
                        {"sequence", chunk.sequence},
                        {"expected_sequence", last + 1}});
   }
-  if (last == 0 && hull.head.writer_count >= limits_.max_writers_per_hull) {
-    return TooManyWriters(hull.head, limits_.max_writers_per_hull);
+  if (last == 0 && hull.head().writer_count >= state_.limits.max_writers_per_hull) {
+    return TooManyWriters(hull.head(), state_.limits.max_writers_per_hull);
   }
-  const HullRecord& record = hull.head.record;
+  const HullRecord& record = hull.head().record;
   if (absl::Status s = CheckChunkRevision(pending.session, record, chunk); !s.ok()) return s;
-  if (absl::Status s = CheckPointCount(record, chunk, limits_); !s.ok()) return s;
-  if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) return s;
+  if (absl::Status s = CheckPointCount(record, chunk, state_.limits); !s.ok()) return s;
+  if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) return s;
   return Verdict::kNew;
 }
 
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
 // sequence include it.
-absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, RegisteredHull& hull,
-                                                             PendingChunk& pending) {
+absl::StatusOr<HullChanges::BuiltChunk> HullChanges::Build(Locked& locked, RegisteredHull& hull,
+                                                           PendingChunk& pending) {
   // A reader may have found damage during a release of the mutex.
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
   const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
   if (Committer::IsSuperseded(live.status())) return live.status();
   if (!live.ok()) return WhyNotBuilt(hull, live.status());
-  hull.live_is_ahead = true;
   BuiltChunk built;
   Change& change = built.change;
-  change.hull = hull.head;
-  change.former_vertices = hull.head.record.vertex_count;
-  change.former_layout = hull.head.layout;
-  std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
-  HULLD_CHECK(builder != nullptr || hull.state.in_flight() == 0);
-  const std::vector<Vector> builder_lacks = std::exchange(hull.builder_lacks, {});
-  const LiveHull::Mark committed = hull.committed_mark;
+  change.hull = hull.head();
+  change.former_vertices = hull.head().record.vertex_count;
+  change.former_layout = hull.head().layout;
+  LentBuilder lent = hull.LendBuilder();
 
   locked.Unlock();
-  const absl::StatusOr<PointCounts> added =
-      AddPoints(pending, committed, builder_lacks, **live, builder, built);
-  if (!store_.is_shared()) pending.chunk.points = {};
-  const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
+  const absl::StatusOr<PointCounts> added = AddPoints(pending, lent, **live, built);
+  if (!barrier_.has_peers()) pending.chunk.points = {};
+  const uint64_t builder_bytes = lent.builder == nullptr ? 0 : lent.builder->MemoryBytes();
   locked.Lock();
 
-  hull.builder = std::move(builder);
-  hull.builder_bytes = builder_bytes;
+  hull.ReturnBuilder(std::move(lent.builder), builder_bytes);
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
-    if (store_.is_shared()) return Superseded();
+    if (barrier_.has_peers()) return Superseded();
     return absl::UnavailableError("an earlier change could not be stored");
   }
   if (!added.ok()) return WhyNotBuilt(hull, added.status());
@@ -384,67 +346,59 @@ absl::StatusOr<HullAppender::BuiltChunk> HullAppender::Build(Locked& locked, Reg
   }
 
   built.counts = *added;
-  if (hull.state.in_flight() == 0) {
-    hull.revisions = std::make_shared<HullRevisions>(RevisionsOf(hull.committed));
-  }
-  FillChange(hull, *added, change);
-  RegisteredHull::Sequences& sequences = hull.writers[pending.session.writer_id];
-  if (sequences.head == 0) ++change.hull.writer_count;
-  sequences.head = pending.chunk.sequence;
-  change.writer = WriterSequence{pending.session.writer_id, pending.chunk.sequence};
-  hull.head = change.hull;
+  hull.AddToHead(*added, {pending.session.writer_id, pending.chunk.sequence}, &change);
   return built;
 }
 
 // Returns the LiveHull to append to. Releases the mutex to read it from the store if it is not in
 // memory. A writer does not wait for a reader that loads the same hull; the first to finish wins.
-absl::StatusOr<std::shared_ptr<LiveHull>> HullAppender::LiveForWriter(Locked& locked,
-                                                                      RegisteredHull& hull) {
-  if (hull.live != nullptr) return hull.live;
+absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& locked,
+                                                                     RegisteredHull& hull) {
+  if (hull.live() != nullptr) return hull.live();
   HULLD_CHECK(hull.state.in_flight() == 0);
-  const StoredHull stored = hull.committed;
+  const StoredHull stored = hull.committed();
   if (stored.record.vertex_count == 0) {
     hull.SetLive(std::make_shared<LiveHull>());
-    return hull.live;
+    return hull.live();
   }
   locked.Unlock();
-  absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
+  absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(state_.store, stored);
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
-    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
+    if (absl::Status s = barrier_.AwaitPeers(locked, {}); !s.ok()) return s;
     const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
                           hull.state.changing_life();
     return is_known ? Superseded() : StoreDisagrees(stored.record);
   }
   if (hull.state.work() == HullState::Work::kReverting) return Superseded();
-  if (hull.live != nullptr) return hull.live;
+  if (hull.live() != nullptr) return hull.live();
   if (!loaded.ok()) return loaded.status();
   hull.SetLive(*std::move(loaded));
-  ++catalog_.statistics().loads;
+  ++state_.catalog.statistics().loads;
   hull.NoteUse();
   hull.changed.notify_all();
-  return hull.live;
+  return hull.live();
 }
 
-// Adds a chunk's points to its hull's builder, after the points of peer servers that it lacks;
-// builds it from the committed points if it is missing. Appends the new vertices to the LiveHull
-// and fills the change with the data to store. Called without the mutex.
-absl::StatusOr<PointCounts> HullAppender::AddPoints(
-    PendingChunk& pending, const LiveHull::Mark& committed, std::span<const Vector> builder_lacks,
-    LiveHull& live, std::unique_ptr<HullBuilder>& builder, BuiltChunk& built) {
+// Adds a chunk's points to the lent builder, after its backlog; builds the builder from the
+// committed points if it is missing. Appends the new vertices to the LiveHull and fills the change
+// with the data to store. Called without the mutex.
+absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
+                                                   LiveHull& live, BuiltChunk& built) {
   Change& change = built.change;
-  if (builder != nullptr && !BringUp(*builder, builder_lacks, change.hull.record)) {
+  std::unique_ptr<HullBuilder>& builder = lent.builder;
+  if (builder != nullptr && !BringUp(*builder, lent.backlog, change.hull.record)) {
     builder = nullptr;
   }
   if (builder == nullptr) {
     absl::StatusOr<std::unique_ptr<HullBuilder>> made =
-        BuildHull(change.hull.record, live.PointsAt(committed), pending.should_stop);
+        BuildHull(change.hull.record, live.PointsAt(lent.committed), pending.should_stop);
     if (!made.ok()) return made.status();
     builder = *std::move(made);
   }
   if (Stopped(pending.should_stop)) return Cancelled();
   AddLimits limits;
-  limits.max_vertices = static_cast<size_t>(limits_.max_vertices_per_hull);
+  limits.max_vertices = static_cast<size_t>(state_.limits.max_vertices_per_hull);
   limits.should_stop = pending.should_stop;
   absl::StatusOr<PointCounts> added = builder->Add(pending.chunk.points, limits);
   if (!added.ok()) return added;
@@ -454,7 +408,7 @@ absl::StatusOr<PointCounts> HullAppender::AddPoints(
   }
   std::vector<Vector> vertices = builder->NewVertices();
   built.mark = live.Append(vertices, builder->dimension());
-  if (store_.keeps_hulls()) {
+  if (state_.store.keeps_hulls()) {
     const bool base = Store::WantsBase(change.hull.layout, added->outside);
     change.vertex_change = base ? VertexChange::kReplaced : VertexChange::kAdded;
     change.vertices = base ? builder->Vertices() : std::move(vertices);
@@ -463,98 +417,43 @@ absl::StatusOr<PointCounts> HullAppender::AddPoints(
 }
 
 // Returns the writer's status for a failure of AddPoints.
-absl::Status HullAppender::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
-  if (absl::IsDataLoss(cause)) catalog_.MarkDamaged(hull, cause);
+absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+  if (absl::IsDataLoss(cause)) state_.catalog.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
-      absl::StrCat(QuotedHull(hull.head.record.hull_id), " would hold too many vertices"),
-      limits_.max_vertices_per_hull, "max-vertices-per-hull");
+      absl::StrCat(QuotedHull(hull.head().record.hull_id), " would hold too many vertices"),
+      state_.limits.max_vertices_per_hull, "max-vertices-per-hull");
 }
 
-// Sets the record and layout of the hull with the added points.
-void HullAppender::FillChange(const RegisteredHull& hull, const PointCounts& added,
-                              Change& change) {
-  HullRecord& record = change.hull.record;
-  VertexLayout& layout = change.hull.layout;
-  record.counts += added;
-  change.before = hull.revisions;
-  change.takes_revision = added.outside > 0;
-  if (!change.takes_revision) return;
-  record.vertex_count = hull.builder->vertex_count();
-  record.dimension = hull.builder->dimension();
-  if (change.vertex_change == VertexChange::kReplaced) {
-    layout = {.base_vertices = record.vertex_count};
-  } else if (change.vertex_change == VertexChange::kAdded) {
-    ++layout.delta_count;
-    layout.delta_vertices += change.vertices.size();
-  }
-}
-
-void HullAppender::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                               BuiltChunk built) {
+void HullChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
+                              BuiltChunk built) {
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
-  const std::string writer_id = pending.session.writer_id;
-  const uint64_t sequence = pending.chunk.sequence;
-  if (store_.is_shared()) {
+  const WriterSequence writer = *built.change.writer;
+  if (barrier_.has_peers()) {
     kept = std::make_shared<PendingChunk>(std::move(pending));
     // NOLINTNEXTLINE(bugprone-use-after-move): it is the caller's again
     pending.on_built = std::exchange(kept->on_built, nullptr);
   }
   const auto finish = [=, this, mark = built.mark, counts = built.counts](
                           Locked& later, const absl::Status& status, const Change& change) {
-    if (!status.ok()) Revert(later, *hull);
+    if (!status.ok()) hull->Revert(later);
     if (Committer::IsSuperseded(status)) {
       hull->Requeue(std::move(*kept));
       return;
     }
     if (!status.ok()) {
-      return AnswerChunk(later, done, sequence, status);
+      return AnswerChunk(later, done, writer.sequence, status);
     }
-    CommitChunk(later, hull, change.hull, mark, writer_id, sequence);
-    hull->points_since_prepared += counts.outside;
-    preparer_.ScheduleIfWorn(hull);
+    state_.ApplyChunk(later, hull, {change.hull, mark, writer, counts.outside});
     const HullRecord& record = change.hull.record;
-    AnswerChunk(
-        later, done, sequence,
-        ChunkResult{catalog_.revision(), false, record.revision, record.vertex_count, counts});
+    AnswerChunk(later, done, writer.sequence,
+                ChunkResult{state_.catalog.revision(), false, record.revision, record.vertex_count,
+                            counts});
   };
   hull->state.Submit();
-  changes_.Submit(locked, hull, std::move(built.change), finish);
-}
-
-// after, mark: the hull with this chunk.
-void HullAppender::CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
-                               const LiveHull::Mark& mark, const std::string& writer_id,
-                               uint64_t sequence) {
-  const HullRecord before = std::exchange(hull->committed, after).record;
-  *hull->revisions = RevisionsOf(after);
-  SetRevisions(*hull->revisions, &hull->head);
-  hull->SetCommittedMark(locked, mark);
-  catalog_.NoteChange(*hull);
-  if (after.record.revision != before.revision) {
-    catalog_.Publish(after.record.revision);
-    catalog_.NoteVertices(before.vertex_count, after.record.vertex_count);
-    hull->DiscardServed(locked);
-    locked.Discard(std::exchange(hull->canonical, nullptr));
-    feed_.NoteChanged(locked, hull);
-  }
-  RegisteredHull::Sequences& sequences = hull->writers[writer_id];
-  HULLD_CHECK(sequence == sequences.committed + 1 && sequence <= sequences.head);
-  sequences.committed = sequence;
-  hull->NoteUse();
-}
-
-// Returns the hull to its committed state after a chunk in flight, and with it all later ones, was
-// refused. The first refusal reverts; the later ones find it done. A thread building on refused
-// chunks drops the builder itself (kReverting).
-void HullAppender::Revert(Locked& locked, RegisteredHull& hull) {
-  hull.head = hull.committed;
-  for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;
-  hull.DiscardBuilder(locked);
-  hull.RevertLive(locked);
-  hull.NoteUse();
+  Submit(locked, hull, std::move(built.change), finish);
 }
 
 }  // namespace hulld::server

@@ -1,68 +1,154 @@
 #ifndef HULLD_SERVER_REGISTRY_CHANGES_HULL_CHANGES_H_
 #define HULLD_SERVER_REGISTRY_CHANGES_HULL_CHANGES_H_
 
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
 #include <functional>
 #include <memory>
-#include <utility>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
+#include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/live_hull.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/catalog/catalog.h"
+#include "server/registry/catalog/registry_state.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/memory/memory_budget.h"
-#include "server/registry/others/after_others.h"
+#include "server/registry/peers/read_barrier.h"
+#include "server/registry/records/record_reader.h"
 
 namespace hulld::server {
 
-struct RegisteredHull;
+struct LentBuilder;
+struct PendingChunk;
 
-// Submits changes of hulls to the committer and resumes the tasks that wait for a hull: first tasks
-// that need the hull to be quiet (RegisteredHull::exclusive: creations, deletions, replacements),
-// then chunks (RegisteredHull::chunks), which may overlap.
+// Local changes of hulls: creation, deletion, and replacement (hull_lifecycle.cc), and growth by
+// writers' chunks (hull_appender.cc).
 //
-// Invariant: Advance follows each transition of a hull's HullState, so no runnable task is left
-// waiting. Guarded by the registry's mutex.
-class HullChanges {
+// Creation, deletion, and replacement depend on the state of an ID: they load that state, wait
+// until no change of the ID is in flight, and then decide within one hold of the mutex. Chunks
+// overlap. The thread that owns the hull's builder (HullState) builds a chunk without the mutex and
+// appends the new vertices to the LiveHull; the resulting change is submitted, and the next chunk
+// of the hull may be built on it immediately. If the batch fails, all later chunks fail too, and
+// the hull returns to its last committed state (Revert). If a peer server committed first, a change
+// is retried on the new state, and a chunk returns to its place in the queue.
+//
+// Invariants:
+//   - Advance follows each transition of a hull's HullState, so no runnable task is left waiting:
+//     first tasks that need the hull to be quiet (RegisteredHull::exclusive), then its chunks.
+//   - Per hull and writer, chunks commit in the order of their sequences, each exactly once; `head`
+//     and the writer's `head` include every chunk in flight, `committed` only what the store has
+//     committed. Queued chunks occupy no thread.
+//   - A change is invisible until the store commits it; a refusal leaves the former state.
+//
+// Guarded by the registry's mutex; functions without a Locked parameter acquire it.
+class HullChanges : public PeerChangeListener {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
-  using ChunkTask = std::function<void(const HullPointer&)>;
 
-  // All must outlive this. writers: threads that build chunks.
-  HullChanges(Catalog& catalog, MemoryBudget& memory, Committer& committer,
-              AfterOthers& after_others, WorkerPool& writers)
-      : catalog_(catalog),
-        memory_(memory),
+  // All must outlive this. Chunks are built on `writers`.
+  HullChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
+              RecordReader& records, WorkerPool& writers)
+      : state_(state),
         committer_(committer),
-        after_others_(after_others),
+        barrier_(barrier),
+        records_(records),
         writers_(writers) {}
   HullChanges(const HullChanges&) = delete;
   HullChanges& operator=(const HullChanges&) = delete;
 
-  // Sets the tasks for chunks, called on a thread of `writers` without the mutex. run: processes
-  // the next chunk of a hull in kScheduled. refuse: refuses all chunks of a hull that can no longer
-  // grow. Call before the first chunk.
-  void SetChunkTasks(ChunkTask run, ChunkTask refuse) {
-    run_chunk_ = std::move(run);
-    refuse_chunks_ = std::move(refuse);
-  }
+  // Registers an empty hull. Calls `done`, on this or another thread, after it is committed or
+  // refused. Requires: a valid ID (not checked here; CheckHullId runs on arrival of the call).
+  // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
+  // cannot be written.
+  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done);
+  // Removes a hull and notifies its sessions. Replies with the store's revision, as above.
+  // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
+  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
+  // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
+  // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
+  // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
+  void Replace(Replacement replacement, Reply<ReplaceResult> done);
 
-  // Submits a change that follows all earlier changes of its hull. Requires: the state of `hull`
-  // counts it as in flight. finish: called after the state's transition, before waiting tasks
-  // resume.
-  void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
+  // Opens a session; `done` runs on this or another thread. `on_gone` is called at most once, on
+  // any thread, with the reason if the hull is deleted or replaced before the session is closed.
+  // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: shares threads fairly with other clients.
+  void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
+                  std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
+                  ClientId client = kNoClient);
+  void CloseAppend(const AppendSession& session);
+  // Queues a chunk. `on_built`, which may be empty, is called when its points are released and the
+  // next chunk may be queued. `done` is called after it is committed or refused. Each is called
+  // exactly once, on another thread, in either order. Commits are reported in the order of the
+  // sequences; a refusal may precede earlier chunks. Refusals, which change nothing:
+  // FAILED_PRECONDITION: a gap in the sequence, or the hull is gone; ABORTED: if_revision does not
+  // match; INVALID_ARGUMENT: a point is not finite; RESOURCE_EXHAUSTED: --max-vertices-per-hull,
+  // --max-points-per-hull, --max-writers-per-hull, --memory-limit, or the disk is full;
+  // UNAVAILABLE: the store cannot be written; DATA_LOSS: the store is damaged; CANCELLED:
+  // should_stop returned true.
+  void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
+              std::function<void()> on_built, Reply<ChunkResult> done);
+
   // Resumes the tasks that wait for the hull.
-  void Advance(Locked& locked, const HullPointer& hull);
-  // As Advance, after all pending peer changes are applied.
-  void AdvanceLater(const HullPointer& hull);
+  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
 
  private:
-  Catalog& catalog_;
-  MemoryBudget& memory_;
+  using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;
+  struct OpenRequest;
+  struct BuiltChunk;
+  enum class Verdict;
+
+  void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
+  void Advance(Locked& locked, const HullPointer& hull);
+
+  void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
+                    const Reply<CreateResult>& done);
+  void CreateNew(Locked& locked, const std::string& id, const Creation& done);
+  void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
+                    const Reply<uint64_t>& done);
+  void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
+                     const Reply<ReplaceResult>& done);
+  absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
+  void CommitReplacement(Locked& locked, const HullPointer& former,
+                         const std::shared_ptr<Replacement>& replacement,
+                         const Reply<ReplaceResult>& done);
+  absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
+                                                  const HullPointer& hull,
+                                                  const absl::Status& status, const Change& change);
+
+  void RunOpen(const std::shared_ptr<OpenRequest>& request);
+  void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
+  void OpenSession(Locked& locked, const HullPointer& hull,
+                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
+  absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
+                                             const std::string& writer_id);
+  void RunNextChunk(const HullPointer& hull);
+  void RefuseChunks(const HullPointer& hull);
+  void ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending);
+  absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
+                                     const PendingChunk& pending);
+  absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
+  absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
+  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, LentBuilder& lent, LiveHull& live,
+                                        BuiltChunk& built);
+  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
+  void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
+                   BuiltChunk built);
+
+  RegistryState& state_;
   Committer& committer_;
-  AfterOthers& after_others_;
+  ReadBarrier& barrier_;
+  RecordReader& records_;
   WorkerPool& writers_;
-  ChunkTask run_chunk_;
-  ChunkTask refuse_chunks_;
+  // Key of the newest session in RegisteredHull::watches. Guarded by the registry's mutex.
+  uint64_t last_watch_ = 0;
 };
 
 }  // namespace hulld::server

@@ -16,7 +16,7 @@
 namespace hulld::server {
 
 Committer::Committer(Store& store, FairMutex& order)
-    : store_(store), order_(order), thread_([this] { Run(); }) {}
+    : store_(store), order_(order), feed_(store.peers()), thread_([this] { Run(); }) {}
 
 void Committer::End() {
   if (!thread_.joinable()) return;
@@ -43,74 +43,64 @@ CommitStatistics Committer::Statistics() const {
   return statistics_;
 }
 
-void Committer::Follow(const Locked& locked, Follower follower) {
+void Committer::AddBarrier(const Locked& locked, Barrier barrier) {
   HULLD_CHECK(locked.Holds(order_));
   {
     const std::lock_guard lock(mutex_);
-    followers_.push_back(std::move(follower));
+    barriers_.push_back(std::move(barrier));
   }
   ready_.notify_one();
 }
 
-void Committer::FollowNow(Locked& locked, Follower follower) {
+void Committer::StartBarrier(Locked& locked, Barrier barrier) {
   HULLD_CHECK(locked.Holds(order_));
-  bool may_ask = false;
+  bool may_start = false;
   {
     const std::lock_guard lock(mutex_);
-    may_ask = store_.is_shared() && is_idle_ && !is_asking_ && !asked_.asked.has_value() &&
-              queue_.empty() && followers_.empty();
-    followers_.push_back(std::move(follower));
-    if (may_ask) is_asking_ = true;
+    may_start = feed_ != nullptr && is_idle_ && !is_starting_ && !started_.asked.has_value() &&
+                queue_.empty() && barriers_.empty();
+    barriers_.push_back(std::move(barrier));
+    if (may_start) is_starting_ = true;
   }
-  if (may_ask) {
-    locked.Afterwards([this] { AskNow(); });
+  if (may_start) {
+    locked.Afterwards([this] { StartFetch(); });
   } else {
     ready_.notify_one();
   }
 }
 
-// Followers that arrive during the query wait for the next one.
-void Committer::AskNow() {
+// Barriers that arrive during the query wait for the next one.
+void Committer::StartFetch() {
   {
     const std::lock_guard lock(mutex_);
-    asked_.asked = SteadyClock::now();
-    asked_.followers = std::exchange(followers_, {});
+    started_.asked = SteadyClock::now();
+    started_.barriers = std::exchange(barriers_, {});
   }
-  store_.StartFollow();
+  feed_->StartFetch();
   {
     const std::lock_guard lock(mutex_);
-    is_asking_ = false;
-  }
-  ready_.notify_one();
-}
-
-void Committer::FollowSoon() {
-  {
-    const std::lock_guard lock(mutex_);
-    followers_.push_back([](Locked&, const absl::Status&) {});
+    is_starting_ = false;
   }
   ready_.notify_one();
 }
 
-std::optional<SteadyClock::time_point> Committer::caught_up(const Locked& locked) const {
-  HULLD_CHECK(locked.Holds(order_));
-  return caught_up_;
-}
-
-void Committer::NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked) {
-  HULLD_CHECK(locked.Holds(order_));
-  caught_up_ = asked;
+void Committer::FetchSoon() {
+  {
+    const std::lock_guard lock(mutex_);
+    barriers_.push_back([](Locked&, const absl::Status&) {});
+  }
+  ready_.notify_one();
 }
 
 void Committer::Run() {
   while (true) {
     Round round = WaitForRound();
     if (round.IsEmpty()) return;
-    CommitAndFollow(std::move(round));
+    CommitRound(std::move(round));
   }
 }
 
-void Committer::CommitAndFollow(Round round) {
+void Committer::CommitRound(Round round) {
   // Taken before anything is sent, because a commit queries peer changes as well.
   const SteadyClock::time_point asked = round.asked.has_value() ? *round.asked : SteadyClock::now();
   absl::Status status;
@@ -118,25 +108,21 @@ void Committer::CommitAndFollow(Round round) {
   if (!status.ok()) {
     // Refused before the query for peer changes: if the outcome is unknown, the store may contain
     // this very batch at that point.
-    Round looking;
-    looking.followers = std::exchange(round.followers, {});
+    Round barriers;
+    barriers.barriers = std::exchange(round.barriers, {});
     Settle(round, status, absl::OkStatus(), asked);
-    if (looking.followers.empty()) return;
-    round = std::move(looking);
+    if (barriers.IsEmpty()) return;
+    round = std::move(barriers);
     status = absl::OkStatus();
   }
   // A commit has already queried the peer changes.
-  absl::Status followed;
-  if (round.batch.empty()) {
-    // A follower needs the outcome of the last batch now, not at the next change.
-    if (!store_.is_shared()) followed = RecoverIfFailing();
-    if (followed.ok()) followed = store_.Follow();
-  }
-  Settle(round, status, followed, asked);
+  Settle(round, status, round.batch.empty() ? Fetch() : absl::OkStatus(), asked);
 }
 
-// Recovers before a query without a commit; a commit reports its own failure.
-absl::Status Committer::RecoverIfFailing() {
+// Fetches the commits of peer servers for a round of barriers. Without peer servers, resolves the
+// outcome of a failed batch, which a barrier must not leave to the next change.
+absl::Status Committer::Fetch() {
+  if (feed_ != nullptr) return feed_->Fetch();
   if (!Statistics().failing) return absl::OkStatus();
   absl::Status status = store_.Recover();
   const std::lock_guard lock(mutex_);
@@ -149,12 +135,12 @@ Committer::Round Committer::WaitForRound() {
   std::unique_lock lock(mutex_);
   is_idle_ = true;
   ready_.wait(lock, [this] {
-    if (is_asking_) return false;
-    return ending_ || asked_.asked.has_value() || !queue_.empty() || !followers_.empty();
+    if (is_starting_) return false;
+    return ending_ || started_.asked.has_value() || !queue_.empty() || !barriers_.empty();
   });
   is_idle_ = false;
-  if (asked_.asked.has_value()) return std::exchange(asked_, {});
-  Round round = {std::exchange(queue_, {}), std::exchange(followers_, {}), {}};
+  if (started_.asked.has_value()) return std::exchange(started_, {});
+  Round round = {std::exchange(queue_, {}), std::exchange(barriers_, {}), {}};
   has_ended_ = round.IsEmpty();
   return round;
 }
@@ -177,34 +163,34 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
 
 // Returns the peer changes, with the growth of hulls in memory. status: the result of the query;
 // after an error the store is not queried again.
-OtherChanges Committer::TakeOthers(const absl::Status& status) {
-  OtherChanges others = store_.TakeOthers();
-  if (!status.ok() || others.revision == 0 || grown_ == nullptr) return others;
+PeerChanges Committer::TakePeerChanges(const absl::Status& status) {
+  PeerChanges changes = feed_->TakeChanges();
+  if (!status.ok() || changes.revision == 0) return changes;
   std::vector<HullGrowth> grown;
   {
-    Locked locked(order_);
-    grown = grown_(locked, others);
+    const std::lock_guard lock(order_);
+    grown = peers_->GrownHulls(changes);
   }
-  if (grown.empty()) return others;
-  std::vector<std::optional<std::vector<Vector>>> growth = store_.LoadGrowth(grown);
+  if (grown.empty()) return changes;
+  std::vector<std::optional<std::vector<Vector>>> growth = feed_->LoadGrowth(grown);
   for (size_t i = 0; i < grown.size(); ++i) {
-    others.by_id.at(grown[i].after.record.hull_id).growth = std::move(growth[i]);
+    changes.by_id.at(grown[i].after.record.hull_id).growth = std::move(growth[i]);
   }
-  return others;
+  return changes;
 }
 
 // Completes a committed batch; or refuses a failed batch and everything pending. asked: the
 // earliest time of the store query.
-void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed,
+void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& fetched,
                        SteadyClock::time_point asked) {
   std::vector<Pending>& batch = round.batch;
   // Evaluated before superseded changes are removed from the batch.
   const bool was_written = !batch.empty();
-  OtherChanges others;
-  if (store_.is_shared()) others = TakeOthers(was_written ? status : followed);
+  PeerChanges changes;
+  if (feed_ != nullptr) changes = TakePeerChanges(was_written ? status : fetched);
   Locked locked(order_);
-  if (others.revision != 0) TellOthers(locked, others, batch);
-  if (store_.is_shared() && status.ok() && followed.ok()) caught_up_ = asked;
+  if (changes.revision != 0) ApplyPeerChanges(locked, changes, batch);
+  if (feed_ != nullptr && status.ok() && fetched.ok()) peers_->NoteSynced(asked);
   if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
@@ -229,20 +215,20 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
     pending.done(locked, status, pending.change);
     ++completed;
   }
-  for (const Follower& follower : round.followers) follower(locked, followed);
+  for (const Barrier& barrier : round.barriers) barrier(locked, fetched);
   // Sends the replies here; the changes, which may be large, are destroyed without a lock.
   locked.Unlock();
 }
 
 // Refuses the changes superseded by peer servers, in the batch and in the queue, then passes the
-// peer changes to the callback.
-void Committer::TellOthers(Locked& locked, const OtherChanges& others,
-                           std::vector<Pending>& batch) {
+// peer changes to `peers_`.
+void Committer::ApplyPeerChanges(Locked& locked, const PeerChanges& changes,
+                                 std::vector<Pending>& batch) {
   std::vector<Pending> superseded;
   const auto take_from = [&](std::vector<Pending>& pending) {
     const auto first = std::stable_partition(
         pending.begin(), pending.end(),
-        [&](const Pending& each) { return !others.by_id.contains(each.change.id()); });
+        [&](const Pending& each) { return !changes.by_id.contains(each.change.id()); });
     std::move(first, pending.end(), std::back_inserter(superseded));
     pending.erase(first, pending.end());
   };
@@ -255,7 +241,7 @@ void Committer::TellOthers(Locked& locked, const OtherChanges& others,
   for (auto it = superseded.rbegin(); it != superseded.rend(); ++it) {
     it->done(locked, status, it->change);
   }
-  others_(locked, others);
+  peers_->Apply(locked, changes);
   // Destroys large changes without a lock.
   locked.Afterwards([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
 }

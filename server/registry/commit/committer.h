@@ -52,16 +52,26 @@ class Committer {
   // True if a change is refused because a peer server changed the same ID first (shared store). Its
   // base is stale; the submitter retries it.
   static bool IsSuperseded(const absl::Status& status) { return absl::IsAborted(status); }
-  // Receives the changes of peer servers, with `order` held: after the superseded changes were
-  // refused, latest first, and before the committed changes of the same batch, which follow them,
-  // complete. No change of these IDs is in flight then.
-  using Others = std::function<void(Locked& order, const OtherChanges& others)>;
-  // Returns, with `order` held, the hulls changed by peer servers that only grew and are wanted as
-  // increments. OtherChanges then includes their points, if available.
-  using Grown = std::function<std::vector<HullGrowth>(Locked& order, const OtherChanges& others)>;
-  // Called, with `order` held, after the callback received everything that peer servers had
-  // committed when the follower was submitted, or with the error of the query.
-  using Follower = std::function<void(Locked& order, const absl::Status&)>;
+  // Called, with `order` held, after everything submitted before the barrier is committed or
+  // refused, and the changes that peer servers had committed are applied; or with the error of the
+  // query for them.
+  using Barrier = std::function<void(Locked& order, const absl::Status&)>;
+
+  // Receives the changes of peer servers. All functions require `order` and run on the committer's
+  // thread.
+  class Peers {
+   public:
+    virtual ~Peers() = default;
+    // Returns the hulls that only grew and whose growth is to be fetched (PeerChange::growth).
+    virtual std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const = 0;
+    // Applies the changes: after the superseded changes were refused, latest first, and before the
+    // committed changes of the same batch, which follow them, complete. No change of these IDs is
+    // in flight then.
+    virtual void Apply(Locked& order, const PeerChanges& changes) = 0;
+    // All commits of peer servers before this time are applied: a query for them was sent then, and
+    // answered.
+    virtual void NoteSynced(SteadyClock::time_point asked) = 0;
+  };
 
   // Completions of committed changes within one hold of `order`; each takes about a microsecond.
   static constexpr size_t kMostPerHold = 128;
@@ -80,26 +90,16 @@ class Committer {
   // has not ended. Cost: O(1).
   void Submit(const Locked& locked, Change change, Completion done);
 
-  // Sets the callbacks for a shared store. Call before the first change and the first follower.
-  // grown: may be empty.
-  void SetOthers(Others others, Grown grown = nullptr) {
-    others_ = std::move(others);
-    grown_ = std::move(grown);
-  }
-  // Queues a follower. Requires that `locked` holds `order`. Cost: one store query, shared by all
-  // waiting followers.
-  void Follow(const Locked& locked, Follower follower);
-  // As Follow for a blocking thread: if the committer is idle, the query is sent on this thread
+  // Must be called before the first change if the store has a PeerFeed.
+  void SetPeers(Peers& peers) { peers_ = &peers; }
+  // Queues a barrier. Requires that `locked` holds `order`. Cost: with peer servers, one store
+  // query, shared by all waiting barriers.
+  void AddBarrier(const Locked& locked, Barrier barrier);
+  // As AddBarrier for a blocking thread: if the committer is idle, the query is sent on this thread
   // when `order` is released, without waiting for the committer's thread to wake up.
-  void FollowNow(Locked& locked, Follower follower);
-  // Schedules a query for peer changes without a follower. Takes only the queue's lock.
-  void FollowSoon();
-  // Time up to which Others has received all commits of peer servers: when the last answered query
-  // was sent. nullopt before the first one. Requires that `locked` holds `order`.
-  std::optional<SteadyClock::time_point> caught_up(const Locked& locked) const;
-  // Records a query that the caller sent itself at this time and reported. Requires the
-  // same.
-  void NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked);
+  void StartBarrier(Locked& locked, Barrier barrier);
+  // Schedules a query for peer changes. Takes only the queue's lock.
+  void FetchSoon();
 
   CommitStatistics Statistics() const;
   // Sets the metrics of batches. Call before the first change; `metrics` must outlive this.
@@ -114,44 +114,43 @@ class Committer {
   // Work of a round: each member may be empty; all are empty at the end.
   struct Round {
     std::vector<Pending> batch;
-    std::vector<Follower> followers;
-    // Time of a query already sent for the followers, which is then the only work of the round.
+    std::vector<Barrier> barriers;
+    // Time of a query already sent for the barriers, which are then the only work of the round.
     std::optional<SteadyClock::time_point> asked;
 
-    bool IsEmpty() const { return batch.empty() && followers.empty(); }
+    bool IsEmpty() const { return batch.empty() && barriers.empty(); }
   };
 
   void Run();
   Round WaitForRound();
-  void AskNow();
-  void CommitAndFollow(Round round);
-  absl::Status RecoverIfFailing();
+  void StartFetch();
+  void CommitRound(Round round);
+  absl::Status Fetch();
   absl::Status Write(std::vector<Pending>& batch);
-  OtherChanges TakeOthers(const absl::Status& status);
-  void Settle(Round& round, const absl::Status& status, const absl::Status& followed,
+  PeerChanges TakePeerChanges(const absl::Status& status);
+  void Settle(Round& round, const absl::Status& status, const absl::Status& fetched,
               SteadyClock::time_point asked);
-  void TellOthers(Locked& locked, const OtherChanges& others, std::vector<Pending>& batch);
+  void ApplyPeerChanges(Locked& locked, const PeerChanges& changes, std::vector<Pending>& batch);
 
   Store& store_;
   FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
-  Others others_;
-  Grown grown_;
-  // Guarded by order_.
-  std::optional<SteadyClock::time_point> caught_up_;
+  // Null without peer servers.
+  PeerFeed* const feed_;
+  Peers* peers_ = nullptr;
 
   mutable Mutex mutex_;
   // mutex_ guards the members below.
   ConditionVariable ready_;
   std::vector<Pending> queue_;
-  std::vector<Follower> followers_;
+  std::vector<Barrier> barriers_;
   CommitStatistics statistics_;
   // The committer's thread waits for work.
   bool is_idle_ = false;
-  // AskNow is due or running, with exclusive use of the store.
-  bool is_asking_ = false;
-  // Result of AskNow.
-  Round asked_;
+  // StartFetch is due or running, with exclusive use of the store.
+  bool is_starting_ = false;
+  // Result of StartFetch.
+  Round started_;
   bool ending_ = false;
   // The thread takes no more work.
   bool has_ended_ = false;

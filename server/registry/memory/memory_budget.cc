@@ -17,19 +17,19 @@ constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace
 
-void MemoryBudget::Books::Remove(Kind kind, uint64_t amount) {
+void MemoryBudget::Usage::Remove(Kind kind, uint64_t amount) {
   HULLD_CHECK(bytes[kind] >= amount);
   bytes[kind] -= amount;
 }
 
 void MemoryBudget::Account::Enter() {
-  Books& books = *budget_.books_;
+  Usage& books = *budget_.books_;
   books.Add(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
   books.Add(is_for_writing_ ? kForWriting : kForReading, pinned_);
 }
 
 void MemoryBudget::Account::Leave() {
-  Books& books = *budget_.books_;
+  Usage& books = *budget_.books_;
   books.Remove(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
   books.Remove(is_for_writing_ ? kForWriting : kForReading, pinned_);
 }
@@ -108,7 +108,7 @@ void MemoryPart::Pin(bool pins) {
 
 void MemoryCharge::Set(uint64_t bytes) {
   if (bytes == bytes_) return;
-  MemoryBudget::Books& books = *budget_->books_;
+  MemoryBudget::Usage& books = *budget_->books_;
   const auto kind = static_cast<MemoryBudget::Kind>(use_);
   const std::lock_guard lock(books.mutex);
   books.Remove(kind, std::exchange(bytes_, bytes));

@@ -58,7 +58,7 @@ class MemoryBudget {
  private:
   enum Kind : size_t { kForReading, kForWriting, kAtRest };
   // Outlives the budget as long as parts do.
-  struct Books {
+  struct Usage {
     Mutex mutex;
     std::array<uint64_t, 3> bytes{};
 
@@ -146,7 +146,7 @@ class MemoryBudget {
   const uint64_t limit_bytes_;
   const std::array<uint64_t, 2> shares_;
   const FairMutex& owners_;
-  const std::shared_ptr<Books> books_ = std::make_shared<Books>();
+  const std::shared_ptr<Usage> books_ = std::make_shared<Usage>();
   // The owners' mutex guards the members below. Non-empty accounts, most recently used first.
   std::list<Account*> used_;
   uint64_t evictions_ = 0;
@@ -174,7 +174,7 @@ class MemoryPart {
   void Enter();
   void Leave();
 
-  const std::shared_ptr<MemoryBudget::Books> books_;
+  const std::shared_ptr<MemoryBudget::Usage> books_;
   const void* const what_;
   // Guarded by the budget's mutex.
   uint64_t bytes_ = 0;

@@ -42,16 +42,16 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpDue(Locked& locked, cons
 
 absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
-  if (!known.next_change_.has_value()) known.next_change_ = catalog_.recent_changes().end();
+  if (!known.next_change_.has_value()) known.next_change_ = state_.catalog.recent_changes().end();
   while (true) {
     uint64_t& next = *known.next_change_;
-    if (!catalog_.recent_changes().Knows(next)) {
-      next = catalog_.recent_changes().end();
+    if (!state_.catalog.recent_changes().Knows(next)) {
+      next = state_.catalog.recent_changes().end();
       locked.Unlock();
       known.ForgetAll();
       locked.Lock();
-    } else if (next < catalog_.recent_changes().end()) {
-      known.NoteChange(catalog_.recent_changes().at(next++));
+    } else if (next < state_.catalog.recent_changes().end()) {
+      known.NoteChange(state_.catalog.recent_changes().at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
       const absl::StatusOr<LookUpEnd> end = LookUp(locked, read, known.due_.back());
@@ -75,8 +75,8 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, cons
 
 // RESOURCE_EXHAUSTED: readers exceed their share.
 absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
-  if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
-  const uint64_t share = memory_.share(MemoryUse::kReading);
+  if (!state_.memory.IsOver(MemoryUse::kReading)) return absl::OkStatus();
+  const uint64_t share = state_.memory.share(MemoryUse::kReading);
   // A retry does not help a read that holds most of the memory itself.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
     return LimitExceeded(absl::StrCat("the hulls that the call names take ", bytes,
@@ -84,7 +84,7 @@ absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
                                       "readers' share; request fewer hulls per call"),
                          share, "memory-limit");
   }
-  return memory_.Check(locked, MemoryUse::kReading);
+  return state_.memory.Check(locked, MemoryUse::kReading);
 }
 
 // Looks up the view of a hull, or its error.
@@ -96,8 +96,8 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
-    if (*found == nullptr || (*found)->state.gone()) found = catalog_.hulls().Ask(id);
-    if (!found.has_value() && !catalog_.bodies().contains(id)) {
+    if (*found == nullptr || (*found)->state.gone()) found = state_.catalog.hulls().Ask(id);
+    if (!found.has_value() && !state_.catalog.bodies().contains(id)) {
       if (!read.may_wait) return LookUpEnd::kWouldWait;
       const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
       if (!is_over.ok()) return is_over.status();
@@ -106,7 +106,7 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
-      known.view = catalog_.NoSuchHull(id);
+      known.view = state_.catalog.NoSuchHull(id);
       return LookUpEnd::kDone;
     }
     if (hull->state.damaged()) {
@@ -117,7 +117,7 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
       // The hull was looked up, prepared, and evicted since. Loading and preparing it again could
       // evict another hull of the same read, and so on without end.
       if (IsHeld(known, *hull)) {
-        ++catalog_.statistics().hits;
+        ++state_.catalog.statistics().hits;
         return LookUpEnd::kDone;
       }
       if (!read.may_wait) return LookUpEnd::kWouldWait;
@@ -134,7 +134,7 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
         continue;
       }
     }
-    if (prepare) preparer_.Schedule(hull);
+    if (prepare) state_.preparer.Schedule(hull);
     NoteView(locked, hull, read.known, k, was_missing);
     return LookUpEnd::kDone;
   }
@@ -167,7 +167,7 @@ absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& re
   KnownHulls& hulls = read.known;
   if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
   if (!std::exchange(was_missing, true)) {
-    ++catalog_.statistics().misses;
+    ++state_.catalog.statistics().misses;
     LoadMany(locked, read, k);
     if (Stopped(read.should_stop)) return Cancelled();
     return false;
@@ -189,13 +189,13 @@ absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, Reg
     EndAllLoading(locked, read);
     if (!Preparer::IsWanted(hull, read.plan.expected_questions)) return absl::OkStatus();
   }
-  preparer_.Prepare(locked, hull);
+  state_.preparer.Prepare(locked, hull);
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
 // True if this reader already holds the committed state of the hull.
 bool HullReader::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
-  return known.view.ok() && known.view->record == hull.committed.record;
+  return known.view.ok() && known.view->record == hull.committed().record;
 }
 
 // Records the view of a hull that is ready. was_missing: its points were read for it.
@@ -203,14 +203,15 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
                           bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
   const bool was_loaded = std::exchange(known.is_loaded, false);
-  if (!was_missing) ++(was_loaded ? catalog_.statistics().misses : catalog_.statistics().hits);
-  known.view = HullView{hull->committed.record, hull->Serve()};
+  if (!was_missing)
+    ++(was_loaded ? state_.catalog.statistics().misses : state_.catalog.statistics().hits);
+  known.view = HullView{hull->committed().record, hull->Serve()};
   known.bytes = hull->SharedBytes();
   // A freshly loaded hull was counted at its load; Serve counted the rest.
   if (!was_loaded) hull->NoteUse();
   if (was_missing || was_loaded) {
-    memory_.Evict(locked);
-    catalog_.hulls().RestSome();
+    state_.memory.Evict(locked);
+    state_.catalog.hulls().RestSome();
   }
 }
 
@@ -231,7 +232,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   // At some 200 bytes per point, a twentieth of the memory limit: the readers' share is not checked
   // until each hull is looked up.
-  uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
+  uint64_t most_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
   // Two jobs, so that the second loads while the hulls of the first are looked up.
   const uint64_t enough_points = most_points / 2;
   for (const KnownHulls::Loading& loading : hulls.ahead_) {
@@ -251,27 +252,27 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
     locked.NoteLookup();
     const KnownHulls::Known& known = hulls.hulls_[k];
     const std::string& id = read.ids[known.first];
-    const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
-    if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
+    const HullPointer hull = state_.catalog.IsKnown(id) ? state_.catalog.FindVisible(id) : nullptr;
+    if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->is_loading() ||
         hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
       --end;
       continue;
     }
-    const VertexLayout& layout = hull->committed.layout;
+    const VertexLayout& layout = hull->committed().layout;
     const uint64_t points = next.points + layout.base_vertices + layout.delta_vertices;
     if (points > most_points || (points > enough_points && next.hulls.size() > 1)) break;
     --end;
     next.points = points;
     next.found.push_back(hull);
     next.hulls.push_back(k);
-    stored.push_back(hull->committed);
+    stored.push_back(hull->committed());
   }
   if (next.hulls.size() < 2) return false;
   for (size_t i = 0; i < next.hulls.size(); ++i) {
-    next.found[i]->loading = true;
+    next.found[i]->StartLoading();
     hulls.hulls_[next.hulls[i]].is_ahead = true;
   }
-  next.job = LoadJob::Start(store_, std::move(stored), loaders_);
+  next.job = LoadJob::Start(state_.store, std::move(stored), loaders_);
   hulls.ahead_.push_back(std::move(next));
   return true;
 }
@@ -288,13 +289,12 @@ void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
     KnownHulls::Known& known = hulls.hulls_[loading.hulls[i]];
     RegisteredHull& hull = *loading.found[i];
     known.is_ahead = false;
-    hull.loading = false;
-    hull.changed.notify_all();
+    hull.EndLoading();
     const uint64_t revision = loading.job->hulls()[i].record.revision;
-    const bool is_current = hull.committed.record.revision == revision;
-    if (!loaded[i].ok() || !is_current || hull.live != nullptr || hull.state.gone()) continue;
+    const bool is_current = hull.committed().record.revision == revision;
+    if (!loaded[i].ok() || !is_current || hull.live() != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
-    ++catalog_.statistics().loads;
+    ++state_.catalog.statistics().loads;
     hull.NoteUse();
     known.is_loaded = true;
     known.found = loading.found[i];
@@ -312,15 +312,15 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
   known.BeginLookup();
   Resolved resolved;
   {
-    Locked locked(mutex_);
-    const auto staleness = freshness_.AwaitFresh(locked, plan.freshness, should_stop);
+    Locked locked(state_.mutex);
+    const auto staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.staleness = *staleness;
     const auto end = LookUpDue(locked, {ids, known, should_stop, plan});
     if (!end.ok()) return end.status();
     HULLD_CHECK(*end == LookUpEnd::kDone);
-    resolved.store_revision = catalog_.revision();
-    memory_.Evict(locked);
+    resolved.store_revision = state_.catalog.revision();
+    state_.memory.Evict(locked);
   }
   resolved.hulls = known.Views(ids);
   return resolved;
@@ -333,15 +333,15 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
   const std::function<bool()> should_stop;
   Resolved resolved;
   {
-    Locked locked(mutex_);
-    const auto staleness = freshness_.TryFresh(locked, plan.freshness);
+    Locked locked(state_.mutex);
+    const auto staleness = barrier_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
     const auto end = LookUpDue(locked, read);
     // Refresh reports an error, which may be gone later.
     if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
-    resolved.store_revision = catalog_.revision();
+    resolved.store_revision = state_.catalog.revision();
   }
   resolved.hulls = known.Views(ids);
   return resolved;
@@ -351,8 +351,8 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
                                                   const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
   {
-    Locked locked(mutex_);
-    if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+    Locked locked(state_.mutex);
+    if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   }
   const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
@@ -360,15 +360,15 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     snapshot_seconds_->Observe(taken.count());
   }
-  Locked locked(mutex_);
+  Locked locked(state_.mutex);
   const std::string& id = view.record.hull_id;
   // An unknown hull has no state to update.
-  const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
+  const HullPointer hull = state_.catalog.IsKnown(id) ? state_.catalog.FindVisible(id) : nullptr;
   const bool is_current =
-      hull != nullptr && hull->committed.record.revision == view.record.revision;
-  if (is_current && absl::IsDataLoss(status)) catalog_.MarkDamaged(*hull, status);
+      hull != nullptr && hull->committed().record.revision == view.record.revision;
+  if (is_current && absl::IsDataLoss(status)) state_.catalog.MarkDamaged(*hull, status);
   if (is_current) hull->NoteUse();
-  memory_.Evict(locked);
+  state_.memory.Evict(locked);
   if (!status.ok()) return status;
   return view.served->canonical();
 }
@@ -381,41 +381,40 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
   while (!hull.IsReady() && !hull.state.gone()) {
     if (hull.state.damaged()) return hull.state.damage();
     const bool is_ending = hull.state.life() == HullState::Life::kEnding;
-    if (hull.loading || (failed && is_ending)) {
+    if (hull.is_loading() || (failed && is_ending)) {
       // Runs the deferred tasks before waiting.
       locked.Unlock();
       locked.Lock();
       const auto may_go_on = [&] {
-        return !hull.loading && !(failed && hull.state.life() == HullState::Life::kEnding);
+        return !hull.is_loading() && !(failed && hull.state.life() == HullState::Life::kEnding);
       };
       locked.WaitOn([&](auto& lock) { hull.changed.wait_for(lock, kStopPoll, may_go_on); });
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
-    hull.loading = true;
-    const StoredHull stored = hull.committed;
+    hull.StartLoading();
+    const StoredHull stored = hull.committed();
     locked.Unlock();
-    absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
+    absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(state_.store, stored);
     locked.Lock();
-    hull.loading = false;
-    hull.changed.notify_all();
+    hull.EndLoading();
     if (absl::IsAborted(loaded.status())) {
-      if (absl::Status s = freshness_.AwaitOthers(locked, should_stop); !s.ok()) return s;
-      const HullRecord& now = hull.committed.record;
+      if (absl::Status s = barrier_.AwaitPeers(locked, should_stop); !s.ok()) return s;
+      const HullRecord& now = hull.committed().record;
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
     }
     // A writer was faster. The points read, or missing, belong to a state that is no longer
     // current.
-    const bool is_current = hull.committed.record.revision == stored.record.revision;
-    if (hull.live != nullptr || hull.state.gone() || !is_current) {
+    const bool is_current = hull.committed().record.revision == stored.record.revision;
+    if (hull.live() != nullptr || hull.state.gone() || !is_current) {
       // Writers may be faster repeatedly.
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
     if (loaded.ok()) {
       hull.SetLive(*std::move(loaded));
-      ++catalog_.statistics().loads;
+      ++state_.catalog.statistics().loads;
       hull.NoteUse();
       return absl::OkStatus();
     }
@@ -423,7 +422,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     // are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
-    if (absl::IsDataLoss(loaded.status())) catalog_.MarkDamaged(hull, loaded.status());
+    if (absl::IsDataLoss(loaded.status())) state_.catalog.MarkDamaged(hull, loaded.status());
     return loaded.status();
   }
   return absl::OkStatus();

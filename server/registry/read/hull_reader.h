@@ -13,16 +13,12 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/catalog/catalog.h"
 #include "server/registry/catalog/known_hulls.h"
+#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/memory/memory_budget.h"
-#include "server/registry/others/freshness_gate.h"
-#include "server/registry/read/preparer.h"
+#include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
-#include "server/settings/config.h"
-#include "server/store/store.h"
 
 namespace hulld::server {
 
@@ -45,27 +41,24 @@ class HullReader {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // All must outlive this. limits: the limits in force. loaders: threads that help readers of many
-  // hulls.
-  HullReader(Store& store, const Limits& limits, FairMutex& mutex, Catalog& catalog,
-             MemoryBudget& memory, FreshnessGate& freshness, RecordReader& records,
-             Preparer& preparer, WorkerPool& loaders)
-      : store_(store),
-        limits_(limits),
-        mutex_(mutex),
-        catalog_(catalog),
-        memory_(memory),
-        freshness_(freshness),
-        records_(records),
-        preparer_(preparer),
-        loaders_(loaders) {}
+  // All must outlive this. loaders: threads that help readers of many hulls.
+  HullReader(RegistryState& state, ReadBarrier& barrier, RecordReader& records, WorkerPool& loaders)
+      : state_(state), barrier_(barrier), records_(records), loaders_(loaders) {}
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
 
-  // See Registry.
+  // As Registry::Resolve, for a caller that repeatedly requests the same hulls: `known` persists
+  // between calls, and only hulls changed since are looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
-                                   const std::function<bool()>& should_stop, const ReadPlan& plan);
-  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan);
+                                   const std::function<bool()>& should_stop,
+                                   const ReadPlan& plan = {});
+  // As Registry::Resolve, but returns nullopt without blocking if it would have to query or read
+  // the store, or to prepare a hull.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
+  // Returns the canonical snapshot of a resolved hull, built at first use; it lives as long as
+  // view.served. Not for gRPC threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
+  // returned true. RESOURCE_EXHAUSTED: it is not built yet, and readers exceed their share of
+  // --memory-limit. Cost: building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
                                         const std::function<bool()>& should_stop);
   // Sets the histogram of snapshot build times. Call before the first; it must outlive this.
@@ -101,14 +94,9 @@ class HullReader {
   absl::Status LoadOne(Locked& locked, RegisteredHull& hull,
                        const std::function<bool()>& should_stop);
 
-  Store& store_;
-  const Limits& limits_;
-  FairMutex& mutex_;
-  Catalog& catalog_;
-  MemoryBudget& memory_;
-  FreshnessGate& freshness_;
+  RegistryState& state_;
+  ReadBarrier& barrier_;
   RecordReader& records_;
-  Preparer& preparer_;
   WorkerPool& loaders_;
   // May be null.
   prometheus::Histogram* snapshot_seconds_ = nullptr;

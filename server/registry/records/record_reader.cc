@@ -1,13 +1,19 @@
 #include "server/registry/records/record_reader.h"
 
+#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include "core/base/check.h"
 #include "server/contract/stopped_call.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 namespace {
@@ -24,11 +30,24 @@ void NoteBodyUnderHull(const std::string& id) {
       id);
 }
 
+// The store reported an older revision than `asked_at`, its revision before the query.
+absl::Status WentBack(uint64_t found, uint64_t asked_at) {
+  return absl::UnavailableError(absl::StrCat(
+      "the store answers as of revision ", found, ", and was at ", asked_at,
+      " before: it was restored to an earlier state, or another database is answering"));
+}
+
+absl::Status IsAhead(uint64_t found, uint64_t known) {
+  return absl::UnavailableError(absl::StrCat("the store holds changes up to revision ", found,
+                                             ", but only changes up to ", known,
+                                             " are known to be committed; retry"));
+}
+
 }  // namespace
 
 void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
                              LockedTask next) {
-  HULLD_CHECK(locked.Holds(mutex_) && !catalog_.IsKnown(id));
+  HULLD_CHECK(locked.Holds(state_.mutex) && !state_.catalog.IsKnown(id));
   std::shared_ptr<Reading>& reading = readings_[id];
   const bool is_new = reading == nullptr;
   if (is_new) {
@@ -43,10 +62,29 @@ void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refu
   loaders_.Submit([this] { ReadDue(); }, kRecordReader);
 }
 
+bool RecordReader::MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
+                            LockedTask next) {
+  Catalog& catalog = state_.catalog;
+  if (!catalog.IsKnown(id)) {
+    WhenKnown(locked, id, refuse, std::move(next));
+    return true;
+  }
+  if (BodyTable::Entry* const body = catalog.BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back(std::move(next));
+    return true;
+  }
+  const std::shared_ptr<RegisteredHull> hull = catalog.Find(id);
+  if (hull == nullptr) return false;
+  const HullState& state = hull->state;
+  const bool waits = need == For::kQuiet ? !state.quiet() : state.changing_life();
+  if (waits) hull->exclusive.push_back(std::move(next));
+  return waits;
+}
+
 // Sends one query; IDs that arrive during it go into the next one. The thread is offered to other
 // clients in between, so that a steady supply of IDs does not starve them.
 void RecordReader::ReadDue() {
-  Locked locked(mutex_);
+  Locked locked(state_.mutex);
   if (!due_.empty()) {
     const auto first = due_.begin();
     const auto last = first + std::min<ptrdiff_t>(due_.size(), kMostAtOnce);
@@ -71,7 +109,7 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
   std::shared_ptr<Reading> awaited;
   for (const std::string* const id : ids) {
     locked.NoteLookup();
-    if (catalog_.IsKnown(*id)) {
+    if (state_.catalog.IsKnown(*id)) {
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
@@ -94,10 +132,10 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
 
 absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::string> ids,
                                         const std::function<bool()>& should_stop) {
-  if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::vector<const std::string*> missing;
   for (const std::string& id : ids) {
-    if (!catalog_.IsKnown(id)) missing.push_back(&id);
+    if (!state_.catalog.IsKnown(id)) missing.push_back(&id);
   }
   const absl::Status read = AwaitKnown(locked, missing, should_stop);
   if (Stopped(should_stop)) return Cancelled();
@@ -109,21 +147,21 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
   std::vector<std::string> ids;
   ids.reserve(readings.size());
   for (const auto& reading : readings) ids.push_back(reading->id);
-  const uint64_t asked_at = catalog_.revision();
+  const uint64_t asked_at = state_.catalog.revision();
   locked.Unlock();
-  absl::StatusOr<FoundRecords> found = store_.FindRecords(ids);
+  absl::StatusOr<FoundRecords> found = state_.store.FindRecords(ids);
   locked.Lock();
-  gate_.WhenReached(locked, asked_at, std::move(found),
-                    [this, readings](Locked& later, const absl::StatusOr<FoundRecords>& reached) {
-                      TakeRecords(later, readings, reached);
-                    });
+  WhenReached(locked, asked_at, std::move(found),
+              [this, readings](Locked& later, const absl::StatusOr<FoundRecords>& reached) {
+                TakeRecords(later, readings, reached);
+              });
 }
 
 void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
                                const absl::StatusOr<FoundRecords>& found) {
   // Evicts first, so that the new records are still there when their callers resume.
-  for (size_t i = 0; i < readings.size(); ++i) catalog_.hulls().RestSome();
-  catalog_.bodies().DropSome(locked);
+  for (size_t i = 0; i < readings.size(); ++i) state_.catalog.hulls().RestSome();
+  state_.catalog.bodies().DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
     if (reading->is_over) continue;
@@ -134,15 +172,15 @@ void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
 }
 
 void RecordReader::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
-  HULLD_CHECK(!catalog_.IsKnown(id));
+  HULLD_CHECK(!state_.catalog.IsKnown(id));
   const auto hull = found.hulls.find(id);
   const auto body = found.bodies.find(id);
   const bool has_hull = hull != found.hulls.end();
   const bool has_body = body != found.bodies.end();
-  if (!has_hull && !has_body) return catalog_.hulls().NoteAbsent(id);
-  if (!has_hull) return catalog_.AddBody(locked, id, body->second);
+  if (!has_hull && !has_body) return state_.catalog.hulls().NoteAbsent(id);
+  if (!has_hull) return state_.catalog.AddBody(locked, id, body->second);
   if (has_body) NoteBodyUnderHull(id);
-  catalog_.AddStored(id, hull->second);
+  state_.catalog.AddStored(id, hull->second);
 }
 
 void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {
@@ -159,19 +197,200 @@ void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Stat
   }
 }
 
-std::vector<LockedTask> RecordReader::EndReadingOf(const std::string& id) {
-  std::vector<LockedTask> waiting;
+void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
+                                const std::shared_ptr<RegisteredHull>& /*hull*/) {
   const auto found = readings_.find(id);
-  if (found == readings_.end()) return waiting;
+  if (found == readings_.end()) return;
   const std::shared_ptr<Reading> reading = found->second;
-  if (!catalog_.IsKnown(id)) catalog_.hulls().NoteAbsent(id);
+  if (!state_.catalog.IsKnown(id)) state_.catalog.hulls().NoteAbsent(id);
   reading->is_over = true;
   reading->over.notify_all();
   readings_.erase(found);
-  for (auto& [refuse, next] : std::exchange(reading->waiting, {})) {
-    waiting.push_back(std::move(next));
+  for (auto& [refuse, next] : std::exchange(reading->waiting, {})) barrier_.Defer(std::move(next));
+}
+
+void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
+                               absl::StatusOr<FoundRecords> found, FoundTaker take) {
+  if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
+  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
+  // After this round of the committer, the catalog includes everything that the store held.
+  const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
+  committer_.AddBarrier(
+      locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
+        const uint64_t known = state_.catalog.revision();
+        if (!status.ok()) return take(later, status);
+        if (kept->revision > known) return take(later, IsAhead(kept->revision, known));
+        take(later, *kept);
+      });
+}
+
+absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
+                                                        absl::StatusOr<FoundRecords> found,
+                                                        const std::function<bool()>& should_stop) {
+  if (!found.ok()) return found;
+  if (found->revision < asked_at) return WentBack(found->revision, asked_at);
+  Locked locked(state_.mutex);
+  bool is_behind = found->revision > state_.catalog.revision();
+  for (auto hull = found->hulls.begin(); !is_behind && hull != found->hulls.end(); ++hull) {
+    locked.LetOthersPass();
+    is_behind = IsBehind(hull->first, hull->second);
   }
-  return waiting;
+  if (!is_behind) return found;
+  if (absl::Status s = barrier_.AwaitCommits(locked, should_stop); !s.ok()) return s;
+  const uint64_t known = state_.catalog.revision();
+  if (found->revision > known) return IsAhead(found->revision, known);
+  return found;
+}
+
+// True if the store holds a later state of the hull than the catalog under the same revision:
+// points that change no vertex do not create a revision.
+bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
+  if (!stored.ok()) return false;
+  const HullTable::Entries& all = state_.catalog.hulls().entries();
+  const auto known = all.find(id);
+  if (known == all.end() || known->second.revision() != stored->record.revision) return false;
+  return known->second.Describe(id).record.counts.received < stored->record.counts.received;
+}
+
+// True if the records are newer than the catalog: committed, perhaps by a peer server, but not yet
+// applied. An answer from them would be followed by an older one from the catalog.
+bool RecordReader::IsBehind(const FoundRecords& found) const {
+  if (found.revision > state_.catalog.revision()) return true;
+  return std::ranges::any_of(
+      found.hulls, [this](const auto& hull) { return IsBehind(hull.first, hull.second); });
+}
+
+// Returns the store's list after the catalog has reached its revision.
+absl::StatusOr<FoundRecords> RecordReader::List(const std::string& prefix, const std::string& after,
+                                                size_t page_size, RecordKinds kinds,
+                                                const std::function<bool()>& should_stop) {
+  uint64_t asked_at = 0;
+  {
+    const std::lock_guard lock(state_.mutex);
+    asked_at = state_.catalog.revision();
+  }
+  return AwaitReached(asked_at, state_.store.ListRecords(prefix, after, page_size, kinds),
+                      should_stop);
+}
+
+absl::StatusOr<BodyPage> RecordReader::ListBodies(const std::string& prefix,
+                                                  const std::string& after, size_t page_size,
+                                                  const std::function<bool()>& should_stop) {
+  {
+    Locked locked(state_.mutex);
+    if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  }
+  const absl::StatusOr<FoundRecords> found =
+      List(prefix, after, page_size, {.bodies = true}, should_stop);
+  if (!found.ok()) return found.status();
+  BodyPage page;
+  page.store_revision = found->revision;
+  page.more = found->more;
+  for (const auto& [id, stored] : found->bodies) {
+    page.bodies.push_back(
+        std::make_shared<const Body>(id, stored, state_.memory, MemoryUse::kReading));
+  }
+  return page;
+}
+
+absl::StatusOr<HullPage> RecordReader::ListHulls(const std::string& prefix,
+                                                 const std::string& after, size_t page_size,
+                                                 const std::function<bool()>& should_stop) {
+  const absl::StatusOr<FoundRecords> found =
+      List(prefix, after, page_size, {.hulls = true}, should_stop);
+  if (!found.ok()) return found.status();
+  HullPage page;
+  page.store_revision = found->revision;
+  page.more = found->more;
+  Locked locked(state_.mutex);
+  for (const auto& [id, stored] : found->hulls) {
+    locked.LetOthersPass();
+    HullChange hull = Describe(id, stored);
+    page.hulls.push_back({std::move(hull.record), hull.damaged});
+  }
+  return page;
+}
+
+// The catalog may know more about this version than its record: its box, or its damage.
+HullChange RecordReader::Describe(const std::string& id,
+                                  const absl::StatusOr<StoredHull>& stored) const {
+  HullChange change;
+  change.damaged = !stored.ok();
+  if (stored.ok()) {
+    change.record = stored->record;
+  } else {
+    change.record.hull_id = id;
+  }
+  const HullTable::Entries& all = state_.catalog.hulls().entries();
+  const auto known = all.find(id);
+  if (known == all.end() || !known->second.visible()) return change;
+  HullChange described = known->second.Describe(id);
+  return described.record == change.record ? described : change;
+}
+
+// Starts the store query for the watch's next piece.
+void RecordReader::ReadPresent(Locked& locked, ChangeWatch& watch) {
+  HULLD_CHECK(locked.Holds(state_.mutex));
+  // Changes before the first step are part of the list.
+  if (watch.last_id.empty() && watch.after_revision == 0) state_.feed.SkipChanges(watch);
+  const WatchTarget& target = ChangeFeed::TargetOf(watch);
+  watch.is_reading = true;
+  loaders_.Submit(
+      [this, kept = watch.shared_from_this(), reading = ++watch.readings,
+       asked_at = state_.catalog.revision(), after = watch.last_id, prefix = target.prefix,
+       ids = target.ids, bodies = target.bodies] {
+        absl::StatusOr<FoundRecords> found =
+            ids.empty() ? state_.store.ListRecords(prefix, after, ChangeFeed::kMostPerPiece,
+                                                   {.hulls = true, .bodies = bodies})
+                        : state_.store.FindRecords(std::span(ids).first(1));
+        if (found.ok() && !bodies) found->bodies.clear();
+        Locked later(state_.mutex);
+        WhenReached(
+            later, asked_at, std::move(found),
+            [this, kept, reading](Locked& now, const absl::StatusOr<FoundRecords>& reached) {
+              if (!kept->is_reading || kept->readings != reading) return;
+              kept->is_reading = false;
+              kept->found = reached;
+              state_.feed.Wake(now, kept);
+            });
+      },
+      kWatchReader);
+}
+
+absl::Status RecordReader::TakePresent(Locked& locked, ChangeWatch& watch, WatchPiece* piece) {
+  if (!watch.found.has_value()) {
+    if (!watch.is_reading) ReadPresent(locked, watch);
+    piece->waits = true;
+    state_.feed.Arm(watch);
+    return absl::OkStatus();
+  }
+  if (!watch.found->ok()) return std::exchange(watch.found, std::nullopt)->status();
+  const FoundRecords found = **std::exchange(watch.found, std::nullopt);
+  // A damaged record has no readable revision.
+  const auto tell = [&](HullChange change) {
+    const bool is_new = watch.after_revision == 0 || change.record.revision > watch.after_revision;
+    if (is_new) piece->changes.push_back(std::move(change));
+  };
+  auto hull = found.hulls.begin();
+  auto body = found.bodies.begin();
+  while (hull != found.hulls.end() || body != found.bodies.end()) {
+    const bool is_hull =
+        body == found.bodies.end() || (hull != found.hulls.end() && hull->first < body->first);
+    watch.last_id = is_hull ? hull->first : body->first;
+    if (is_hull) {
+      tell(Describe(hull->first, hull->second));
+      ++hull;
+    } else {
+      const absl::StatusOr<StoredBody>& stored = body->second;
+      const StoredBody nothing = {{body->first, 0, 0}, {}, {}};
+      tell(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
+      ++body;
+    }
+  }
+  if (found.more) return absl::OkStatus();
+  watch.stage = ChangeWatch::Stage::kChanges;
+  watch.synced_at = state_.catalog.revision();
+  return absl::OkStatus();
 }
 
 }  // namespace hulld::server

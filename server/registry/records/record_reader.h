@@ -16,48 +16,55 @@
 #include "server/process/fair_queue.h"
 #include "server/process/synchronization.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/catalog/catalog.h"
-#include "server/registry/catalog/registry_types.h"
+#include "server/registry/catalog/registry_state.h"
+#include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/memory/memory_budget.h"
-#include "server/registry/records/record_gate.h"
+#include "server/registry/peers/read_barrier.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
 // Clients in fair scheduling of the threads that read the store, besides readers that load points:
-// pending record reads, and reads for watches (RecordLister).
+// pending record reads, and reads for watches.
 inline constexpr ClientId kRecordReader = 1;
 inline constexpr ClientId kWatchReader = 2;
 
-// Loads the records of IDs into the catalog if it is a cache of a store that finds records: the
-// record of the hull or of the body, or the absence of both.
+// Reads records from a store that finds them, of which the catalog holds only a part: loads the
+// record of an ID into the catalog (of the hull or of the body, or the absence of both), and lists
+// records page by page without adding them to the catalog.
 //
 // Invariants:
 //   - At most one thread reads the record of an ID, however many callers wait for it.
 //   - Only unknown IDs are read, so no local change interferes: local changes require known IDs.
-//     A change by a peer server replaces the read in progress (EndReadingOf).
+//     A change by a peer server replaces the read in progress (OnPeerChange).
 //   - When the waiting callers resume, the record is in the catalog, or was and is evicted again.
 //     A caller therefore looks the ID up again, and may find it unknown once more.
+//   - Records are used only after the catalog has reached their revision. The store may be at a
+//     later one; the changes in between, of peer servers or local ones, are then applied first. An
+//     answer mixing both revisions would be inconsistent, and a caller that saw the later one could
+//     be answered from the earlier one next.
 //
 // Guarded by the registry's mutex, which is released during store queries.
-class RecordReader {
+class RecordReader : public PeerChangeListener {
  public:
-  // All must outlive this. loaders: threads for reads without a blocked caller.
-  RecordReader(Store& store, FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
-               RecordGate& gate, WorkerPool& loaders)
-      : store_(store),
-        mutex_(mutex),
-        catalog_(catalog),
-        memory_(memory),
-        gate_(gate),
-        loaders_(loaders) {}
+  // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
+  RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier,
+               WorkerPool& loaders)
+      : state_(state), committer_(committer), barrier_(barrier), loaders_(loaders) {}
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
   // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
   // refuses, without the mutex. Requires: the ID is unknown.
   void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
+
+  // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
+  // end of a hull in flight. kQuiet: known, with nothing in flight.
+  enum class For { kLife, kQuiet };
+  // Returns true if the ID is not in that state; then `next` runs when it may be, and must check
+  // again. Otherwise does nothing. refuse: as WhenKnown.
+  bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
+                LockedTask next);
 
   // Blocks until the first ID is known; also reads up to kMostLookupsPerHold pending IDs. Releases
   // the mutex. Returns the error of the read, or CANCELLED if should_stop, which may be empty,
@@ -69,9 +76,21 @@ class RecordReader {
   absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
                             const std::function<bool()>& should_stop);
 
-  // Ends the read of an ID after a peer server's change of it was applied to the catalog. Returns
-  // the waiting tasks, to be run after all peer changes are applied.
-  std::vector<LockedTask> EndReadingOf(const std::string& id);
+  // Ends the read of the ID; its tasks look the ID up again.
+  void OnPeerChange(Locked& locked, const std::string& id,
+                    const std::shared_ptr<RegisteredHull>& hull) override;
+
+  // As Registry::List and ListBodies. Query the store on this thread. Require that the thread does
+  // not hold the mutex (not checked: a mutex does not know its holder).
+  absl::StatusOr<HullPage> ListHulls(const std::string& prefix, const std::string& after,
+                                     size_t page_size, const std::function<bool()>& should_stop);
+  absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
+                                      size_t page_size, const std::function<bool()>& should_stop);
+
+  // Takes the next piece of a watch in stage kPresent and advances the watch. If the piece is not
+  // read yet, starts the read, and the watch waits for it. UNAVAILABLE: the read failed; the next
+  // call retries.
+  absl::Status TakePresent(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
 
  private:
   struct Reading {
@@ -83,6 +102,8 @@ class RecordReader {
     std::vector<std::pair<Refusal, LockedTask>> waiting;
   };
   using Readings = std::vector<std::shared_ptr<Reading>>;
+  // Called with the registry's mutex held, with the records valid from then on, or an error.
+  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);
@@ -91,11 +112,27 @@ class RecordReader {
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
   void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
 
-  Store& store_;
-  FairMutex& mutex_;
-  Catalog& catalog_;
-  MemoryBudget& memory_;
-  RecordGate& gate_;
+  // Passes `found` to `take`, now or on the committer's thread. asked_at: the catalog's revision at
+  // the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes in
+  // between.
+  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
+                   FoundTaker take);
+  // As WhenReached, but blocks. Requires that the thread does not hold the mutex. CANCELLED:
+  // should_stop returned true.
+  absl::StatusOr<FoundRecords> AwaitReached(uint64_t asked_at, absl::StatusOr<FoundRecords> found,
+                                            const std::function<bool()>& should_stop);
+  bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
+  bool IsBehind(const FoundRecords& found) const;
+
+  absl::StatusOr<FoundRecords> List(const std::string& prefix, const std::string& after,
+                                    size_t page_size, RecordKinds kinds,
+                                    const std::function<bool()>& should_stop);
+  HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
+  void ReadPresent(Locked& locked, ChangeWatch& watch);
+
+  RegistryState& state_;
+  Committer& committer_;
+  ReadBarrier& barrier_;
   WorkerPool& loaders_;
 
   // Guarded by mutex_: reads that are not over, by ID; the ones not yet taken by a thread; and the

@@ -13,7 +13,7 @@
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/records/record_lister.h"
+#include "server/registry/records/record_reader.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -21,7 +21,7 @@ namespace hulld::server {
 // Opens watches, and gives each what it is told next. A watch passes through three stages: what
 // went since it was told last, where it resumes; what is there, in the order of IDs; and what
 // changes, which the ChangeFeed notes. What is there is taken from the catalog, or from the store
-// where the catalog knows only a part (RecordLister).
+// where the catalog knows only a part (RecordReader).
 //
 // Invariant: what changes while a watch is told what is there is told after it, so nothing is
 // missed. Takes the registry's mutex, for some ten microseconds at a time.
@@ -29,7 +29,7 @@ class Watches {
  public:
   // All must outlive this. The mutex is the registry's.
   Watches(const Store& store, FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
-          ChangeFeed& feed, RecordLister& lister)
+          ChangeFeed& feed, RecordReader& lister)
       : store_(store),
         mutex_(mutex),
         catalog_(catalog),
@@ -58,7 +58,7 @@ class Watches {
   Catalog& catalog_;
   MemoryBudget& memory_;
   ChangeFeed& feed_;
-  RecordLister& lister_;
+  RecordReader& lister_;
 };
 
 }  // namespace hulld::server

@@ -25,8 +25,8 @@ namespace hulld::server {
 // that lost some of it. The mark costs one write of 512 bytes to the page cache for each commit,
 // and no sync: it is synced in the background and before a log is deleted.
 //
-// The free space of the disk is hidden: RocksDB would resume by itself after an error and write to
-// a log that failed.
+// Hides the free space of the disk from RocksDB, which would otherwise resume after an error and
+// write to a failed log.
 class LogFileSystem : public rocksdb::FileSystemWrapper {
  public:
   // directory: that of the logs. Copies of logs elsewhere are ordinary files.

@@ -75,7 +75,7 @@ void PostgresStore::Keep() {
     if (keeper_session_ == nullptr && !is_beat) continue;
     lock.unlock();
     if (is_beat) {
-      const bool is_deaf = notices_ != nullptr && notices_->is_listening() && !HearsOthers();
+      const bool is_deaf = notices_ != nullptr && notices_->is_listening() && !HearsPeers();
       deaf_beats = is_deaf ? deaf_beats + 1 : 0;
       said_deaf = said_deaf && is_deaf;
     }
@@ -89,7 +89,7 @@ void PostgresStore::Keep() {
     absl::Status status;
     if (is_beat) status = Beat();
     if (status.ok() && is_beat && options_.shared) status = EndStuckTurns();
-    if (status.ok() && options_.shared && (is_beat || !HearsOthers())) status = LookForOthers();
+    if (status.ok() && options_.shared && (is_beat || !HearsPeers())) status = PollPeers();
     if (status.ok() && look % (looks_per_beat * kBeatsPerMeasure) == 0) status = MeasureDisk();
     if (!status.ok()) {
       keeper_session_ = nullptr;

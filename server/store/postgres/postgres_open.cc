@@ -327,7 +327,7 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenWriter() const {
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(), ";",
-                                  kPrepareReads, options_.shared ? PrepareFollow() : ""));
+                                  kPrepareReads, options_.shared ? PrepareFetch() : ""));
 }
 
 // The database ends this session, and thus this server's turn, after several missed beats.

@@ -53,7 +53,7 @@ constexpr char kSharedTables[] = R"(
   COMMIT;)";
 
 // hulld_follow requests one ID more than the limit, its second parameter.
-constexpr char kPrepareFollow[] = R"(
+constexpr char kPrepareFetch[] = R"(
     PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
         h.record, b.body, s.store_id, s.hulls, s.vertices, c.began, c.body_began, s.bodies
@@ -98,7 +98,7 @@ constexpr char kPrepareShared[] = R"(
       DELETE FROM hulld.changes WHERE batch <= $1;)";
 
 // Selects the changes of peer servers after this batch.
-Statement AskForOthers(uint64_t batch) {
+Statement FetchStatement(uint64_t batch) {
   return {.name = "hulld_follow",
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
@@ -148,14 +148,14 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
 }
 
 // Records the incarnation that ended first. rows: of hulld_follow.
-void NoteFormer(const Rows& rows, int row, OtherChange& other) {
+void NoteFormer(const Rows& rows, int row, PeerChange& change) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
   };
   const uint64_t first = std::min(began(13), began(14));
   if (first == UINT64_MAX) return;
-  other.former_began = first;
-  other.former_was_body = first == began(14);
+  change.former_began = first;
+  change.former_was_body = first == began(14);
 }
 
 absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
@@ -171,8 +171,8 @@ absl::Status MakeSharedTables(Session& session) {
 
 }  // namespace
 
-std::string PostgresStore::PrepareFollow() { return kPrepareFollow; }
-std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFollow, kPrepareShared); }
+std::string PostgresStore::PrepareFetch() { return kPrepareFetch; }
+std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFetch, kPrepareShared); }
 
 // Serializes the creation of tables by servers that start together.
 absl::Status PostgresStore::MakeSharedSchema(Session& session) {
@@ -251,55 +251,53 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
 }
 
 // rows: of hulld_follow.
-absl::Status PostgresStore::NoteOthers(const Rows& rows) {
+absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
   if (absl::Status s = CheckStore(rows); !s.ok()) return s;
   for (int i = 0; i < rows.count(); ++i) {
     const std::string id(rows.at(i, 5));
     if (id.empty()) continue;
-    OtherChange& other = others_.by_id[id];
-    other.revision = rows.bigint(i, 6);
-    other.ended_at = std::max(other.ended_at, rows.bigint(i, 7));
-    if (other.former_began == 0) NoteFormer(rows, i, other);
-    other.hull.reset();
-    other.body.reset();
+    PeerChange& change = peer_changes_.by_id[id];
+    change.revision = rows.bigint(i, 6);
+    change.ended_at = std::max(change.ended_at, rows.bigint(i, 7));
+    if (change.former_began == 0) NoteFormer(rows, i, change);
+    change.hull.reset();
+    change.body.reset();
     if (!rows.at(i, 8).empty()) {
-      other.hull = UnsealStoredHull(id, rows.at(i, 8));
-      if (other.hull->ok()) other.revision = (*other.hull)->record.revision;
+      change.hull = UnsealStoredHull(id, rows.at(i, 8));
+      if (change.hull->ok()) change.revision = (*change.hull)->record.revision;
     } else if (!rows.at(i, 9).empty()) {
-      other.body = UnsealStoredBody(id, rows.at(i, 9));
-      if (other.body->ok()) other.revision = (*other.body)->record.revision;
+      change.body = UnsealStoredBody(id, rows.at(i, 9));
+      if (change.body->ok()) change.revision = (*change.body)->record.revision;
     }
   }
   batch_ = rows.bigint(0, 0);
   seen_batch_ = batch_;
   revision_ = rows.bigint(0, 1);
   totals_ = {rows.bigint(0, 11), rows.bigint(0, 12), rows.bigint(0, 15)};
-  if (others_.by_id.empty()) return absl::OkStatus();
-  others_.revision = revision_;
-  others_.totals = totals_;
+  if (peer_changes_.by_id.empty()) return absl::OkStatus();
+  peer_changes_.revision = revision_;
+  peer_changes_.totals = totals_;
   return absl::OkStatus();
 }
 
-void PostgresStore::StartFollow() {
-  if (!options_.shared || !ended().ok()) return;
-  const Statement follow = AskForOthers(batch_);
-  following_ = follower_.TryStart(std::span(&follow, 1));
+void PostgresStore::StartFetch() {
+  if (!ended().ok()) return;
+  const Statement fetch = FetchStatement(batch_);
+  fetching_ = follower_.TryStart(std::span(&fetch, 1));
 }
 
-absl::Status PostgresStore::Follow() {
-  std::unique_ptr<Session> asked = std::exchange(following_, nullptr);
+absl::Status PostgresStore::Fetch() {
+  std::unique_ptr<Session> asked = std::exchange(fetching_, nullptr);
   if (absl::Status s = ended(); !s.ok()) {
     follower_.GiveUp(std::move(asked));
     return s;
   }
-  // No other server commits.
-  if (!options_.shared) return absl::OkStatus();
-  const Statement follow = AskForOthers(batch_);
+  const Statement fetch = FetchStatement(batch_);
   const absl::StatusOr<std::vector<Rows>> rows =
-      asked != nullptr ? follower_.Finish(std::move(asked), std::span(&follow, 1))
-                       : follower_.Ask(std::span(&follow, 1));
+      asked != nullptr ? follower_.Finish(std::move(asked), std::span(&fetch, 1))
+                       : follower_.Ask(std::span(&fetch, 1));
   if (rows.ok()) {
-    const absl::Status noted = NoteOthers(rows->front());
+    const absl::Status noted = NotePeerChanges(rows->front());
     if (went_back_) GiveNewId();
     return noted;
   }
@@ -313,9 +311,9 @@ absl::Status PostgresStore::TakeTurn() {
   std::vector<Statement> turn;
   turn.push_back({.text = "BEGIN"});
   turn.push_back({.name = "hulld_turn"});
-  turn.push_back(AskForOthers(batch_));
+  turn.push_back(FetchStatement(batch_));
   const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(turn);
-  return rows.ok() ? NoteOthers(rows->back()) : rows.status();
+  return rows.ok() ? NotePeerChanges(rows->back()) : rows.status();
 }
 
 // Returns the turn without a write. status: result of the transaction so far.
@@ -332,7 +330,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
   absl::Status status = TakeTurn();
   std::vector<Change*> kept;
   for (Change* change : changes) {
-    if (!others_.by_id.contains(change->id())) kept.push_back(change);
+    if (!peer_changes_.by_id.contains(change->id())) kept.push_back(change);
   }
   if (status.ok() && !kept.empty()) {
     const SharedBatch next = {batch_ + 1, NumberChanges(kept, revision_), AddedBy(kept)};
@@ -470,7 +468,7 @@ absl::Status PostgresStore::EndStuckTurns() {
 
 void PostgresStore::StartNotices() {
   const auto on_batch = [this](uint64_t batch) {
-    if (batch > seen_batch_) TellOfOthers();
+    if (batch > seen_batch_) NotifyPeerCommit();
   };
   notices_ = std::make_unique<BatchNotices>(
       [this] { return OpenListener(); }, options_.beat, on_batch,
@@ -479,28 +477,28 @@ void PostgresStore::StartNotices() {
 
 // True if notices arrive. The keeper still polls the store with each beat. A batch found that way
 // but not announced by now means a lost notice: then it polls more often until a notice arrives.
-bool PostgresStore::HearsOthers() const {
+bool PostgresStore::HearsPeers() const {
   return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
 }
 
 // Polls for new commits of peer servers, and reports them.
-absl::Status PostgresStore::LookForOthers() {
+absl::Status PostgresStore::PollPeers() {
   const absl::StatusOr<uint64_t> batch = LastBatch(*keeper_session_);
   if (!batch.ok()) return batch.status();
   looked_at_ = *batch;
-  if (*batch != seen_batch_) TellOfOthers();
+  if (*batch != seen_batch_) NotifyPeerCommit();
   return absl::OkStatus();
 }
 
-// Under the mutex, so that OnOthers waits until the former callback is not running.
-void PostgresStore::TellOfOthers() {
+// Under the mutex, so that OnPeerCommit waits until the former callback is not running.
+void PostgresStore::NotifyPeerCommit() {
   const std::lock_guard lock(mutex_);
-  if (on_others_) on_others_();
+  if (on_peer_commit_) on_peer_commit_();
 }
 
-void PostgresStore::OnOthers(std::function<void()> others) {
+void PostgresStore::OnPeerCommit(std::function<void()> committed) {
   const std::lock_guard lock(mutex_);
-  on_others_ = std::move(others);
+  on_peer_commit_ = std::move(committed);
 }
 
 // Reads the sequence, and compares the hull's record with `hull`, in one snapshot.

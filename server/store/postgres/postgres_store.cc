@@ -126,7 +126,7 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   if (!claimed.ok()) return claimed.status();
   if (writer_->TakeWarned())
     return absl::UnavailableError("PostgreSQL reported a warning during COMMIT");
-  if (claimed->count() == 0) return OutcomeBeforeOthers(batch);
+  if (claimed->count() == 0) return OutcomeBeforePeers(batch);
   epoch_ = claimed->bigint(0, 0);
   const uint64_t found = claimed->bigint(0, 1);
   if (found >= batch_) return found >= batch;
@@ -144,7 +144,7 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
 }
 
 // The first epoch after this server's records the number of batches at its start.
-absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
+absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
   const absl::StatusOr<Rows> next =
       writer_->Ask({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}});
   if (!next.ok()) return next.status();

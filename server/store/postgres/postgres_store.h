@@ -75,20 +75,20 @@ struct PostgresOptions {
 // superseded server cannot commit anything, whatever it believes, and neither can packets that
 // arrive late.
 //
-// A batch of changes is one transaction, sent in one piece. If the session is lost before the
-// outcome is known, the store raises the epoch again in a new session: this waits for the
-// transaction if it still exists, and nothing of it can follow. The number of batches at that point
-// shows if it was committed. No caller is answered before.
+// A batch of changes is one transaction, sent in one message. If the session is lost before the
+// outcome is known, the store raises the epoch again in a new session. This waits for the
+// transaction if it is still running, and prevents its commit afterwards, so the number of batches
+// then shows if it was committed. No caller is answered before.
 //
 // If shared, several servers are active concurrently (postgres_shared.cc). They share the advisory
 // lock and belong to one epoch, so that they and a server that is active alone exclude each other.
-// A transaction first takes the turn, which is the lock of the store's row, and reads the commits
-// of peer servers that this server has not seen; its revisions follow theirs. Changes of IDs that
-// peer servers changed are left out, and retried by the registry. The committing server notifies
-// the rest (BatchNotices), which also poll. COMMIT is sent only by a session that holds the turn,
-// so none can arrive after the turn has passed on; a server that lost the answer looks for its
-// batch after it has the turn again.
-class PostgresStore : public Store {
+// A transaction first takes the turn: it locks the store's row. It then reads the commits of peer
+// servers that this server has not seen, and numbers its revisions after theirs. Changes of IDs
+// that peer servers changed are left out, and retried by the registry. The committing server
+// notifies the rest (BatchNotices), which also poll. COMMIT is sent only by a session that holds
+// the turn, so none can arrive after the turn has passed on; a server that lost the answer looks
+// for its batch after it has the turn again.
+class PostgresStore : public Store, public PeerFeed {
  public:
   // Waits while another server is active, unless take_over. Creates the schema if it is missing.
   // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld made the schema, or
@@ -104,13 +104,13 @@ class PostgresStore : public Store {
   Durability durability() const override { return durability_; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
-  bool is_shared() const override { return options_.shared; }
-  absl::Status Follow() override;
-  void StartFollow() override;
-  OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
+  PeerFeed* peers() override { return options_.shared ? this : nullptr; }
+  absl::Status Fetch() override;
+  void StartFetch() override;
+  PeerChanges TakeChanges() override { return std::exchange(peer_changes_, {}); }
   std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
       std::span<const HullGrowth> hulls) override;
-  void OnOthers(std::function<void()> others) override;
+  void OnPeerCommit(std::function<void()> committed) override;
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   bool finds_records() const override { return true; }
@@ -188,21 +188,21 @@ class PostgresStore : public Store {
   absl::Status Attempt(std::span<const Change* const> changes, uint64_t revision, uint64_t batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
-  absl::StatusOr<bool> OutcomeBeforeOthers(uint64_t batch);
+  absl::StatusOr<bool> OutcomeBeforePeers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
   absl::Status OutcomeUnknown(const absl::Status& cause) const;
   static absl::Status Refused(const absl::Status& cause);
   void EndRelaxedRun();
 
   // For a shared store.
-  static std::string PrepareFollow();
+  static std::string PrepareFetch();
   static std::string PrepareShared();
   absl::Status MakeSharedSchema(Session& session);
   absl::Status Join();
   void Leave();
   absl::Status CheckStore(const Rows& rows);
   void GiveNewId();
-  absl::Status NoteOthers(const Rows& rows);
+  absl::Status NotePeerChanges(const Rows& rows);
   absl::Status CommitShared(std::span<Change* const> changes);
   absl::Status TakeTurn();
   void GiveTurnBack(const absl::Status& status);
@@ -213,9 +213,9 @@ class PostgresStore : public Store {
                                          std::chrono::steady_clock::time_point deadline);
   absl::Status EndStuckTurns();
   void StartNotices();
-  bool HearsOthers() const;
-  absl::Status LookForOthers();
-  void TellOfOthers();
+  bool HearsPeers() const;
+  absl::Status PollPeers();
+  void NotifyPeerCommit();
   absl::StatusOr<std::string> ReadSequence(const HullRecord& hull, const std::string& writer_id);
   absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
 
@@ -242,12 +242,12 @@ class PostgresStore : public Store {
   std::unique_ptr<Session> writer_;
   // Number of committed batches, as far as is known.
   uint64_t batch_ = 0;
-  // Shared: batch_ for the keeper, and the changes of peer servers up to it that TakeOthers has not
-  // returned yet.
+  // Shared: batch_ for the keeper, and the changes of peer servers up to it that TakeChanges has
+  // not returned yet.
   std::atomic<uint64_t> seen_batch_ = 0;
-  OtherChanges others_;
-  // Shared: a started query for Follow to finish; null: it must send one.
-  std::unique_ptr<Session> following_;
+  PeerChanges peer_changes_;
+  // Shared: a started query for Fetch to finish; null: it must send one.
+  std::unique_ptr<Session> fetching_;
   // The database has lost batches.
   bool went_back_ = false;
   // Not OK: the outcome of batch_ + 1 is unknown.
@@ -263,7 +263,7 @@ class PostgresStore : public Store {
   bool ending_ = false;
   absl::Status ended_;
   std::function<void()> on_ended_;
-  std::function<void()> on_others_;
+  std::function<void()> on_peer_commit_;
   std::optional<StoreDisk> disk_;
 
   std::atomic<uint64_t> write_failures_ = 0;

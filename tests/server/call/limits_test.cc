@@ -172,8 +172,8 @@ TEST_F(LimitsTest, AClientHasSoManyCallsWhateverTheServerHasLeft) {
   EXPECT_TRUE(GetHull(&again).ok());
 }
 
-// A textbook query of hours runs on the one thread that opens teams. A similar one of some
-// milliseconds is answered during it.
+// A textbook query of hours runs in slices. A similar one of some milliseconds is answered during
+// it.
 TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   Config config = TestConfig();
   config.limits.max_textbook_axes = uint64_t{1} << 40;

@@ -241,7 +241,7 @@ TEST_F(CheckCollisionCall, ADeadlineEndsALongTextbookQuery) {
       &context, Pair(PlacementOf("ball"), PlacementOf("ball", 0.5), v1::METHOD_TEXTBOOK_SAT),
       &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
-  // The executor is free again: a short query that uses its team gets through.
+  // Its thread is free again: a short query gets through.
   Put("small", Sphere(100));
   EXPECT_EQ(Check(Pair(PlacementOf("small"), PlacementOf("small", 5), v1::METHOD_TEXTBOOK_SAT))
                 .relation(),

@@ -6,10 +6,7 @@
 #include <atomic>
 #include <string>
 #include <thread>
-#include <vector>
 
-#include "core/hull/growth/hull_builder.h"
-#include "server/collisions/placed/query_settings.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -135,31 +132,6 @@ TEST_F(TextbookMemory, ABatchBeginsOneLargePairAtATime) {
   const grpc::Status status = reader->Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(overlapping, 4);
-}
-
-// Facets have axes, too: a large hull against a point has no pair of edges.
-TEST(TextbookTeam, AnswersLargeHullsAgainstPoints) {
-  const auto hull_of = [](const Coordinates& xyz) {
-    std::vector<Vector> points;
-    for (size_t i = 0; i < xyz.size(); i += 3) points.emplace_back(xyz[i], xyz[i + 1], xyz[i + 2]);
-    HullBuilder builder;
-    EXPECT_TRUE(builder.Add(points).ok());
-    return builder.Snapshot();
-  };
-  const Hull large = hull_of(Sphere(5000));
-  const Hull small = hull_of(Cube());
-  const Hull point = hull_of({0, 0, 0});
-  const QueryHull query_large(large);
-  const QueryHull query_small(small);
-  const QueryHull query_point(point);
-  QueryOptions options;
-  options.method = Method::kTextbookSat;
-  const auto is_for_team = [&](const QueryHull& a, const QueryHull& b) {
-    return IsTextbookForTeam(options, PlacedHull(a, Pose()), PlacedHull(b, Pose()));
-  };
-  EXPECT_TRUE(is_for_team(query_large, query_point));
-  EXPECT_TRUE(is_for_team(query_point, query_large));
-  EXPECT_FALSE(is_for_team(query_small, query_point));
 }
 
 }  // namespace textbook_memory_test

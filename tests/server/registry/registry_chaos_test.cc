@@ -30,7 +30,7 @@ class RegistryChaos : public RegistryInterleaving {
     for (uint64_t i = 0; i < times; ++i) {
       if (!session.has_value()) {
         const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-          registry_.OpenAppend(
+          registry_.hulls().OpenAppend(
               id, "w", true, [](const absl::Status&) {}, std::move(done));
         });
         if (!opened.ok()) continue;
@@ -41,7 +41,7 @@ class RegistryChaos : public RegistryInterleaving {
       const HullView view = registry_.Resolve(id, {})->second;
       EXPECT_EQ(view.record.counts.received, sequence);
       if (random() % 100 == 0 && Delete(id).ok()) {
-        registry_.CloseAppend(*session);
+        registry_.hulls().CloseAppend(*session);
         session.reset();
       }
     }
@@ -106,7 +106,7 @@ class RegistryChaos : public RegistryInterleaving {
     EXPECT_EQ(hull.served->high().x(), static_cast<double>(received));
     EXPECT_EQ(hull.served->query_hull().dimension(), hull.record.dimension);
     if (!also_canonical) return;
-    const auto canonical = registry_.Canonical(hull, {});
+    const auto canonical = registry_.reader().Canonical(hull, {});
     ASSERT_TRUE(canonical.ok()) << canonical.status();
     EXPECT_EQ((*canonical)->vertices().size(), received);
     EXPECT_EQ((*canonical)->vertices().back(), hull.served->high());

@@ -29,9 +29,9 @@ using std::chrono::minutes;
 using std::chrono::nanoseconds;
 
 // A peer server commits on the test's request. Requests to the store may be held.
-class SharedStore : public MemoryStore {
+class SharedStore : public MemoryStore, public PeerFeed {
  public:
-  bool is_shared() const override { return true; }
+  PeerFeed* peers() override { return this; }
   // Keeps hulls without points only.
   bool keeps_hulls() const override { return true; }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
@@ -46,12 +46,12 @@ class SharedStore : public MemoryStore {
     revision_ = NumberChanges(changes, std::max(revision_, found_.revision));
     return absl::OkStatus();
   }
-  absl::Status Follow() override {
+  absl::Status Fetch() override {
     std::unique_lock lock(mutex_);
     ++asked_;
     changed_.notify_all();
     // The answer may lack changes committed while the request is in flight.
-    OtherChanges found = std::exchange(committed_, {});
+    PeerChanges found = std::exchange(committed_, {});
     changed_.wait(lock, [this] { return !is_held_; });
     if (failure_.ok()) {
       found_ = std::move(found);
@@ -61,7 +61,7 @@ class SharedStore : public MemoryStore {
     }
     return failure_;
   }
-  OtherChanges TakeOthers() override {
+  PeerChanges TakeChanges() override {
     const std::lock_guard lock(mutex_);
     return std::exchange(found_, {});
   }
@@ -73,7 +73,7 @@ class SharedStore : public MemoryStore {
     hull.record.hull_id = id;
     hull.record.create_revision = hull.record.revision = revision;
     hull.record.dimension = -1;
-    OtherChange& change = committed_.by_id[id];
+    PeerChange& change = committed_.by_id[id];
     change.revision = committed_.revision = revision;
     change.hull = hull;
   }
@@ -105,8 +105,8 @@ class SharedStore : public MemoryStore {
   int asked_ = 0;
   bool is_held_ = false;
   absl::Status failure_;
-  OtherChanges committed_;
-  OtherChanges found_;
+  PeerChanges committed_;
+  PeerChanges found_;
   uint64_t revision_ = 0;
 };
 
@@ -139,7 +139,7 @@ class RegistryFreshnessTest : public ::testing::Test {
   }
   // Returns true if gRPC's thread may answer.
   bool IsAnsweredAtOnce(const std::string& id, const Freshness& freshness) {
-    return registry_.TryResolve(std::span(&id, 1), {.freshness = freshness}).has_value();
+    return registry_.reader().TryResolve(std::span(&id, 1), {.freshness = freshness}).has_value();
   }
 
   TestRegistry<SharedStore> hulls_{std::make_unique<SharedStore>()};
@@ -180,7 +180,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatDoesNotHoldAsksTheStore) {
   store_.CreateElsewhere("h", 1);
   const Freshness freshness = AtMost(hours(1), hours(2));
   EXPECT_FALSE(IsAnsweredAtOnce("h", freshness));
-  EXPECT_FALSE(registry_.TryFresh(freshness).has_value());
+  EXPECT_FALSE(registry_.barrier().TryFresh(freshness).has_value());
   const int before = store_.asked();
   const auto read = Read("h", freshness);
   ASSERT_TRUE(read.ok()) << read.status();
@@ -201,7 +201,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatIsHalfUsedUpHasTheStoreAskedOnceForReads
   store_.AwaitQuestion(before + 1);
   store_.Release();
   // One read that followed the other reads' request: no other request was sent in between.
-  ASSERT_TRUE(registry_.AwaitOthers({}).ok());
+  ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
   EXPECT_EQ(store_.asked(), before + 2);
 }
 
@@ -225,7 +225,7 @@ TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQuestionAndNotFromItsAnswer
 TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQuestionNeedsNoOther) {
   Freshness began_before;
   began_before.began = SteadyClock::now();
-  ASSERT_TRUE(registry_.AwaitOthers({}).ok());
+  ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
   const int before = store_.asked();
   EXPECT_TRUE(IsAnsweredAtOnce("h", began_before));
   EXPECT_TRUE(absl::IsNotFound(Read("h", began_before).status()));
@@ -314,7 +314,7 @@ TEST(RegistryFreshness, AStoreOfOneServerIsAlwaysFresh) {
     const auto read = hulls.registry().Resolve("h", {}, freshness);
     ASSERT_TRUE(read.ok()) << read.status();
     EXPECT_EQ(read->first.staleness, nanoseconds(0));
-    EXPECT_EQ(hulls.registry().TryFresh(freshness), nanoseconds(0));
+    EXPECT_EQ(hulls.registry().barrier().TryFresh(freshness), nanoseconds(0));
   }
   freshness.at_least_revision = 2;
   const absl::Status refused = hulls.registry().Resolve("h", {}, freshness).status();

@@ -65,7 +65,7 @@ TEST_F(RegistryInterleaving, ManyReadersOfOneHullReadItOnce) {
   readers.push_back(StartResolve({"h"}, {}));
   gate.WaitUntilReached();
   for (int i = 0; i < 3; ++i) readers.push_back(StartResolve({"h", "h"}, {}));
-  EXPECT_FALSE(registry_.TryResolve(std::vector<std::string>{"h"}).has_value());
+  EXPECT_FALSE(registry_.reader().TryResolve(std::vector<std::string>{"h"}).has_value());
   gate.Open();
   for (auto& reader : readers) {
     const auto resolved = reader.get();
@@ -286,7 +286,7 @@ TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
   ASSERT_TRUE(DurableRegistry::Wait<ReplaceResult>([&](Reply<ReplaceResult> done) {
-                registry_.Replace(std::move(replacement), std::move(done));
+                registry_.hulls().Replace(std::move(replacement), std::move(done));
               }).ok());
   gate.Open();
   const auto resolved = reader.get();
@@ -326,7 +326,7 @@ TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
     DropAll();
     const HullView view = registry_.Resolve(id, {})->second;
     const absl::Status found = by_writer ? Append(session, 2, {{9, 9, 9}}).status()
-                                         : registry_.Canonical(view, {}).status();
+                                         : registry_.reader().Canonical(view, {}).status();
     EXPECT_TRUE(absl::IsDataLoss(found)) << found;
     EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve(id, {}).status()));
     EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
@@ -337,19 +337,19 @@ TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
 TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewer) {
   const AppendSession first = Open("h", "w");
   ASSERT_TRUE(Append(first, 1, {{0, 0, 0}}).ok());
-  registry_.CloseAppend(first);
+  registry_.hulls().CloseAppend(first);
   store_.after_load_sequence.Set([this] {
     const OpenResult other = OpenResultOf("h", "w");
     EXPECT_EQ(other.last_sequence, 1);
     EXPECT_TRUE(Append(other.session, 2, {{1, 0, 0}}).ok());
-    registry_.CloseAppend(other.session);
+    registry_.hulls().CloseAppend(other.session);
   });
   const OpenResult opened = OpenResultOf("h", "w");
   EXPECT_EQ(opened.last_sequence, 2);
   const absl::StatusOr<ChunkResult> repeated = Append(opened.session, 2, {{1, 0, 0}});
   ASSERT_TRUE(repeated.ok()) << repeated.status();
   EXPECT_TRUE(repeated->already_applied);
-  registry_.CloseAppend(opened.session);
+  registry_.hulls().CloseAppend(opened.session);
 }
 
 // The chunk is queued on a thread, not yet started, when the batch before it fails. The store has
@@ -357,14 +357,14 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
   const OpenResult first = OpenResultOf("h", "w");
   ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
-  registry_.CloseAppend(first.session);
+  registry_.hulls().CloseAppend(first.session);
   // One of two threads is busy, so tasks submitted after the opening run after it.
   Gate busy, reads, committed;
   writers_.Submit([&] { busy.Stop(); });
   busy.WaitUntilReached();
   store_.before_load_sequence.Set([&] { reads.Stop(); });
   std::promise<absl::StatusOr<OpenResult>> opened;
-  registry_.OpenAppend(
+  registry_.hulls().OpenAppend(
       "h", "w", true, [](const absl::Status&) {},
       [&](absl::StatusOr<OpenResult> result) { opened.set_value(std::move(result)); });
   reads.WaitUntilReached();

@@ -97,7 +97,7 @@ TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) 
   ASSERT_EQ(page->hulls.size(), 1);
   EXPECT_LE(page->hulls[0].record.counts.received, view->record.counts.received);
   EXPECT_TRUE(appended.get().ok());
-  hulls.registry().CloseAppend(writer->session);
+  hulls.registry().hulls().CloseAppend(writer->session);
 }
 
 }  // namespace registry_listing_test

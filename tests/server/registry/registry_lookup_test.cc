@@ -41,7 +41,7 @@ TEST_F(RegistryLookup, TheMutexIsHeldForAFewLookupsAtATime) {
   const std::vector<std::string> ids = Create(1000);
   ASSERT_TRUE(registry_.Resolve(ids, {}).ok());
   EXPECT_EQ(registry_.Holds().most_lookups, kMost);
-  ASSERT_TRUE(registry_.TryResolve(ids).has_value());
+  ASSERT_TRUE(registry_.reader().TryResolve(ids).has_value());
   EXPECT_EQ(registry_.Holds().most_lookups, kMost);
   EXPECT_GT(registry_.Holds().longest, std::chrono::nanoseconds(0));
 }
@@ -106,7 +106,7 @@ TEST_F(RegistryLookup, WhatIsGivenIsOfOneMoment) {
   uint64_t last = 0;
   for (int round = 0; round < 300 || last < 100; ++round) {
     const auto resolved =
-        round % 2 == 0 ? registry_.Resolve(ids, {}) : registry_.Refresh(ids, known, {});
+        round % 2 == 0 ? registry_.Resolve(ids, {}) : registry_.reader().Refresh(ids, known, {});
     ASSERT_TRUE(resolved.ok());
     const uint64_t first = Received(*resolved, 0);
     const uint64_t second = Received(*resolved, ids.size() - 1);
@@ -124,11 +124,11 @@ TEST_F(RegistryLookup, WhatIsGivenIsOfOneMoment) {
 TEST_F(RegistryLookup, ARefreshLooksUpWhatChangedAlone) {
   const std::vector<std::string> ids = Create(1000);
   KnownHulls known;
-  ASSERT_TRUE(registry_.Refresh(ids, known, {}).ok());
+  ASSERT_TRUE(registry_.reader().Refresh(ids, known, {}).ok());
   EXPECT_EQ(Lookups(), 1000);
   ASSERT_TRUE(hulls_.Put(ids[3], CubeCorners()).ok());
   ASSERT_TRUE(hulls_.Put("another", CubeCorners()).ok());
-  absl::StatusOr<Resolved> resolved = registry_.Refresh(ids, known, {});
+  absl::StatusOr<Resolved> resolved = registry_.reader().Refresh(ids, known, {});
   EXPECT_EQ(Lookups(), 1001);
   EXPECT_EQ(resolved->hulls[3]->record.vertex_count, 8);
   EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
@@ -139,13 +139,13 @@ TEST_F(RegistryLookup, ARefreshLooksUpWhatChangedAlone) {
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
   ASSERT_TRUE(hulls_.Replace(std::move(replacement)).ok());
-  resolved = registry_.Refresh(ids, known, {});
+  resolved = registry_.reader().Refresh(ids, known, {});
   EXPECT_TRUE(absl::IsNotFound(resolved->hulls[3].status()));
   EXPECT_EQ(resolved->hulls[4]->served->low(), Vector(5, 5, 5));
   EXPECT_EQ(Lookups(), 1002);
 
   ASSERT_TRUE(hulls_.Create(ids[3]).ok());
-  EXPECT_TRUE(registry_.Refresh(ids, known, {})->hulls[3].ok());
+  EXPECT_TRUE(registry_.reader().Refresh(ids, known, {})->hulls[3].ok());
   EXPECT_EQ(Lookups(), 1003);
 }
 
@@ -153,20 +153,20 @@ TEST_F(RegistryLookup, ARefreshLooksUpWhatChangedAlone) {
 TEST_F(RegistryLookup, ARefreshAfterMoreChangesThanAreKnownLooksUpAll) {
   const std::vector<std::string> ids = Create(300);
   KnownHulls known;
-  ASSERT_TRUE(registry_.Refresh(ids, known, {}).ok());
+  ASSERT_TRUE(registry_.reader().Refresh(ids, known, {}).ok());
   ASSERT_TRUE(hulls_.Put(ids[7], CubeCorners()).ok());
   const AppendSession session = hulls_.Open("another")->session;
   std::promise<void> done;
   for (uint64_t sequence = 1; sequence <= RecentChanges::kMost; ++sequence) {
-    registry_.Append(session, {sequence, {{0, 0, 0}}, std::nullopt}, {}, {},
-                     [&, sequence](const absl::StatusOr<ChunkResult>& result) {
-                       EXPECT_TRUE(result.ok());
-                       if (sequence == RecentChanges::kMost) done.set_value();
-                     });
+    registry_.hulls().Append(session, {sequence, {{0, 0, 0}}, std::nullopt}, {}, {},
+                             [&, sequence](const absl::StatusOr<ChunkResult>& result) {
+                               EXPECT_TRUE(result.ok());
+                               if (sequence == RecentChanges::kMost) done.set_value();
+                             });
   }
   done.get_future().wait();
   const uint64_t before = Lookups();
-  EXPECT_EQ(registry_.Refresh(ids, known, {})->hulls[7]->record.vertex_count, 8);
+  EXPECT_EQ(registry_.reader().Refresh(ids, known, {})->hulls[7]->record.vertex_count, 8);
   EXPECT_EQ(Lookups(), before + 300);
   EXPECT_LE(registry_.Holds().most_lookups, kMost);
 }

@@ -68,13 +68,13 @@ TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {
   EXPECT_GT(hulls_->registry().Cache().bytes, builder.MemoryBytes());
   Start();
   const std::vector<std::string> ids = {"h"};
-  EXPECT_FALSE(hulls_->registry().TryResolve(ids).has_value());
+  EXPECT_FALSE(hulls_->registry().reader().TryResolve(ids).has_value());
   EXPECT_EQ(hulls_->registry().Cache().hits, 0);
   const HullView view = *hulls_->View("h");
   EXPECT_EQ(view.served->canonical(), nullptr);
   EXPECT_EQ(view.served->query_hull().point_count(), 2000);
   EXPECT_LT(hulls_->registry().Cache().bytes, builder.MemoryBytes() / 2);
-  EXPECT_TRUE(hulls_->registry().TryResolve(ids).has_value());
+  EXPECT_TRUE(hulls_->registry().reader().TryResolve(ids).has_value());
   // A writer continues with the points that the reader loaded.
   ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
@@ -90,7 +90,7 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
   {
     const HullView view = *hulls_->View("h");
     const uint64_t before = registry.Cache().bytes;
-    ASSERT_TRUE(registry.Canonical(view, {}).ok());
+    ASSERT_TRUE(registry.reader().Canonical(view, {}).ok());
     EXPECT_GE(registry.Cache().bytes, before + view.served->canonical()->MemoryBytes());
     EXPECT_GE(registry.Cache().reading_bytes, view.served->canonical()->MemoryBytes());
     // Derived data that queries need is added.
@@ -114,7 +114,7 @@ TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped
   const std::vector<std::string> ids = {"h"};
   const ReadPlan plan = {.expected_questions = 1'000'000};
   KnownHulls known;
-  const absl::StatusOr<Resolved> first = registry.Refresh(ids, known, {}, plan);
+  const absl::StatusOr<Resolved> first = registry.reader().Refresh(ids, known, {}, plan);
   ASSERT_TRUE(first.ok() && first->hulls[0].ok());
   const auto is_prepared = [&] { return hulls_->View("h")->served != first->hulls[0]->served; };
   for (int i = 0; i < 100'000 && !is_prepared(); ++i) std::this_thread::yield();
@@ -123,15 +123,15 @@ TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped
     const MemoryCharge charge(registry.memory(), MemoryUse::kReading, registry.Cache().limit_bytes);
     EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
   }
-  ASSERT_FALSE(registry.TryResolve(ids).has_value());
+  ASSERT_FALSE(registry.reader().TryResolve(ids).has_value());
   const uint64_t loads = registry.Cache().loads;
-  const absl::StatusOr<Resolved> second = registry.Refresh(ids, known, {}, plan);
+  const absl::StatusOr<Resolved> second = registry.reader().Refresh(ids, known, {}, plan);
   ASSERT_TRUE(second.ok() && second->hulls[0].ok());
   EXPECT_EQ(registry.Cache().loads, loads);
   EXPECT_EQ(second->hulls[0]->served, first->hulls[0]->served);
   // A change causes a read.
   ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
-  EXPECT_EQ(registry.Refresh(ids, known, {}, plan)->hulls[0]->served->high().x(), 2);
+  EXPECT_EQ(registry.reader().Refresh(ids, known, {}, plan)->hulls[0]->served->high().x(), 2);
 }
 
 TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
@@ -212,12 +212,12 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   Registry registry(store, limits, writers);
   const auto put = [&](const std::string& id) {
     const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry.OpenAppend(
+      registry.hulls().OpenAppend(
           id, "w", true, [](const absl::Status&) {}, std::move(done));
     });
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry.Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
-                      std::move(done));
+      registry.hulls().Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
+                              std::move(done));
     });
   };
   ASSERT_TRUE(put("first").ok());
@@ -233,7 +233,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   WorkerPool writers(2);
   Registry registry(store, Limits(), writers);
   const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    registry.OpenAppend(
+    registry.hulls().OpenAppend(
         "h", "w", true, [](const absl::Status&) {}, std::move(done));
   });
   std::vector<Vector> line;
@@ -247,13 +247,15 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
     if (std::exchange(asked, true)) return false;
     const uint64_t before = registry.Cache().bytes;
     EXPECT_EQ(before, line_bytes);
-    registry.Append(opened->session, {2, waiting, std::nullopt}, {}, {},
-                    [&](absl::StatusOr<ChunkResult> result) { next.set_value(std::move(result)); });
+    registry.hulls().Append(
+        opened->session, {2, waiting, std::nullopt}, {}, {},
+        [&](absl::StatusOr<ChunkResult> result) { next.set_value(std::move(result)); });
     EXPECT_EQ(registry.Cache().bytes, before + waiting.size() * sizeof(Vector));
     return false;
   };
   const auto first = DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-    registry.Append(opened->session, {1, line, std::nullopt}, should_stop, {}, std::move(done));
+    registry.hulls().Append(opened->session, {1, line, std::nullopt}, should_stop, {},
+                            std::move(done));
   });
   EXPECT_TRUE(first.ok());
   EXPECT_TRUE(asked);
@@ -275,13 +277,14 @@ TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
   limits.memory_limit = 10'000;
   Registry registry(store, limits, writers);
   const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    registry.OpenAppend(
+    registry.hulls().OpenAppend(
         "h", "w", true, [](const absl::Status&) {}, std::move(done));
   });
   const auto append = [&](size_t points) {
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry.Append(opened->session, {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {},
-                      {}, std::move(done));
+      registry.hulls().Append(opened->session,
+                              {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {}, {},
+                              std::move(done));
     });
   };
   EXPECT_EQ(append(1000).status().code(), absl::StatusCode::kResourceExhausted);
@@ -356,7 +359,7 @@ TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
     SCOPED_TRACE(deleted);
     ASSERT_TRUE(hulls_->Put("h", sphere).ok());
     std::optional<HullView> view = *hulls_->View("h");
-    ASSERT_TRUE(registry.Canonical(*view, {}).ok());
+    ASSERT_TRUE(registry.reader().Canonical(*view, {}).ok());
     const uint64_t held = registry.Cache().reading_bytes;
     EXPECT_GT(held, view->record.vertex_count * sizeof(Vector) +
                         view->served->canonical()->MemoryBytes());

@@ -95,7 +95,7 @@ class RegistryRecords : public ::testing::Test {
     return ids;
   }
   void ExpectBodies(const std::vector<std::string>& ids) {
-    const FoundBodies found = registry_.FindBodies(ids);
+    const FoundBodies found = registry_.bodies().Find(ids);
     ASSERT_TRUE(found.status.ok()) << found.status;
     ASSERT_EQ(found.bodies.size(), ids.size());
     for (size_t i = 0; i < ids.size(); ++i) {
@@ -154,10 +154,10 @@ TEST_F(RegistryRecords, AlsoThatThereIsNothingIsKept) {
 TEST_F(RegistryRecords, WhoMayNotWaitIsNotAnsweredUntilItIsKnown) {
   Start(1000);
   const std::vector<std::string> ids = {"h1"};
-  EXPECT_FALSE(registry_.TryResolve(ids).has_value());
+  EXPECT_FALSE(registry_.reader().TryResolve(ids).has_value());
   EXPECT_EQ(store_.questions, 0);
   ExpectThere(ids);
-  EXPECT_TRUE(registry_.TryResolve(ids).has_value());
+  EXPECT_TRUE(registry_.reader().TryResolve(ids).has_value());
 }
 
 // Records requested later replace earlier ones.
@@ -192,15 +192,15 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
 TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
-  EXPECT_FALSE(registry_.TryFindBodies(ids).has_value());
+  EXPECT_FALSE(registry_.bodies().TryFind(ids).has_value());
   EXPECT_EQ(store_.questions, 0);
-  const FoundBodies found = registry_.FindBodies(ids);
+  const FoundBodies found = registry_.bodies().Find(ids);
   ASSERT_TRUE(found.status.ok()) << found.status;
   EXPECT_EQ(found.bodies[0], nullptr);
   EXPECT_NE(found.bodies[1], nullptr);
   EXPECT_EQ(found.bodies[2], nullptr);
   EXPECT_EQ(store_.questions, 1);
-  EXPECT_TRUE(registry_.TryFindBodies(ids).has_value());
+  EXPECT_TRUE(registry_.bodies().TryFind(ids).has_value());
   const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   EXPECT_TRUE(resolved->hulls[0].ok());
@@ -230,9 +230,9 @@ TEST_F(RegistryRecords, BodiesThatNobodyUsesAreBoundedInBytes) {
 TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
   Start(1);
   const std::vector<std::string> ids = {"b7"};
-  const FoundBodies held = registry_.FindBodies(ids);
+  const FoundBodies held = registry_.bodies().Find(ids);
   for (uint64_t first = 100; first < 1000; first += 10) ExpectBodies(Ids(first, 10, "b"));
-  EXPECT_EQ(registry_.FindBodies(ids).bodies.front(), held.bodies.front());
+  EXPECT_EQ(registry_.bodies().Find(ids).bodies.front(), held.bodies.front());
 }
 
 TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
@@ -245,7 +245,7 @@ TEST_F(RegistryRecords, WhyABodyCannotBeReadIsTold) {
   ExpectBodies({"b1"});
   store_.is_gone = true;
   const std::vector<std::string> ids = {"b1", "b2"};
-  const FoundBodies found = registry_.FindBodies(ids);
+  const FoundBodies found = registry_.bodies().Find(ids);
   EXPECT_TRUE(absl::IsUnavailable(found.status)) << found.status;
   EXPECT_NE(found.bodies[0], nullptr);
   EXPECT_EQ(found.bodies[1], nullptr);
@@ -257,7 +257,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   Start(1000);
   std::string after;
   for (int i = 0; i < 10; ++i) {
-    const absl::StatusOr<BodyPage> page = registry_.ListBodies("b", after, 5);
+    const absl::StatusOr<BodyPage> page = registry_.bodies().List("b", after, 5);
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_EQ(page->bodies.size(), 5);
     EXPECT_TRUE(page->more);
@@ -265,7 +265,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   }
   EXPECT_EQ(after, "b59");
   EXPECT_EQ(store_.questions, 10);
-  EXPECT_FALSE(registry_.TryFindBodies(Ids(10, 1, "b")).has_value());
+  EXPECT_FALSE(registry_.bodies().TryFind(Ids(10, 1, "b")).has_value());
 }
 
 }  // namespace registry_records_test

@@ -41,15 +41,15 @@ class RegistryTest : public ::testing::Test {
                                      std::vector<Vector> points,
                                      std::function<bool()> should_stop = {}) {
     return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry_.Append(session, {sequence, std::move(points), std::nullopt}, std::move(should_stop),
-                       {}, std::move(done));
+      registry_.hulls().Append(session, {sequence, std::move(points), std::nullopt},
+                               std::move(should_stop), {}, std::move(done));
     });
   }
 
   absl::StatusOr<OpenResult> OpenAppend(
       const std::string& id, const std::string& writer, std::function<void()> on_gone = [] {}) {
     return Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry_.OpenAppend(
+      registry_.hulls().OpenAppend(
           id, writer, true, [on_gone](const absl::Status&) { on_gone(); }, std::move(done));
     });
   }
@@ -58,7 +58,7 @@ class RegistryTest : public ::testing::Test {
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
     return Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.Delete(id, std::nullopt, std::move(done)); });
+        [&](Reply<uint64_t> done) { registry_.hulls().Delete(id, std::nullopt, std::move(done)); });
   }
 
   CountingStore store_;
@@ -89,7 +89,7 @@ TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
   const AppendSession session = Open("h");
   for (uint64_t i = 1; i <= 100; ++i) {
     ASSERT_TRUE(Append(session, i, {Vector(static_cast<double>(i), 0, 0)}).ok());
-    const auto tried = registry_.TryResolve(ids);
+    const auto tried = registry_.reader().TryResolve(ids);
     ASSERT_TRUE(tried.has_value());
     ASSERT_EQ(tried->hulls.size(), 2);
     EXPECT_EQ(tried->store_revision, registry_.Sizes().store_revision);
@@ -109,7 +109,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   Registry registry(store, Limits(), writers);
   const auto open = [&](const std::string& id, ClientId client) {
     std::promise<AppendSession> opened;
-    registry.OpenAppend(
+    registry.hulls().OpenAppend(
         id, "w", true, [](const absl::Status&) {},
         [&](const absl::StatusOr<OpenResult>& result) { opened.set_value(result->session); },
         client);
@@ -127,7 +127,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
     const auto ended = std::make_shared<std::promise<void>>();
     ends.push_back(building->get_future());
     ends.push_back(ended->get_future());
-    registry.Append(
+    registry.hulls().Append(
         sessions[i], {1, {{1, 2, 3}}, std::nullopt}, {},
         [&, i, building] {
           {
@@ -189,12 +189,12 @@ TEST_F(RegistryTest, AReaderThatMakesTheCanonicalSnapshotCanBeCancelled) {
   const HullView view = registry_.Resolve("h", {})->second;
   for (const int last : {1, 2, 20}) {
     int polls = 0;
-    EXPECT_TRUE(
-        absl::IsCancelled(registry_.Canonical(view, [&] { return ++polls >= last; }).status()));
+    EXPECT_TRUE(absl::IsCancelled(
+        registry_.reader().Canonical(view, [&] { return ++polls >= last; }).status()));
     EXPECT_EQ(polls, last);
     EXPECT_EQ(view.served->canonical(), nullptr);
   }
-  const auto made = registry_.Canonical(view, {});
+  const auto made = registry_.reader().Canonical(view, {});
   ASSERT_TRUE(made.ok()) << made.status();
   EXPECT_EQ((*made)->vertices().size(), points.size());
 }
@@ -207,7 +207,7 @@ TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
   std::vector<const Hull*> made(4);
   std::vector<std::thread> threads;
   for (const Hull*& hull : made) {
-    threads.emplace_back([&] { hull = *registry_.Canonical(view, {}); });
+    threads.emplace_back([&] { hull = *registry_.reader().Canonical(view, {}); });
   }
   for (std::thread& thread : threads) thread.join();
   for (const Hull* hull : made) EXPECT_EQ(hull, view.served->canonical());
@@ -223,10 +223,11 @@ TEST_F(RegistryTest, AReaderThatWaitsForTheCanonicalSnapshotCanBeCancelled) {
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const HullView view = registry_.Resolve("h", {})->second;
   bool asked = false;
-  const auto made = registry_.Canonical(view, [&] {
+  const auto made = registry_.reader().Canonical(view, [&] {
     if (!std::exchange(asked, true)) {
       std::thread([&] {
-        EXPECT_TRUE(absl::IsCancelled(registry_.Canonical(view, [] { return true; }).status()));
+        EXPECT_TRUE(
+            absl::IsCancelled(registry_.reader().Canonical(view, [] { return true; }).status()));
       }).join();
     }
     return false;
@@ -260,13 +261,13 @@ TEST_F(RegistryTest, WhatQuestionsPayForIsPreparedFirstOnlyForWhoeverWaits) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const ReadPlan many = {1'000'000, true};
-  EXPECT_FALSE(registry_.TryResolve(ids, many).has_value());
-  const auto before = registry_.TryResolve(ids);
+  EXPECT_FALSE(registry_.reader().TryResolve(ids, many).has_value());
+  const auto before = registry_.reader().TryResolve(ids);
   ASSERT_TRUE(before.has_value());
   const auto prepared = registry_.Resolve(ids, {}, many);
   ASSERT_TRUE(prepared.ok());
   EXPECT_NE(prepared->hulls[0]->served, before->hulls[0]->served);
-  const auto after = registry_.TryResolve(ids, many);
+  const auto after = registry_.reader().TryResolve(ids, many);
   ASSERT_TRUE(after.has_value());
   EXPECT_EQ(after->hulls[0]->served, prepared->hulls[0]->served);
   // The snapshot is that of the revision, regardless of preparation.
@@ -294,13 +295,13 @@ TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
 TEST_F(RegistryTest, WhatManyQuestionsPaidForIsPrepared) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
-  const auto first = registry_.TryResolve(ids, {1'000'000, false});
+  const auto first = registry_.reader().TryResolve(ids, {1'000'000, false});
   ASSERT_TRUE(first.has_value());
   // Bounded by the test's time limit only.
-  while (registry_.TryResolve(ids)->hulls[0]->served == first->hulls[0]->served) {
+  while (registry_.reader().TryResolve(ids)->hulls[0]->served == first->hulls[0]->served) {
     std::this_thread::yield();
   }
-  EXPECT_TRUE(registry_.TryResolve(ids, {1'000'000, true}).has_value());
+  EXPECT_TRUE(registry_.reader().TryResolve(ids, {1'000'000, true}).has_value());
 }
 
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
@@ -312,10 +313,10 @@ TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   bool asked = false;
   const auto result = Append(session, 1, std::move(points), [&] {
     if (!std::exchange(asked, true)) {
-      registry_.Delete("h", std::nullopt,
-                       [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
-      registry_.Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
-                       [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
+      registry_.hulls().Delete("h", std::nullopt,
+                               [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
+      registry_.hulls().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
+                               [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
       EXPECT_EQ(registry_.List("", "", 10)->hulls.size(), 1);
     }
     return false;
@@ -332,11 +333,11 @@ TEST_F(RegistryTest, AWatchIsCalledOnceOnDeletionAndNotAfterClosing) {
   std::atomic<int> open = 0;
   const auto first = OpenAppend("h", "1", [&] { ++closed; });
   const auto second = OpenAppend("h", "2", [&] { ++open; });
-  registry_.CloseAppend(first->session);
+  registry_.hulls().CloseAppend(first->session);
   ASSERT_TRUE(Delete("h").ok());
   EXPECT_EQ(closed, 0);
   EXPECT_EQ(open, 1);
-  registry_.CloseAppend(second->session);
+  registry_.hulls().CloseAppend(second->session);
 }
 
 TEST_F(RegistryTest, TheStoreSeesEveryChange) {
@@ -355,11 +356,11 @@ TEST_F(RegistryTest, ChunksOfOneSessionAreAnsweredInOrderThoughTheyOverlap) {
   std::vector<uint64_t> revisions;
   std::promise<void> all;
   for (uint64_t i = 1; i <= kChunks; ++i) {
-    registry_.Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
-                     [&](absl::StatusOr<ChunkResult> result) {
-                       revisions.push_back(result.ok() ? result->hull_revision : 0);
-                       if (revisions.size() == kChunks) all.set_value();
-                     });
+    registry_.hulls().Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
+                             [&](absl::StatusOr<ChunkResult> result) {
+                               revisions.push_back(result.ok() ? result->hull_revision : 0);
+                               if (revisions.size() == kChunks) all.set_value();
+                             });
   }
   all.get_future().wait();
   for (uint64_t i = 0; i < kChunks; ++i) EXPECT_EQ(revisions[i], i + 2);

@@ -21,9 +21,9 @@ TEST(WaitingCalls, OneIsToldOnce) {
     ++told;
   });
   EXPECT_EQ(calls.count(), 1);
-  wait->Tell(absl::UnavailableError("no database"));
+  wait->Finish(absl::UnavailableError("no database"));
   EXPECT_EQ(calls.count(), 0);
-  wait->Tell(absl::OkStatus());
+  wait->Finish(absl::OkStatus());
   EXPECT_FALSE(wait->Withdraw());
   EXPECT_EQ(told, 1);
 }
@@ -33,7 +33,7 @@ TEST(WaitingCalls, OneThatIsWithdrawnIsNotTold) {
   const auto wait = calls.Add({}, [](const absl::Status&) { FAIL(); });
   EXPECT_TRUE(wait->Withdraw());
   EXPECT_EQ(calls.count(), 0);
-  wait->Tell(absl::OkStatus());
+  wait->Finish(absl::OkStatus());
 }
 
 // Also the last one in the queue.
@@ -47,7 +47,7 @@ TEST(WaitingCalls, OneThatIsCancelledEndsAndTheOthersWait) {
   is_cancelled = true;
   EXPECT_TRUE(absl::IsCancelled(told.get_future().get()));
   EXPECT_EQ(calls.count(), 1);
-  wait->Tell(absl::OkStatus());
+  wait->Finish(absl::OkStatus());
   EXPECT_TRUE(other->Withdraw());
 }
 
@@ -68,7 +68,7 @@ TEST(WaitingCalls, NobodyIsAskedWhetherToStopOnceItIsOver) {
           ++told;
         });
     if (i % 100 == 0) std::this_thread::sleep_for(kStopPoll / 2);
-    wait->Tell(absl::OkStatus());
+    wait->Finish(absl::OkStatus());
   }
   // None is notified twice; the notification of a call that the other thread ends may arrive
   // slightly later.

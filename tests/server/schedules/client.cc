@@ -152,7 +152,7 @@ void Client::Create() {
   };
   Await<CreateResult>(
       [&](Reply<CreateResult> done) {
-        simulation_.registry.Create(HullName(call.hull), if_absent, std::move(done));
+        simulation_.registry.hulls().Create(HullName(call.hull), if_absent, std::move(done));
       },
       check);
 }
@@ -175,7 +175,7 @@ void Client::Delete() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.Delete(HullName(call.hull), call.if_revision, std::move(done));
+        simulation_.registry.hulls().Delete(HullName(call.hull), call.if_revision, std::move(done));
       },
       check);
 }
@@ -211,7 +211,7 @@ void Client::Replace() {
   };
   Await<ReplaceResult>(
       [&](Reply<ReplaceResult> done) {
-        simulation_.registry.Replace(std::move(replacement), std::move(done));
+        simulation_.registry.hulls().Replace(std::move(replacement), std::move(done));
       },
       check);
 }
@@ -219,7 +219,7 @@ void Client::Replace() {
 void Client::List() {
   Call call = Begin(0);
   Scheduler::Current().Note("lists hulls");
-  if (const absl::Status fresh = simulation_.registry.AwaitOthers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
@@ -251,11 +251,12 @@ void Client::List() {
 bool Client::AwaitFresh(const Freshness& freshness) {
   const auto told = std::make_shared<Event>();
   const auto fresh = std::make_shared<absl::Status>();
-  const bool asks = simulation_.registry.StartFresh(freshness, [=](const absl::Status& status) {
-    if (told->is_set()) Scheduler::Current().Fail("a reader is told twice");
-    *fresh = status;
-    told->Set();
-  });
+  const bool asks =
+      simulation_.registry.barrier().StartFresh(freshness, [=](const absl::Status& status) {
+        if (told->is_set()) Scheduler::Current().Fail("a reader is told twice");
+        *fresh = status;
+        told->Set();
+      });
   if (!asks) return false;
   told->Wait();
   return fresh->ok();
@@ -276,14 +277,14 @@ void Client::Read() {
   absl::StatusOr<Resolved> resolved = absl::UnknownError("");
   if (way == 1) {
     read_plan.freshness.began = SteadyClock::now();
-    std::optional<Resolved> tried = simulation_.registry.TryResolve(ids, read_plan);
+    std::optional<Resolved> tried = simulation_.registry.reader().TryResolve(ids, read_plan);
     if (!tried.has_value() && AwaitFresh(read_plan.freshness)) {
-      tried = simulation_.registry.TryResolve(ids, read_plan);
+      tried = simulation_.registry.reader().TryResolve(ids, read_plan);
     }
     if (!tried.has_value()) return;
     resolved = *std::move(tried);
   } else if (way == 2) {
-    resolved = simulation_.registry.Refresh(ids, known_, stop, read_plan);
+    resolved = simulation_.registry.reader().Refresh(ids, known_, stop, read_plan);
   } else {
     resolved = simulation_.registry.Resolve(ids, stop, read_plan);
   }
@@ -348,7 +349,7 @@ void Client::MakeCanonical(const Call& before, const HullView& view) {
   Call call = Begin(before.hull);
   const std::function<bool()> stop = StopOf(call);
   Scheduler::Current().Note("makes a snapshot of hull", call.hull, view.record.revision);
-  const absl::StatusOr<const Hull*> made = simulation_.registry.Canonical(view, stop);
+  const absl::StatusOr<const Hull*> made = simulation_.registry.reader().Canonical(view, stop);
   if (!made.ok()) {
     if (MayFail(call, made.status(), true)) return;
     Fail(call, absl::StrCat("wrong: ", made.status().ToString()));

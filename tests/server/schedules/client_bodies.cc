@@ -80,7 +80,7 @@ void Client::PutBody() {
   };
   Await<PutBodyResult>(
       [&](Reply<PutBodyResult> done) {
-        simulation_.registry.PutBody(std::move(body), call.if_revision, std::move(done));
+        simulation_.registry.bodies().Put(std::move(body), call.if_revision, std::move(done));
       },
       check);
 }
@@ -102,7 +102,7 @@ void Client::DeleteBody() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.DeleteBody(HullName(call.hull), std::nullopt, std::move(done));
+        simulation_.registry.bodies().Delete(HullName(call.hull), std::nullopt, std::move(done));
       },
       check);
 }
@@ -129,17 +129,17 @@ void Client::FindBodies() {
   std::vector<std::string> ids;
   for (size_t hull = 0; hull < simulation_.plan.hulls; ++hull) ids.push_back(HullName(hull));
   Scheduler::Current().Note("looks for bodies", ids.size());
-  if (const absl::Status fresh = simulation_.registry.AwaitOthers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
   FoundBodies found;
   if (random().OneIn(3)) {
-    std::optional<FoundBodies> tried = simulation_.registry.TryFindBodies(ids);
+    std::optional<FoundBodies> tried = simulation_.registry.bodies().TryFind(ids);
     if (!tried.has_value()) return;
     found = *std::move(tried);
   } else {
-    found = simulation_.registry.FindBodies(ids, stop);
+    found = simulation_.registry.bodies().Find(ids, stop);
   }
   ++simulation_.reached.answers;
   if (!found.status.ok()) {
@@ -157,11 +157,11 @@ void Client::FindBodies() {
 void Client::ListBodies() {
   Call call = Begin(0);
   Scheduler::Current().Note("lists bodies");
-  if (const absl::Status fresh = simulation_.registry.AwaitOthers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
-  const absl::StatusOr<BodyPage> page = simulation_.registry.ListBodies("", "", kHulls);
+  const absl::StatusOr<BodyPage> page = simulation_.registry.bodies().List("", "", kHulls);
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;

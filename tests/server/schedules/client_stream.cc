@@ -57,7 +57,7 @@ void Client::AppendStream() {
   }
   CheckOrder(*stream);
   Scheduler::Current().Note("closes a stream into hull", stream->hull, stream->writer);
-  simulation_.registry.CloseAppend(stream->session);
+  simulation_.registry.hulls().CloseAppend(stream->session);
 }
 
 bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_absent) {
@@ -77,8 +77,8 @@ bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_ab
   };
   Await<OpenResult>(
       [&](Reply<OpenResult> done) {
-        simulation_.registry.OpenAppend(HullName(stream->hull), WriterName(stream->writer),
-                                        create_if_absent, on_gone, std::move(done));
+        simulation_.registry.hulls().OpenAppend(HullName(stream->hull), WriterName(stream->writer),
+                                                create_if_absent, on_gone, std::move(done));
       },
       check);
   return stream->is_open;
@@ -121,7 +121,7 @@ void Client::SendChunk(const std::shared_ptr<Stream>& stream, uint64_t sequence)
     sent->status = result.status();
     sent->answered.Set();
   };
-  simulation_.registry.Append(
+  simulation_.registry.hulls().Append(
       stream->session,
       {sequence, PointsOf(ChunkPoints(stream->writer, sequence)), call.if_revision}, StopOf(call),
       on_built, done);
@@ -217,7 +217,7 @@ void Client::CheckSequences(size_t hull) {
     stream->hull = hull;
     stream->writer = writer;
     if (!OpenStream(stream, false)) continue;
-    simulation_.registry.CloseAppend(stream->session);
+    simulation_.registry.hulls().CloseAppend(stream->session);
   }
 }
 

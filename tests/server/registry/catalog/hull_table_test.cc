@@ -49,12 +49,10 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
   {
     const auto hull = table_.Find("a");
     EXPECT_TRUE(IsAwake("a"));
-    EXPECT_EQ(hull->committed, stored);
-    EXPECT_EQ(hull->head, stored);
+    EXPECT_EQ(hull->committed(), stored);
+    EXPECT_EQ(hull->head(), stored);
     EXPECT_EQ(table_.Find("a"), hull);
-    hull->has_box = true;
-    hull->low = {1, 2, 3};
-    hull->high = {4, 5, 6};
+    hull->SetBox({1, 2, 3}, {4, 5, 6});
     GoRound();
     EXPECT_TRUE(IsAwake("a")) << "while someone holds it";
   }
@@ -64,9 +62,9 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
   EXPECT_TRUE(told.has_box);
   EXPECT_EQ(told.high, Vector(4, 5, 6));
   const auto again = table_.Find("a");
-  EXPECT_EQ(again->committed, stored);
-  EXPECT_TRUE(again->has_box);
-  EXPECT_EQ(again->low, Vector(1, 2, 3));
+  EXPECT_EQ(again->committed(), stored);
+  EXPECT_TRUE(again->Describe().has_box);
+  EXPECT_EQ(again->Describe().low, Vector(1, 2, 3));
 }
 
 // Putting it to rest would lose each of these.
@@ -85,26 +83,23 @@ TEST_F(HullTableTest, WhatIsInUseStaysAwake) {
       "a session", [](RegisteredHull& hull) { hull.watches[1] = {}; },
       [](RegisteredHull& hull) { hull.watches.clear(); });
   expect_awake_while(
-      "a writer's sequence",
-      [](RegisteredHull& hull) {
-        hull.writers["w"] = {4, 5};
-      },
-      [](RegisteredHull& hull) { hull.writers.clear(); });
+      "a writer's sequence", [](RegisteredHull& hull) { hull.KeepSequence("w", 4); },
+      [](RegisteredHull& hull) { hull.DropUnusedWriters(); });
   expect_awake_while(
-      "a thread that reads one", [](RegisteredHull& hull) { ++hull.sequence_readers; },
-      [](RegisteredHull& hull) { --hull.sequence_readers; });
+      "a thread that reads one", [](RegisteredHull& hull) { hull.StartReadingSequence(); },
+      [](RegisteredHull& hull) { hull.EndReadingSequence(); });
   expect_awake_while(
-      "a thread that loads it", [](RegisteredHull& hull) { hull.loading = true; },
-      [](RegisteredHull& hull) { hull.loading = false; });
+      "a thread that loads it", [](RegisteredHull& hull) { hull.StartLoading(); },
+      [](RegisteredHull& hull) { hull.EndLoading(); });
   expect_awake_while(
-      "a thread that prepares it", [](RegisteredHull& hull) { hull.preparing = true; },
-      [](RegisteredHull& hull) { hull.preparing = false; });
+      "a thread that prepares it", [](RegisteredHull& hull) { hull.SetPreparing(true); },
+      [](RegisteredHull& hull) { hull.SetPreparing(false); });
   expect_awake_while(
       "a change that waits", [](RegisteredHull& hull) { hull.exclusive.emplace_back(); },
       [](RegisteredHull& hull) { hull.exclusive.clear(); });
   expect_awake_while(
-      "points", [](RegisteredHull& hull) { hull.live = std::make_shared<LiveHull>(); },
-      [](RegisteredHull& hull) { hull.live = nullptr; });
+      "points", [](RegisteredHull& hull) { hull.SetLive(std::make_shared<LiveHull>()); },
+      [this](RegisteredHull& hull) { hull.DiscardAll(locked_); });
   expect_awake_while(
       "an end on its way", [](RegisteredHull& hull) { hull.state.StartEnding(); },
       [](RegisteredHull& hull) { hull.state.Refuse(); });

@@ -76,19 +76,19 @@ TEST_F(SupersededHull, OnlyFewPointsInDeltasAfterTheSameBaseAreGrowth) {
 TEST_F(SupersededHull, GrowthIsAddedAndReadersKeepWhatTheyHold) {
   const std::shared_ptr<const ServedHull> before = hull_.Serve();
   EXPECT_TRUE(Supersede(Grown(), &growth_));
-  EXPECT_EQ(hull_.committed, Grown());
-  EXPECT_EQ(hull_.head, Grown());
+  EXPECT_EQ(hull_.committed(), Grown());
+  EXPECT_EQ(hull_.head(), Grown());
   EXPECT_EQ(before->query_hull().point_count(), 8);
   EXPECT_EQ(before->high(), Vector(1, 1, 1));
   EXPECT_EQ(ServedPoints(), 9);
   EXPECT_EQ(hull_.Serve()->high(), Vector(2, 2, 2));
   EXPECT_EQ(hull_.Describe().high, Vector(2, 2, 2));
-  EXPECT_EQ(hull_.points_since_prepared, 1);
+  EXPECT_EQ(hull_.points_since_prepared(), 1);
 }
 
 TEST_F(SupersededHull, WithoutGrowthItGoes) {
   EXPECT_FALSE(Supersede(Grown(), nullptr));
-  EXPECT_EQ(hull_.committed, Grown());
+  EXPECT_EQ(hull_.committed(), Grown());
   EXPECT_FALSE(hull_.IsReady());
   EXPECT_FALSE(hull_.Describe().has_box);
   // The hull was deleted before its growth arrived.
@@ -97,26 +97,26 @@ TEST_F(SupersededHull, WithoutGrowthItGoes) {
 }
 
 TEST_F(SupersededHull, WhereNoVertexCameAllStays) {
-  hull_.builder = std::make_unique<HullBuilder>();
+  hull_.SetBuilder(std::make_unique<HullBuilder>());
   StoredHull counted = Cube();
   counted.record.counts.received = 1;
   EXPECT_FALSE(Supersede(counted, nullptr));
-  EXPECT_EQ(hull_.committed, counted);
+  EXPECT_EQ(hull_.committed(), counted);
   EXPECT_EQ(ServedPoints(), 8);
-  EXPECT_NE(hull_.builder, nullptr);
-  EXPECT_TRUE(hull_.builder_lacks.empty());
+  EXPECT_NE(hull_.builder(), nullptr);
+  EXPECT_TRUE(hull_.builder_backlog().empty());
 }
 
 TEST_F(SupersededHull, ABuilderIsKeptWithWhatItLacksUnlessThatIsMuch) {
-  hull_.builder = std::make_unique<HullBuilder>();
+  hull_.SetBuilder(std::make_unique<HullBuilder>());
   EXPECT_TRUE(Supersede(Grown(), &growth_));
-  EXPECT_THAT(hull_.builder_lacks, ElementsAre(growth_.front()));
+  EXPECT_THAT(hull_.builder_backlog(), ElementsAre(growth_.front()));
   const std::vector<Vector> many = SpherePoints(RegisteredHull::kMostGrowth, 10);
   StoredHull next = Grown(1 + many.size());
   next.record.revision = 10;
   EXPECT_TRUE(Supersede(next, &many));
-  EXPECT_EQ(hull_.builder, nullptr);
-  EXPECT_TRUE(hull_.builder_lacks.empty());
+  EXPECT_EQ(hull_.builder(), nullptr);
+  EXPECT_TRUE(hull_.builder_backlog().empty());
   EXPECT_EQ(ServedPoints(), 9 + many.size());
 }
 
@@ -124,12 +124,12 @@ TEST_F(SupersededHull, ABuilderIsKeptWithWhatItLacksUnlessThatIsMuch) {
 TEST_F(SupersededHull, AThreadThatBuildsLosesWhatItAppended) {
   hull_.state.Schedule();
   hull_.state.StartBuilding();
-  hull_.live_is_ahead = true;
-  const std::shared_ptr<LiveHull> live = hull_.live;
+  hull_.LendBuilder();
+  const std::shared_ptr<LiveHull> live = hull_.live();
   live->Append(std::vector<Vector>{{3, 3, 3}}, 3);
   EXPECT_TRUE(Supersede(Grown(), &growth_));
   EXPECT_EQ(hull_.state.work(), HullState::Work::kReverting);
-  EXPECT_NE(hull_.live, live);
+  EXPECT_NE(hull_.live(), live);
   live->Append(std::vector<Vector>{{4, 4, 4}}, 3);
   EXPECT_EQ(ServedPoints(), 9);
   EXPECT_EQ(hull_.Serve()->high(), Vector(2, 2, 2));
@@ -148,8 +148,8 @@ TEST_F(SupersededHull, WhatCameIsCountedAndIsNoReasonToKeepTheHull) {
   const MemoryCharge charge(budget_, MemoryUse::kReading, (1 << 30) - (16 << 10));
   Locked locked(mutex_);
   budget_.Evict(locked);
-  EXPECT_EQ(hull_.live, nullptr);
-  EXPECT_NE(used_later.live, nullptr);
+  EXPECT_EQ(hull_.live(), nullptr);
+  EXPECT_NE(used_later.live(), nullptr);
 }
 
 }  // namespace registered_hull_test

@@ -81,18 +81,18 @@ class GatedStore : public MemoryStore {
 };
 
 // A peer server changes some IDs at the next commit.
-class SharedStore : public GatedStore {
+class SharedStore : public GatedStore, public PeerFeed {
  public:
-  bool is_shared() const override { return true; }
-  OtherChanges TakeOthers() override { return std::exchange(others, {}); }
-  void StartFollow() override {
+  PeerFeed* peers() override { return this; }
+  PeerChanges TakeChanges() override { return std::exchange(changes, {}); }
+  void StartFetch() override {
     ++starts;
     if (on_start) on_start();
   }
-  absl::Status Follow() override {
-    ++follows;
-    if (found_by_follow.revision > 0) others = std::exchange(found_by_follow, {});
-    return can_follow;
+  absl::Status Fetch() override {
+    ++fetches;
+    if (found_by_fetch.revision > 0) changes = std::exchange(found_by_fetch, {});
+    return fetched;
   }
 
   std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
@@ -108,13 +108,34 @@ class SharedStore : public GatedStore {
     return growth;
   }
 
-  OtherChanges others;
-  OtherChanges found_by_follow;
-  std::atomic<int> follows = 0;
+  PeerChanges changes;
+  PeerChanges found_by_fetch;
+  std::atomic<int> fetches = 0;
   std::atomic<int> starts = 0;
   // Called while a request is sent; may be empty.
   std::function<void()> on_start;
-  absl::Status can_follow;
+  absl::Status fetched;
+};
+
+// Records what the committer reports.
+class RecordedPeers : public Committer::Peers {
+ public:
+  explicit RecordedPeers(std::function<void(const PeerChanges&)> apply = {},
+                         std::vector<HullGrowth> grown = {})
+      : apply_(std::move(apply)), grown_(std::move(grown)) {}
+
+  std::vector<HullGrowth> GrownHulls(const PeerChanges&) const override { return grown_; }
+  void Apply(Locked& locked, const PeerChanges& changes) override {
+    EXPECT_TRUE(order == nullptr || locked.Holds(*order));
+    if (apply_) apply_(changes);
+  }
+  void NoteSynced(SteadyClock::time_point) override {}
+
+  const FairMutex* order = nullptr;
+
+ private:
+  const std::function<void(const PeerChanges&)> apply_;
+  const std::vector<HullGrowth> grown_;
 };
 
 class CommitterTest : public ::testing::Test {
@@ -253,7 +274,8 @@ TEST_F(CommitterTest, AStoreThatRecoveredForWhoFollowsFailsNoMore) {
   std::promise<absl::Status> told;
   {
     const Locked locked(order_);
-    committer_.Follow(locked, [&](Locked&, const absl::Status& status) { told.set_value(status); });
+    committer_.AddBarrier(locked,
+                          [&](Locked&, const absl::Status& status) { told.set_value(status); });
   }
   EXPECT_TRUE(told.get_future().get().ok());
   EXPECT_FALSE(committer_.Statistics().failing);
@@ -301,11 +323,12 @@ TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
   FairMutex order;
   std::vector<std::string> events;
   std::promise<void> ended;
-  Committer committer(store, order);
-  committer.SetOthers([&](Locked& locked, const OtherChanges& others) {
-    EXPECT_TRUE(locked.Holds(order));
-    events.push_back(absl::StrCat("others at ", others.revision));
+  RecordedPeers peers([&](const PeerChanges& changes) {
+    events.push_back(absl::StrCat("peers at ", changes.revision));
   });
+  peers.order = &order;
+  Committer committer(store, order);
+  committer.SetPeers(peers);
   const auto submit = [&](const std::string& id, int number) {
     const Locked locked(order);
     Change change;
@@ -326,13 +349,13 @@ TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
   submit("a", 2);
   submit("b", 1);
   submit("a", 3);
-  store.others.revision = 7;
-  store.others.by_id["a"];
+  store.changes.revision = 7;
+  store.changes.by_id["a"];
   first.outcome.set_value(absl::OkStatus());
   submit("last", 1);
   ended.get_future().wait();
   const std::lock_guard lock(order);
-  EXPECT_THAT(events, ElementsAre("a3 superseded", "a2 superseded", "a1 superseded", "others at 7",
+  EXPECT_THAT(events, ElementsAre("a3 superseded", "a2 superseded", "a1 superseded", "peers at 7",
                                   "b1 kept", "last1 kept"));
 }
 
@@ -342,8 +365,9 @@ TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
   FairMutex order;
   std::vector<std::string> events;
   std::promise<void> followed;
+  RecordedPeers peers([&](const PeerChanges&) { events.emplace_back("peers"); });
   Committer committer(store, order);
-  committer.SetOthers([&](Locked&, const OtherChanges&) { events.emplace_back("others"); });
+  committer.SetPeers(peers);
   GatedStore::Gate gate;
   store.Close(gate);
   {
@@ -355,34 +379,35 @@ TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
                      [&](Locked&, const absl::Status& status, const Change&) {
                        events.push_back(Committer::IsSuperseded(status) ? "superseded" : "refused");
                      });
-    committer.Follow(locked, [&](Locked&, const absl::Status&) { followed.set_value(); });
+    committer.AddBarrier(locked, [&](Locked&, const absl::Status&) { followed.set_value(); });
   }
   gate.entered.get_future().wait();
-  store.found_by_follow.revision = 7;
-  store.found_by_follow.by_id["h"];
+  store.found_by_fetch.revision = 7;
+  store.found_by_fetch.by_id["h"];
   gate.outcome.set_value(absl::UnavailableError("lost the database connection during COMMIT"));
   followed.get_future().wait();
   const std::lock_guard lock(order);
-  EXPECT_THAT(events, ElementsAre("refused", "others"));
+  EXPECT_THAT(events, ElementsAre("refused", "peers"));
 }
 
 TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   SharedStore store;
   FairMutex order;
+  RecordedPeers peers;
   Committer committer(store, order);
-  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  committer.SetPeers(peers);
   const auto follow = [&] {
     std::promise<absl::Status> told;
     {
       const Locked locked(order);
-      committer.Follow(locked,
-                       [&](Locked&, const absl::Status& status) { told.set_value(status); });
+      committer.AddBarrier(locked,
+                           [&](Locked&, const absl::Status& status) { told.set_value(status); });
     }
     return told.get_future().get();
   };
   EXPECT_TRUE(follow().ok());
-  EXPECT_EQ(store.follows, 1);
-  store.can_follow = absl::UnavailableError("no database");
+  EXPECT_EQ(store.fetches, 1);
+  store.fetched = absl::UnavailableError("no database");
   EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
@@ -394,12 +419,13 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
   std::vector<std::string> events;
   std::promise<void> told_later;
   std::promise<void> committed;
+  RecordedPeers peers;
   Committer committer(store, order);
-  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  committer.SetPeers(peers);
   const auto note = [&](const std::string& event) {
     return [&, event](Locked&, const absl::Status& status) {
       EXPECT_TRUE(status.ok());
-      events.push_back(absl::StrCat(event, " ", store.follows.load()));
+      events.push_back(absl::StrCat(event, " ", store.fetches.load()));
     };
   };
   const std::thread::id caller = std::this_thread::get_id();
@@ -408,7 +434,7 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
     if (std::exchange(has_come, true)) return;
     EXPECT_EQ(std::this_thread::get_id(), caller);
     Locked locked(order);
-    committer.FollowNow(locked, [&, note](Locked& later, const absl::Status& status) {
+    committer.StartBarrier(locked, [&, note](Locked& later, const absl::Status& status) {
       note("later")(later, status);
       told_later.set_value();
     });
@@ -423,7 +449,7 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
     std::promise<void> told;
     {
       Locked locked(order);
-      committer.FollowNow(locked, [&](Locked& later, const absl::Status& status) {
+      committer.StartBarrier(locked, [&](Locked& later, const absl::Status& status) {
         if (store.starts > 0) note("first")(later, status);
         told.set_value();
       });
@@ -446,28 +472,26 @@ TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
   SharedStore store;
   FairMutex order;
   std::vector<std::string> events;
-  Committer committer(store, order);
-  committer.SetOthers(
-      [&](Locked&, const OtherChanges& others) {
-        for (const auto& [id, other] : others.by_id) {
-          events.push_back(absl::StrCat(id, other.growth.has_value() ? " grew" : " changed"));
+  std::vector<HullGrowth> grown(2);
+  grown[0].after.record.hull_id = "wanted";
+  grown[1].after.record.hull_id = "unreadable";
+  RecordedPeers peers(
+      [&](const PeerChanges& changes) {
+        for (const auto& [id, change] : changes.by_id) {
+          events.push_back(absl::StrCat(id, change.growth.has_value() ? " grew" : " changed"));
         }
       },
-      [&](Locked& locked, const OtherChanges& others) {
-        EXPECT_TRUE(locked.Holds(order));
-        EXPECT_EQ(others.by_id.size(), 3);
-        std::vector<HullGrowth> wanted(2);
-        wanted[0].after.record.hull_id = "wanted";
-        wanted[1].after.record.hull_id = "unreadable";
-        return wanted;
-      });
+      grown);
+  peers.order = &order;
+  Committer committer(store, order);
+  committer.SetPeers(peers);
   const auto follow = [&] {
-    store.found_by_follow.revision = 7;
-    for (const char* id : {"wanted", "unreadable", "other"}) store.found_by_follow.by_id[id];
+    store.found_by_fetch.revision = 7;
+    for (const char* id : {"wanted", "unreadable", "other"}) store.found_by_fetch.by_id[id];
     std::promise<void> told;
     {
       const Locked locked(order);
-      committer.Follow(locked, [&](Locked&, const absl::Status&) { told.set_value(); });
+      committer.AddBarrier(locked, [&](Locked&, const absl::Status&) { told.set_value(); });
     }
     told.get_future().get();
     const std::lock_guard lock(order);
@@ -475,7 +499,7 @@ TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
   };
   EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted grew"));
   // A failed request is not immediately retried.
-  store.can_follow = absl::UnavailableError("no database");
+  store.fetched = absl::UnavailableError("no database");
   EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted changed"));
 }
 

@@ -105,12 +105,12 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
 }
 
 // Records the peer changes since its last known revision.
-void SharedStore::NoteOthers() {
+void SharedStore::NotePeerChanges() {
   known_.revision = database_.ledger_.revision();
   known_.totals = database_.totals();
   for (; known_.seen < database_.log_.size(); ++known_.seen) {
     const SimulatedStore::Logged& logged = database_.log_[known_.seen];
-    OtherChange& other = known_.others.by_id[logged.hull_id];
+    PeerChange& other = known_.peer_changes.by_id[logged.hull_id];
     other.revision = logged.revision;
     other.ended_at = std::max(other.ended_at, logged.ended_at);
     if (other.former_began == 0) {
@@ -129,32 +129,32 @@ void SharedStore::NoteOthers() {
     other.hull = found->second.stored;
     other.revision = found->second.stored.record.revision;
   }
-  if (known_.others.by_id.empty()) return;
-  known_.others.revision = known_.revision;
-  known_.others.totals = known_.totals;
+  if (known_.peer_changes.by_id.empty()) return;
+  known_.peer_changes.revision = known_.revision;
+  known_.peer_changes.totals = known_.totals;
 }
 
-void SharedStore::StartFollow() {
+void SharedStore::StartFetch() {
   Begin("database: is sent the question what others did since change", known_.seen);
   if (!Dice().OneIn(database_.faults_.read)) {
     const Known before = known_;
-    NoteOthers();
+    NotePeerChanges();
     started_ = std::exchange(known_, before);
   }
   End("database: has the question, at revision, change", absl::OkStatus()).IgnoreError();
 }
 
-absl::Status SharedStore::Follow() {
+absl::Status SharedStore::Fetch() {
   Begin("database: is asked what others did since change", known_.seen);
   absl::Status status;
   // A server that cannot reach the database at its start ends.
-  if (std::exchange(has_followed_, true) && Dice().OneIn(database_.faults_.read)) {
+  if (std::exchange(has_fetched_, true) && Dice().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     status = absl::UnavailableError("the database does not answer");
   } else if (started_.has_value()) {
     known_ = *std::move(started_);
   } else {
-    NoteOthers();
+    NotePeerChanges();
   }
   started_.reset();
   return End("database: has told what others did up to revision, change", status);
@@ -166,7 +166,7 @@ absl::Status SharedStore::Commit(std::span<Change* const> changes) {
   ++database_.counts_.batches;
   const absl::Status status = CommitInTurn(changes);
   NoteEnd(!status.ok());
-  if (status.ok()) TellTheOthers();
+  if (status.ok()) NotifyPeers();
   return End("database: has committed up to revision, change", status);
 }
 
@@ -178,10 +178,10 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
     return status;
   };
   if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("it cannot be reached"));
-  NoteOthers();
+  NotePeerChanges();
   std::vector<Change*> kept;
   for (Change* change : changes) {
-    if (!known_.others.by_id.contains(change->id())) kept.push_back(change);
+    if (!known_.peer_changes.by_id.contains(change->id())) kept.push_back(change);
   }
   database_.counts_.superseded += changes.size() - kept.size();
   if (kept.empty()) return absl::OkStatus();
@@ -216,16 +216,16 @@ void SharedStore::NoteEnd(bool failed) {
   is_failing_ = failed;
 }
 
-void SharedStore::TellTheOthers() {
+void SharedStore::NotifyPeers() {
   const std::lock_guard lock(database_.servers_mutex_);
   for (SharedStore* server : database_.servers_) {
-    if (server != this && server->on_others_ && Dice().OneIn(2)) server->on_others_();
+    if (server != this && server->on_peer_commit_ && Dice().OneIn(2)) server->on_peer_commit_();
   }
 }
 
-void SharedStore::OnOthers(std::function<void()> others) {
+void SharedStore::OnPeerCommit(std::function<void()> committed) {
   const std::lock_guard lock(database_.servers_mutex_);
-  on_others_ = std::move(others);
+  on_peer_commit_ = std::move(committed);
 }
 
 }  // namespace hulld::server

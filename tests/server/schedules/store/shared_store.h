@@ -13,9 +13,9 @@
 namespace hulld::server {
 
 // A server's view of a SimulatedStore that several servers share as their database. It behaves as
-// Store specifies for shared stores. Other threads may run before and after each call. The database
+// PeerFeed specifies. Other threads may run before and after each call. The database
 // outlives it.
-class SharedStore : public Store {
+class SharedStore : public Store, public PeerFeed {
  public:
   explicit SharedStore(SimulatedStore& database);
   ~SharedStore() override;
@@ -24,7 +24,7 @@ class SharedStore : public Store {
   std::string id() const override { return database_.id(); }
   Durability durability() const override { return Durability::kSync; }
   bool keeps_hulls() const override { return true; }
-  bool is_shared() const override { return true; }
+  PeerFeed* peers() override { return this; }
   uint64_t revision() const override { return known_.revision; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   // Without record lookup no bodies exist.
@@ -44,18 +44,18 @@ class SharedStore : public Store {
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override { return database_.MakeCopy(); }
-  absl::Status Follow() override;
-  void StartFollow() override;
-  OtherChanges TakeOthers() override { return std::exchange(known_.others, {}); }
-  void OnOthers(std::function<void()> others) override;
+  absl::Status Fetch() override;
+  void StartFetch() override;
+  PeerChanges TakeChanges() override { return std::exchange(known_.peer_changes, {}); }
+  void OnPeerCommit(std::function<void()> committed) override;
 
  private:
   void Begin(const char* what, uint64_t number);
   absl::Status End(const char* what, const absl::Status& status);
-  void NoteOthers();
+  void NotePeerChanges();
   void NoteEnd(bool failed);
   absl::Status CommitInTurn(std::span<Change* const> changes);
-  void TellTheOthers();
+  void NotifyPeers();
   // Returns the stored data of a hull if it matches the record, or null.
   const SimulatedStore::StoredVertices* Find(const HullRecord& record) const;
 
@@ -67,18 +67,18 @@ class SharedStore : public Store {
     // As of that revision.
     StoreTotals totals = {};
     // Peer changes not yet taken.
-    OtherChanges others = {};
+    PeerChanges peer_changes = {};
   };
 
   SimulatedStore& database_;
   Known known_;
-  // The state captured when a pending Follow started.
+  // The state captured when a pending Fetch started.
   std::optional<Known> started_;
   // Guarded by the database's mutex.
-  std::function<void()> on_others_;
+  std::function<void()> on_peer_commit_;
   bool is_busy_ = false;
   bool is_failing_ = false;
-  bool has_followed_ = false;
+  bool has_fetched_ = false;
 };
 
 }  // namespace hulld::server

@@ -66,7 +66,7 @@ class PostgresFollow : public PostgresTest {
   }
   // Empty if the hull does not exist.
   static std::vector<Vector> Canonical(PostgresRegistry& server, const HullView& view) {
-    const auto hull = server.registry().Canonical(view, {});
+    const auto hull = server.registry().reader().Canonical(view, {});
     if (!hull.ok()) {
       ADD_FAILURE() << hull.status();
       return {};
@@ -179,7 +179,7 @@ TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
       for (uint64_t i = 0; i < kChunks; ++i) {
         const auto done = std::make_shared<std::promise<absl::StatusOr<ChunkResult>>>();
         results.push_back(done->get_future());
-        server->registry().Append(
+        server->registry().hulls().Append(
             opened->session,
             {i + 1, {PointOutside(static_cast<int>(2 * i + is_here))}, std::nullopt}, {}, {},
             [done](absl::StatusOr<ChunkResult> result) { done->set_value(std::move(result)); });
@@ -254,11 +254,11 @@ TEST_F(PostgresFollow, WhoIsBehindByTooManyHullsEnds) {
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
   change(1 << 17);
-  EXPECT_TRUE(hulls_->registry().AwaitOthers({}).ok());
+  EXPECT_TRUE(hulls_->registry().barrier().AwaitPeers({}).ok());
   EXPECT_EQ(hulls_->registry().Sizes().store_revision, 1 << 17);
   EXPECT_FALSE(ended);
   change((1 << 17) + 1);
-  EXPECT_TRUE(absl::IsUnavailable(hulls_->registry().AwaitOthers({})));
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->registry().barrier().AwaitPeers({})));
   EXPECT_TRUE(ended);
 }
 

@@ -44,17 +44,17 @@ class PostgresRecords : public PostgresTest {
     body.hull_ids = {"a"};
     body.pieces.assign(pieces, StoredPiece());
     return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().PutBody(std::move(body), std::nullopt, std::move(done));
+      server.registry().bodies().Put(std::move(body), std::nullopt, std::move(done));
     });
   }
   static absl::StatusOr<uint64_t> DeleteBody(PostgresRegistry& server, const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      server.registry().DeleteBody(id, std::nullopt, std::move(done));
+      server.registry().bodies().Delete(id, std::nullopt, std::move(done));
     });
   }
   // DATA_LOSS or NOT_FOUND if the record is unavailable.
   static absl::StatusOr<BodyRecord> FindBody(PostgresRegistry& server, const std::string& id) {
-    const FoundBodies found = server.registry().FindBodies(std::span(&id, 1));
+    const FoundBodies found = server.registry().bodies().Find(std::span(&id, 1));
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
     if (body == nullptr) return absl::NotFoundError("none");
@@ -91,8 +91,7 @@ TEST_F(PostgresRecords, NoRecordIsReadUntilItIsAskedFor) {
 TEST_F(PostgresRecords, AServerThatIsActiveAloneHasNobodyToFollow) {
   const auto store = Open();
   ASSERT_TRUE(store.ok()) << store.status();
-  EXPECT_FALSE((*store)->is_shared());
-  EXPECT_TRUE((*store)->Follow().ok()) << (*store)->Follow();
+  EXPECT_EQ((*store)->peers(), nullptr);
 }
 
 TEST_F(PostgresRecords, APrefixThatNoIdHasListsNothing) {
@@ -125,7 +124,7 @@ TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   const std::unique_ptr<PostgresRegistry> other = MakeRegistry();
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Put("b", {{9, 9, 9}}, "other").ok());
-  ASSERT_TRUE(other->registry().AwaitOthers({}).ok());
+  ASSERT_TRUE(other->registry().barrier().AwaitPeers({}).ok());
   EXPECT_EQ(other->registry().Sizes().hull_count, 2);
   EXPECT_EQ(other->registry().Sizes().vertex_count, hulls_->registry().Sizes().vertex_count);
   EXPECT_EQ(KeptVertices(), hulls_->registry().Sizes().vertex_count);
@@ -133,7 +132,7 @@ TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(PutBody(*hulls_, id).ok());
   ASSERT_TRUE(PutBody(*hulls_, "body-1").ok());
   ASSERT_TRUE(DeleteBody(*hulls_, "body-2").ok());
-  ASSERT_TRUE(other->registry().AwaitOthers({}).ok());
+  ASSERT_TRUE(other->registry().barrier().AwaitPeers({}).ok());
   EXPECT_EQ(hulls_->registry().Sizes().body_count, 1);
   EXPECT_EQ(other->registry().Sizes().body_count, 1);
   EXPECT_EQ(KeptBodies(), CountedBodies());
@@ -261,7 +260,7 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
   std::vector<std::string> listed;
   size_t pages = 0;
   for (std::string after;;) {
-    const absl::StatusOr<BodyPage> page = hulls_->registry().ListBodies("large-", after, 1000);
+    const absl::StatusOr<BodyPage> page = hulls_->registry().bodies().List("large-", after, 1000);
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_FALSE(page->bodies.empty());
     ++pages;
@@ -301,7 +300,7 @@ TEST_F(PostgresRecords, AWatchIsToldOfBodiesThatAreNotInMemory) {
   ASSERT_TRUE(hulls_->Delete("to-body").ok());
   ASSERT_TRUE(PutBody(*hulls_, "to-body").ok());
   ASSERT_TRUE(PutBody(*hulls_, "new").ok());
-  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
   struct Told {
     std::string id;
     ChangeKind kind;
@@ -428,7 +427,7 @@ TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
   ASSERT_TRUE(PutBody(*hulls_, "b").ok());
   // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
-  EXPECT_FALSE(registry.TryFindBodies(std::vector<std::string>{"b"}).has_value());
+  EXPECT_FALSE(registry.bodies().TryFind(std::vector<std::string>{"b"}).has_value());
   const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
     WatchTarget target;

@@ -57,7 +57,7 @@ class PostgresShared : public PostgresTest {
     body.hull_ids = {"piece"};
     body.pieces = {{0, Pose()}};
     return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().PutBody(std::move(body), if_revision, std::move(done));
+      server.registry().bodies().Put(std::move(body), if_revision, std::move(done));
     });
   }
   // Returns the hull as currently stored.
@@ -95,7 +95,7 @@ class PostgresShared : public PostgresTest {
     return put;
   }
   static std::vector<std::string> Listed(PostgresRegistry& server) {
-    EXPECT_TRUE(server.registry().AwaitOthers({}).ok());
+    EXPECT_TRUE(server.registry().barrier().AwaitPeers({}).ok());
     std::vector<std::string> ids;
     const absl::StatusOr<HullPage> page = server.registry().List("", "", 100);
     EXPECT_TRUE(page.ok()) << page.status();
@@ -255,12 +255,12 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   EXPECT_FALSE(again->created);
   EXPECT_EQ(again->body.create_revision, put->body.create_revision);
   EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.revision).status()));
-  ASSERT_TRUE(hulls_->registry().AwaitOthers({}).ok());
+  ASSERT_TRUE(hulls_->registry().barrier().AwaitPeers({}).ok());
   const std::string id = "b";
-  EXPECT_EQ(hulls_->registry().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
+  EXPECT_EQ(hulls_->registry().bodies().Find(std::span(&id, 1)).bodies[0]->record().revision,
             again->body.revision);
   const auto deleted = PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-    hulls_->registry().DeleteBody("b", std::nullopt, std::move(done));
+    hulls_->registry().bodies().Delete("b", std::nullopt, std::move(done));
   });
   EXPECT_TRUE(deleted.ok()) << deleted.status();
   EXPECT_TRUE(other->Create("b").ok());
@@ -272,7 +272,7 @@ TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
   const Server other = StartPeer();
   std::promise<absl::Status> gone;
   const auto opened = PostgresRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    hulls_->registry().OpenAppend(
+    hulls_->registry().hulls().OpenAppend(
         "h", "w", true, [&](const absl::Status& status) { gone.set_value(status); },
         std::move(done));
   });
@@ -350,7 +350,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
   ASSERT_TRUE(PutBody(*other, "was-body").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   Registry& registry = hulls_->registry();
-  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
   WatchTarget both;
   both.bodies = true;
   const auto watch_hulls = registry.OpenWatch(WatchTarget(), {}, [] {});
@@ -358,7 +358,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
   ASSERT_TRUE(watch_hulls.ok() && watch_both.ok());
   const auto delete_body = [&](const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      other->registry().DeleteBody(id, std::nullopt, std::move(done));
+      other->registry().bodies().Delete(id, std::nullopt, std::move(done));
     });
   };
   ASSERT_TRUE(other->Delete("was-hull").ok());
@@ -368,7 +368,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
   ASSERT_TRUE(delete_body("replaced").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
-  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
 
   using Told = std::tuple<std::string, ChangeKind, bool>;
   const auto told_to = [&](const std::shared_ptr<ChangeWatch>& watch) {

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_READ_PREPARER_H_
-#define HULLD_SERVER_REGISTRY_READ_PREPARER_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_PREPARER_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_PREPARER_H_
 
 #include <cstdint>
 #include <memory>
@@ -13,7 +13,7 @@
 
 namespace hulld::server {
 
-struct RegisteredHull;
+class RegisteredHull;
 
 // Prepares hulls: after queries have paid for it (LiveHull::WantsPreparing), or before a hull holds
 // too many points that are no longer vertices. Runs on its own thread, for which no call waits, or
@@ -60,4 +60,4 @@ class Preparer {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_READ_PREPARER_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_PREPARER_H_

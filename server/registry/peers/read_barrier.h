@@ -1,0 +1,102 @@
+#ifndef HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
+#define HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/registry/catalog/registry_state.h"
+#include "server/registry/commit/committer.h"
+#include "server/registry/memory/locked.h"
+
+namespace hulld::server {
+
+// A part of the registry in which tasks wait for IDs.
+class PeerChangeListener {
+ public:
+  virtual ~PeerChangeListener() = default;
+  // Defers the tasks that wait for the ID, after a peer server's change of it was applied. hull:
+  // the known hull that the change updated or ended, or null.
+  virtual void OnPeerChange(Locked& locked, const std::string& id,
+                            const std::shared_ptr<RegisteredHull>& hull) = 0;
+};
+
+// Blocks calls until the catalog satisfies their freshness. This class is the barrier of a store
+// without peer servers, whose catalog is always current; PeerSync overrides it.
+//
+// Functions with a Locked parameter require the registry's mutex; blocking ones release it. The
+// other functions acquire it.
+class ReadBarrier {
+ public:
+  // Both must outlive this.
+  ReadBarrier(RegistryState& state, Committer& committer) : state_(state), committer_(committer) {}
+  ReadBarrier(const ReadBarrier&) = delete;
+  ReadBarrier& operator=(const ReadBarrier&) = delete;
+  virtual ~ReadBarrier() = default;
+
+  // True if a peer server may change an ID before a submitted change of it commits; the change is
+  // then retried.
+  virtual bool has_peers() const { return false; }
+
+  // Applies the peer changes since the initial load, and follows the feed until End. listeners: in
+  // the order of notification. Call once, before the first change.
+  virtual absl::Status Begin(Locked& /*locked*/, std::vector<PeerChangeListener*> /*listeners*/) {
+    return absl::OkStatus();
+  }
+  virtual void End() {}
+
+  // Blocks until all changes that were submitted, and that peer servers had committed, before the
+  // call are applied. CANCELLED: should_stop, which may be empty, returned true. UNAVAILABLE: the
+  // store cannot be queried. Cost: one store query, shared by all waiting calls.
+  absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
+
+  // Read barrier: blocks until all changes that peer servers committed before the call are applied.
+  // Required before functions without a freshness of their own (List, FindBodies, ListBodies). Not
+  // for gRPC threads. Errors and cost as AwaitCommits; no effect without peer servers.
+  absl::Status AwaitPeers(const std::function<bool()>& should_stop);
+  virtual absl::Status AwaitPeers(Locked& /*locked*/,
+                                  const std::function<bool()>& /*should_stop*/) {
+    return absl::OkStatus();
+  }
+
+  // Returns the bound on staleness if the catalog satisfies `freshness`, else nullopt.
+  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
+  virtual std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked,
+                                                           const Freshness& freshness);
+  // Blocks until TryFresh succeeds and returns its result. FAILED_PRECONDITION: the store has not
+  // assigned that revision. Other errors as AwaitPeers. Cost: a store query only if the catalog is
+  // too stale.
+  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
+                                                      const std::function<bool()>& should_stop);
+  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
+                                                      const std::function<bool()>& should_stop);
+  // If the catalog is too stale for `freshness`, requests the changes committed by peer servers so
+  // far and calls `done` exactly once after they are applied, on this or another thread, without
+  // any lock. Otherwise returns false and does nothing. Errors and cost as AwaitPeers, without
+  // blocking.
+  virtual bool StartFresh(const Freshness& /*freshness*/,
+                          std::function<void(const absl::Status&)> /*done*/) {
+    return false;
+  }
+  // Runs `next`, on which the answer to a call depends, after the changes committed by peer servers
+  // so far are applied; or refuses, without any lock.
+  virtual void WhenFresh(Refusal refuse, LockedTask next);
+
+  // Defers a task, which depends on an ID that a peer server changed, until that change is applied.
+  // Requires has_peers().
+  virtual void Defer(LockedTask task);
+
+ protected:
+  RegistryState& state_;
+  Committer& committer_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
