@@ -215,7 +215,7 @@ class Admission {
   // Running calls of these kinds.
   size_t single_calls_ = 0;
   size_t anonymous_ = 0;
-  // Running calls that count towards --max-calls.
+  // Running calls that count toward --max-calls.
   size_t calls_ = 0;
   // Connections with a free watch of health.
   std::unordered_set<uint64_t> watching_health_;

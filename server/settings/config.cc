@@ -394,7 +394,7 @@ class Parser {
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
              "Candidate axes of one pair under TEXTBOOK_SAT", kAnyNumber);
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
-             "Writers whose sequences are kept for one hull", kAnyNumber);
+             "Writers of one hull with a stored sequence", kAnyNumber);
     AddLimit(
         "max-pieces-per-body", limits.max_pieces_per_body,
         "Pieces of one body; answers beyond 10000 may exceed the default limit of gRPC clients, "
@@ -413,9 +413,9 @@ class Parser {
     AddSize("max-message-bytes", limits.max_message_bytes, "Size of one message from a client",
             kMaxGrpcMessageBytes, 1);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
-             "Points that one hull takes in its lifetime", kAnyNumber);
+             "Points that one hull can receive in totaltime", kAnyNumber);
     AddLimit("max-placements", limits.max_placements,
-             "Placements of one batch, scene or stream of poses", kAnyNumber);
+             "Placements of one batch, scene, or stream of poses", kAnyNumber);
     AddCallLimits();
   }
 

@@ -21,7 +21,7 @@ constexpr char kYamlHelp[] =
     "  scale: mm                  # default for files: mm, cm, m, in, ft, or a factor\n"
     "  hulls:\n"
     "    bracket: {file: bracket.stl, scale: cm}    # the hull of the file's points\n"
-    "    table: {box: [2, 1, 0.1]}                  # edges; centerd on the origin\n"
+    "    table: {box: [2, 1, 0.1]}                  # edges; centered on the origin\n"
     "    wedge: {points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}\n"
     "  bodies:                    # several hulls as one\n"
     "    corner:\n"

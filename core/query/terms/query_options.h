@@ -38,7 +38,7 @@ struct QueryOptions {
   // Textbook only: the most candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
   // The most memory of the exact search for a depth, in bytes; more is refused. A search may need
-  // some 10 KB for each vertex near the deepest contact, as in a disc pierced at its centre.
+  // some 10 KB for each vertex near the deepest contact, as in a disc pierced at its center.
   uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
   // Bodies only: the most certificates of pieces; more are refused.
   uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <random>
 
 namespace hulld {
@@ -103,6 +104,13 @@ TEST(TextNumber, AgreesWithTheCLibraryOnRandomBits) {
 TEST(TextNumber, QuotesForeignTextSafely) {
   EXPECT_EQ(Quoted("a\x1b[31m\xff"), "\"a?[31m?\"");
   EXPECT_EQ(Quoted(std::string(1000, 'a')), "\"" + std::string(40, 'a') + "...\"");
+  EXPECT_EQ(Quoted("W\xC3\xBCrfel"), "\"W\xC3\xBCrfel\"");
+  // Truncated before a whole character.
+  EXPECT_EQ(Quoted(std::string(39, 'a') + "\xC3\xBC"), "\"" + std::string(39, 'a') + "...\"");
+  // A stray continuation, an overlong form, a surrogate, and a value beyond U+10FFFF.
+  for (const char* text : {"\x80", "\xC0\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80"}) {
+    EXPECT_EQ(Quoted(text), "\"" + std::string(std::strlen(text), '?') + "\"");
+  }
 }
 
 }  // namespace text_number_test

@@ -207,7 +207,7 @@ TEST_F(GuardedServer, SaysWhatToTryWhenTheConnectionFails) {
 
   config = TestConfig();
   Restart(config);
-  expect({"--ca-cert", authorities_}, "it does not speak TLS");
+  expect({"--ca-cert", authorities_}, "it does not use TLS");
 }
 
 TEST(ConnectionSecurity, ATokenDoesNotTravelUnencryptedToOtherMachines) {

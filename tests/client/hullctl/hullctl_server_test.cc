@@ -308,7 +308,7 @@ TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
   const TempFile pairs("pairs", "place: {a: {id: cube}, b: {id: cube}}\nask: {pairs: [[a, b]]}\n");
   const Ran ran = Ask({"scene", pairs.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("it names pairs, but 'scene' finds them itself"));
+  EXPECT_THAT(ran.err, HasSubstr("finds pairs itself, but the file names pairs"));
 }
 
 TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
@@ -386,7 +386,7 @@ TEST_F(HullctlQuestions, LoadRefusesAPrefixThatIsInUse) {
   Put("mine/cube", server::Cube());
   const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"mine/cube\" is there already"), HasSubstr("--prefix")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"mine/cube\" already exists"), HasSubstr("--prefix")));
   EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
 }
 
@@ -414,7 +414,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
                        "--prefix", "short/"});
   interrupter.join();
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.err, HasSubstr("interrupted; the hulls of the load are deleted"));
+  EXPECT_THAT(ran.err, HasSubstr("interrupted; deleted the hulls of the load"));
   EXPECT_THAT(ran.out, HasSubstr("requests/s"));
   v1::ListHullsResponse left;
   grpc::ClientContext context;
@@ -425,7 +425,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
 TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests a second"));
+  EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests per second"));
   ran = Ask({"bench", "load", "--clients", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("whole number from 1 to 1000"));

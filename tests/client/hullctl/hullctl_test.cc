@@ -61,11 +61,11 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1"});
   EXPECT_EQ(unreachable.code, 3);
   EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1; start it "
-                                          "with 'hulld', or name another with --server"));
+                                          "with 'hulld', or choose another with --server"));
   fake_.Hang("GetHull");
   const Ran late = Ask({"get", "x", "--timeout", "50ms"});
   EXPECT_EQ(late.code, 3);
-  EXPECT_THAT(late.err, HasSubstr("within 50 ms: raise --timeout"));
+  EXPECT_THAT(late.err, HasSubstr("within 50 ms; raise --timeout"));
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "draining",
                                            v1::ERROR_REASON_DRAINING)});
   const Ran draining = Ask({"create", "x"});
@@ -215,7 +215,7 @@ TEST_F(HullctlTest, AppendCountsSkippedPoints) {
               HasSubstr(".csv:3: point 2 has x = NaN; skip such points with --skip-nonfinite"));
   const Ran ran = Ask({"append", "b", "--create", "--skip-nonfinite", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("skipped    2 points that are not finite\n"));
+  EXPECT_THAT(ran.out, HasSubstr("skipped    2 points with NaN or infinity\n"));
   EXPECT_THAT(fake_.hull("b").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
@@ -223,7 +223,7 @@ TEST_F(HullctlTest, AppendAndReplaceCountPointsAtZero) {
   const TempFile file("a.xyz", "0 0 0\n1 2 3\n0 0 0\nnan 0 0\n4 5 6\n");
   Ran ran = Ask({"append", "a", "--create", "--skip-zero", "--skip-nonfinite", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("skipped    1 points that are not finite\n"
+  EXPECT_THAT(ran.out, HasSubstr("skipped    1 point with NaN or infinity\n"
                                  "skipped    2 points at (0, 0, 0)\n"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
   ran = Ask({"append", "b", "--create", "--skip-zero", "--skip-nonfinite", file.path(), "--output",
@@ -253,7 +253,7 @@ TEST_F(HullctlTest, AppendResumesWhereTheWriterStopped) {
   again.push_back("--resume");
   const Ran resumed = Ask(again);
   EXPECT_EQ(resumed.code, 0) << resumed.err;
-  EXPECT_THAT(resumed.out, HasSubstr("2 points were committed before"));
+  EXPECT_THAT(resumed.out, HasSubstr("2 points committed before"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3));
 }
 
@@ -333,7 +333,7 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   const Ran some = Ask({"batch", mixed.path()});
   EXPECT_EQ(some.code, 4);
   EXPECT_THAT(some.out, HasSubstr("a\tc\tFAILED\thull \"nope\" not found\n"));
-  EXPECT_THAT(some.err, HasSubstr("2 of 3 pairs have no answer"));
+  EXPECT_THAT(some.err, HasSubstr("2 of 3 pairs failed"));
   const Ran json = AskJson({"batch", mixed.path(), "--axis", "--report"});
   EXPECT_EQ(json.code, 4);
   v1::BatchCheckCollisionsResponse all;
@@ -348,7 +348,7 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   EXPECT_EQ(all.columns().axes(0).kind(), v1::AXIS_KIND_EDGE_EDGE);
   const Ran unclear = AskJson({"batch", mixed.path(), "--colliding"});
   EXPECT_EQ(unclear.code, 2);
-  EXPECT_THAT(unclear.err, HasSubstr("'hullctl scene' finds those"));
+  EXPECT_THAT(unclear.err, HasSubstr("use 'hullctl scene' to find colliding pairs"));
 }
 
 TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {

@@ -279,7 +279,7 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
   EXPECT_EQ(message([](QueryOptions& o) { o.max_error = kInfinity; }), "OK");
 }
 
-// A disc pierced at its centre: all sides of the difference are equally near, so the search for the
+// A disc pierced at its center: all sides of the difference are equally near, so the search for the
 // depth visits all of them.
 class PiercedDisc : public testing::Test {
  protected:

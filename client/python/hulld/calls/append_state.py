@@ -146,8 +146,8 @@ class AppendState:
         """The error to raise when a reconnect failed with `error`."""
         if isinstance(error, NotFoundError):
             return FailedPreconditionError(
-                f'hull "{self.hull_id}" vanished while the connection was lost; append everything '
-                "again"
+                f'hull "{self.hull_id}" was deleted while the connection was down; append all '
+                "points again"
             )
         return error
 

@@ -38,5 +38,14 @@ TEST(Arguments, PosesAreThreeOrSevenNumbers) {
   }
 }
 
+TEST(Arguments, NumbersWithoutCommasAreExplained) {
+  for (const char* text : {"1 0 0", "1 0 0, 2"}) {
+    EXPECT_THAT(std::string(ParsePose(text).status().message()),
+                testing::HasSubstr("separate numbers with commas, as in 1,0,0"));
+  }
+  EXPECT_THAT(std::string(ParsePose("1,2").status().message()),
+              testing::HasSubstr("3 numbers, x,y,z, or 7, w,x,y,z,x,y,z, with commas"));
+}
+
 }  // namespace arguments_test
 }  // namespace hulld

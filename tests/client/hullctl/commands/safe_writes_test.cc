@@ -52,7 +52,7 @@ TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
   const TempFile empty("empty.xyz", "# nothing\n");
   const Ran ran = Ask({"append", "new", empty.path(), "--create"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("hold no points"), HasSubstr("hullctl create")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("contain no points"), HasSubstr("hullctl create")));
   EXPECT_FALSE(Exists("new"));
   // Adding nothing to an existing hull is allowed.
   Put("h", server::Cube());

@@ -147,7 +147,7 @@ TEST_F(HullctlWatch, ExplainsWhatIsWrong) {
   EXPECT_THAT(ran.err, HasSubstr("empty segment"));
   ran = Ask({"watch", "a", "--scene", "scene.json"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("leave out PREFIX"));
+  EXPECT_THAT(ran.err, HasSubstr("cannot be combined with PREFIX"));
   ran = Ask({"watch", "--scene", "/no/such/file"});
   EXPECT_EQ(ran.code, 2);
 }

@@ -106,6 +106,23 @@ EOF
     expect "a no" "arm/left" "$(hullctl list arm/ --output name)"
     contains "a yes" "arm/left deleted" "$(on_terminal 'y\n' 'hullctl delete --prefix arm/')"
     expect "a yes" "" "$(hullctl list arm/ --output name)"
+    mkfifo points.xyz.pipe
+    hullctl append big points.xyz.pipe --format xyz --create --chunk-points 1 --writer me 2>interrupted.txt &
+    appending=$!
+    exec 3>points.xyz.pipe
+    echo "0 0 0" >&3
+    until [[ $(hullctl get big 2>/dev/null) == *"1 received"* ]]; do
+      kill -0 "$appending" || break
+      sleep 0.1
+    done
+    kill -INT "$appending"
+    exec 3>&-
+    wait "$appending"
+    expect "the exit code of an interrupted append" "1" "$?"
+    expect "an interrupted append" \
+      "hullctl: interrupted; 1 point committed to big; add --resume to the command to append the rest" \
+      "$(cat interrupted.txt)"
+    hullctl delete big >/dev/null
     hullctl create cell/stray >/dev/null
     printf 'prefix: cell/\nhulls:\n  table: {box: [1, 1, 1]}\n' >cell.yaml
     contains "the question before a prune" "Delete 1 hull (cell/stray)? [y/N]" \

@@ -106,7 +106,7 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
     Write(text);
     const Ran ran = RunTool({"list"});
     EXPECT_EQ(ran.code, 2);
-    EXPECT_THAT(ran.err, AllOf(HasSubstr(ContextFilePath()), HasSubstr("mend it, or remove it")));
+    EXPECT_THAT(ran.err, AllOf(HasSubstr(ContextFilePath()), HasSubstr("fix it, or delete it")));
     EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << ran.err;
     return ran.err;
   };

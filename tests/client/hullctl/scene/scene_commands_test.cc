@@ -77,7 +77,7 @@ TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
     const TempFile scene("s.yaml", prefix + "hulls:\n  table: {box: [2, 2, 1]}\n");
     Ran ran = Ask({"scene", "apply", scene.path(), "--prune", "--yes"});
     EXPECT_EQ(ran.code, 2);
-    EXPECT_THAT(ran.err, HasSubstr("--prune needs a scene whose prefix ends with \"/\""));
+    EXPECT_THAT(ran.err, HasSubstr("--prune needs a prefix that ends in \"/\""));
     EXPECT_EQ(Ask({"list", "--output", "name"}).out, before);
     EXPECT_THAT(Ask({"scene", "diff", scene.path()}).out, testing::Not(HasSubstr("stray")));
   }

@@ -92,7 +92,7 @@ TEST_F(EditFeedTest, SaysWhatItHasNoRoomFor) {
   const std::vector<double> many(size_t{3} << 20);
   feed.Ask(AppendOf("h", 0));
   for (int i = 0; i < 4; ++i) feed.Ask({ViewEdit::Action::kAppend, "other", many});
-  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("too much waits"));
+  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("too many edits are pending"));
   EXPECT_THAT(page_->WaitForTold(0), HasSubstr("\"done\":false"));
   hulld_.Release();
   EXPECT_THAT(page_->WaitForTold(1), HasSubstr("h: 1 appended"));

@@ -650,7 +650,7 @@ class ViewerTest(unittest.TestCase):
         self.browser.wait("document.body.dataset.fitted")
         self.browser.driver.delete_all_cookies()
         self.browser.driver.get(viewer.address)
-        self.assertIn("worked once", self.browser.text("body"))
+        self.assertIn("was already used", self.browser.text("body"))
         self.browser.driver.get("about:blank")
         # Refusals are errors for the console.
         self.browser.problems()

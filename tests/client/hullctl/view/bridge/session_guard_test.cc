@@ -33,7 +33,7 @@ TEST(SessionGuard, TokenIsExchangedOnceForTheCookie) {
   const SessionGuard::Decision again = guard.Judge(Page("/?token=token"));
   EXPECT_EQ(again.verdict, Verdict::kRefuse);
   EXPECT_EQ(again.http_status, 403);
-  EXPECT_THAT(again.reason, HasSubstr("worked once"));
+  EXPECT_THAT(again.reason, HasSubstr("was already used"));
   // A browser with a session uses the address again, as by the back button.
   EXPECT_EQ(guard.Judge(Page("/?token=token", kCookie)).verdict, Verdict::kExchange);
 }
