@@ -144,7 +144,7 @@ std::optional<size_t> PlaceOf(const std::string& folder) {
   return room - std::begin(kRooms);
 }
 
-TEST(Includes, RoomsUseOnlyWhatIsBelowThem) {
+TEST(Includes, FoldersIncludeOnlyLowerFolders) {
   size_t arrows = 0;
   for (const std::string top : {"core", "server", "client"}) {
     for (const Include& include : IncludesUnder(top)) {
@@ -190,7 +190,7 @@ std::multimap<std::string, std::string> FoldersOfSources() {
   return folders;
 }
 
-TEST(Tests, StandWhereWhatTheyAreNamedForStands) {
+TEST(Tests, MirrorTheSourceTree) {
   const std::multimap<std::string, std::string> folders = FoldersOfSources();
   const fs::path root = SourceTree() / "tests";
   constexpr std::string_view kEnd = "_test";
@@ -268,7 +268,7 @@ bool RunsThreads(const fs::path& source) {
 }
 
 // ThreadSanitizer covers every test program that runs threads and can be instrumented.
-TEST(Programs, ThatRunThreadsAreThoseOfThePresetTsan) {
+TEST(Programs, ThatRunThreadsArePartOfThePresetTsan) {
   // gRPC is not instrumented.
   const std::string grpc[] = {"hulld_test_server", "hulld_client", "hulld_fake", "hulld_history",
                               "hullctl_commands"};

@@ -203,7 +203,7 @@ TEST_F(AppenderTest, AnotherHullUnderTheSameNameIsNotContinued) {
   EXPECT_EQ(FirstCoordinates().size(), 0u);
 }
 
-TEST_F(AppenderTest, AHullThatVanishedIsNotCreatedAnew) {
+TEST_F(AppenderTest, AVanishedHullIsNotRecreated) {
   StreamScript script;
   script.break_after = 1;
   fake_.ScriptStreams({script});

@@ -84,7 +84,7 @@ TEST_F(ClientTest, AServerThatDoesNotAnswerMeetsTheDeadline) {
   EXPECT_TRUE(absl::IsDeadlineExceeded(hull.status())) << hull.status();
 }
 
-TEST_F(ClientTest, NobodyThereIsUnavailable) {
+TEST_F(ClientTest, AMissingServerIsUnavailable) {
   ClientOptions options;
   options.server = "127.0.0.1:1";
   options.retry.max_attempts = 2;
@@ -207,7 +207,7 @@ TEST_F(ClientTest, AnErrorOfTheReceiverEndsABatch) {
   EXPECT_EQ(fake_.calls("BatchCheckCollisions"), 1);
 }
 
-TEST_F(ClientTest, HealthIsWhatTheServerSays) {
+TEST_F(ClientTest, HealthReportsTheServersState) {
   const Client client = MakeClient();
   EXPECT_TRUE(client.CheckHealth().ok()) << client.CheckHealth();
   fake_.SetServing(false);

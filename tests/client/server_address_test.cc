@@ -32,7 +32,7 @@ TEST(ServerAddress, IsAHostAndPortOrAListOrATargetName) {
   }
 }
 
-TEST(ServerAddress, ListsThatCannotBeSayWhatCan) {
+TEST(ServerAddress, InvalidListsSuggestValidOnes) {
   EXPECT_THAT(Problem("a.example:1,b.example:1"), HasSubstr("dns:///hulls.example:50551"));
   EXPECT_THAT(Problem("10.0.0.1:1,[::1]:1"), HasSubstr("use one kind"));
   EXPECT_THAT(Problem("10.0.0.1:1, 10.0.0.2:1"), HasSubstr("\" 10.0.0.2\""));

@@ -109,7 +109,7 @@ TEST_F(Watches, OutliveARestartAsEverySafeCallDoes) {
   EXPECT_GE(waits, 10);
 }
 
-TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
+TEST_F(Watches, WatchesOfHullsResume) {
   Put("a", server::Cube());
   Put("b", server::Cube());
   const auto watch = client_->WatchHulls({});
@@ -158,7 +158,7 @@ TEST_F(Watches, QuietForLongGoOn) {
   EXPECT_GT(clock_readings_, 0);
 }
 
-TEST_F(Watches, OfAServerThatStaysAwayEndWithThePatience) {
+TEST_F(Watches, WatchesOfAnUnreachableServerEndAfterTheirPatience) {
   UseOwnClock();
   const Client client(options_);
   Put("a", server::Cube());
@@ -203,7 +203,7 @@ class CollisionWatches : public Watches, public ::testing::WithParamInterface<bo
   }
 };
 
-TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
+TEST_P(CollisionWatches, ReportEachEventOnceAndEndedContacts) {
   // 0 and 1 overlap throughout; 2 and 3 touch, and will overlap; 4 and 5 overlap until 5 is
   // deleted; 6 and 7 overlap until 7 moves away.
   const auto watch = client_->WatchCollisions(OpenOf({{"cube", 0},
@@ -243,7 +243,7 @@ TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
   EXPECT_EQ(last.update(), 3u);
 }
 
-TEST_P(CollisionWatches, TellWhatIsNotNearAnyMore) {
+TEST_P(CollisionWatches, ReportPairsThatAreNoLongerNear) {
   v1::CollisionWatchOpen open = OpenOf({{"cube", 0}, {"cube", 1.5}, {"cube", 10}, {"cube", 10.5}});
   open.set_clearance(1);
   const auto watch = client_->WatchCollisions(open);

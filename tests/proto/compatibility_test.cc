@@ -124,7 +124,7 @@ Lines Missing(const Lines& lines, const Lines& others) {
   return missing;
 }
 
-TEST(Compatibility, WhatIsRecordedOfV1StaysTrue) {
+TEST(Compatibility, TheRecordedContractOfV1StillHolds) {
   const ContractFiles contract;
   ASSERT_GE(contract.files().size(), 6);
   const Lines now = DescribeContract(contract);

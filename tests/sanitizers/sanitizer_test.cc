@@ -19,11 +19,11 @@ namespace sanitizer_test {
 
 bool Failed(int status) { return !testing::ExitedWithCode(0)(status); }
 
-TEST(SanitizerDeathTest, ALibraryThatUsesWhatItFreedIsFound) {
+TEST(SanitizerDeathTest, ALibraryThatUsesItsFreedMemoryIsFound) {
   EXPECT_DEATH(planted::LastOfFreed(5), "heap-use-after-free");
 }
 
-TEST(SanitizerDeathTest, ALibraryThatUsesWhatTheTestFreedIsFound) {
+TEST(SanitizerDeathTest, ALibraryThatUsesTheTestsFreedMemoryIsFound) {
   auto value = std::make_unique<double>(3);
   // The compiler would warn.
   const double* volatile freed = value.get();
@@ -32,7 +32,7 @@ TEST(SanitizerDeathTest, ALibraryThatUsesWhatTheTestFreedIsFound) {
   EXPECT_DEATH(planted::Read(freed), "heap-use-after-free");
 }
 
-TEST(SanitizerDeathTest, ALibraryThatReadsPastTheEndOfWhatTheTestAllocatedIsFound) {
+TEST(SanitizerDeathTest, ALibraryThatReadsPastTheTestsAllocationIsFound) {
   const std::vector<double> values = {1, 2, 3, 4, 5};
   EXPECT_DEATH(planted::SumTooMany(values), "heap-buffer-overflow");
 }

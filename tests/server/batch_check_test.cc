@@ -56,7 +56,7 @@ std::string FaultOfBatch(uint64_t invoked, uint64_t returned, std::vector<Seen> 
   return FaultOf({BatchAt(invoked, returned, std::move(all))});
 }
 
-TEST(BatchCheck, AcceptsWhatWasThereAtOneInstant) {
+TEST(BatchCheck, AcceptsStatesOfOneInstant) {
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 1), SeenAt("b", 1), SeenAt("c", 1)}), "");
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 2), SeenAt("b", 1), SeenAt("c", 1)}), "");
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 2), SeenAt("b", 1), SeenAt("c", 2)}), "");
@@ -70,7 +70,7 @@ TEST(BatchCheck, RefusesHullsThatNeverWereTogether) {
   EXPECT_NE(FaultOfBatch(1, 40, {Missing("a"), SeenAt("c", 1)}), "");
 }
 
-TEST(BatchCheck, RefusesWhatWasBeforeOrCameAfter) {
+TEST(BatchCheck, RefusesEarlierAndLaterStates) {
   EXPECT_NE(FaultOfBatch(33, 34, {SeenAt("a", 2), SeenAt("c", 1)}), "");
   EXPECT_NE(FaultOfBatch(10, 11, {SeenAt("a", 2), SeenAt("c", 1)}), "");
   EXPECT_NE(FaultOfBatch(33, 34, {Missing("b")}), "");
@@ -126,7 +126,7 @@ TEST(BatchCheck, APieceIsMissingOnlyWhereTheBodyHasIt) {
 }
 
 // The store revisions named by an answer bound its contents from both sides.
-TEST(BatchCheck, RefusesWhatIsNotOfTheRevisionsOfTheStores) {
+TEST(BatchCheck, RefusesStatesOfOtherRevisions) {
   Operation batch = BatchAt(100, 101, {SeenAt("a", 1), SeenAt("c", 1)});
   batch.max_staleness = std::nullopt;
   batch.staleness = 90;

@@ -154,7 +154,7 @@ TEST(BodyCheck, APutWithoutAnAnswerMayOrMayNotHaveHappened) {
   EXPECT_NE(FaultOf({lost, after, GetAt(15, 16, 10, {"a", "c"})}), "");
 }
 
-TEST(BodyCheck, NothingIsSaidToBeMissingThatIsThere) {
+TEST(BodyCheck, ExistingBodiesAreNotReportedMissing) {
   EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "")}), "");
   EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "c")}), "");
   EXPECT_EQ(FaultOf({Missing(AskAt(4, 40, 0, 0, 0, false), "")}), "");

@@ -117,7 +117,7 @@ TEST_F(DurableServer, AcksSayThatTheChunkIsOnDisk) {
   EXPECT_EQ(next.Append(2, {3, 3, 3})->durability(), v1::DURABILITY_RELAXED);
 }
 
-TEST_F(DurableServer, ARestartKeepsWhatWasAcked) {
+TEST_F(DurableServer, ARestartKeepsAcknowledgedChanges) {
   Put("a/sphere", Sphere(300));
   Put("cube", Cube());
   const v1::GetHullResponse before = Get("a/sphere");
@@ -130,7 +130,7 @@ TEST_F(DurableServer, ARestartKeepsWhatWasAcked) {
   EXPECT_EQ(Check(request).relation(), v1::RELATION_SEPARATED);
 }
 
-TEST_F(DurableServer, AReplacementIsSeenAsAWhole) {
+TEST_F(DurableServer, AReplacementIsAtomic) {
   Put("h", Sphere(100));
   const uint64_t revision = Get("h").hull().revision();
   v1::ReplaceOpen open;
@@ -338,7 +338,7 @@ TEST_F(DurableServer, ARestoringThatFailsLeavesTheDirectoryEmpty) {
   EXPECT_TRUE(std::filesystem::is_empty(target));
 }
 
-TEST_F(DurableServer, TheDoctorLooksAtAStoreThatNobodyHasOpen) {
+TEST_F(DurableServer, TheDoctorChecksAStoreThatIsNotOpen) {
   Put("sphere", Sphere(300));
   Put("cube", Cube());
   TearDown();

@@ -256,7 +256,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
 
 // All reads check freshness. An unassigned revision, another store, and a malformed value give
 // distinct errors.
-TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
+TEST_F(FreshReads, EveryReadRefusesUnknownRevisions) {
   const v1::ResponseHeader header = Append(0, "h", 1);
   const auto channel = Connect(1);
   const auto hulls = v1::HullService::NewStub(channel);
@@ -341,7 +341,7 @@ TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
   expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "it must be at least 0");
 }
 
-TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
+TEST_F(FreshReads, HistoriesMeetEachFreshnessGuarantee) {
   constexpr int kClients = 6;
   constexpr int kCalls = 120;
   const int first = NumberIn("HULLD_TEST_SEED", 0);

@@ -77,7 +77,7 @@ Operation ProbeAt(uint64_t invoked, uint64_t returned, uint64_t revision, int po
   return operation;
 }
 
-TEST(LinearizabilityCheck, AcceptsWhatOneThingAtATimeCouldAnswer) {
+TEST(LinearizabilityCheck, AcceptsSequentialHistories) {
   EXPECT_EQ(LinearizabilityFault({}), "");
   // The probe overlaps the append and may see either side of it.
   for (const bool before : {false, true}) {
@@ -108,7 +108,7 @@ TEST(LinearizabilityCheck, AConditionMayFailBecauseOfAChangeWithoutAnAnswer) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), lost, refused, ProbeAt(7, 8, 1, 5, false)}), "");
 }
 
-TEST(LinearizabilityCheck, WhatAnEndedServerDidNotAnswerCannotHappenLater) {
+TEST(LinearizabilityCheck, UnansweredCallsOfAnEndedServerDoNotHappenLater) {
   Operation lost = AppendAt(3, UINT64_MAX, 0, 5, 1);
   lost.outcome = Outcome::kUnknown;
   for (const bool settled : {false, true}) {
@@ -158,7 +158,7 @@ TEST(LinearizabilityCheck, RefusesARevisionThatFalls) {
 
 // Pipelined chunks with points 5 and 6 and a joint ack: the first at tick `returned`, the second at
 // the next.
-TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
+TEST(LinearizabilityCheck, ChunksReportedTogetherHappenedInOrder) {
   Operation first = AppendAt(3, 20, 0, 5, 0);
   first.shares_later_ack = true;
   Operation second = AppendAt(4, 21, 3, 6, 2, "w", 2);

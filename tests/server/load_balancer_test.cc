@@ -75,7 +75,7 @@ class LoadBalancer : public ::testing::Test {
   std::unique_ptr<Process> haproxy_;
 };
 
-TEST_F(LoadBalancer, ConnectionsAreSpreadOverThoseThatServe) {
+TEST_F(LoadBalancer, ConnectionsAreSpreadOverServingServers) {
   std::vector<Client> clients;
   std::set<std::string> stores;
   for (int i = 0; i < 8; ++i) {

@@ -71,7 +71,7 @@ TEST_F(ManyServers, ClientsThatGoFromOneToAnotherSeeOneStore) {
   });
 }
 
-TEST_F(ManyServers, TheOthersGoOnWhenOneIsKilled) {
+TEST_F(ManyServers, PeersContinueAfterOneIsKilled) {
   ForEachRun([this](uint64_t seed) {
     Begin();
     HullHistory history;
@@ -109,7 +109,7 @@ TEST_F(ManyServers, BatchesStreamsAndListsAreOfOneRevisionOfTheStore) {
   EXPECT_GT(whole, 20 * runs);
 }
 
-TEST_F(ManyServers, OneThatStoodStillFindsWhatTheOthersDid) {
+TEST_F(ManyServers, AServerThatHungAppliesPeerChanges) {
   Begin();
   HullHistory history;
   const auto stand_still = [&] {
@@ -169,7 +169,7 @@ TEST_F(ManyServers, NothingIsLostBehindANetworkThatCuts) {
   });
 }
 
-TEST_F(ManyServers, ThoseThatStartAtOnceOverAnEmptyDatabaseServeOneStore) {
+TEST_F(ManyServers, ServersStartedTogetherOverAnEmptyDatabaseServeOneStore) {
   constexpr size_t kAtOnce = 8;
   PostgresCluster& cluster = PostgresCluster::Shared();
   BeginAtOnce(std::vector<std::string>(kAtOnce, cluster.WriteConninfo(cluster.MakeDatabase())));

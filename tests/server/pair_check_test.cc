@@ -56,7 +56,7 @@ TEST(PairCheck, RefusesAPairOfThePastOrOfTheFuture) {
   EXPECT_NE(JointLinearizabilityFault(With({PairAt(23, 24, 2, 1), PairAt(25, 26, 1, 1)})), "");
 }
 
-TEST(PairCheck, NoHullIsSaidToBeMissingThatIsThere) {
+TEST(PairCheck, ExistingHullsAreNotReportedMissing) {
   Operation missing = PairAt(10, 40, 0, 0);
   missing.outcome = Outcome::kNotFound;
   EXPECT_NE(JointLinearizabilityFault(With({missing})), "");

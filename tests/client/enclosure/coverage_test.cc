@@ -40,7 +40,7 @@ TEST(Coverage, AHullEnclosesItself) {
   EXPECT_EQ(coverage.clipped, 0u);
 }
 
-TEST(Coverage, OneHullTellsHowFarTheMeshSticksOut) {
+TEST(Coverage, OneHullReportsHowFarTheMeshProtrudes) {
   const Coverage coverage =
       Cover({BoxHull({0, 0, 0}, {1, 1, 1})}, Triangle({0.5, 0.5, 0.5}, {4, 5, 1}, {0.5, 0.5, 1}));
   ASSERT_EQ(coverage.uncovered.size(), 1u);
@@ -111,7 +111,7 @@ TEST(Coverage, TheNarrowestGapIsSeen) {
   EXPECT_LE(coverage.distance, start - 0.7);
 }
 
-TEST(Coverage, FlatPiecesCoverWhatLiesInThem) {
+TEST(Coverage, FlatPiecesCoverTheirOwnPlane) {
   const TriangleMesh mesh = Triangle({0, 0, 1}, {2, 0, 1}, {0, 2, 1});
   const HullMesh left = BoxHull({0, 0, 1}, {1, 2, 1});
   const HullMesh right = BoxHull({1, 0, 1}, {2, 2, 1});
@@ -228,7 +228,7 @@ TEST(Coverage, CoordinatesOfAnySizeAreExact) {
 
 std::vector<double> CornersOf(const HullMesh& mesh) { return mesh.xyz; }
 
-TEST(IsHullOf, TellsHullsApart) {
+TEST(IsHullOf, DistinguishesHulls) {
   const HullMesh box = BoxHull({0, 0, 0}, {1, 2, 3});
   std::vector<double> points = CornersOf(box);
   EXPECT_TRUE(*IsHullOf(box, points));

@@ -38,7 +38,7 @@ TEST(MeshVolume, VerticesAtOnePlaceAreOne) {
   EXPECT_TRUE(IsClosed(soup));
 }
 
-TEST(MeshVolume, WhatIsOpenHasNone) {
+TEST(MeshVolume, AnOpenMeshHasNoVolume) {
   TriangleMesh mesh = BoxMesh({0, 0, 0}, {1, 1, 1});
   mesh.triangles.pop_back();
   EXPECT_FALSE(IsClosed(mesh));

@@ -126,7 +126,7 @@ TEST(PlyFile, BinaryErrorsNameTheByte) {
   EXPECT_EQ(read.counts.skipped, 1u);
 }
 
-TEST(PcdFile, BinaryFloatsStayFloatsWhateverLiesBetween) {
+TEST(PcdFile, BinaryFloatsStayFloatsWithOtherFieldsBetween) {
   Packer body;
   for (const float base : {0.0f, 10.0f}) {
     body.Add(uint32_t{7})

@@ -108,7 +108,7 @@ TEST(ByteSource, SkippingPastTheEndFails) {
   EXPECT_FALSE((*again)->Skip(~uint64_t{0}));
 }
 
-TEST(ByteSource, OpeningSaysWhatIsWrong) {
+TEST(ByteSource, OpeningFailsWithAClearError) {
   const std::string missing = testing::TempDir() + "hulld_client_no_such_file";
   EXPECT_EQ(ByteSource::Open(missing).status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(ByteSource::Open(testing::TempDir()).status().code(),

@@ -86,7 +86,7 @@ TEST(StlText, FilesCutAnywhereAreRefusedWithLineAndCount) {
             "FILE:22: the file ends after 3 facets, before endsolid; is it complete?");
 }
 
-TEST(StlText, WhatIsNoStlIsRefusedWithLineAndCount) {
+TEST(StlText, OtherFilesAreRefusedWithLineAndCount) {
   EXPECT_EQ(Error("solid\nendsolid\n"), "FILE:2: the file contains no facet");
   EXPECT_EQ(Error("solid\n" + Facet() + "vertex 0 0 0\n"),
             "FILE:9: \"vertex\" after 1 facets where \"facet\" is expected");

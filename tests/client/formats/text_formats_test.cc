@@ -197,7 +197,7 @@ TEST(OffFile, FacesWithoutVerticesAreAnError) {
             "FILE:2: the file declares 1 faces, but no vertex");
 }
 
-TEST(OffFile, RefusesWhatItDoesNotKnow) {
+TEST(OffFile, RefusesUnknownContent) {
   EXPECT_THAT(ReadText("4OFF\n1 0 0\n1 2 3 4\n", PointFormat::kOff).error(),
               HasSubstr("FILE:1: \"4OFF\" is not OFF"));
   EXPECT_THAT(ReadText("OFF BINARY\n", PointFormat::kOff).error(), HasSubstr("convert it"));
@@ -211,7 +211,7 @@ constexpr char kAsciiPly[] =
     "property double x\nproperty float y\n"
     "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
 
-TEST(PlyFile, AsciiKeepsWhatTheTextSays) {
+TEST(PlyFile, AsciiKeepsThePrecisionOfTheText) {
   const PointsRead read = ReadText(
       std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n3 0 1 1\n",
       PointFormat::kPly);

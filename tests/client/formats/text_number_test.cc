@@ -58,7 +58,7 @@ TEST(TextNumber, TooSmallForADoubleIsZero) {
   EXPECT_EQ(Parsed("2.4703282292062328e-324"), 0x1p-1074);
 }
 
-TEST(TextNumber, TooLargeForADoubleIsSaid) {
+TEST(TextNumber, TooLargeNumbersAreReported) {
   for (const char* text : {"1e999", "-1e999", "+1e309", "1.8e308", "1e99999999999999999999999",
                            "0.00001e9223372036854775807"}) {
     EXPECT_EQ(KindOf(text), NumberText::kTooLarge) << text;
@@ -76,7 +76,7 @@ TEST(TextNumber, ReadsNanAndInfinityAsSuch) {
   EXPECT_EQ(Parsed("-Infinity"), -HUGE_VAL);
 }
 
-TEST(TextNumber, RefusesWhatIsNoNumber) {
+TEST(TextNumber, RefusesOtherText) {
   for (const char* text :
        {"",   "-",    "+",   ".",  "abc", "1x",     "+-1",   "--1",  "-+1",   "++1",
         "1e", "0x10", "1,5", "1 ", " 1",  "3.1+e2", "1e5.5", "nanx", "infin", "e5"}) {
@@ -101,15 +101,21 @@ TEST(TextNumber, AgreesWithTheCLibraryOnRandomBits) {
   EXPECT_GT(denormal, 5000);
 }
 
+std::string InQuotes(const std::string& text) {
+  std::string quoted(1, '"');
+  quoted.append(text).push_back('"');
+  return quoted;
+}
+
 TEST(TextNumber, QuotesForeignTextSafely) {
   EXPECT_EQ(Quoted("a\x1b[31m\xff"), "\"a?[31m?\"");
-  EXPECT_EQ(Quoted(std::string(1000, 'a')), "\"" + std::string(40, 'a') + "...\"");
+  EXPECT_EQ(Quoted(std::string(1000, 'a')), InQuotes(std::string(40, 'a') + "..."));
   EXPECT_EQ(Quoted("W\xC3\xBCrfel"), "\"W\xC3\xBCrfel\"");
   // Truncated before a whole character.
-  EXPECT_EQ(Quoted(std::string(39, 'a') + "\xC3\xBC"), "\"" + std::string(39, 'a') + "...\"");
+  EXPECT_EQ(Quoted(std::string(39, 'a') + "\xC3\xBC"), InQuotes(std::string(39, 'a') + "..."));
   // A stray continuation, an overlong form, a surrogate, and a value beyond U+10FFFF.
   for (const char* text : {"\x80", "\xC0\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80"}) {
-    EXPECT_EQ(Quoted(text), "\"" + std::string(std::strlen(text), '?') + "\"");
+    EXPECT_EQ(Quoted(text), InQuotes(std::string(std::strlen(text), '?')));
   }
 }
 

@@ -87,7 +87,7 @@ class GuardedServer : public server::ServerTest {
   server::Config config_;
 };
 
-TEST_F(GuardedServer, TokensMadeByHullctlAreWhatTheServerTakes) {
+TEST_F(GuardedServer, TheServerAcceptsTokensMadeByHullctl) {
   Restart(config_);
   EXPECT_EQ(As("boss", {"create", "cell-10/a"}).code, 0);
   EXPECT_EQ(As("cell", {"create", "cell-1/a"}).code, 0);
@@ -182,7 +182,7 @@ TEST_F(GuardedServer, MutualTlsNeedsCertAndKey) {
   EXPECT_THAT(half.err, HasSubstr("belong together"));
 }
 
-TEST_F(GuardedServer, SaysWhatToTryWhenTheConnectionFails) {
+TEST_F(GuardedServer, AFailedConnectionSuggestsARemedy) {
   Restart(config_);
   setenv("HULLD_TOKEN", TokenOf("boss").c_str(), 1);
   const auto expect = [this](std::vector<std::string> options, const std::string& hint) {

@@ -46,7 +46,7 @@ class HullctlQuestions : public HullctlOnServer {
   }
 };
 
-TEST_F(HullctlQuestions, VerifyTellsValidInvalidAndUncheckableApart) {
+TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   Put("cube", server::Cube());
   auto [request, response] = TouchingCubes();
   const TempFile valid("valid.json", Recorded(request, response));
@@ -84,7 +84,7 @@ TEST_F(HullctlQuestions, VerifyTellsValidInvalidAndUncheckableApart) {
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
 }
 
-TEST_F(HullctlQuestions, VerifyRefusesWhatIsNoRecordedAnswer) {
+TEST_F(HullctlQuestions, VerifyRefusesOtherFiles) {
   const TempFile no_json("no.json", "relation SEPARATED\n");
   EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
@@ -214,7 +214,7 @@ TEST_F(HullctlQuestions, CertificatesOfCachedAnswersAreValid) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(HullctlQuestions, SceneFindsWhatCollides) {
+TEST_F(HullctlQuestions, SceneFindsCollisions) {
   Put("cube", server::Cube());
   const std::string placements =
       R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},

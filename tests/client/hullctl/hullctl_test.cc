@@ -54,7 +54,7 @@ TEST_F(HullctlTest, CreateGetListAndDelete) {
   EXPECT_EQ(fake_.hull("a/1").create_revision, 0u);
 }
 
-TEST_F(HullctlTest, ErrorsSayWhatToDo) {
+TEST_F(HullctlTest, ErrorsNameARemedy) {
   const Ran missing = Ask({"get", "x"});
   EXPECT_EQ(missing.code, 1);
   EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
@@ -283,7 +283,7 @@ TEST_F(HullctlTest, CheckPassesPosesAndWishesOn) {
                              HasSubstr("EDGE_EDGE, axis 16"), HasSubstr("12 edges")));
 }
 
-TEST_F(HullctlTest, CheckShowsWhatWasMeasured) {
+TEST_F(HullctlTest, CheckShowsMeasuredValues) {
   v1::CheckCollisionResponse& answer = fake_.collision_answer;
   answer.set_relation(v1::RELATION_SEPARATED);
   answer.mutable_separation()->set_value(0.5);
@@ -351,7 +351,7 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   EXPECT_THAT(unclear.err, HasSubstr("use 'hullctl scene' to find colliding pairs"));
 }
 
-TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
+TEST_F(HullctlTest, LargeBatchesAreSplitIntoCompleteCalls) {
   fake_.PutHull("box", {});
   std::string text = "place:\n  extra: {id: box}\n";
   for (int i = 0; i < 500; ++i) text += "  p" + std::to_string(i) + ": {id: box}\n";
@@ -484,7 +484,7 @@ TEST_F(HullctlTest, CheckAsksAgainWhenAHullMovesOnBeforeItIsVerified) {
   EXPECT_THAT(wrong.err, HasSubstr("does not prove the answer"));
 }
 
-TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
+TEST_F(HullctlTest, SimplifiedMeshStatesItsError) {
   fake_.mesh_parts = Tetrahedron();
   v1::MeshHeader& header = *fake_.mesh_parts[0].mutable_header();
   header.mutable_hull()->set_vertex_count(72);
@@ -499,7 +499,7 @@ TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
   EXPECT_EQ(Ask({"mesh", "a", "--max-error", "-1"}).code, 2);
 }
 
-TEST_F(HullctlTest, ASimplificationThatIsNotWhatItClaimsIsNotWritten) {
+TEST_F(HullctlTest, AFalseSimplificationIsNotWritten) {
   fake_.mesh_parts = Tetrahedron();
   fake_.mesh_parts[0].mutable_header()->set_error(0);
   const TempFile file("a.obj", "");

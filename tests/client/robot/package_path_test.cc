@@ -37,7 +37,7 @@ class PackagePath : public testing::Test {
   PackagePaths paths_;
 };
 
-TEST_F(PackagePath, NamedFolderStandsBeforeAllOthers) {
+TEST_F(PackagePath, ANamedFolderComesFirst) {
   const std::string named = Make("elsewhere/meshes/a.stl");
   Make("ws/src/arm_description/meshes/a.stl");
   paths_.named["arm_description"] = At("elsewhere");

@@ -33,7 +33,7 @@ void ExpectNear(const std::array<double, 3>& p, const std::array<double, 3>& q) 
 
 TEST(Robot, RestsAtZeroOrWithinLimits) { EXPECT_THAT(RestValues(Arm()), ElementsAre(0, 0, 0.75)); }
 
-TEST(Robot, JointsMoveWhatHangsOnThem) {
+TEST(Robot, JointsMoveTheirDescendants) {
   const Robot robot = Arm();
   const double right = std::numbers::pi / 2;
   // The arm lies along x, its lower part points down; the finger is extended by 1, for any length

@@ -80,7 +80,7 @@ TEST(AdjacentPairs, BranchesOfABareRootAreNeighbors) {
   EXPECT_FALSE(AdjacentPairs(full).contains(MakeLinkPair(full.FindLink("a"), full.FindLink("b"))));
 }
 
-TEST_F(SrdfFile, WhatIsWrittenReadsBack) {
+TEST_F(SrdfFile, RoundTrips) {
   std::ostringstream out;
   WriteSrdf(robot_, {{Pair("base", "tool"), "Never"}, {Pair("base", "upper"), "Adjacent"}}, "why",
             out);

@@ -145,7 +145,7 @@ TEST(SimplificationCheck, SurvivesMeshesThatMakeNoSense) {
 }
 
 // The server's own simplifications of clouds of every size, position, and dimension.
-TEST(SimplificationCheck, AgreesWithWhatTheServerMakes) {
+TEST(SimplificationCheck, AgreesWithTheServer) {
   Random random(TestSeed(91));
   std::vector<std::vector<Vector>> clouds = {
       RandomOnSphere(random, 200, 1),

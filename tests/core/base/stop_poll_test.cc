@@ -34,7 +34,7 @@ TEST(StopPoll, LargeStepsCountForMany) {
   EXPECT_EQ(polls, 5);
 }
 
-TEST(StopPoll, AsksNoMoreOnceTold) {
+TEST(StopPoll, StopsPollingAfterAStop) {
   int polls = 0;
   const std::function<bool()> should_stop = [&] { return ++polls == 2; };
   StopPoll poll(should_stop, 1);

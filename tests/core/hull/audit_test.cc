@@ -59,7 +59,7 @@ absl::Status AuditUntil(const Hull& hull, int last, int* polls) {
   return AuditHull(hull, [last, polls] { return ++*polls == last; });
 }
 
-TEST(Audit, StopsWheneverItIsToldTo) {
+TEST(Audit, StopsAtEveryPoll) {
   Random random(41);
   const Hull solid = BuildHull(RandomOnSphere(random, 4000, 2));
   std::vector<Vector> circle;

@@ -33,7 +33,7 @@ TEST(Integer, ScaledDoublesStayWithinTheirBound) {
   EXPECT_EQ(ToScaledDoubles({0, 0, -1}), Vector(0, 0, -0x1p62));
 }
 
-TEST(IntegerDeathTest, RefusesWhatHasNoAnswer) {
+TEST(IntegerDeathTest, RefusesUndefinedOperations) {
   EXPECT_DEATH(LowestBitExponent(0.0), "check failed: x != 0");
   EXPECT_DEATH(ToInteger(0.75, 0), "check failed: shift > -53");
   EXPECT_DEATH(ToInteger(std::numeric_limits<double>::infinity(), 0),

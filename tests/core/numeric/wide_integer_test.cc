@@ -82,7 +82,7 @@ void CheckProducts(std::mt19937_64& random) {
   }
 }
 
-TEST(WideInteger, SumsDifferencesAndShiftsAreThoseOfIntegers) {
+TEST(WideInteger, SumsDifferencesAndShiftsAgreeWithIntegers) {
   std::mt19937_64 random(1);
   CheckSumsAndShifts<1>(random);
   CheckSumsAndShifts<2>(random);
@@ -91,7 +91,7 @@ TEST(WideInteger, SumsDifferencesAndShiftsAreThoseOfIntegers) {
   CheckSumsAndShifts<15>(random);
 }
 
-TEST(WideInteger, ProductsAreThoseOfIntegers) {
+TEST(WideInteger, ProductsAgreeWithIntegers) {
   std::mt19937_64 random(2);
   CheckProducts<1, 1>(random);
   CheckProducts<2, 1>(random);
@@ -105,7 +105,7 @@ TEST(WideInteger, ProductsAreThoseOfIntegers) {
   CheckProducts<10, 5>(random);
 }
 
-TEST(WideInteger, VectorProductsAreThoseOfIntegers) {
+TEST(WideInteger, VectorProductsAgreeWithIntegers) {
   std::mt19937_64 random(3);
   for (int i = 0; i < 2000; ++i) {
     // Halved, so that sums fit.

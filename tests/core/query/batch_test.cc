@@ -96,7 +96,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
   for (int count : seen) EXPECT_GT(count, 20);
 }
 
-TEST(Batch, RelationsAloneAreThoseOfWholeAnswers) {
+TEST(Batch, RelationsAloneEqualThoseOfFullAnswers) {
   const Crowd crowd = MakeCrowd(704);
   QueryOptions whole;
   whole.want_axis = true;

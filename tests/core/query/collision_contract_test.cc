@@ -132,7 +132,7 @@ TEST(Collision, AxesOfAFlatDifferenceCountAgainstTheLimit) {
       CheckCollision(triangle, Pose(), triangle, Pose(), options).status()));
 }
 
-TEST(Collision, StageIsTheKindOfTheAxisWhetherOrNotTheAxisIsWanted) {
+TEST(Collision, StageIsTheKindOfTheAxisEvenIfTheAxisIsNotRequested) {
   const Hull cube = UnitCube();
   for (const Pose& pose : {At(2, 0, 0), At(1, 0, 0), At(1, 1, 1), At(3, 2, 1)}) {
     QueryOptions options;

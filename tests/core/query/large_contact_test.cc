@@ -112,7 +112,7 @@ TEST(LargeContact, PrismsOverManySidedPolygonsTouchFaceToFace) {
 
 // Polygons with many corners in one plane, all farthest along its normal. For any query, the scans
 // of these poll should_stop and end when it returns true.
-TEST(LargeContact, FlatQuestionsStopWheneverTheyAreToldTo) {
+TEST(LargeContact, FlatQueriesStopAtEveryPoll) {
   std::vector<Vector> corners;
   for (int i = -10000; i <= 10000; ++i) corners.emplace_back(i, int64_t{i} * i, 0);
   const Hull hull = BuildHull(corners);

@@ -76,7 +76,7 @@ TEST(Separation, EmptyHullsAreInfinitelyFar) {
   EXPECT_EQ(answer.within_clearance, false);
 }
 
-TEST(Separation, WhatNoDoubleHoldsSaturates) {
+TEST(Separation, OutOfRangeValuesSaturate) {
   const Hull far_left = BuildHull(std::vector<Vector>{{-kLargest, 0, 0}, {-kLargest, 1, 0}});
   const Hull far_right = BuildHull(std::vector<Vector>{{kLargest, 0, 0}});
   const Answer far = Ask(far_left, Pose(), far_right, Pose());

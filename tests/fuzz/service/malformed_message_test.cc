@@ -53,7 +53,7 @@ TEST_F(MalformedMessage, FirstOfAStreamIsRefused) {
 }
 
 // Formerly, these ended UNIMPLEMENTED, because gRPC parsed them.
-TEST_F(MalformedMessage, OfACallWithOneRequestIsRefused) {
+TEST_F(MalformedMessage, AMalformedUnaryRequestIsRefused) {
   for (const Rpc rpc :
        {Rpc::kCreateHull, Rpc::kGetHull, Rpc::kGetHullMesh, Rpc::kListHulls, Rpc::kDeleteHull,
         Rpc::kCheckCollision, Rpc::kBatchCheckCollisions, Rpc::kFindCollisions, Rpc::kGetStatus,
@@ -64,7 +64,7 @@ TEST_F(MalformedMessage, OfACallWithOneRequestIsRefused) {
   }
 }
 
-TEST_F(MalformedMessage, InAStreamIsRefusedAndWhatCameBeforeStands) {
+TEST_F(MalformedMessage, AMalformedStreamMessageKeepsEarlierOnes) {
   v1::AppendPointsRequest open;
   open.mutable_open()->set_hull_id("a");
   open.mutable_open()->set_create_if_absent(true);

@@ -379,7 +379,7 @@ TEST_F(Access, EveryCallNeedsItsRole) {
 }
 
 // Not by the code, not by the message, not by the reply.
-TEST_F(Access, NoCallTellsWhetherAHullOfOthersExists) {
+TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
   for (const auto& [call, rule] : Rules()) {
     if (rule.refusal == CallRule::kNoHull) continue;
     for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
@@ -410,7 +410,7 @@ TEST_F(Access, NoCallTellsWhetherAHullOfOthersExists) {
   }
 }
 
-TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
+TEST_F(Access, ListsShowOnlyTheCallersHulls) {
   EXPECT_THAT(ListedBy("boss's secret", ""),
               ElementsAre("cell", "cell-1", "cell-1/own", "cell-10/theirs"));
   for (const char* prefix : {"", "c", "cell-1", "cell-1/", "cell-1/o"}) {
@@ -419,7 +419,7 @@ TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
   EXPECT_THAT(ListedBy("cell's secret", "cell-1/x"), ElementsAre());
 }
 
-TEST_F(Access, AWatchTellsWhatIsTheCallersAlone) {
+TEST_F(Access, AWatchReportsOnlyTheCallersHulls) {
   int n = 0;
   for (const char* prefix : {"", "c", "cell-1/"}) {
     ++n;
@@ -454,14 +454,14 @@ TEST_F(Access, AWatchTellsWhatIsTheCallersAlone) {
   EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::PERMISSION_DENIED);
 }
 
-TEST_F(Access, TheStoreAsAWholeIsNotForThoseWithAPrefix) {
+TEST_F(Access, CallersWithAPrefixMayNotUseTheWholeStore) {
   const grpc::Status status =
       Do("hulld.v1.MaintenanceService.SaveBackup", "cell's secret", "").status;
   EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_THAT(status.error_message(), HasSubstr("\"cell-1/\""));
 }
 
-TEST_F(Access, SizesOfTheStoreAreNotForThoseWithAPrefix) {
+TEST_F(Access, CallersWithAPrefixMayNotReadTheSizesOfTheStore) {
   const auto ask = [this](const std::string& token) {
     v1::GetStatusResponse response;
     const Outcome outcome = Do("hulld.v1.StatusService.GetStatus", token, "");
@@ -497,7 +497,7 @@ TEST_F(Access, ChangedTokensCountFromTheNextCallAndABrokenFileChangesNothing) {
   EXPECT_EQ(code("new secret"), grpc::StatusCode::UNAUTHENTICATED);
 }
 
-TEST_F(Access, WithoutTokensATokenIsNotLookedAt) {
+TEST_F(Access, WithoutTokensATokenIsIgnored) {
   Restart(TestConfig());
   Put("h", Cube());
   EXPECT_TRUE(Do("hulld.v1.HullService.GetHull", "anything", "h").status.ok());

@@ -62,7 +62,7 @@ class Revocation : public ServerTest {
   std::string kept_;
 };
 
-TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
+TEST_F(Revocation, EndsIdleStreamsOfTheRevokedTokenOnly) {
   v1::AppendPointsResponse appended;
   v1::WatchHullsResponse change;
   v1::StreamCollisionsResponse answer;
@@ -123,7 +123,7 @@ TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
   EXPECT_THAT(log.text(), HasSubstr("info 4 calls ended, as their tokens are no longer valid"));
 }
 
-TEST_F(Revocation, EndsWhatIsBeingComputed) {
+TEST_F(Revocation, EndsRunningComputations) {
   // 5e9 pairs: hours.
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 100'000; ++i) *request.add_placements() = PlacementOf("cube");
@@ -140,7 +140,7 @@ TEST_F(Revocation, EndsWhatIsBeingComputed) {
 }
 
 // A stream that waits for its client to read cannot send the reason, but it ends.
-TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
+TEST_F(Revocation, EndsCallsWithoutAReader) {
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 20'000; ++i) *request.add_placements() = PlacementOf("cube");
   request.mutable_wanted()->set_witness(true);
@@ -154,7 +154,7 @@ TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
 }
 
 // The last token is removed with its line, with all content, with the file, or by a dangling link.
-TEST_F(Revocation, OfTheLastTokenRefusesEverything) {
+TEST_F(Revocation, RevokingTheLastTokenRefusesEverything) {
   const auto create = [this](const std::string& token) {
     grpc::ClientContext context;
     Be(context, token);

@@ -78,7 +78,7 @@ class Tls : public ServerTest {
   Config config_;
 };
 
-TEST_F(Tls, OnlyThoseWhoTrustTheAuthorityConnectAndNobodyInPlaintext) {
+TEST_F(Tls, OnlyClientsThatTrustTheAuthorityConnect) {
   Restart(config_);
   EXPECT_EQ(Connect(Trusting(authority_)), grpc::StatusCode::OK);
   EXPECT_EQ(Connect(Trusting(other_)), grpc::StatusCode::UNAVAILABLE);
@@ -103,7 +103,7 @@ TEST_F(Tls, MutualTlsRefusesClientsWithoutACertificateOfTheAuthority) {
 }
 
 // Missing files count as revoked, like the last token.
-TEST_F(Tls, WithoutAnAuthorityOfClientsNobodyConnects) {
+TEST_F(Tls, WithoutAClientAuthorityAllConnectionsFail) {
   config_.tls_client_ca = Write("clients.crt", authority_.certificate());
   Restart(config_);
   const TestIdentity client = authority_.Issue("client");
@@ -208,7 +208,7 @@ TEST_F(Tls, UnixSocketsServeWithAndWithout) {
   EXPECT_EQ(Ask(*stub), grpc::StatusCode::OK);
 }
 
-TEST_F(Tls, AddressesThatOthersCanReachNeedIt) {
+TEST_F(Tls, ReachableAddressesNeedTls) {
   config_.listen = "0.0.0.0:0";
   EXPECT_TRUE(Server::Start(config_).ok());
   EXPECT_THAT(ExposureWarnings(config_), ::testing::ElementsAre(HasSubstr("--tokens-file")));

@@ -61,7 +61,7 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
   expect(good + Line("b", "admin", "*", kAbc), "line 2: \"b\" has the token of \"a\"");
 }
 
-TEST(TokenTable, AFileThatOthersCanUseIsRefused) {
+TEST(TokenTable, AFileAccessibleToOtherUsersIsRefused) {
   const std::string path = ::testing::TempDir() + "/hulld_token_table_test";
   WriteSecret(path, Line("a", "admin", "*", kAbc));
   EXPECT_TRUE(ReadTokensFile(path).ok());

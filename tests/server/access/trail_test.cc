@@ -50,7 +50,7 @@ class Trail : public ServerTest {
   std::string path_;
 };
 
-TEST_F(Trail, EachChangeOfAHullNamesWhoMadeIt) {
+TEST_F(Trail, EachChangeOfAHullNamesItsAuthor) {
   const CapturedLog log;
   grpc::ClientContext create_context;
   BeRobot(create_context, "c-1");

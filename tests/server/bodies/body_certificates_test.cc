@@ -91,7 +91,7 @@ TEST_F(BodyCertificates, EveryRelationIsProven) {
   EXPECT_EQ(far.piece_certificates_size(), 0);
 }
 
-TEST_F(BodyCertificates, AHullBesideABodyAndDetailsBesideCertificates) {
+TEST_F(BodyCertificates, HullsWithBodiesAndDetailsWithCertificates) {
   PutRows(3);
   Put("probe", Cube());
   v1::CheckCollisionRequest request = Question(PlacementOf("probe", 2, 1, 0), PlacementOf("row"));
@@ -117,7 +117,7 @@ TEST_F(BodyCertificates, PosesComposeExactly) {
   EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
 }
 
-TEST_F(BodyCertificates, WhatIsAlteredIsRefused) {
+TEST_F(BodyCertificates, AlteredCertificatesAreRefused) {
   PutRows(3);
   const v1::CheckCollisionRequest request =
       Question(PlacementOf("row"), PlacementOf("row", 0, 1, 0));
@@ -152,7 +152,7 @@ TEST_F(BodyCertificates, WhatIsAlteredIsRefused) {
   EXPECT_EQ(Verify(moved, proven).verdict, Verdict::kInvalid);
 }
 
-TEST_F(BodyCertificates, WhatChangedSinceCannotBeChecked) {
+TEST_F(BodyCertificates, AChangedHullMakesACertificateUncheckable) {
   PutRows(3);
   Put("probe", Cube());
   const v1::CheckCollisionRequest request =
@@ -268,7 +268,7 @@ class BodyProofs : public BodyCertificates {
   }
 };
 
-TEST_F(BodyProofs, OfBatchesAreChecked) {
+TEST_F(BodyProofs, ProofsOfBatchesAreChecked) {
   const std::vector<v1::Placement> cell = Cell();
   v1::BatchCheckCollisionsRequest request;
   for (const v1::Placement& placement : cell) *request.add_placements() = placement;
@@ -305,7 +305,7 @@ TEST_F(BodyProofs, OfBatchesAreChecked) {
   EXPECT_EQ(plain.piece_hulls_size() + plain.columns().piece_proofs_size(), 0);
 }
 
-TEST_F(BodyProofs, OfScenesAreChecked) {
+TEST_F(BodyProofs, ProofsOfScenesAreChecked) {
   const std::vector<v1::Placement> cell = Cell();
   v1::FindCollisionsRequest request;
   for (const v1::Placement& placement : cell) *request.add_placements() = placement;
@@ -322,7 +322,7 @@ TEST_F(BodyProofs, OfScenesAreChecked) {
   EXPECT_GE(ExpectProven(cell, pairs, HullsOf(all), PieceHullsOf(all), all.columns()), 3);
 }
 
-TEST_F(BodyProofs, OfStreamsAreCheckedAfterEachUpdate) {
+TEST_F(BodyProofs, ProofsOfStreamsAreCheckedAfterEachUpdate) {
   std::vector<v1::Placement> cell = Cell();
   v1::CollisionStreamOpen open;
   for (const v1::Placement& placement : cell) *open.add_placements() = placement;
@@ -348,7 +348,7 @@ TEST_F(BodyProofs, OfStreamsAreCheckedAfterEachUpdate) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(BodyProofs, ARowThatIsTooLargeHasAProblemAndTheOthersAnswers) {
+TEST_F(BodyProofs, ATooLargeRowFailsAlone) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("heap", std::vector<v1::Placement>(100, PlacementOf("cube"))).ok());
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(80, PlacementOf("cube"))).ok());

@@ -48,7 +48,7 @@ TEST_F(BodyQuestions, TheAnswerNamesThePieceThatDecided) {
   EXPECT_FALSE(apart->has_piece_a());
 }
 
-TEST_F(BodyQuestions, DetailsAreThoseOfTheNearestOrDeepestPair) {
+TEST_F(BodyQuestions, DetailsBelongToTheNearestOrDeepestPair) {
   PutPair("pair");
   v1::Wanted wanted;
   wanted.set_separation(true);
@@ -185,7 +185,7 @@ TEST_F(BodyQuestions, BatchesTakeBoth) {
               HasSubstr("METHOD_TEXTBOOK_SAT is for pairs of hulls, not of bodies"));
 }
 
-TEST_F(BodyQuestions, WithoutBodiesThereIsNoColumnOfPieces) {
+TEST_F(BodyQuestions, WithoutBodiesThePiecesColumnIsAbsent) {
   Put("cube", Cube());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");

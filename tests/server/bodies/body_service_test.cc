@@ -23,7 +23,7 @@ class BodyCalls : public BodyTest {};
 
 std::string TextOf(const absl::Status& status) { return std::string(status.message()); }
 
-TEST_F(BodyCalls, WhatWasPutIsGot) {
+TEST_F(BodyCalls, GetReturnsTheBodyThatWasPut) {
   const Client client = MakeClient();
   v1::PutBodyRequest request =
       BodyOf("cell/arm", {PlacementOf("cell/link", 0.1, -2, 1e300), PlacementOf("cell/box"),
@@ -49,7 +49,7 @@ TEST_F(BodyCalls, WhatWasPutIsGot) {
   EXPECT_EQ(got->pieces(2).pose().rotation().w(), 1);
 }
 
-TEST_F(BodyCalls, PuttingAnewReplacesAllPieces) {
+TEST_F(BodyCalls, PuttingAgainReplacesAllPieces) {
   const auto first = PutBody("b", {PlacementOf("x"), PlacementOf("y")});
   const auto second = PutBody("b", {PlacementOf("z")});
   ASSERT_TRUE(second.ok());
@@ -283,7 +283,7 @@ TEST_F(DurableBodies, TheFirstBodyRaisesTheFormatOfTheStore) {
   EXPECT_TRUE(MakeClient().GetBody("b").ok());
 }
 
-TEST_F(DurableBodies, ADamagedBodyIsNamedAndCanBePutAnew) {
+TEST_F(DurableBodies, ADamagedBodyIsNamedAndCanBeReplaced) {
   PutPair("pair");
   TearDown();
   {

@@ -84,7 +84,7 @@ class BodyWatches : public BodyTest {
   int growths_ = 0;
 };
 
-TEST_F(BodyWatches, WatchHullsTellsOfBodiesWhereTheyAreAskedFor) {
+TEST_F(BodyWatches, WatchHullsReportsBodiesOnRequest) {
   PutPair("pair");
   v1::WatchHullsRequest request;
   const auto hulls = client_->WatchHulls(request);
@@ -215,7 +215,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 - -"));
 }
 
-TEST_F(BodyWatches, ClearancesAreThoseOfTheNearestPieces) {
+TEST_F(BodyWatches, ClearancesBelongToTheNearestPieces) {
   PutPair("pair");
   v1::CollisionWatchOpen open;
   *open.add_placements() = PlacementOf("pair");
@@ -243,7 +243,7 @@ TEST_F(BodyWatches, ABodyIsWatchedBeforeItsHullsExist) {
 }
 
 // A watch's events agree with a batch at all times.
-TEST_F(BodyWatches, AgreeWithBatchesWhateverChanges) {
+TEST_F(BodyWatches, AgreeWithBatchesAfterEveryChange) {
   Random random(7);
   const std::vector<std::string> hulls = {"h0", "h1", "h2"};
   // Every change affects the watch, which need not wait for marks: the last two stand far away.

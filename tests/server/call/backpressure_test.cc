@@ -91,7 +91,7 @@ TEST_F(Backpressure, MemoryStaysFlatWhilePointsStreamIn) {
 
 // Both batches take turns: when the one that is read ends, the other is far behind if it is
 // throttled, and at its end if not.
-TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
+TEST_F(Backpressure, AnUnreadBatchIsNotComputedAhead) {
   constexpr int kPairs = 500'000;
   Put("cube", Cube());
   const v1::BatchCheckCollisionsRequest request = Batch(kPairs);
@@ -115,7 +115,7 @@ TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
 
 // Every pair is found, with a certificate of some hundred bytes. The unread scene delays no other
 // call, so it need not be ended, and completes when the client resumes reading.
-TEST_F(Backpressure, ASceneThatNobodyReadsIsNotSearchedAhead) {
+TEST_F(Backpressure, AnUnreadSceneIsNotSearchedAhead) {
   constexpr int kPlacements = 600;
   constexpr double kPairs = kPlacements * (kPlacements - 1) / 2.0;
   Put("ball", Sphere(20));
@@ -140,7 +140,7 @@ TEST_F(Backpressure, ASceneThatNobodyReadsIsNotSearchedAhead) {
 }
 
 // One step of a stream of poses answers all pairs; the client reads none of it.
-TEST_F(Backpressure, AStepOfAStreamThatNobodyReadsIsNotComputedAhead) {
+TEST_F(Backpressure, AnUnreadStepOfAStreamIsNotComputedAhead) {
   constexpr int kPairs = 500'000;
   Put("cube", Cube());
   const v1::BatchCheckCollisionsRequest batch = Batch(kPairs);

@@ -177,7 +177,7 @@ TEST(ErrorInfo, IsCarriedUnderAPrefixAndImpliedByItsCode) {
   EXPECT_EQ(EncodeErrorInfo(absl::InternalError("x")), std::nullopt);
 }
 
-TEST(ErrorInfo, PermissionsSayWhatIsMissing) {
+TEST(ErrorInfo, PermissionErrorsNameTheMissingPermission) {
   const absl::Status low = CheckPermission({"bob", Permission::kRead, ""}, Rpc::kDeleteHull);
   EXPECT_EQ(ReasonOf(low), v1::ERROR_REASON_ROLE_TOO_LOW);
   EXPECT_EQ(MetadataOf(low, "role"), "read-only");

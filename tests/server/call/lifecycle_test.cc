@@ -115,7 +115,7 @@ TEST_F(Lifecycle, DrainingRefusesNewCallsAndLetsRunningOnesFinish) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-TEST_F(Lifecycle, EndingTheServerCancelsWhatStillRuns) {
+TEST_F(Lifecycle, EndingTheServerCancelsRunningCalls) {
   Put("ball", Sphere(700));
   Create("h");
   Appender idle(*hulls_, "h", "w");
@@ -141,7 +141,7 @@ TEST_F(Lifecycle, EndingTheServerCancelsWhatStillRuns) {
   EXPECT_FALSE(idle.Finish().ok());
 }
 
-TEST_F(Lifecycle, ATakenPortIsSaidSo) {
+TEST_F(Lifecycle, ATakenPortIsReported) {
   Config config = TestConfig();
   config.listen = server_->address();
   const absl::Status status = Server::Start(config).status();
@@ -150,7 +150,7 @@ TEST_F(Lifecycle, ATakenPortIsSaidSo) {
               HasSubstr("cannot listen on " + config.listen + ": the port is in use"));
 }
 
-TEST_F(Lifecycle, AddressesThatOthersCanReachAreRefused) {
+TEST_F(Lifecycle, ReachableAddressesAreRefused) {
   Config config = TestConfig();
   config.listen = "0.0.0.0:0";
   const absl::Status status = Server::Start(config).status();

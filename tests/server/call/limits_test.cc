@@ -154,7 +154,7 @@ TEST_F(LimitsTest, AClientHasSoManyStreamsAndGetsThemBack) {
   EXPECT_TRUE(fourth.is_open());
 }
 
-TEST_F(LimitsTest, AClientHasSoManyCallsWhateverTheServerHasLeft) {
+TEST_F(LimitsTest, TheLimitPerClientHoldsRegardlessOfFreeSlots) {
   Config config = TestConfig();
   config.limits.max_calls_per_client = 1;
   Restart(config);
@@ -213,7 +213,7 @@ TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   EXPECT_TRUE(WaitIdle());
 }
 
-TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
+TEST_F(LimitsTest, ExcessBatchesAreRefusedWithARetryDelay) {
   Config config = TestConfig();
   config.limits.max_concurrent_batches = 1;
   Restart(config);
@@ -324,7 +324,7 @@ TEST_F(LimitsTest, ARequestEndsWhenItsTimeIsUp) {
                 "max-request-time");
 }
 
-TEST_F(LimitsTest, ACallWhoseClientDoesNotReadLosesItsPlaceWhenItsTimeIsUp) {
+TEST_F(LimitsTest, AnUnreadCallLosesItsSlotAtItsDeadline) {
   Config config = TestConfig();
   config.limits.max_request_time = std::chrono::seconds(2);
   Restart(config);

@@ -98,7 +98,7 @@ std::vector<Sample> Samples() {
   };
 }
 
-TEST(MessageLayout, BoundsWhatParsingTakes) {
+TEST(MessageLayout, BoundsTheMemoryOfParsing) {
   for (const Sample& sample : Samples()) {
     const std::unique_ptr<Message> message(sample.type->New());
     ASSERT_TRUE(message->ParseFromString(sample.bytes)) << sample.name;
@@ -113,7 +113,7 @@ TEST(MessageLayout, BoundsWhatParsingTakes) {
 }
 
 // A damaged message is parsed up to the damage at most.
-TEST(MessageLayout, BoundsWhatParsingDamagedMessagesTakes) {
+TEST(MessageLayout, BoundsTheMemoryOfParsingDamagedMessages) {
   // Protobuf logs strings that are not UTF-8 to standard error.
   const google::protobuf::LogSilencer silencer;
   constexpr uint64_t kSeed = 71;
@@ -162,7 +162,7 @@ TEST(RequestMemory, IsTakenAndGivenBack) {
   EXPECT_EQ(memory.taken_bytes(), 0u);
 }
 
-TEST(RequestMemory, TellsWhatIsTooLargeFromWhatHasToWait) {
+TEST(RequestMemory, DistinguishesTooLargeFromWaiting) {
   RequestMemory memory(1000);
   RequestMemory::Share first;
   RequestMemory::Share second;
@@ -194,7 +194,7 @@ TEST(ParseRequest, FreesTheBytesAndCoversTheMessage) {
   EXPECT_GE(memory.taken_bytes(), parsed.SpaceUsedLong());
 }
 
-TEST(ParseRequest, RefusesWhatIsMalformedAndWhatIsTooLargeWithoutParsingIt) {
+TEST(ParseRequest, RefusesMalformedAndTooLargeRequestsWithoutParsing) {
   RequestMemory memory(100'000);
   RequestMemory::Share share;
   v1::BatchCheckCollisionsRequest parsed;

@@ -217,7 +217,7 @@ TEST_F(StreamBases, AStreamEndsOnlyWhenItsWorkIsOver) {
   EXPECT_THAT(numbers, ElementsAre(1));
 }
 
-TEST_F(StreamBases, CancellingStopsTheWorkAndDropsWhatWaits) {
+TEST_F(StreamBases, CancellingStopsTheWorkAndDropsQueuedReplies) {
   std::promise<std::shared_ptr<TestQueue>> opened;
   script_ = [&](const std::shared_ptr<TestQueue>& stream) {
     stream->SetWorking(true);
@@ -242,7 +242,7 @@ TEST_F(StreamBases, CancellingStopsTheWorkAndDropsWhatWaits) {
   gone_->Wait();
 }
 
-TEST_F(StreamBases, UnsentBytesCountWhatWaitsAndWhatIsBeingWritten) {
+TEST_F(StreamBases, UnsentBytesIncludeQueuedAndWrittenReplies) {
   std::vector<uint64_t> numbers;
   const grpc::Status status = Run(
       [](const std::shared_ptr<TestQueue>& stream) {
@@ -266,7 +266,7 @@ TEST_F(StreamBases, UnsentBytesCountWhatWaitsAndWhatIsBeingWritten) {
   EXPECT_THAT(numbers, ElementsAre(1, 3));
 }
 
-TEST_F(StreamBases, AReplyWaitsForOthersUntilOneFollowsOrAllIsSaid) {
+TEST_F(StreamBases, RepliesAreCombinedUntilOneFollowsOrTheStreamEnds) {
   std::vector<uint64_t> numbers;
   const grpc::Status status = Run(
       [](const std::shared_ptr<TestQueue>& stream) {

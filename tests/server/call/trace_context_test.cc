@@ -10,7 +10,7 @@ namespace trace_context_test {
 const std::string kTrace = "0af7651916cd43dd8448eb211c80319c";
 const std::string kParent = "b7ad6b7169203331";
 
-TEST(TraceContext, ReadsWhatIsOne) {
+TEST(TraceContext, ReadsValidText) {
   const std::string text = "00-" + kTrace + "-" + kParent + "-01";
   const std::optional<TraceContext> trace = TraceContext::Parse(text);
   ASSERT_TRUE(trace.has_value());
@@ -21,7 +21,7 @@ TEST(TraceContext, ReadsWhatIsOne) {
 }
 
 // Later versions may have more fields, which are ignored.
-TEST(TraceContext, ReadsOfLaterVersionsWhatItKnows) {
+TEST(TraceContext, ReadsKnownFieldsOfLaterVersions) {
   const std::string text = "00-" + kTrace + "-" + kParent + "-01";
   for (const std::string& later : {"01" + text.substr(2), "cc" + text.substr(2) + "-more"}) {
     const std::optional<TraceContext> trace = TraceContext::Parse(later);

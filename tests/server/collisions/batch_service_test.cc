@@ -149,7 +149,7 @@ class LongTable : public BatchCall {
   const std::string missing_ = std::string(250, 'm');
 };
 
-TEST_F(LongTable, OfABatchComesInPieces) {
+TEST_F(LongTable, ABatchArrivesInParts) {
   for (const bool any_pair : {false, true}) {
     v1::BatchCheckCollisionsRequest request;
     AddPlacements(&request);
@@ -178,7 +178,7 @@ TEST_F(LongTable, OfABatchComesInPieces) {
   }
 }
 
-TEST_F(LongTable, OfASceneComesInPieces) {
+TEST_F(LongTable, ASceneArrivesInParts) {
   v1::FindCollisionsRequest request;
   AddPlacements(&request);
   // The second placement against all other placements.
@@ -205,7 +205,7 @@ TEST_F(LongTable, OfASceneComesInPieces) {
   EXPECT_TRUE(parts.back().has_totals());
 }
 
-TEST_F(LongTable, OfAStreamComesInPieces) {
+TEST_F(LongTable, AStreamArrivesInParts) {
   grpc::ClientContext context;
   const auto stream = collisions_->StreamCollisions(&context);
   v1::StreamCollisionsRequest request;
@@ -374,7 +374,7 @@ TEST_F(BatchCall, ProblemsOfAPairNameThePair) {
   EXPECT_THAT(batch.problems[0].message(), HasSubstr("(--max-textbook-axes)"));
 }
 
-TEST_F(BatchCall, MalformedBatchesFailWhole) {
+TEST_F(BatchCall, AMalformedBatchFailsAsAWhole) {
   Config config = TestConfig();
   config.limits.max_pairs_per_batch = 2;
   Restart(config);
@@ -430,7 +430,7 @@ TEST_F(BatchCall, AMillionPairsFitInOneRequest) {
             999'950);
 }
 
-TEST_F(BatchCall, WishesThatExcludeEachOtherFailWhole) {
+TEST_F(BatchCall, ConflictingOptionsFailTheWholeCall) {
   Put("cube", Cube());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");
@@ -519,7 +519,7 @@ TEST_F(BatchCall, BatchesTakeTurns) {
 
 // Formerly, an axis across wide facets shared a message with the preceding answers and the table of
 // hulls, which exceeded every client's limit.
-TEST_F(BatchCall, MessagesStayBelowFourMebibytesWhateverTheAnswers) {
+TEST_F(BatchCall, MessagesStayBelowFourMebibytes) {
   constexpr int kCorners = Config::kMaxFeatureVertices;
   Create("wide");
   Appender writer(*hulls_, "wide", "w");

@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace claimed_range_test {
 
-TEST(ClaimedRange, BlocksAreDisjointAndTheLastOneGivenBackIsTold) {
+TEST(ClaimedRange, BlocksAreDisjointAndTheLastReturnIsReported) {
   ClaimedRange range;
   EXPECT_TRUE(range.Claim(4).empty());
   range.Begin(10);

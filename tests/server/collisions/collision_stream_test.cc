@@ -166,7 +166,7 @@ TEST_F(StreamCollisionsCall, UpdatesAreAnsweredByThePairsThatMoved) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-TEST_F(StreamCollisionsCall, OnlyChangesLeavesOutWhatIsAsBefore) {
+TEST_F(StreamCollisionsCall, OnlyChangesOmitsUnchangedPairs) {
   Put("cube", Cube());
   Stream stream(*collisions_);
   auto open =
@@ -503,7 +503,7 @@ TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
 }
 
 // So many that threads share them.
-TEST_F(StreamCollisionsCall, OnlyChangesOfManyPairsAreThoseThatABatchFinds) {
+TEST_F(StreamCollisionsCall, OnlyChangesAgreesWithABatch) {
   Put("cube", Cube());
   Put("ball", Sphere(60));
   v1::BatchCheckCollisionsRequest batch;
@@ -562,7 +562,7 @@ TEST_F(StreamCollisionsCall, ClientsThatWriteAheadAreAnsweredInOrder) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsOthersEnd) {
+TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsRunningOnesEnd) {
   Put("cube", Cube());
   Stream stream(*collisions_);
   stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));

@@ -43,7 +43,7 @@ class SceneMemory : public ServerTest {
 
 // 2e10 pairs overlap and the client reads no answer. The scene holds the placements, the tree of
 // their boxes, and the answers that gRPC has not taken: some MiB, counted against --memory-limit.
-TEST_F(SceneMemory, OfASceneThatNobodyReadsIsCountedAndBounded) {
+TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   constexpr int kPlacements = 200'000;
   // Placed hulls, their boxes twice, the tree.
   constexpr double kLeast = kPlacements * 300.0;
@@ -98,7 +98,7 @@ TEST_F(SceneMemory, BeyondTheMemoryLimitIsRefused) {
 }
 
 // A batch has the same number of placements.
-TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
+TEST_F(SceneMemory, ABatchCountsAgainstTheSameLimit) {
   Config config = TestConfig();
   config.limits.memory_limit = 4 << 20;
   Restart(config);
@@ -118,7 +118,7 @@ TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
 }
 
 // An error takes more memory than its placement.
-TEST_F(SceneMemory, OfWhatIsWrongWithPlacementsCounts) {
+TEST_F(SceneMemory, ErrorsOfPlacementsCount) {
   Config config = TestConfig();
   config.limits.memory_limit = 30'000'000;
   Restart(config);

@@ -78,7 +78,7 @@ class FindCollisionsCall : public ServerTest {
   }
 };
 
-TEST_F(FindCollisionsCall, FindsWhatCollidesAndCounts) {
+TEST_F(FindCollisionsCall, FindsAndCountsCollisions) {
   Put("cube", Cube());
   auto request = Row({0, 0.5, 1.5, 5});
   *request.add_placements() = PlacementOf("none");

@@ -54,7 +54,7 @@ class TextbookMemory : public ServerTest {
   double before_ = 0;
 };
 
-TEST_F(TextbookMemory, OfAPairThatIsBegunIsCountedAndOthersAreRefused) {
+TEST_F(TextbookMemory, AStartedPairIsCountedAndFurtherOnesAreRefused) {
   PutLarge();
   grpc::ClientContext context;
   grpc::Status status;
@@ -75,7 +75,7 @@ TEST_F(TextbookMemory, OfAPairThatIsBegunIsCountedAndOthersAreRefused) {
 }
 
 // Also while it waits for its next slice.
-TEST_F(TextbookMemory, OfABatchIsCountedFromSliceToSlice) {
+TEST_F(TextbookMemory, ABatchIsCountedFromSliceToSlice) {
   PutLarge();
   v1::BatchCheckCollisionsRequest request;
   request.set_method(v1::METHOD_TEXTBOOK_SAT);

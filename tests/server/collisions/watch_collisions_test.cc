@@ -117,7 +117,7 @@ class WatchCollisions : public ServerTest {
   }
 };
 
-TEST_F(WatchCollisions, TellsWhatCollidesAndWhatMotionChanges) {
+TEST_F(WatchCollisions, ReportsCollisionsAndChangesByMotion) {
   for (const bool is_scene : {false, true}) {
     const v1::CollisionWatchOpen scene = Cubes({0, 0.5, 9});
     v1::CollisionWatchOpen pairs = Pair(Pair(Pair(scene, 0, 1), 0, 2), 1, 2);
@@ -149,7 +149,7 @@ TEST_F(WatchCollisions, TellsWhatCollidesAndWhatMotionChanges) {
   }
 }
 
-TEST_F(WatchCollisions, TellsWhatAHullDoesThatGrowsByItself) {
+TEST_F(WatchCollisions, ReportsAHullThatGrows) {
   Append("growing", 1, Cube());
   v1::CollisionWatchOpen open = Cubes({2});
   *open.add_placements() = PlacementOf("growing");
@@ -216,7 +216,7 @@ TEST_F(WatchCollisions, AHullMayComeAndGo) {
   EXPECT_EQ(Text(again.events(0)), "ENTER 0 1");
 }
 
-TEST_F(WatchCollisions, TellsWhatIsNear) {
+TEST_F(WatchCollisions, ReportsNearPairs) {
   v1::CollisionWatchOpen open = Cubes({0, 9});
   open.set_clearance(1);
   Watch watch(*collisions_, open);
@@ -259,7 +259,7 @@ TEST_F(WatchCollisions, GroupsAndMoversLeaveOutPairs) {
   EXPECT_THAT(Watch(*collisions_, movers).Events(), UnorderedElementsAre("ENTER 0 1", "ENTER 0 2"));
 }
 
-TEST_F(WatchCollisions, RefusesWhatIsMalformed) {
+TEST_F(WatchCollisions, RefusesMalformedRequests) {
   const auto expect = [](const grpc::Status& status, const std::string& text) {
     EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT);
     EXPECT_THAT(status.error_message(), HasSubstr(text));

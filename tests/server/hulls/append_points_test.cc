@@ -251,7 +251,7 @@ TEST_F(AppendPoints, MissingHullsAreNotFoundUnlessCreated) {
   EXPECT_EQ(Get("none").hull().dimension(), -1);
 }
 
-TEST_F(AppendPoints, MalformedMessagesSayWhatIsWrong) {
+TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   Create("h");
   const auto expect = [&](const std::vector<v1::AppendPointsRequest>& messages,
                           const std::string& what) {

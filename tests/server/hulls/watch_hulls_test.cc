@@ -97,7 +97,7 @@ class WatchHulls : public ServerTest {
   }
 };
 
-TEST_F(WatchHulls, TellsAHullWithItsCountsAndItsBox) {
+TEST_F(WatchHulls, ReportsAHullWithItsCountsAndItsBox) {
   Create("empty");
   Put("cube", Cube(0, 2));
   Watch watch(*hulls_, {});
@@ -382,8 +382,8 @@ class Writer {
 // What a watch said when its header was of this revision.
 using Moments = std::vector<std::pair<uint64_t, Mirror::State>>;
 
-// Each state that a watch told is what the histories say of its revision, but for hulls that
-// changed since: for those it may tell what came first, or what came since.
+// Checks each state against the histories at its revision. A hull that changed since may be
+// reported at an earlier or a later version.
 void ExpectTrue(const Moments& moments, const Writer::History& histories) {
   for (const auto& [revision, state] : moments) {
     for (const auto& [id, history] : histories) {

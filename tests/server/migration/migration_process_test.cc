@@ -127,7 +127,7 @@ TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
 }
 
 // After kill -9 at any time, the next run resumes the migration.
-TEST_F(MigrateProgram, AKilledRunIsGoneOnWith) {
+TEST_F(MigrateProgram, AKilledRunIsResumed) {
   {
     const auto hulld = Serve(Words{"--store", "rocksdb", "--data-dir"} + Directory("first"));
     const Client client = Connect(*hulld);

@@ -209,7 +209,7 @@ TEST_P(MigrationTest, TheCopyServesTheSame) {
   ASSERT_TRUE(copy->Delete("large").ok());
 }
 
-TEST_P(MigrationTest, AnInterruptedRunIsGoneOnWith) {
+TEST_P(MigrationTest, AnInterruptedRunIsResumed) {
   FillSource();
   uint64_t before = 0;
   // The second batch is refused, then the third run's fifth.
@@ -241,7 +241,7 @@ TEST_P(MigrationTest, AnInterruptedRunIsGoneOnWith) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
-TEST_P(MigrationTest, ASourceThatChangedMeanwhileIsCopiedAnew) {
+TEST_P(MigrationTest, AChangedSourceIsCopiedAgain) {
   FillSource();
   {
     const auto source = from_->Open();
@@ -262,7 +262,7 @@ TEST_P(MigrationTest, ASourceThatChangedMeanwhileIsCopiedAnew) {
 }
 
 // Chunks without new vertices take no revision of the store.
-TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
+TEST_P(MigrationTest, ASourceWithChangedCountsIsCopiedAgain) {
   FillSource();
   std::vector<std::string> copied;
   {
@@ -326,7 +326,7 @@ TEST_P(MigrationTest, AnOpenStoreIsRefused) {
   EXPECT_EQ(Migrate(*from_, *to_).code, 0);
 }
 
-TEST_P(MigrationTest, ASourceThatIsNotThereIsNotMade) {
+TEST_P(MigrationTest, AMissingSourceIsNotCreated) {
   Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("it contains no hulld store"));

@@ -44,7 +44,7 @@ TEST_F(FrameGuardTest, OrdinaryCallsPassInPiecesOfAnySize) {
   EXPECT_EQ(all_half_open_, 0);
 }
 
-TEST_F(FrameGuardTest, WhatDoesNotBeginAsHttp2IsRefused) {
+TEST_F(FrameGuardTest, RefusesConnectionsThatAreNotHttp2) {
   EXPECT_EQ(Send("PRI * HTTP/2.0\r\n\r\nS"), Verdict::kAllowed);
   EXPECT_EQ(Send("X"), Verdict::kNotHttp2);
 }

@@ -148,7 +148,7 @@ TEST_F(Observation, AConnectionThatSaysNothingDoesNotHoldUpTheMetrics) {
   for (const int descriptor : silent) close(descriptor);
 }
 
-TEST_F(Observation, WhatIsOpenAndRunsIsShown) {
+TEST_F(Observation, OpenAndRunningCallsAreShown) {
   Put("a", Cube());
   ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
   EXPECT_EQ(Metric("hulld_connections"), 1);
@@ -243,7 +243,7 @@ TEST_F(Observation, TheStoreAndItsCacheReport) {
   EXPECT_GT(Metric("hulld_cache_limit_bytes"), Metric("hulld_cache_bytes"));
 }
 
-TEST_F(Observation, TheMemoryOfReadersAndOfWritersIsToldApart) {
+TEST_F(Observation, ReaderAndWriterMemoryAreReportedSeparately) {
   Put("a", Cube());
   EXPECT_EQ(Metric("hulld_cache_reading_bytes"), 0);
   EXPECT_GT(Metric("hulld_cache_writing_bytes"), 0);
@@ -332,7 +332,7 @@ TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
   EXPECT_NE(ask("no spaces", "cube"), "");
 }
 
-TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
+TEST_F(Observation, AnAbandonedAuditEndsUnfinished) {
   Put("ball", Sphere(50'000));
   // Makes the snapshot, so that only an audit remains.
   Get("ball");
@@ -464,7 +464,7 @@ TEST_F(Observation, SlowRequestsAreLoggedWithTheirSizes) {
                               "peer=[^ ]+ code=OK milliseconds=[0-9.]+ pairs=4 points=0\n"));
 }
 
-TEST(LogEventTest, TextQuotesWhatIsNoWordAndEscapes) {
+TEST(LogEventTest, TextIsQuotedAndEscapedWhereNeeded) {
   const CapturedLog log;
   LogEvent(LogLevel::kInfo, "done",
            {{"id", "a/b"}, {"name", "two words"}, {"bad", "a\n\"b\""}, {"count", uint64_t{3}}});

@@ -89,7 +89,7 @@ TEST(TaskPool, ASingleCallWaitsForOneSliceAtMost) {
   EXPECT_THAT(order.names(), ElementsAre("slice 1", "single", "slice 2", "slice 3"));
 }
 
-TEST(TaskPool, LanesTakeTurnsWhateverTheirLength) {
+TEST(TaskPool, LanesTakeTurnsRegardlessOfLength) {
   HeldPool held;
   Order order;
   TaskPool::Lane a(held.pool());
@@ -186,7 +186,7 @@ TEST(TaskPool, SlicesWaitNoLongerThanSingleCallsArrive) {
   ready.wait();
 }
 
-TEST(TaskPool, EndingRunsWhatIsQueued) {
+TEST(TaskPool, EndingRunsQueuedTasks) {
   std::atomic<int> ran = 0;
   {
     auto pool = std::make_unique<TaskPool>(2);
@@ -222,7 +222,7 @@ TEST(SharedLoop, WaitsForNoThreadThatIsNotFree) {
   free.set_value();
 }
 
-TEST(SharedLoop, WaitsForWhatAnotherThreadBegan) {
+TEST(SharedLoop, WaitsForWorkStartedByAnotherThread) {
   WorkerPool helpers(1);
   std::promise<void> both;
   std::atomic<int> running = 0;

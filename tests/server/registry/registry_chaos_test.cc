@@ -113,7 +113,7 @@ class RegistryChaos : public RegistryInterleaving {
   }
 };
 
-TEST_F(RegistryChaos, EveryVersionHoldsWhatItsRecordSays) {
+TEST_F(RegistryChaos, EveryVersionMatchesItsRecord) {
 #ifdef HULLD_SANITIZED
   constexpr uint64_t kChunks = 300;
 #else

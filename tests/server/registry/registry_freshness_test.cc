@@ -147,7 +147,7 @@ class RegistryFreshnessTest : public ::testing::Test {
   Registry& registry_ = hulls_.registry();
 };
 
-TEST_F(RegistryFreshnessTest, ALinearizableReadAsksTheStoreAndSeesWhatOthersDid) {
+TEST_F(RegistryFreshnessTest, ALinearizableReadSeesPeerChanges) {
   store_.CreateElsewhere("h", 1);
   EXPECT_FALSE(IsAnsweredAtOnce("h", {}));
   const int before = store_.asked();

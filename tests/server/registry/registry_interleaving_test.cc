@@ -208,7 +208,7 @@ TEST_F(RegistryInterleaving, AReaderDoesNotWaitForAWriterThatReads) {
   EXPECT_EQ(registry_.Resolve("h", {})->second.served->high().x(), 100);
 }
 
-TEST_F(RegistryInterleaving, WhatIsNotCommittedIsNotSeen) {
+TEST_F(RegistryInterleaving, UncommittedChangesAreInvisible) {
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
   uint64_t sequence = 2;
@@ -257,7 +257,7 @@ TEST_F(RegistryInterleaving, AHullThatIsDeletedWhileItIsReadIsNotFound) {
 }
 
 // The store has deleted the points, and the registry has not applied the deletion yet.
-TEST_F(RegistryInterleaving, AHullWhoseEndIsOnItsWayIsNotTakenForDamaged) {
+TEST_F(RegistryInterleaving, AHullBeingDeletedIsNotReportedDamaged) {
   ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
   DropAll();
   Gate gate;

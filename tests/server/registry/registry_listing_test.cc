@@ -72,7 +72,7 @@ class ListedStore : public MemoryStore {
 };
 
 // Interior points take no revision, so the revision alone does not identify the committed state.
-TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) {
+TEST(RegistryListing, InsidePointsInFlightAreSeenByAllReadsOrNone) {
   TestRegistry<ListedStore> hulls(std::make_unique<ListedStore>());
   Registry& registry = hulls.registry();
   ASSERT_TRUE(hulls.Put("h", CubeCorners()).ok());

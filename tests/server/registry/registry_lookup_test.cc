@@ -63,7 +63,7 @@ TEST_F(RegistryLookup, AHullThatIsNamedOftenIsLookedUpOnce) {
   }
 }
 
-TEST_F(RegistryLookup, WhatChangesBetweenTwoSlicesIsLookedUpAgain) {
+TEST_F(RegistryLookup, ChangesBetweenTwoSlicesAreLookedUpAgain) {
   const std::vector<std::string> ids = Create(1000);
   uint64_t round = 0;
   const auto change = [&] {
@@ -94,7 +94,7 @@ TEST_F(RegistryLookup, WhatChangesBetweenTwoSlicesIsLookedUpAgain) {
 
 // A writer appends to one hull, then to the next, and so on: no reader sees the second ahead of the
 // first, nor two steps behind it, whatever lies between them.
-TEST_F(RegistryLookup, WhatIsGivenIsOfOneMoment) {
+TEST_F(RegistryLookup, ResultsBelongToOneRevision) {
   const std::vector<std::string> ids = Create(600);
   std::atomic<bool> ending = false;
   std::thread writer([&] {
@@ -121,7 +121,7 @@ TEST_F(RegistryLookup, WhatIsGivenIsOfOneMoment) {
   writer.join();
 }
 
-TEST_F(RegistryLookup, ARefreshLooksUpWhatChangedAlone) {
+TEST_F(RegistryLookup, ARefreshLooksUpOnlyChangedHulls) {
   const std::vector<std::string> ids = Create(1000);
   KnownHulls known;
   ASSERT_TRUE(registry_.reader().Refresh(ids, known, {}).ok());
@@ -178,7 +178,7 @@ TEST_F(RegistryLookup, ALookupCanBeCancelledBetweenSlices) {
 }
 
 // A waiting thread gets the mutex before the thread that releases it and locks it again.
-TEST(FairMutexTest, WhoWaitsGoesFirst) {
+TEST(FairMutexTest, WaitersGoFirst) {
   FairMutex mutex;
   for (int round = 0; round < 100; ++round) {
     bool is_first = false;

@@ -106,7 +106,7 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
 
 // Two hulls do not fit together. Without this, a reader of both would load one after the other
 // forever: each is prepared while the other is loaded, and so looked up again.
-TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped) {
+TEST_F(RegistryMemory, APinnedVersionIsNotReadAgain) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());
   Start();
@@ -154,7 +154,7 @@ TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
   EXPECT_EQ(hulls_->View("1")->record.counts.received, 2001);
 }
 
-TEST_F(RegistryMemory, WhatAReaderHoldsStays) {
+TEST_F(RegistryMemory, PinnedVersionsStay) {
   Limits limits;
   limits.memory_limit = 1 << 20;
   Start(limits);
@@ -292,7 +292,7 @@ TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
   EXPECT_TRUE(append(100).ok());
 }
 
-TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
+TEST(RegistryOfMemoryStore, MemoryHeldByCallsCountsUntilTheyEnd) {
   MemoryStore store;
   WorkerPool writers(2);
   Limits limits;
@@ -384,7 +384,7 @@ TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
 }
 
 // Versions of a hull share most of their data, which counts one time only.
-TEST_F(RegistryMemory, WhatVersionsShareCountsOnce) {
+TEST_F(RegistryMemory, SharedMemoryOfVersionsCountsOnce) {
   Start();
   Registry& registry = hulls_->registry();
   ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());

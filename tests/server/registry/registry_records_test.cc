@@ -140,7 +140,7 @@ TEST_F(RegistryRecords, EachIsReadOnceAndManyAtATime) {
   EXPECT_EQ(store_.questions, questions);
 }
 
-TEST_F(RegistryRecords, AlsoThatThereIsNothingIsKept) {
+TEST_F(RegistryRecords, MissingRecordsAreCached) {
   Start(1000);
   const std::vector<std::string> ids = {"none"};
   for (int i = 0; i < 3; ++i) {
@@ -151,7 +151,7 @@ TEST_F(RegistryRecords, AlsoThatThereIsNothingIsKept) {
   EXPECT_EQ(store_.records, 1);
 }
 
-TEST_F(RegistryRecords, WhoMayNotWaitIsNotAnsweredUntilItIsKnown) {
+TEST_F(RegistryRecords, NonblockingReadsFailUntilTheRecordIsKnown) {
   Start(1000);
   const std::vector<std::string> ids = {"h1"};
   EXPECT_FALSE(registry_.reader().TryResolve(ids).has_value());
@@ -161,7 +161,7 @@ TEST_F(RegistryRecords, WhoMayNotWaitIsNotAnsweredUntilItIsKnown) {
 }
 
 // Records requested later replace earlier ones.
-TEST_F(RegistryRecords, NoMoreAreKeptThanItIsTold) {
+TEST_F(RegistryRecords, TheCacheStaysWithinItsLimit) {
   Start(200);
   for (uint64_t first = 0; first < 20'000; first += 100) ExpectThere(Ids(first, 100));
   const uint64_t records = store_.records;
@@ -189,7 +189,7 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
 }
 
 // A caller that looks for bodies among hulls learns the kind of every ID in one request.
-TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
+TEST_F(RegistryRecords, MissingBodiesAreCached) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
   EXPECT_FALSE(registry_.bodies().TryFind(ids).has_value());
@@ -209,7 +209,7 @@ TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
   EXPECT_EQ(store_.records, 3);
 }
 
-TEST_F(RegistryRecords, BodiesThatNobodyUsesAreBoundedInBytes) {
+TEST_F(RegistryRecords, UnusedBodiesAreBoundedInBytes) {
   Start(100);
   const uint64_t before = registry_.Cache().bytes;
   for (uint64_t first = 0; first < 20'000; first += 100) ExpectBodies(Ids(first, 100, "b"));
@@ -240,7 +240,7 @@ TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
   ExpectBodies(Ids(0, 3000, "b"));
 }
 
-TEST_F(RegistryRecords, WhyABodyCannotBeReadIsTold) {
+TEST_F(RegistryRecords, UnreadableBodiesReportTheCause) {
   Start(1000);
   ExpectBodies({"b1"});
   store_.is_gone = true;

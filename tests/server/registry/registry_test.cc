@@ -66,7 +66,7 @@ class RegistryTest : public ::testing::Test {
   Registry registry_{store_, Limits(), writers_};
 };
 
-TEST_F(RegistryTest, WhatIsServedIsMadeOnceAndSharedUntilTheNextChange) {
+TEST_F(RegistryTest, SnapshotsAreMadeOnceAndShared) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}, {1, 0, 0}}).ok());
   const auto first = registry_.Resolve("h", {});
@@ -257,7 +257,7 @@ TEST_F(RegistryTest, ReadersKeepTheVersionThatTheyResolved) {
   }
 }
 
-TEST_F(RegistryTest, WhatQuestionsPayForIsPreparedFirstOnlyForWhoeverWaits) {
+TEST_F(RegistryTest, PreparationPrecedesOnlyWaitingQueries) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const ReadPlan many = {1'000'000, true};
@@ -292,7 +292,7 @@ TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
 }
 
 // The preparing thread runs after the reader has continued.
-TEST_F(RegistryTest, WhatManyQuestionsPaidForIsPrepared) {
+TEST_F(RegistryTest, FrequentlyQueriedHullsArePrepared) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const auto first = registry_.reader().TryResolve(ids, {1'000'000, false});

@@ -13,7 +13,7 @@
 namespace hulld::server {
 namespace waiting_calls_test {
 
-TEST(WaitingCalls, OneIsToldOnce) {
+TEST(WaitingCalls, EachCallIsNotifiedOnce) {
   WaitingCalls calls;
   int told = 0;
   const auto wait = calls.Add({}, [&](const absl::Status& status) {
@@ -28,7 +28,7 @@ TEST(WaitingCalls, OneIsToldOnce) {
   EXPECT_EQ(told, 1);
 }
 
-TEST(WaitingCalls, OneThatIsWithdrawnIsNotTold) {
+TEST(WaitingCalls, AWithdrawnCallIsNotNotified) {
   WaitingCalls calls;
   const auto wait = calls.Add({}, [](const absl::Status&) { FAIL(); });
   EXPECT_TRUE(wait->Withdraw());
@@ -37,7 +37,7 @@ TEST(WaitingCalls, OneThatIsWithdrawnIsNotTold) {
 }
 
 // Also the last one in the queue.
-TEST(WaitingCalls, OneThatIsCancelledEndsAndTheOthersWait) {
+TEST(WaitingCalls, ACancelledCallEndsAndOtherCallsWait) {
   WaitingCalls calls;
   std::atomic<bool> is_cancelled = false;
   std::promise<absl::Status> told;
@@ -52,7 +52,7 @@ TEST(WaitingCalls, OneThatIsCancelledEndsAndTheOthersWait) {
 }
 
 // The state of a call's stop predicate is gone as soon as the call ends, on any thread.
-TEST(WaitingCalls, NobodyIsAskedWhetherToStopOnceItIsOver) {
+TEST(WaitingCalls, FinishedCallsAreNotPolled) {
   WaitingCalls calls;
   constexpr int kCalls = 2000;
   std::atomic<int> told = 0;

@@ -77,7 +77,7 @@ TEST(Scheduler, FindsALostWakeupBehindATimeLimit) {
   EXPECT_TRUE(Find([] { LoseAWakeup(true); }).has_value());
 }
 
-TEST(Scheduler, TellsALostWakeupFromAHang) {
+TEST(Scheduler, DistinguishesALostWakeupFromAHang) {
   const auto forgotten = Find([] {
     Mutex mutex;
     ConditionVariable changed;
@@ -104,7 +104,7 @@ TEST(Scheduler, TellsALostWakeupFromAHang) {
   EXPECT_EQ(never->kind, Kind::kDeadlock);
 }
 
-TEST(Scheduler, FindsWhatDoesNotEnd) {
+TEST(Scheduler, FindsHangs) {
   const auto fault = Find(
       [] {
         while (true) Scheduler::Current().Note("goes round");
@@ -131,7 +131,7 @@ void Count(bool takes_mutex) {
   if (count != 3) Scheduler::Current().Fail("it counts wrong");
 }
 
-TEST(Scheduler, FindsStepsThatComeBetweenOthers) {
+TEST(Scheduler, FindsInterleavedSteps) {
   const auto fault = Find([] { Count(false); });
   ASSERT_TRUE(fault.has_value());
   EXPECT_EQ(fault->kind, Kind::kWrongAnswer);
@@ -186,7 +186,7 @@ TEST(Scheduler, ReachesEveryOrder) {
   EXPECT_EQ(orders.size(), 6);
 }
 
-TEST(Scheduler, TellsItsSteps) {
+TEST(Scheduler, ReportsItsSteps) {
   Scheduler scheduler(1);
   ASSERT_FALSE(scheduler
                    .Run([] {

@@ -28,7 +28,7 @@ class CpuLimitTest : public ::testing::Test {
   std::filesystem::path root_;
 };
 
-TEST_F(CpuLimitTest, WithoutControlGroupsThereIsNone) {
+TEST_F(CpuLimitTest, WithoutControlGroupsThereIsNoLimit) {
   EXPECT_TRUE(std::isinf(Quota()));
   EXPECT_GE(ReadCpuLimit(root_).processors, 1);
 }

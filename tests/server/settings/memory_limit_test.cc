@@ -29,7 +29,7 @@ class MemoryLimit : public ::testing::Test {
   std::filesystem::path root_;
 };
 
-TEST_F(MemoryLimit, WithoutControlGroupsThereIsNone) {
+TEST_F(MemoryLimit, WithoutControlGroupsThereIsNoLimit) {
   EXPECT_EQ(ControlGroupMemory(root_), kNone);
 }
 

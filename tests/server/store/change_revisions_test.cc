@@ -75,7 +75,7 @@ TEST(NumberChanges, ABodyKeepsTheRevisionOfItsBeginning) {
   EXPECT_EQ(changes[1].body->record.revision, 9);
 }
 
-TEST(NumberChanges, WhatIsDeletedStaysAsItWas) {
+TEST(NumberChanges, DeletedEntriesKeepTheirValues) {
   std::vector<Change> changes = {Creation("h"), Creation("i")};
   changes[1].body = std::make_shared<StoredBody>(StoredBody{{"b", 3, 5}, {}, {}});
   for (Change& change : changes) change.deleted = true;

@@ -130,7 +130,7 @@ TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   ExpectOnlyBIsDamaged();
 }
 
-TEST_P(StoreDamage, ADeletedHullWhoseRecordIsDamagedLeavesNothingAfterAStart) {
+TEST_P(StoreDamage, DeletingADamagedHullLeavesNothingAfterAStart) {
   FillThree();
   ASSERT_TRUE(hulls_->Put("b", SpherePoints(40'000, 9)).ok());
   ASSERT_GT(CountKeys(kBasePrefix), 0);
@@ -145,7 +145,7 @@ TEST_P(StoreDamage, ADeletedHullWhoseRecordIsDamagedLeavesNothingAfterAStart) {
   EXPECT_EQ(hulls_->Open("a", "w")->last_sequence, 1);
 }
 
-TEST_P(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothingAfterAStart) {
+TEST_P(StoreDamage, ReplacingADamagedHullLeavesNothingAfterAStart) {
   FillThree();
   Flip(HullKey("b"));
   Start();
@@ -160,7 +160,7 @@ TEST_P(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothingAfterAStart) {
 
 // Finding the remains of such a hull takes a scan of all records. A start scans, a deletion does
 // not.
-TEST_F(RocksDbDamage, DeletingAHullWhoseRecordIsDamagedDoesNotReadTheOthers) {
+TEST_F(RocksDbDamage, DeletingADamagedHullReadsNoOtherRecord) {
   FillThree();
   FlipRecord("b");
   Start();
@@ -190,7 +190,7 @@ TEST_F(RocksDbDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedT
   EXPECT_EQ(hulls_->View("c")->record.vertex_count, 8);
 }
 
-TEST_F(RocksDbDamage, TheDoctorsReportIsUtf8WhateverTheKeysAre) {
+TEST_F(RocksDbDamage, TheDoctorsReportIsUtf8ForAnyKeys) {
   FillThree();
   ASSERT_TRUE(hulls_->store().db().Put({}, HullKey("x\xff\"\n"), "garbage").ok());
   hulls_ = nullptr;

@@ -91,12 +91,12 @@ TEST_F(StoreFault, ADiskMountedForReadingRefusesChangesAndNothingElse) {
   ExpectRefusedThenWell(Fault::kReadOnly, absl::StatusCode::kUnavailable, "Read-only file system");
 }
 
-TEST_F(StoreFault, WhatCannotBeSyncedIsNotAcked) {
+TEST_F(StoreFault, UnsyncedChangesAreNotAcknowledged) {
   ExpectRefusedThenWell(Fault::kSyncError, absl::StatusCode::kUnavailable, "syncing");
 }
 
 // Each database counts only its own stalls.
-TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
+TEST_F(StoreFault, StallCountsContinueAfterReopening) {
   Start();
   RocksDbStore& store = hulls_->store();
   // One file that was not compacted is one too many.
@@ -122,7 +122,7 @@ TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
 
 // Simulates a kill and a power failure after a refused change. The change must be absent if the
 // error says that nothing was changed; otherwise the error says that may appear.
-TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
+TEST_F(StoreFault, FailedChangesAreNotFoundByTheNextProcess) {
   constexpr int64_t kForever = std::numeric_limits<int64_t>::max();
   struct Case {
     Fault fault;
@@ -174,7 +174,7 @@ TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
 }
 
 // An orderly end leaves no refused change behind.
-TEST_F(StoreFault, WhatWasRefusedDoesNotOutliveAnEnd) {
+TEST_F(StoreFault, RefusedChangesDoNotSurviveAnEnd) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   files_->SetFault(Fault::kNoSpaceAtSync);
@@ -184,7 +184,7 @@ TEST_F(StoreFault, WhatWasRefusedDoesNotOutliveAnEnd) {
   EXPECT_EQ(hulls_->View("h")->record.counts.received, 8);
 }
 
-TEST_F(StoreFault, FailuresAreCountedByWhatFailed) {
+TEST_F(StoreFault, FailuresAreCountedByKind) {
   struct Expected {
     Fault fault;
     uint64_t write;
@@ -225,7 +225,7 @@ TEST_F(StoreFault, SyncsThatFailLaterAreCounted) {
   files_->SetFault(Fault::kNone);
 }
 
-TEST_F(StoreFault, WhatCannotBeReadIsCounted) {
+TEST_F(StoreFault, FailedReadsAreCounted) {
   Start();
   // More than the block of the records, which is read when the store is opened.
   ASSERT_TRUE(hulls_->Put("h", SpherePoints(1000)).ok());
@@ -274,7 +274,7 @@ TEST_F(StoreFault, RelaxedChangesAreSyncedSoon) {
 }
 
 // Shows that the simulated power failure loses unsynced changes.
-TEST_F(StoreFault, AnOutageLosesWhatWasNotSynced) {
+TEST_F(StoreFault, AnOutageLosesOnlyUnsyncedChanges) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
   Start();
@@ -382,7 +382,7 @@ TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
   EXPECT_EQ(ids[2], ids[0]);
 }
 
-TEST_F(StoreFault, ARelaxedStoreWhoseEndCouldNotBeSyncedIsAnotherStore) {
+TEST_F(StoreFault, ARelaxedStoreWithAFailedFinalSyncGetsANewId) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
   Start();

@@ -194,7 +194,7 @@ TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
 }
 
 // RocksDB takes zeros for preallocated bytes.
-TEST_F(StoreLoss, ALogWhoseEndIsZerosIsRefused) {
+TEST_F(StoreLoss, ALogEndingInZerosIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   const std::string content = Read(Logs()[0]);
   Write(Logs()[0], std::string(content.size(), '\0'));
@@ -226,7 +226,7 @@ TEST_F(StoreLoss, AnOlderCopyOfTheLogIsRefused) {
 }
 
 // The mark covers synced changes of a relaxed store as well.
-TEST_F(StoreLoss, ARelaxedStoreMissesWhatItSynced) {
+TEST_F(StoreLoss, ARelaxedStoreDetectsMissingSyncedChanges) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
   Start();

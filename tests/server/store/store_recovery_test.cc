@@ -139,7 +139,7 @@ TEST_P(StoreRecovery, AReplacedHullIsANewIncarnation) {
   ExpectSame(*Start().View("h"), view);
 }
 
-TEST_P(StoreRecovery, ReplacingWhatIsNotThereNeedsCreateIfAbsent) {
+TEST_P(StoreRecovery, ReplacingAMissingHullNeedsCreateIfAbsent) {
   KeptRegistry& first = Start();
   const auto cube = [] {
     auto builder = std::make_shared<HullBuilder>();

@@ -125,7 +125,7 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
 }
 
 // Then hulls without a canonical snapshot suffice.
-TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
+TEST(AnswerColumns, UnrequestedColumnsAreNotSent) {
   const LiveHull live({{0, 0, 0}, {0, 0, 4}, {0, 4, 0}, {4, 0, 0}}, 3);
   const std::shared_ptr<const QueryHull> asked = live.VersionAt(live.Now());
   v1::AnswerColumns columns;

@@ -77,7 +77,7 @@ TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {
   EXPECT_GT(freshness->max_staleness, nanoseconds(std::chrono::hours(24 * 365)));
 }
 
-TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
+TEST(FreshnessWords, MalformedTextAndOtherStoresAreRefused) {
   const MemoryStore store;
   const auto expect = [&store](const v1::Freshness& message, absl::StatusCode code,
                                const std::string& what) {
@@ -109,7 +109,7 @@ TEST(ListenAddress, LoopbackAndUnixSocketsAreLocal) {
   }
 }
 
-TEST(ListenAddress, OthersNeedInsecure) {
+TEST(ListenAddress, OtherAddressesNeedInsecure) {
   for (const char* text : {"0.0.0.0:50551", "[::]:50551", "192.168.1.7:1", "example.com:1",
                            "[::ffff:127.0.0.1]:1", "1270.0.0.1:1", "localhost.example.com:1"}) {
     const absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
@@ -160,7 +160,7 @@ TEST(Log, JsonStringsAreEscaped) {
             "\xC3\xA4\xE2\x82\xAC\xF0\x9F\x98\x80");
 }
 
-TEST(Log, WhatIsNotUtf8IsReplaced) {
+TEST(Log, InvalidUtf8IsReplaced) {
   EXPECT_EQ(JsonEscape("\xFF"), "\\ufffd");
   EXPECT_EQ(JsonEscape("\xC3"), "\\ufffd");
   EXPECT_EQ(JsonEscape("\xC0\x80"), "\\ufffd\\ufffd");

@@ -66,7 +66,7 @@ TEST_F(FreshnessOptions, EachReadCarriesThem) {
   EXPECT_THAT(future.err, HasSubstr("at_least_revision is 1000"));
 }
 
-TEST_F(FreshnessOptions, WhatIsNoTimeOrRevisionIsRefused) {
+TEST_F(FreshnessOptions, MalformedTimesAndRevisionsAreRefused) {
   for (const char* const text : {"7", "store:", ":7", "store:x", "store:-1"}) {
     const Ran ran = Ask({"get", "cube", "--at-least", text});
     EXPECT_EQ(ran.code, 2) << text;

@@ -46,7 +46,7 @@ TEST_F(ListAndDelete, CountsAreOfAll) {
   EXPECT_EQ(Ask({"list", "b", "--count"}).out, "hulls     1\nvertices  2\npoints    2\n");
 }
 
-TEST_F(ListAndDelete, SeveralAreDeletedOnlyWhenItIsSaid) {
+TEST_F(ListAndDelete, SeveralAreDeletedOnlyWithConfirmation) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"delete", "arm/1", "box"}, {"delete", "--prefix", "arm/"}}) {
     const Ran ran = Ask(words);
@@ -61,7 +61,7 @@ TEST_F(ListAndDelete, SeveralAreDeletedOnlyWhenItIsSaid) {
   EXPECT_THAT(none.err, HasSubstr("no hull starts with \"arm/\""));
 }
 
-TEST_F(ListAndDelete, OneThatIsMissingDoesNotKeepTheOthers) {
+TEST_F(ListAndDelete, AMissingHullDoesNotPreventOtherDeletions) {
   const Ran ran = Ask({"delete", "arm/1", "nope", "box", "arm/1", "--yes"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("\"nope\" not found"), HasSubstr("deleted 2 of 3 hulls")));

@@ -78,7 +78,7 @@ TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoint
   EXPECT_EQ(Get("some").hull().vertex_count(), 4U);
 }
 
-TEST_F(SafeWrites, WhatIsNotThereIsNotToBeCreatedToBeDeleted) {
+TEST_F(SafeWrites, MissingHullsAreNotCreatedInOrderToBeDeleted) {
   const Ran ran = Ask({"delete", "nope"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));

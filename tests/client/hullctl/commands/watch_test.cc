@@ -22,7 +22,7 @@ using ::testing::MatchesRegex;
 
 class HullctlWatch : public HullctlOnServer {};
 
-TEST_F(HullctlWatch, TellsWhatIsThere) {
+TEST_F(HullctlWatch, ReportsExistingHulls) {
   Put("a/cube", server::Cube());
   Create("a/empty");
   Create("b");
@@ -41,7 +41,7 @@ TEST_F(HullctlWatch, TellsWhatIsThere) {
                                     "\\{.*\"synced\":true.*\\}\n"));
 }
 
-TEST_F(HullctlWatch, TellsOfBodies) {
+TEST_F(HullctlWatch, ReportsBodies) {
   Put("a/cube", server::Cube());
   ASSERT_EQ(Ask({"body", "put", "a/body", "a/cube", "a/cube@3,0,0"}).code, 0);
   Ran ran = Ask({"watch", "a/", "--until-synced"});
@@ -79,7 +79,7 @@ class Growth {
   std::thread thread_;
 };
 
-TEST_F(HullctlWatch, TellsWhatChanges) {
+TEST_F(HullctlWatch, ReportsChanges) {
   const Growth growth(*hulls_);
   const Ran ran = Ask({"watch", "hull", "--events", "5"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -123,7 +123,7 @@ TEST_F(HullctlWatch, EndsAtCtrlC) {
   EXPECT_EQ(err.str(), "");
 }
 
-TEST_F(HullctlWatch, TellsWhatCollidesInAScene) {
+TEST_F(HullctlWatch, ReportsCollisionsOfAScene) {
   Put("cube", server::Cube());
   const TempFile text("scene.yaml",
                       "place:\n  left: {id: cube}\n  right: {id: cube, at: [1, 0, 0]}\n"
@@ -141,7 +141,7 @@ TEST_F(HullctlWatch, TellsWhatCollidesInAScene) {
   EXPECT_THAT(ran.out, HasSubstr("\"kind\":\"COLLISION_EVENT_KIND_ENTER\""));
 }
 
-TEST_F(HullctlWatch, ExplainsWhatIsWrong) {
+TEST_F(HullctlWatch, ErrorsAreClear) {
   Ran ran = Ask({"watch", "a//b", "--exact"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("empty segment"));

@@ -170,7 +170,7 @@ TEST_F(Contexts, OptionThenEnvironmentThenContextThenDefault) {
   EXPECT_THAT(server({}), HasSubstr("$HULLCTL_CONTEXT: unknown context \"nope\""));
 }
 
-TEST_F(Contexts, WhatCannotWorkIsNotAdded) {
+TEST_F(Contexts, UnusableContextsAreNotAdded) {
   const std::string token = directory_ + "/token";
   std::ofstream(token) << "secret\n";
   chmod(token.c_str(), 0644);

@@ -25,7 +25,7 @@ TEST(Suggestion, IsAPrefixOrNear) {
   for (const char* far : {"fly", "", "--", "-", "-v", "d"}) EXPECT_EQ(Suggestion(far, words), "");
 }
 
-TEST(ManPage, SaysWhatTheHelpSaysInRoff) {
+TEST(ManPage, RepeatsTheHelpInRoff) {
   CommandDescription program;
   program.path = program.name = "tool";
   auto command = std::make_unique<CommandDescription>();

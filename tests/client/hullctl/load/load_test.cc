@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 
 void IgnoreProgress(double /*share*/, uint64_t /*requests*/) {}
 
-TEST(Load, AsksEachRequestOnceWhateverTheClients) {
+TEST(Load, SendsEachRequestOnceForAnyNumberOfClients) {
   std::mutex mutex;
   std::multiset<uint64_t> asked;
   const LoadRequest client = [&](uint64_t i) -> absl::StatusOr<uint64_t> {

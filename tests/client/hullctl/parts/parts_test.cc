@@ -126,7 +126,7 @@ TEST_F(HullctlParts, CoverTakesTheBodyAtItsPoses) {
   EXPECT_THAT(ran.err, HasSubstr("body \"half\": piece 1: hull \"nail\" not found"));
 }
 
-TEST_F(HullctlParts, CoverTellsWhatSticksOut) {
+TEST_F(HullctlParts, CoverReportsProtrudingPoints) {
   ASSERT_EQ(Ask({"append", "l", bracket_.path(), "--split", "names", "--create"}).code, 0);
   Ran ran = Ask({"cover", "l/foot", "l/back", bracket_.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;

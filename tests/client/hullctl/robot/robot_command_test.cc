@@ -59,7 +59,7 @@ TEST_F(HullctlRobot, PrefixKeepsTheHulls) {
   EXPECT_EQ(Robot({"--prefix", "arm/"}).code, 0);
 }
 
-TEST_F(HullctlRobot, ATrajectoryTellsContactsAndTheFirst) {
+TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
   const TempFile path("path.csv", "j\n0\n-0.5\n-1.5\n-2\n0\n9\n");
   Ran ran = Robot({"--joints", path.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -109,7 +109,7 @@ TEST_F(HullctlRobot, ABodyStandsAround) {
   EXPECT_THAT(ran.out, Not(HasSubstr("pieces - -")));
 }
 
-TEST_F(HullctlRobot, AcmWritesWhatCheckReads) {
+TEST_F(HullctlRobot, CheckReadsTheOutputOfAcm) {
   const Ran ran = Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("link1=\"a\" link2=\"b\" reason=\"Adjacent\""));

@@ -41,7 +41,7 @@ TEST_F(HullctlScene, ApplyMakesTheServerMatchTheFile) {
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
 }
 
-TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
+TEST_F(HullctlScene, ApplyRepairsDifferencesAndPrunes) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   const TempFile far("far.xyz", "5 5 5\n");
   ASSERT_EQ(Ask({"append", "cell/table", far.path()}).code, 0);
@@ -70,7 +70,7 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
 }
 
 // "cell-3" is a prefix of another cell's names, too.
-TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
+TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsItsIds) {
   for (const char* id : {"cell-3/stray", "cell-30/stray", "cell-3stray"}) Put(id, server::Cube());
   const std::string before = Ask({"list", "--output", "name"}).out;
   for (const std::string prefix : {"prefix: cell-3\n", ""}) {
@@ -88,7 +88,7 @@ TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell-3/table\ncell-30/stray\ncell-3stray\n");
 }
 
-TEST_F(HullctlScene, CheckAnswersWhatTheFileAsks) {
+TEST_F(HullctlScene, CheckAnswersTheQuestionsOfTheFile) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Ran ran = Ask({"scene", "check", cell_.path()});
   EXPECT_EQ(ran.out, "a\tb\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
@@ -107,7 +107,7 @@ TEST_F(HullctlScene, CheckAnswersWhatTheFileAsks) {
   }
 }
 
-TEST_F(HullctlScene, DeleteRemovesWhatTheFileDefines) {
+TEST_F(HullctlScene, DeleteRemovesTheHullsAndBodiesOfTheFile) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Put("other", server::Cube());
   EXPECT_EQ(Ask({"scene", "delete", cell_.path()}).code, 2);
@@ -148,7 +148,7 @@ TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
 }
 
-TEST_F(HullctlSceneBodies, APoseThatDiffersInOneBitIsPutAnew) {
+TEST_F(HullctlSceneBodies, APoseThatDiffersInOneBitIsPutAgain) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   const TempFile moved("moved.yaml", Cell("[1.5000000000000002, 1, 0]"));
   const TempFile signed_zero("zero.yaml", Cell("[1.5, 1, -0.0]"));

@@ -75,7 +75,7 @@ TEST(YamlScene, DefinitionsAreRead) {
   EXPECT_EQ(scene.wanted.clearance(), 0.01);
 }
 
-TEST(YamlScene, BodiesArePlacedWhole) {
+TEST(YamlScene, BodiesArePlacedAsAWhole) {
   const auto scene = ToScene(Parse(kCell), "cell.yaml", BodyForm::kWhole);
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_THAT(scene->names, ElementsAre("floor", "wall", "left", "right"));

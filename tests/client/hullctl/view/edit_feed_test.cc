@@ -87,7 +87,7 @@ TEST_F(EditFeedTest, MakesEveryChangeInItsOrderHoweverManyWait) {
   EXPECT_THAT(page_->WaitForTold(page_->told() - 1), HasSubstr("other is deleted"));
 }
 
-TEST_F(EditFeedTest, SaysWhatItHasNoRoomFor) {
+TEST_F(EditFeedTest, ReportsDroppedEdits) {
   EditFeed feed(*client_, page_);
   const std::vector<double> many(size_t{3} << 20);
   feed.Ask(AppendOf("h", 0));

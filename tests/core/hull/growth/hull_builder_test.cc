@@ -295,7 +295,7 @@ PointCounts ExpectedCounts(const Hull& before, const Hull& after, std::span<cons
   return counts;
 }
 
-TEST(HullBuilder, CountsSayWhatBecameOfEachPoint) {
+TEST(HullBuilder, CountsCoverEveryPoint) {
   const uint64_t seed = TestSeed(107);
   Random random(seed);
   PointCounts total;
@@ -544,7 +544,7 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
   EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
 }
 
-TEST(HullBuilder, ASnapshotStopsWheneverItIsToldTo) {
+TEST(HullBuilder, ASnapshotStopsAtEveryPoll) {
   Random random(112);
   constexpr int kVertices = 20000;
   // Three passes over 2 V - 4 triangles, and seven over V vertices.
@@ -561,7 +561,7 @@ std::set<std::tuple<double, double, double>> SetOf(std::span<const Vector> point
   return set;
 }
 
-TEST(HullBuilder, NewVerticesAreThoseThatTheLastBlockBrought) {
+TEST(HullBuilder, NewVerticesComeFromTheLastBlock) {
   const uint64_t seed = TestSeed(113);
   Random random(seed);
   size_t brought = 0;

@@ -130,7 +130,7 @@ TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
 }
 
 // A block's undo record depends on its changes, not on the size of the hull.
-TEST(HullCost, UndoingCostsWhatChanges) {
+TEST(HullCost, UndoingCostsAsMuchAsTheChange) {
   const uint64_t seed = TestSeed(507);
   Random random(seed);
   const std::vector<Vector> inside = RandomInBall(random, 2000, 0.9);

@@ -157,7 +157,7 @@ TEST(VertexSubset, DoesNotStartInAPlane) {
   EXPECT_FALSE(start({}).has_value());
 }
 
-TEST(Relaxation, SpreadsWhatIsCrowded) {
+TEST(Relaxation, SpreadsCrowdedPoints) {
   const Hull full = BuildHull(OnEllipsoid(4000, Vector(1, 1, 1)));
   const UnitScale scale(full.max_abs_coordinate());
   const std::vector<Vector> unit_points = scale.ToUnit(full.vertices());

@@ -38,7 +38,7 @@ void Change(Random& random, int changes, Elements& vector, std::vector<int>& exp
 }
 
 // The sizes pass the growth of the first chunk and the start of further chunks.
-TEST(ChunkedVector, UndoBringsBackWhatWasThere) {
+TEST(ChunkedVector, UndoRestoresThePreviousContent) {
   const uint64_t seed = TestSeed(601);
   Random random(seed);
   for (const int before : {0, 1, 7, 8, 9, 40, 300, 600, 2000}) {

@@ -148,7 +148,7 @@ TEST(DirectionMap, CoarsenedMapsStillBound) {
   EXPECT_EQ(SurvivorCount(map, PointsAt(BallGauge, center, 1, 5001)), 5001u);
 }
 
-TEST(DirectionMap, KeepsWhatItCannotMeasure) {
+TEST(DirectionMap, KeepsUnmeasurableDirections) {
   const DirectionMap map = MapOf(BallGauge, Vector(0, 0, 0), 8);
   const std::vector<Vector> far = {Vector::Constant(1e308), Vector(-1.7e308, 0, 1),
                                    Vector(0, 0, 1e302), Vector(1, 1, 1)};

@@ -185,7 +185,7 @@ TEST(BodySearch, FewNearPairsOfManyPiecesAreAllThatIsAskedAbout) {
   EXPECT_LT(counts.boxes, 10000u);
 }
 
-TEST(BodySearch, AHullIsAskedAboutBesideBodies) {
+TEST(BodySearch, AHullIsQueriedAgainstBodies) {
   OwnBody body;
   body.Add(LatticeCube(2, 1), At(0, 0, 0));
   body.Add(LatticeCube(2, 1), At(5, 0, 0));
@@ -269,7 +269,7 @@ TEST(BodySearch, StepsLeadToTheSameAnswer) {
   EXPECT_EQ(sliced->answer.separation->value, whole->answer.separation->value);
 }
 
-TEST(BodySearch, StopsWhenToldSo) {
+TEST(BodySearch, StopsAtAPoll) {
   OwnBody grid;
   FillGrid(5, 1, &grid);
   QueryOptions options;
@@ -281,7 +281,7 @@ TEST(BodySearch, StopsWhenToldSo) {
   EXPECT_EQ(polls, 4);
 }
 
-TEST(BodySearch, RefusesWhatIsForPairsOfHulls) {
+TEST(BodySearch, RefusesOptionsForPairsOfHulls) {
   OwnBody cube;
   cube.Add(LatticeCube(2, 1), Pose());
   cube.Finish();

@@ -218,7 +218,7 @@ TEST(PieceCertification, MoreThanTheLimitIsRefusedBeforeAnyIsMade) {
   EXPECT_THAT(std::string(refused.status().message()), HasSubstr("more than 99 pairs of pieces"));
 }
 
-TEST(PieceCertification, StopsWhenToldSo) {
+TEST(PieceCertification, StopsAtAPoll) {
   OwnBody grid;
   FillGrid(4, 1, &grid);
   QueryOptions options = Certified();

@@ -115,7 +115,7 @@ TEST(CenterBounds, RoundHullsAreBoundedClosely) {
 }
 
 // Cells are made lazily by any thread: their contents depend on neither thread nor order.
-TEST(CenterBounds, CellsAreTheSameInWhateverOrderTheyAreMade) {
+TEST(CenterBounds, CellsDoNotDependOnTheOrderOfTheirCreation) {
   const uint64_t seed = TestSeed(907);
   Random random(seed);
   for (const auto& [name, hull] : Solids(random)) {
@@ -201,7 +201,7 @@ TEST(CenterBounds, CentersOnTheBoundaryHaveNoGauge) {
 }
 
 // The relation alone, which the bounds may decide, against the search's result with evidence.
-TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
+TEST(CenterBounds, RelationsAgreeWithTheSearch) {
   const uint64_t seed = TestSeed(904);
   Random random(seed);
   const std::vector<NamedHull> solids = Solids(random);

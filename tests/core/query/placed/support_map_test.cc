@@ -171,7 +171,7 @@ TEST(SupportMap, CandidatesHoldAllThatAreExactlyFarthest) {
 }
 
 // A direction that differs by up to the error: the farthest point along it is a candidate.
-TEST(SupportMap, CandidatesHoldWhatIsFarthestAlongDirectionsNearby) {
+TEST(SupportMap, CandidatesIncludeTheFarthestPointsOfNearbyDirections) {
   Random random(TestSeed(933));
   for (const NamedSet& set : Sets(random)) {
     const SupportMap map(set.points);

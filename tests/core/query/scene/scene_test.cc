@@ -74,7 +74,7 @@ Found BruteForce(const Scene& scene, IsAsked is_asked, uint64_t* asked) {
   return found;
 }
 
-TEST(Scene, FindsWhatAllPairsFindInTheSameOrderOnAnyNumberOfThreads) {
+TEST(Scene, AgreesWithAllPairsInOrderOnAnyNumberOfThreads) {
   const Scene scene = MakeScene(821, 700, 20);
   uint64_t asked = 0;
   const Found expected = BruteForce(
@@ -153,7 +153,7 @@ TEST(Scene, CancellationEndsTheSearch) {
 }
 
 // Every pair collides: the backlog between two calls of emit must not grow with the scene.
-TEST(Scene, AnswersAreEmittedInBoundedPartsWhateverCollides) {
+TEST(Scene, AnswersAreEmittedInBoundedParts) {
   constexpr uint32_t kPlacements = 1000;
   Random random(TestSeed(826));
   const Hull ball = BuildHull(RandomOnSphere(random, 8, 1));

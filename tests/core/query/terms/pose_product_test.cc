@@ -135,7 +135,7 @@ TEST(PoseProduct, ContactIsThatOfTheUnroundedProduct) {
   EXPECT_GT(steps, 20);
 }
 
-TEST(PoseProduct, RelationsAreThoseOfRationalNumbers) {
+TEST(PoseProduct, RelationsAgreeWithRationalArithmetic) {
   Random random(TestSeed(4));
   std::array<int, 3> relations = {};
   std::array<int, kRungCount> rungs = {};

@@ -92,7 +92,7 @@ TEST(HullState, ChunksOverlapUpToTheirLimit) {
   EXPECT_TRUE(state.quiet());
 }
 
-TEST(HullState, ARefusalTellsTheThreadThatBuildsOnIt) {
+TEST(HullState, ARefusalReachesTheThreadThatBuildsOnIt) {
   HullState state = Growing();
   state.Schedule();
   state.StartBuilding();
@@ -137,7 +137,7 @@ TEST(HullState, DamageIsFoundByAThreadThatWorks) {
   EXPECT_EQ(state.damage(), absl::DataLossError("damaged"));
 }
 
-TEST(HullState, WhatOthersDoTellsTheThreadThatBuilds) {
+TEST(HullState, APeerChangeReachesTheThreadThatBuilds) {
   HullState state = Building();
   state.Supersede();
   EXPECT_EQ(state.work(), Work::kReverting);
@@ -171,7 +171,7 @@ TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleAndSound) {
   EXPECT_DEATH(HullState::Present().StartBuilding(), "check failed");
 }
 
-TEST(HullStateDeathTest, OnlyWhatWasBuiltOnWhatStandsIsSubmitted) {
+TEST(HullStateDeathTest, OnlyChangesBuiltOnTheCurrentStateAreSubmitted) {
   EXPECT_DEATH(HullState::Present().Submit(), "check failed");
   HullState reverting = Growing();
   reverting.Schedule();
@@ -195,7 +195,7 @@ TEST(HullStateDeathTest, NothingComesBackThatWasNotStarted) {
   EXPECT_DEATH(Gone().Commit(), "check failed");
 }
 
-TEST(HullStateDeathTest, OthersChangeOnlyWhatIsThereWithNothingInFlight) {
+TEST(HullStateDeathTest, PeerChangesApplyOnlyWithNothingInFlight) {
   EXPECT_DEATH(HullState::Creating().Supersede(), "check failed");
   EXPECT_DEATH(Growing().Supersede(), "check failed");
   EXPECT_DEATH(Ending().Vanish(), "check failed");

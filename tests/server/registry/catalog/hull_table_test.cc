@@ -68,7 +68,7 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
 }
 
 // Putting it to rest would lose each of these.
-TEST_F(HullTableTest, WhatIsInUseStaysAwake) {
+TEST_F(HullTableTest, HullsInUseAreNotEvicted) {
   const auto expect_awake_while = [&](const char* what, auto begin, auto end) {
     table_.AddResting(Stored("x", 3));
     begin(*table_.Find("x"));
@@ -105,7 +105,7 @@ TEST_F(HullTableTest, WhatIsInUseStaysAwake) {
       [](RegisteredHull& hull) { hull.state.Refuse(); });
 }
 
-TEST_F(HullTableTest, WhatIsDamagedStaysKnownAsThat) {
+TEST_F(HullTableTest, DamagedHullsStayMarkedAsDamaged) {
   table_.AddResting(Stored("x", 3));
   table_.Find("x")->state.Damage(absl::DataLossError("as found"));
   GoRound();

@@ -73,7 +73,7 @@ TEST_F(SupersededHull, OnlyFewPointsInDeltasAfterTheSameBaseAreGrowth) {
   EXPECT_FALSE(hull_.GrewInto(Grown()));
 }
 
-TEST_F(SupersededHull, GrowthIsAddedAndReadersKeepWhatTheyHold) {
+TEST_F(SupersededHull, GrowthIsAddedAndReadersKeepTheirSnapshots) {
   const std::shared_ptr<const ServedHull> before = hull_.Serve();
   EXPECT_TRUE(Supersede(Grown(), &growth_));
   EXPECT_EQ(hull_.committed(), Grown());
@@ -107,7 +107,7 @@ TEST_F(SupersededHull, WhereNoVertexCameAllStays) {
   EXPECT_TRUE(hull_.builder_backlog().empty());
 }
 
-TEST_F(SupersededHull, ABuilderIsKeptWithWhatItLacksUnlessThatIsMuch) {
+TEST_F(SupersededHull, ABuilderIsKeptUnlessItLacksMuch) {
   hull_.SetBuilder(std::make_unique<HullBuilder>());
   EXPECT_TRUE(Supersede(Grown(), &growth_));
   EXPECT_THAT(hull_.builder_backlog(), ElementsAre(growth_.front()));
@@ -121,7 +121,7 @@ TEST_F(SupersededHull, ABuilderIsKeptWithWhatItLacksUnlessThatIsMuch) {
 }
 
 // No reader receives a version that contains its appended points.
-TEST_F(SupersededHull, AThreadThatBuildsLosesWhatItAppended) {
+TEST_F(SupersededHull, AThreadThatBuildsLosesItsPoints) {
   hull_.state.Schedule();
   hull_.state.StartBuilding();
   hull_.LendBuilder();
@@ -135,7 +135,7 @@ TEST_F(SupersededHull, AThreadThatBuildsLosesWhatItAppended) {
   EXPECT_EQ(hull_.Serve()->high(), Vector(2, 2, 2));
 }
 
-TEST_F(SupersededHull, WhatCameIsCountedAndIsNoReasonToKeepTheHull) {
+TEST_F(SupersededHull, ReceivedGrowthIsCountedAndDoesNotPinTheHull) {
   RegisteredHull used_later(Cube(), HullState::Present(), true, budget_);
   used_later.SetLive(std::make_shared<LiveHull>(CubeCorners(), 3));
   hull_.NoteUse();

@@ -171,7 +171,7 @@ class CommitterTest : public ::testing::Test {
   Committer committer_{store_, order_};
 };
 
-TEST_F(CommitterTest, WhatWaitsIsOneBatchInTheOrderOfSubmission) {
+TEST_F(CommitterTest, QueuedChangesFormOneBatchInOrderOfSubmission) {
   GatedStore::Gate gate;
   store_.Close(gate);
   Submit(1);
@@ -190,7 +190,7 @@ TEST_F(CommitterTest, WhatWaitsIsOneBatchInTheOrderOfSubmission) {
   for (uint64_t i = 0; i < 5; ++i) EXPECT_EQ(outcomes_[i], Outcome(i + 1, absl::StatusCode::kOk));
 }
 
-TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
+TEST_F(CommitterTest, ARefusedBatchAlsoRefusesQueuedChanges) {
   GatedStore::Gate gate;
   store_.Close(gate);
   Submit(1);
@@ -211,7 +211,7 @@ TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
 }
 
 // A waiting thread runs before the batch has ended, unless the batch is refused.
-TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
+TEST_F(CommitterTest, ManyCompletionsYieldExceptBetweenRefusals) {
   for (const absl::Status& outcome : {absl::OkStatus(), absl::UnavailableError("no disk")}) {
     outcomes_.clear();
     GatedStore::Gate gate;
@@ -246,7 +246,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
 }
 
 // Changes submitted after the rollback do not build on the refused ones.
-TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
+TEST_F(CommitterTest, ChangesSubmittedByACompletionSurviveTheRefusalOfItsBatch) {
   GatedStore::Gate gate;
   store_.Close(gate);
   std::promise<std::future<void>> next;
@@ -265,7 +265,7 @@ TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
-TEST_F(CommitterTest, AStoreThatRecoveredForWhoFollowsFailsNoMore) {
+TEST_F(CommitterTest, AStoreThatRecoveredNoLongerFails) {
   GatedStore::Gate gate;
   store_.Close(gate);
   gate.outcome.set_value(absl::UnavailableError("no disk"));
@@ -301,7 +301,7 @@ TEST_F(CommitterTest, TheStoreRecoversBeforeTheNextBatch) {
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
-TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
+TEST_F(CommitterTest, CommitsQueuedChangesBeforeItEnds) {
   GatedStore store;
   FairMutex order;
   int ended = 0;
@@ -318,7 +318,7 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
 
 // Superseded changes of the batch and of the queue are refused, latest first, before the
 // callback for peer changes runs; the kept ones follow.
-TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
+TEST(Committer, ConflictingChangesAreRefusedAndTheRestIsKept) {
   SharedStore store;
   FairMutex order;
   std::vector<std::string> events;
@@ -390,7 +390,7 @@ TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
   EXPECT_THAT(events, ElementsAre("refused", "peers"));
 }
 
-TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
+TEST(Committer, FollowersReceiveChangesFoundLater) {
   SharedStore store;
   FairMutex order;
   RecordedPeers peers;
@@ -412,7 +412,7 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
 }
 
 // A caller or a change that arrives while a request is in flight waits for the next one.
-TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
+TEST(Committer, AReadBarrierIsSentByItsCallerAndNotSharedWithLaterOnes) {
   SharedStore store;
   FairMutex order;
   // Guarded by order.
@@ -468,7 +468,7 @@ TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
 }
 
 // The peer-change callback receives the growth of hulls where it was requested and available.
-TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
+TEST(Committer, GrowthIsFetchedAfterPeerChangesAreKnown) {
   SharedStore store;
   FairMutex order;
   std::vector<std::string> events;

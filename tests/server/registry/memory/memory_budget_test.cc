@@ -85,7 +85,7 @@ TEST_F(MemoryBudgetTest, TheOneNotUsedForLongestGoesFirstAndNoMoreThanNeeded) {
   EXPECT_EQ(budget_.Statistics().evictions, 1);
 }
 
-TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
+TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreAskedAgain) {
   Owner busy(*this, 1, 60);
   Owner idle(*this, 2);
   busy.account.Set(60, false);

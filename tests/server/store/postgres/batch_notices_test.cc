@@ -37,7 +37,7 @@ namespace batch_notices_test {
 
 // The end arrives between the check for it and the reset of the eventfd. A thread that misses it
 // blocks until the time limit of the test.
-TEST(BatchNotices, EndAlsoWhileTheyTakeBackWhatWokeThem) {
+TEST(BatchNotices, EndDuringTheResetOfTheWakeup) {
   if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
   PostgresCluster& cluster = PostgresCluster::Shared();
   const std::string database = cluster.MakeDatabase();

@@ -20,7 +20,7 @@ TEST(Conninfo, KeywordsAndUrisAreTaken) {
   }
 }
 
-TEST(Conninfo, WhatIsLeftOpenHasATimeout) {
+TEST(Conninfo, TimeoutsHaveDefaults) {
   const auto defaults = Conninfo::Parse("dbname=hulls")->parameters();
   EXPECT_EQ(defaults.at("connect_timeout"), "5");
   EXPECT_EQ(defaults.at("tcp_user_timeout"), "10000");

@@ -63,7 +63,7 @@ TEST_F(PostgresClaim, ASupersededServerReadsNothing) {
   EXPECT_EQ(former->registry().Cache().damaged, 0);
 }
 
-TEST_F(PostgresClaim, AServerThatDoesNothingNoticesThatItWasSuperseded) {
+TEST_F(PostgresClaim, AnIdleServerNoticesThatItWasSuperseded) {
   options_.beat = std::chrono::milliseconds(10);
   Start();
   std::promise<void> ended;
@@ -93,7 +93,7 @@ TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
   EXPECT_EQ(PostgresRegistry(*std::move(store)).View("h")->record.counts.received, 9);
 }
 
-TEST_F(PostgresClaim, WhoWaitsCanBeToldToEnd) {
+TEST_F(PostgresClaim, AWaitingServerCanBeStopped) {
   Start();
   options_.should_stop = [] { return true; };
   EXPECT_TRUE(absl::IsCancelled(Open().status()));
@@ -101,7 +101,7 @@ TEST_F(PostgresClaim, WhoWaitsCanBeToldToEnd) {
 
 // The active server's machine is cut off or the server hangs: the database ends its session, which
 // held the lock.
-TEST_F(PostgresClaim, WhoWaitsTakesOverWhenTheLockOfTheActiveServerGoes) {
+TEST_F(PostgresClaim, AWaitingServerTakesOverWhenTheActiveOneLosesItsLock) {
   options_.beat = std::chrono::hours(1);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -113,7 +113,7 @@ TEST_F(PostgresClaim, WhoWaitsTakesOverWhenTheLockOfTheActiveServerGoes) {
   EXPECT_EQ(PostgresRegistry(*std::move(store)).View("h")->record.counts.received, 8);
 }
 
-TEST_F(PostgresClaim, AServerThatLosesItsLockWithNobodyWaitingTakesItAgain) {
+TEST_F(PostgresClaim, AServerReclaimsALostLock) {
   options_.beat = std::chrono::milliseconds(10);
   Start();
   const uint64_t epoch = hulls_->store().epoch();
@@ -126,7 +126,7 @@ TEST_F(PostgresClaim, AServerThatLosesItsLockWithNobodyWaitingTakesItAgain) {
   EXPECT_EQ(hulls_->store().epoch(), epoch);
 }
 
-TEST_F(PostgresClaim, WithoutSyncAStoreThatWasNotClosedIsAnotherStore) {
+TEST_F(PostgresClaim, WithoutSyncAnUncleanStoreGetsANewId) {
   Ask("ALTER ROLE hulld SET synchronous_commit = off");
   Start();
   EXPECT_EQ(hulls_->store().durability(), Durability::kRelaxed);
@@ -142,7 +142,7 @@ TEST_F(PostgresClaim, WithoutSyncAStoreThatWasNotClosedIsAnotherStore) {
   EXPECT_EQ(hulls_->store().durability(), Durability::kSync);
 }
 
-TEST_F(PostgresClaim, ADatabaseThatWasPutBackIsAnotherStore) {
+TEST_F(PostgresClaim, ARestoredDatabaseGetsANewId) {
   Start();
   const std::string id = hulls_->store().id();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -154,7 +154,7 @@ TEST_F(PostgresClaim, ADatabaseThatWasPutBackIsAnotherStore) {
   EXPECT_NE(hulls_->store().id(), id);
 }
 
-TEST_F(PostgresClaim, AWrongPasswordIsSaidAndNotShown) {
+TEST_F(PostgresClaim, AWrongPasswordIsReportedAndNotShown) {
   options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
                                    " user=hulld password=falsches-Wort");
   const CapturedLog log;
@@ -166,7 +166,7 @@ TEST_F(PostgresClaim, AWrongPasswordIsSaidAndNotShown) {
   EXPECT_THAT(log.text(), Not(HasSubstr("falsches-Wort")));
 }
 
-TEST_F(PostgresClaim, ARoleThatMayNotMakeTheSchemaIsToldWhatItNeeds) {
+TEST_F(PostgresClaim, ARoleWithoutRightsGetsTheMissingGrant) {
   Ask("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
   options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
                                    " user=stranger password=fremd");
@@ -180,7 +180,7 @@ TEST_F(PostgresClaim, ABackupIsLeftToPostgreSql) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("pg_dump"));
 }
 
-TEST_F(PostgresClaim, WhatTheTablesTakeIsKnownAndWhatIsFreeIsNot) {
+TEST_F(PostgresClaim, TableSizesAreKnownAndFreeSpaceIsNot) {
   const std::optional<StoreDisk> disk = Start().store().disk();
   ASSERT_TRUE(disk.has_value());
   EXPECT_GT(disk->bytes, 0);

@@ -115,7 +115,7 @@ INSTANTIATE_TEST_SUITE_P(Servers, PostgresDisk, ::testing::Bool(), [](const auto
   return std::string(shared.param ? "Many" : "One");
 });
 
-TEST_P(PostgresDisk, TablesThatDoNotFitAreSaidToAndNothingOfTheChangeStays) {
+TEST_P(PostgresDisk, AFullTablespaceIsReportedAndTheChangeRolledBack) {
   Start("small");
   ASSERT_TRUE(PutNext().ok());
   machine_->tables.Fill();

@@ -22,7 +22,7 @@ class PostgresFault : public PostgresTest {
   uint64_t Received() { return hulls_->View("h")->record.counts.received; }
 };
 
-TEST_F(PostgresFault, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
+TEST_F(PostgresFault, ACommitWithALostAnswerIsFoundAndNotRepeated) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const std::string batches = Ask("SELECT batch FROM hulld.store").front();
@@ -47,7 +47,7 @@ TEST_F(PostgresFault, ACommitThatDidNotArriveIsRepeated) {
 }
 
 // A delayed transaction arrives after later ones. It adds no vertex, so no table key rejects it.
-TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
+TEST_F(PostgresFault, ALateTransactionChangesNothing) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   proxy_->CutNext(Cut::kHold);
@@ -62,7 +62,7 @@ TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
 }
 
 // While the outcome cannot be determined, the error says so and further changes are refused.
-TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
+TEST_F(PostgresFault, AnUnknownOutcomeIsReported) {
   options_.patience = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
@@ -89,7 +89,7 @@ TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
   }
 }
 
-TEST_F(PostgresFault, ARestartOfTheDatabaseIsNotNoticedByThoseWhoWrite) {
+TEST_F(PostgresFault, WritersDoNotNoticeARestartOfTheDatabase) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   ASSERT_TRUE(hulls_->Put("cold", SpherePoints(100)).ok());
@@ -140,7 +140,7 @@ TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
 }
 
 // The database neither answers nor closes its connections.
-TEST_F(PostgresFault, ADatabaseThatStandsStillHoldsNoThreadForEver) {
+TEST_F(PostgresFault, AHungDatabaseBlocksNoThreadForever) {
   options_.answer_time = std::chrono::milliseconds(200);
   options_.patience = std::chrono::milliseconds(100);
   options_.conninfo += " connect_timeout=2";

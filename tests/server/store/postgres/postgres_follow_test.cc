@@ -83,7 +83,7 @@ Vector PointOutside(int i) {
   return (1.1 + 0.001 * i) * Vector(std::cos(angle), std::sin(angle), 0.01 * i);
 }
 
-TEST_F(PostgresFollow, WhatAnotherServerAddsCostsWhatItAdds) {
+TEST_F(PostgresFollow, ApplyingPeerChangesCostsAsMuchAsTheirSize) {
   FollowWhenCalled();
   constexpr int kAppends = 20;
   uint64_t bytes_of_the_smallest = 0;
@@ -113,7 +113,7 @@ TEST_F(PostgresFollow, WhatAnotherServerAddsCostsWhatItAdds) {
 
 // Covers points that absorb vertices, inside points, several batches per read, and a reader that
 // holds an old snapshot.
-TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
+TEST_F(PostgresFollow, AGrownHullEqualsOneReadAgain) {
   FollowWhenCalled();
   StartWithHull(300);
   const HullView first = *hulls_->View("h");
@@ -141,7 +141,7 @@ TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
 }
 
 // Both servers append alternately: each keeps its builder and adds the peer's points to it.
-TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
+TEST_F(PostgresFollow, AnAppendingServerContinuesFromPeerChanges) {
   FollowWhenCalled();
   StartWithHull(1000);
   const auto here = hulls_->Open("h", "here");
@@ -166,7 +166,7 @@ TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
 
 // Both servers append concurrently, so that chunks being built or in flight conflict and are built
 // again.
-TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
+TEST_F(PostgresFollow, ConflictingChunksInFlightAreBuiltAgain) {
   StartWithHull(1000);
   constexpr uint64_t kChunks = 40;
   std::vector<std::thread> writers;
@@ -196,7 +196,7 @@ TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
   ExpectSameAsFreshServer(*other_);
 }
 
-TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
+TEST_F(PostgresFollow, AHullWithANewBaseIsReadAgain) {
   FollowWhenCalled();
   StartWithHull(1000);
   // Larger than its base.
@@ -208,7 +208,7 @@ TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
   ExpectSameAsFreshServer(*hulls_);
 }
 
-TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
+TEST_F(PostgresFollow, AHullThatGrewMuchIsReadAgain) {
   FollowWhenCalled();
   StartWithHull(20'000);
   ASSERT_TRUE(other_->Put("h", SpherePoints(4097, 2)).ok());
@@ -219,7 +219,7 @@ TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
 }
 
 // Every caller gets the error, as without deltas.
-TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
+TEST_F(PostgresFollow, DamagedDeltasAreDetected) {
   FollowWhenCalled();
   StartWithHull(1000);
   ASSERT_TRUE(other_->Put("h", {PointOutside(0)}).ok());
@@ -229,7 +229,7 @@ TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
 }
 
 // Points added by a peer server do not survive the deletion of the hull.
-TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
+TEST_F(PostgresFollow, AHullThatGrewAndWasDeletedIsGone) {
   FollowWhenCalled();
   StartWithHull(500);
   ASSERT_TRUE(other_->Put("h", {PointOutside(0)}).ok());
@@ -242,7 +242,7 @@ TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
 }
 
 // The memory for changes that are not yet applied is bounded.
-TEST_F(PostgresFollow, WhoIsBehindByTooManyHullsEnds) {
+TEST_F(PostgresFollow, AServerThatLagsTooFarBehindStops) {
   FollowWhenCalled();
   Start();
   const auto change = [&](int count) {
@@ -308,7 +308,7 @@ bool Comes(const std::function<bool()>& what) {
 }
 
 // No server polls.
-TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
+TEST_F(PostgresFollow, ANoticeOfABatchTriggersAReadImmediately) {
   options_.look = options_.beat = kNever;
   Start();
   const Server other = StartPeer();
@@ -323,7 +323,7 @@ TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
   EXPECT_EQ(proxy_->Asked(kLook), 1);
 }
 
-TEST_F(PostgresFollow, WithoutNoticesServersLook) {
+TEST_F(PostgresFollow, WithoutNoticesServersPoll) {
   options_.notices = false;
   options_.look = std::chrono::milliseconds(10);
   Start();
@@ -334,7 +334,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersLook) {
 }
 
 // The listening session reconnects by itself.
-TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
+TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(20);
   Start();
@@ -359,7 +359,7 @@ TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
 
 // The connection stays open but no notice arrives: the heartbeat finds the missed batch, and the
 // server polls more often until notices arrive again.
-TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
+TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
   const CapturedLog log;
   options_.look = std::chrono::milliseconds(5);
   options_.beat = std::chrono::milliseconds(500);
@@ -391,7 +391,7 @@ TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
 }
 
 // The database speaks PostgreSQL's protocol but lacks LISTEN. The log says so a single time.
-TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
+TEST_F(PostgresFollow, ServersPollIfTheDatabaseRefusesToListen) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(10);
   proxy_->RefuseToListen();

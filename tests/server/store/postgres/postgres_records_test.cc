@@ -72,7 +72,7 @@ class PostgresRecords : public PostgresTest {
   }
 };
 
-TEST_F(PostgresRecords, NoRecordIsReadUntilItIsAskedFor) {
+TEST_F(PostgresRecords, NoRecordIsReadBeforeItIsRequested) {
   Start();
   FillSome();
   Ask("UPDATE hulld.hulls SET record = '\\x00' WHERE hull_id = 'b'");
@@ -88,7 +88,7 @@ TEST_F(PostgresRecords, NoRecordIsReadUntilItIsAskedFor) {
 
 // A record may be newer than the registry's last applied commit. The lookup then waits for the
 // committer to apply it, even if no other commit follows.
-TEST_F(PostgresRecords, AServerThatIsActiveAloneHasNobodyToFollow) {
+TEST_F(PostgresRecords, ASingleActiveServerHasNoPeersToFollow) {
   const auto store = Open();
   ASSERT_TRUE(store.ok()) << store.status();
   EXPECT_EQ((*store)->peers(), nullptr);
@@ -106,7 +106,7 @@ TEST_F(PostgresRecords, APrefixThatNoIdHasListsNothing) {
   EXPECT_EQ(hulls_->store().failures().read, 0);
 }
 
-TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
+TEST_F(PostgresRecords, EachBatchUpdatesTheTotals) {
   for (const bool shared : {false, true}) {
     SCOPED_TRACE(shared);
     options_.shared = shared;
@@ -138,7 +138,7 @@ TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   EXPECT_EQ(KeptBodies(), CountedBodies());
 }
 
-TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
+TEST_F(PostgresRecords, TablesOfOldFormatsAreCountedOnce) {
   for (const bool shared : {false, true}) {
     SCOPED_TRACE(shared);
     options_.shared = shared;
@@ -163,7 +163,7 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
   }
 }
 
-TEST_F(PostgresRecords, AServerThatIsToldToEndLeavesTablesAsTheyWere) {
+TEST_F(PostgresRecords, AStoppedServerLeavesTablesUnchanged) {
   Start();
   FillSome();
   hulls_ = nullptr;
@@ -198,7 +198,7 @@ TEST_F(PostgresRecords, AServerWaitsWhileAnotherChangesTheTables) {
 }
 
 // That format already counted hulls.
-TEST_F(PostgresRecords, OfFormat3OnlyBodiesAreCounted) {
+TEST_F(PostgresRecords, OnlyBodiesAreCountedInFormat3) {
   options_.shared = true;
   Start();
   FillSome();
@@ -214,7 +214,7 @@ TEST_F(PostgresRecords, OfFormat3OnlyBodiesAreCounted) {
   EXPECT_EQ(KeptBodies(), "0");
 }
 
-TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
+TEST_F(PostgresRecords, NoBodyIsReadBeforeItIsRequested) {
   for (const bool shared : {false, true}) {
     SCOPED_TRACE(shared);
     options_.shared = shared;
@@ -248,7 +248,7 @@ TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
   }
 }
 
-TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
+TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndHasANextPage) {
   Start();
   constexpr size_t kPieces = 10'000;
   // About 600 KB each: more than one page holds.
@@ -275,7 +275,7 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
 }
 
 // A watch reports a peer's change of a body that is not in memory with its correct kind.
-TEST_F(PostgresRecords, AWatchIsToldOfBodiesThatAreNotInMemory) {
+TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
   options_.shared = true;
   Start();
   for (const char* id : {"changes", "ends", "to-hull"}) {
@@ -413,7 +413,7 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
 
 // One hull is not in memory, one is known to be deleted, one was recreated, and one was recreated
 // as a body.
-TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
+TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   Start();
   FillSome();
   ASSERT_TRUE(hulls_->Create("d").ok());

@@ -108,7 +108,7 @@ class PostgresShared : public PostgresTest {
 };
 
 // Holds regardless of how rarely the server polls.
-TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
+TEST_F(PostgresShared, APeerServerServesAcknowledgedChanges) {
   LookOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
@@ -131,7 +131,7 @@ TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
   EXPECT_EQ(other->registry().Sizes().vertex_count, 0);
 }
 
-TEST_F(PostgresShared, RevisionsAreOfOneOrder) {
+TEST_F(PostgresShared, RevisionsAreTotallyOrdered) {
   Start();
   const Server other = StartPeer();
   uint64_t last = 0;
@@ -284,7 +284,7 @@ TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
   EXPECT_TRUE(absl::IsFailedPrecondition(hulls_->Append(opened->session, 2, {{9, 9, 9}}).status()));
 }
 
-TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
+TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
   Start();
   const Server other = StartPeer();
   std::atomic<int> ready = 0;
@@ -319,7 +319,7 @@ TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
 }
 
 // The stream keeps the hull registered but does not pin its memory.
-TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
+TEST_F(PostgresShared, AnEvictedHullOfAnOpenStreamIsReadAgain) {
   Limits limits;
   limits.memory_limit = 1 << 20;
   auto store = Open();
@@ -341,7 +341,7 @@ TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
 }
 
 // Both changes of an ID form one event. A watch of hulls alone reports the hull.
-TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
+TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   options_.notices = false;
   options_.look = options_.beat = std::chrono::hours(1);
   Start();
@@ -393,7 +393,7 @@ TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
                                      Told("replaced", ChangeKind::kReplaced, true)));
 }
 
-TEST_F(PostgresShared, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
+TEST_F(PostgresShared, ACommitWithALostAnswerIsFoundAndNotRepeated) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -479,7 +479,7 @@ TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
 }
 
 // A repeated creation or deletion cannot be recognized as a repetition.
-TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
+TEST_F(PostgresShared, ACreationOrDeletionWithALostAnswerIsNotRepeated) {
   Start();
   const Server other = StartPeer();
   proxy_->CutNext(Cut::kAfterCommit);
@@ -496,7 +496,7 @@ TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
 }
 
 // Data of one record is not returned to a caller with an older record.
-TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
+TEST_F(PostgresShared, ReadsWithAnOldRecordAreAborted) {
   LookOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
@@ -517,7 +517,7 @@ TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
 }
 
 // The server's knowledge of the hull is stale, so deciding from it would be wrong in each case.
-TEST_F(PostgresShared, ChangesAreDecidedByWhatOthersDid) {
+TEST_F(PostgresShared, ChangesAreDecidedByPeerChanges) {
   LookOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
@@ -655,7 +655,7 @@ TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
 }
 
 // Half of a batch has arrived, and nothing follows.
-TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
+TEST_F(PostgresShared, AServerStalledWithinABatchBlocksPeersOnlyBriefly) {
   options_.longest_send = std::chrono::milliseconds(100);
   options_.beat = std::chrono::milliseconds(50);
   Start();
@@ -679,7 +679,7 @@ TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
   PQfinish(stopped);
 }
 
-TEST_F(PostgresShared, WhoIsTooFarBehindEnds) {
+TEST_F(PostgresShared, AServerTooFarBehindStops) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());

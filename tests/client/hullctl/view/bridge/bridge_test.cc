@@ -169,7 +169,7 @@ TEST_F(BridgeTest, AddressWorksOnce) {
   EXPECT_THAT(Ask(address.substr(address.find("/?"))), StartsWith("HTTP/1.1 403"));
 }
 
-TEST_F(BridgeTest, WebSocketOfThePageIsServedAndOthersAreNot) {
+TEST_F(BridgeTest, OnlyThePagesOwnWebSocketIsServed) {
   const std::string cookie = ComeIn();
   Socket page(bridge_->port());
   page.Send(UpgradeRequest(cookie, "http://" + host_));

@@ -38,7 +38,7 @@ TEST(SessionGuard, TokenIsExchangedOnceForTheCookie) {
   EXPECT_EQ(guard.Judge(Page("/?token=token", kCookie)).verdict, Verdict::kExchange);
 }
 
-TEST(SessionGuard, OtherTokensLetNobodyInAndDoNotUseUpTheRightOne) {
+TEST(SessionGuard, WrongTokensAreRefusedAndDoNotConsumeTheRightOne) {
   SessionGuard guard = TestGuard();
   for (const char* target : {"/?token=", "/?token=toke", "/?token=token1", "/?token=Token",
                              "/?token=session", "/?tok"}) {
