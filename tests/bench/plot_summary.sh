@@ -1,7 +1,7 @@
 #!/bin/bash
 # Plots the summary of tables.sh as the charts of the first page, with gnuplot:
 #
-#   bash tests/bench/plot_summary.sh [MACHINE]       writes results/summary_MACHINE{,_dark}.svg
+#   bash tests/bench/plot_summary.sh [MACHINE]       writes client/pictures/summary_MACHINE{,_dark}.svg
 #   bash tests/bench/plot_summary.sh [MACHINE] png   writes PNGs for viewing into the same folder
 #   bash tests/bench/plot_summary.sh [MACHINE] check   fails if a chart lacks a label of the summary
 #
@@ -29,7 +29,7 @@ rows() {
 }
 
 if [[ $format == check ]]; then
-  for chart in results/summary_"$machine"{,_dark}.svg; do
+  for chart in ../../client/pictures/summary_"$machine"{,_dark}.svg; do
     rows | cut -f 3- | tr '\t' '\n' | grep -v '^ *$' | while IFS= read -r label; do
       grep -qF ">$label<" "$chart" || { echo "$chart lacks \"$label\"; run plot_summary.sh"; exit 1; }
     done
@@ -51,7 +51,7 @@ plot() {
   tasks=$(rows | wc -l)
   gnuplot <<END
 set terminal $terminal
-set output 'results/$1.$format'
+set output '../../client/pictures/$1.$format'
 \$rows <<EOD
 $(rows)
 EOD

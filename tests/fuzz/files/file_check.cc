@@ -410,8 +410,7 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kBatch,
        "# c\nplace: {a: {id: arm}, b: {id: box, at: [1, 0, 0, 0, 1, 2, 3]}}\n"
        "ask: {pairs: [[a, b]]} # d\n"},
-      {FileKind::kBatch, "{\"place\": {\"a\": {\"id\": \"arm\"}}}\n"},
-      {FileKind::kBatch, "place a arm 1 2 3 # c\n"},
+      {FileKind::kBatch, "{\"place\": {\"a\": {\"id\": \"arm\"}, \"b\": {\"id\": \"arm\"}}}\n"},
       {FileKind::kBatch, R"({"placements":[{"hullId":"a"},{"hullId":"b"}],)"
                          "\n"
                          R"("pairs":[0,1],"method":1})"},
@@ -564,6 +563,7 @@ const std::vector<std::string>& FileTokens() {
                                                                  "STCOFF\n",
                                                                  "all\n",
                                                                  "place: {a: {id: b}}\n",
+                                                                 "place a b 1 2\n",
                                                                  "ask: {pairs: [[a, a]]}\n",
                                                                  "{",
                                                                  "[",

@@ -119,8 +119,8 @@ TEST_F(GuardProcess, NoSecretReachesTheLog) {
 
   std::string log;
   for (const std::string& line : hulld.lines()) log += line;
-  EXPECT_THAT(log, HasSubstr("the tokens stay as they were: --tokens-file"));
-  EXPECT_THAT(log, HasSubstr("the TLS certificates stay as they were: --tls-key"));
+  EXPECT_THAT(log, HasSubstr("the tokens were not reloaded: --tokens-file"));
+  EXPECT_THAT(log, HasSubstr("the TLS certificates were not reloaded: --tls-key"));
   for (const std::string& secret : {std::string(kToken), std::string(kWrongToken), HashOf(kToken),
                                     identity_.key.substr(40, 40)}) {
     EXPECT_THAT(log, Not(HasSubstr(secret)));

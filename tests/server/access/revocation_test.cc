@@ -120,7 +120,7 @@ TEST_F(Revocation, EndsIdleStreamsOfTheRevokedTokenOnly) {
   kept->WritesDone();
   EXPECT_TRUE(kept->Finish().ok());
   server_.reset();
-  EXPECT_THAT(log.text(), HasSubstr("info 4 calls ended, as their tokens are no longer valid"));
+  EXPECT_THAT(log.text(), HasSubstr("info ended 4 calls whose tokens were revoked"));
 }
 
 TEST_F(Revocation, EndsRunningComputations) {

@@ -226,10 +226,10 @@ TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   ExpectWrong(config, "--tls-cert requires --tls-key");
   config = config_;
   config.tls_cert.clear();
-  ExpectWrong(config, "--tls-key needs --tls-cert");
+  ExpectWrong(config, "--tls-key requires --tls-cert");
   config = TestConfig();
   config.tls_client_ca = config_.tls_cert;
-  ExpectWrong(config, "--tls-client-ca needs --tls-cert");
+  ExpectWrong(config, "--tls-client-ca requires --tls-cert");
   config = config_;
   config.tls_cert = directory_ + "/none";
   ExpectWrong(config, "--tls-cert " + config.tls_cert + ": No such file");
@@ -241,7 +241,7 @@ TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   ExpectWrong(config, "PEM certificate 2 is damaged");
   config = config_;
   config.tls_key = config_.tls_cert;
-  ExpectWrong(config, "--tls-key " + config.tls_key + ": it holds no PEM private key");
+  ExpectWrong(config, "--tls-key " + config.tls_key + ": it contains no valid PEM private key");
   config.tls_key = Write("other.key", other_.Issue("hulld").key);
   ExpectWrong(config, "it does not belong to the first certificate of --tls-cert");
   config = config_;

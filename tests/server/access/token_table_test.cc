@@ -45,8 +45,8 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("ba7816bf"))) << text;
   };
   const std::string good = Line("a", "admin", "*", kAbc);
-  expect(good + "b admin *\n", "line 2: it is not four words");
-  expect("# x\n" + Line("b", "admin", "* more", kAbc), "line 2: it is not four words");
+  expect(good + "b admin *\n", "line 2: expected four words");
+  expect("# x\n" + Line("b", "admin", "* more", kAbc), "line 2: expected four words");
   expect(Line("-b", "admin", "*", kAbc), "line 1: the name");
   expect(Line(std::string(65, 'b'), "admin", "*", kAbc), "line 1: the name");
   expect(Line("b/c", "admin", "*", kAbc), "line 1: the name");
@@ -57,7 +57,7 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
   expect(Line("b", "admin", "*", std::string(kAbc).substr(1)), "line 1: the hash");
   expect(Line("b", "admin", "*", std::string(64, 'g')), "line 1: the hash");
   expect("b admin * hunter2ba7816bf\n", "never store the token itself");
-  expect(good + Line("a", "admin", "*", kEmpty), "line 2: the name \"a\" is taken");
+  expect(good + Line("a", "admin", "*", kEmpty), "line 2: the name \"a\" is already used");
   expect(good + Line("b", "admin", "*", kAbc), "line 2: \"b\" has the token of \"a\"");
 }
 

@@ -182,7 +182,7 @@ TEST_F(BodyQuestions, BatchesTakeBoth) {
   packed.clear_wanted();
   packed.set_method(v1::METHOD_TEXTBOOK_SAT);
   EXPECT_THAT(Batch(packed)->columns().pair_problems(0).message(),
-              HasSubstr("METHOD_TEXTBOOK_SAT is for pairs of hulls, not of bodies"));
+              HasSubstr("METHOD_TEXTBOOK_SAT applies to pairs of hulls, not of bodies"));
 }
 
 TEST_F(BodyQuestions, WithoutBodiesThePiecesColumnIsAbsent) {

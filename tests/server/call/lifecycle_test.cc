@@ -97,7 +97,7 @@ TEST_F(Lifecycle, DrainingRefusesNewCallsAndLetsRunningOnesFinish) {
 
   const grpc::Status refused = GetStatus();
   EXPECT_EQ(refused.error_code(), grpc::StatusCode::UNAVAILABLE);
-  EXPECT_THAT(refused.error_message(), HasSubstr("draining"));
+  EXPECT_THAT(refused.error_message(), HasSubstr("shutting down"));
   Appender late(*hulls_, "h", "late");
   EXPECT_FALSE(late.is_open());
   EXPECT_EQ(late.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);

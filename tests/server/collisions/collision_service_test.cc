@@ -149,7 +149,7 @@ TEST_F(CheckCollisionCall, WishesThatAreMalformedOrExcludeEachOtherAreRefused) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
     EXPECT_THAT(status.error_message(), HasSubstr(what));
   };
-  expect([](auto* r) { r->set_tolerance(-0.5); }, "tolerance is -0.5; it is a length");
+  expect([](auto* r) { r->set_tolerance(-0.5); }, "tolerance is -0.5; it must be a length");
   expect([](auto* r) { r->set_tolerance(NAN); }, "tolerance is NaN");
   expect([](auto* r) { r->mutable_wanted()->set_max_error(-1); }, "wanted.max_error is -1");
   expect([](auto* r) { r->mutable_wanted()->set_clearance(NAN); }, "wanted.clearance is NaN");

@@ -202,10 +202,10 @@ TEST_F(FindCollisionsCall, ErrorsNameTheField) {
   ExpectRefused(request, "ignored_group_pairs holds 1 groups; each pair needs two");
   request.clear_groups();
   request.add_ignored_group_pairs(1);
-  ExpectRefused(request, "ignored_group_pairs needs groups");
+  ExpectRefused(request, "ignored_group_pairs requires groups");
   request = Row({0, 1});
   request.set_ignore_same_group(true);
-  ExpectRefused(request, "ignore_same_group needs groups");
+  ExpectRefused(request, "ignore_same_group requires groups");
   request = Row({0, 1});
   request.set_movers(3);
   ExpectRefused(request, "movers is 3, but there are 2 placements");

@@ -261,7 +261,7 @@ TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   };
   const auto open = OpenMessage("h", "w");
   expect({ChunkMessage(1, Cube())}, "the first message must be open");
-  expect({open, open}, "open came twice");
+  expect({open, open}, "open was sent twice");
   expect({v1::AppendPointsRequest()}, "set open or chunk");
   expect({OpenMessage("a//b", "w")}, "open.hull_id \"a//b\" has an empty segment");
   expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id holds 257");
@@ -269,7 +269,7 @@ TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   expect({open, ChunkMessage(1, {1, 2, 3, 4})}, "chunk 1: points.xyz holds 4 numbers");
   v1::AppendPointsRequest both = ChunkMessage(1, {1, 2, 3});
   both.mutable_chunk()->mutable_points()->add_xyz_float(1);
-  expect({open, both}, "chunk 1: points holds both xyz and xyz_float");
+  expect({open, both}, "chunk 1: points has both xyz and xyz_float");
 }
 
 TEST_F(AppendPoints, LimitsNameTheirFlags) {

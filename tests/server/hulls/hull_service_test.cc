@@ -231,7 +231,7 @@ TEST_F(HullCalls, SimplifiedMeshesStandForTheHullWithinTheirError) {
     EXPECT_LT(mesh.header.error(), 1);
   }
   simplification.set_max_vertices(2);
-  EXPECT_THAT(GetMesh(request).status.error_message(), HasSubstr("needs at least 8"));
+  EXPECT_THAT(GetMesh(request).status.error_message(), HasSubstr("must be at least 8"));
 }
 
 TEST_F(HullCalls, MeshOfAnEmptyHullIsItsHeader) {

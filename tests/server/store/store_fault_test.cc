@@ -121,7 +121,7 @@ TEST_F(StoreFault, StallCountsContinueAfterReopening) {
 }
 
 // Simulates a kill and a power failure after a refused change. The change must be absent if the
-// error says that nothing was changed; otherwise the error says that may appear.
+// error says that nothing was changed; otherwise the error says that it may appear.
 TEST_F(StoreFault, FailedChangesAreNotFoundByTheNextProcess) {
   constexpr int64_t kForever = std::numeric_limits<int64_t>::max();
   struct Case {

@@ -147,9 +147,9 @@ TEST(SimplifyTarget, NonsenseIsRefused) {
   EXPECT_THAT(std::string(SimplifyInside(full, {}).status().message()),
               HasSubstr("set max_vertices, max_error, or both"));
   EXPECT_THAT(std::string(SimplifyInside(full, {3, 0, {}}).status().message()),
-              HasSubstr("needs at least 4"));
+              HasSubstr("must be at least 4"));
   EXPECT_THAT(std::string(SimplifyOutside(full, {7, 0, {}}).status().message()),
-              HasSubstr("needs at least 8"));
+              HasSubstr("must be at least 8"));
   for (const auto simplify : {SimplifyInside, SimplifyOutside}) {
     for (const size_t max_vertices : {0, 20}) {
       EXPECT_THAT(std::string(simplify(full, {max_vertices, -1, {}}).status().message()),
