@@ -105,6 +105,15 @@ std::string ExplainVerification(long result, const ConnectionSecurity& security)
   }
 }
 
+// Returns false if the server answered the first message of the handshake in another protocol, or
+// closed the connection.
+bool AnsweredInTls(const SSL* ssl) {
+  const int reason = ERR_GET_REASON(ERR_peek_error());
+  if (reason == SSL_R_WRONG_VERSION_NUMBER) return false;
+  const bool is_alert = reason >= SSL_AD_REASON_OFFSET;
+  return is_alert || SSL_get_state(ssl) != TLS_ST_CW_CLNT_HELLO;
+}
+
 // Explains a refusal of our certificate by the server; empty if it was accepted. With TLS 1.3 the
 // refusal arrives only after the handshake, in place of the first bytes.
 std::string ExplainRefusal(SSL* ssl, const ConnectionSecurity& security) {
@@ -136,9 +145,8 @@ std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& sec
   const bool shaken = SSL_connect(ssl.get()) == 1;
   if (!security.tls) return shaken ? "it requires TLS; pass --tls or --ca-cert" : "";
   if (!shaken) {
-    const bool is_tls = ERR_GET_REASON(ERR_peek_error()) != SSL_R_WRONG_VERSION_NUMBER;
-    return is_tls ? ExplainRefusal(ssl.get(), security)
-                  : "it does not use TLS; drop --tls and its options";
+    return AnsweredInTls(ssl.get()) ? ExplainRefusal(ssl.get(), security)
+                                    : "it does not use TLS; drop --tls and its options";
   }
   std::string reason = ExplainVerification(SSL_get_verify_result(ssl.get()), security);
   if (reason.empty()) reason = ExplainRefusal(ssl.get(), security);

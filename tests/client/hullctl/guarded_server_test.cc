@@ -179,7 +179,7 @@ TEST_F(GuardedServer, MutualTlsNeedsCertAndKey) {
   EXPECT_THAT(without.err, HasSubstr("--cert"));
   const Ran half = As("boss", {"status", "--cert", certificate});
   EXPECT_EQ(half.code, 2);
-  EXPECT_THAT(half.err, HasSubstr("belong together"));
+  EXPECT_THAT(half.err, HasSubstr("set both or neither"));
 }
 
 TEST_F(GuardedServer, AFailedConnectionSuggestsARemedy) {

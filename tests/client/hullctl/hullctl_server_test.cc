@@ -71,7 +71,7 @@ TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   const TempFile elsewhere("elsewhere.json", Recorded(request, response));
   ran = Ask({"verify", elsewhere.path()});
   EXPECT_EQ(ran.code, 6);
-  EXPECT_THAT(ran.err, HasSubstr("another store"));
+  EXPECT_THAT(ran.err, HasSubstr("the server's store differs"));
 
   server::Appender appender(*hulls_, "cube", "w");
   ASSERT_TRUE(appender.Append(1, {9, 9, 9}).has_value());

@@ -311,7 +311,7 @@ TEST_P(MigrationTest, ARemainderOfAnotherMigrationIsLeftAlone) {
   }
   const Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("a migration from store another has copied so far"));
+  EXPECT_THAT(ran.err, HasSubstr("an unfinished migration from store another"));
 }
 
 TEST_P(MigrationTest, AnOpenStoreIsRefused) {
@@ -369,7 +369,7 @@ TEST_P(MigrationTest, TheCommandLineIsChecked) {
   EXPECT_EQ(RunMigrate({"--from-data-dir", "x", "--to-data-dir", "x"}, out, err), 2);
   EXPECT_THAT(err.str(), HasSubstr("source and destination are both x"));
   EXPECT_EQ(RunMigrate({"--help"}, out, err), 0);
-  EXPECT_THAT(out.str(), HasSubstr("the copy is another store"));
+  EXPECT_THAT(out.str(), HasSubstr("the copy is a new store"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, MigrationTest,
