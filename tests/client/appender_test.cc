@@ -213,7 +213,7 @@ TEST_F(AppenderTest, AVanishedHullIsNotRecreated) {
   for (int i = 0; i < 5 && status.ok(); ++i) status = appender->Append(Block(i));
   if (status.ok()) status = appender->Finish();
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
-  EXPECT_THAT(Text(status), HasSubstr("vanished"));
+  EXPECT_THAT(Text(status), HasSubstr("was deleted while the connection was down"));
 }
 
 TEST_F(AppenderTest, ARefusedChunkIsReportedAndEarlierOnesStand) {

@@ -261,7 +261,8 @@ TEST_P(CollisionWatches, ReportPairsThatAreNoLongerNear) {
 
 TEST_P(CollisionWatches, RefuseUpdatesThatNameNoPlacement) {
   const auto watch = client_->WatchCollisions(OpenOf({{"cube", 0}, {"cube", 9}}));
-  EXPECT_THAT(std::string(watch->Update(MoveTo(2, 0)).message()), HasSubstr("no placement 2"));
+  EXPECT_THAT(std::string(watch->Update(MoveTo(2, 0)).message()),
+              HasSubstr("placement 2 does not exist"));
   v1::CollisionWatchUpdate short_pose = MoveTo(1, 0);
   short_pose.mutable_poses()->RemoveLast();
   EXPECT_THAT(std::string(watch->Update(short_pose).message()), HasSubstr("needs 7"));

@@ -153,10 +153,11 @@ TEST(GltfFile, BoundsAreChecked) {
   EXPECT_THAT(error(R"("count":3)", R"("count":9e15)"), HasSubstr("accessors[0] reaches beyond"));
   EXPECT_THAT(error(R"("count":3)", R"("count":-1)"), HasSubstr("count is not a whole number"));
   EXPECT_THAT(error(R"("count":3)", R"("count":0)"), HasSubstr("has no positions"));
-  EXPECT_THAT(error(R"("POSITION":0)", R"("POSITION":1)"), HasSubstr("accessors[1] is named"));
-  EXPECT_THAT(error(R"("POSITION":0)", R"("NORMAL":0)"), HasSubstr("there is no vertex"));
+  EXPECT_THAT(error(R"("POSITION":0)", R"("POSITION":1)"),
+              HasSubstr("accessors[1] is out of range"));
+  EXPECT_THAT(error(R"("POSITION":0)", R"("NORMAL":0)"), HasSubstr("have no vertex"));
   EXPECT_THAT(error("VEC3", "VEC2"), HasSubstr("is not a position"));
-  EXPECT_THAT(error(R"("mesh":0)", R"("mesh":1)"), HasSubstr("meshes[1] is named"));
+  EXPECT_THAT(error(R"("mesh":0)", R"("mesh":1)"), HasSubstr("meshes[1] is out of range"));
   EXPECT_THAT(error(R"("2.0")", R"("1.0")"), HasSubstr("only glTF 2.0 is supported"));
   EXPECT_THAT(error("}]}", "}]"), HasSubstr("is not valid glTF JSON"));
 }

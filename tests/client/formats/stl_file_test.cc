@@ -95,8 +95,8 @@ TEST(StlText, OtherFilesAreRefusedWithLineAndCount) {
   EXPECT_EQ(Error("solid\n" + Replaced(Facet(), "0.1", "o.1")), "FILE:4: \"o.1\" is not a number");
   EXPECT_THAT(Error("solid\n" + Replaced(Facet(), "0.1", "nan") + "endsolid"),
               HasSubstr("FILE:4: point 1 has x = NaN"));
-  EXPECT_THAT(Error(Facet()), HasSubstr("is no STL file: it starts with \"facet\""));
-  EXPECT_THAT(Error(""), HasSubstr("FILE: is no STL file"));
+  EXPECT_THAT(Error(Facet()), HasSubstr("not an STL file: it starts with \"facet\""));
+  EXPECT_THAT(Error(""), HasSubstr("FILE: not an STL file"));
   EXPECT_THAT(Error("solid\n" + Facet() + "endsolid\nx"), HasSubstr("\"solid\" is expected"));
 }
 

@@ -1,5 +1,6 @@
 #include "client/formats/text_number.h"
 
+#include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -50,7 +51,7 @@ TEST(TextNumber, KeepsTheSignOfZero) {
 TEST(TextNumber, TooSmallForADoubleIsZero) {
   EXPECT_EQ(Parsed("1e-400"), 0.0);
   EXPECT_TRUE(std::signbit(Parsed("-1e-400")));
-  EXPECT_EQ(Parsed("0." + std::string(500, '0') + "1"), 0.0);
+  EXPECT_EQ(Parsed(absl::StrCat("0.", std::string(500, '0'), "1")), 0.0);
   EXPECT_EQ(Parsed("1e-99999999999999999999999999"), 0.0);
   EXPECT_EQ(Parsed("12345e-9223372036854775807"), 0.0);
   // Half of the smallest denormal rounds to even, which is 0; anything above it rounds up.
@@ -101,21 +102,16 @@ TEST(TextNumber, AgreesWithTheCLibraryOnRandomBits) {
   EXPECT_GT(denormal, 5000);
 }
 
-std::string InQuotes(const std::string& text) {
-  std::string quoted(1, '"');
-  quoted.append(text).push_back('"');
-  return quoted;
-}
-
 TEST(TextNumber, QuotesForeignTextSafely) {
   EXPECT_EQ(Quoted("a\x1b[31m\xff"), "\"a?[31m?\"");
-  EXPECT_EQ(Quoted(std::string(1000, 'a')), InQuotes(std::string(40, 'a') + "..."));
+  EXPECT_EQ(Quoted(std::string(1000, 'a')), absl::StrCat("\"", std::string(40, 'a'), "...\""));
   EXPECT_EQ(Quoted("W\xC3\xBCrfel"), "\"W\xC3\xBCrfel\"");
   // Truncated before a whole character.
-  EXPECT_EQ(Quoted(std::string(39, 'a') + "\xC3\xBC"), InQuotes(std::string(39, 'a') + "..."));
+  EXPECT_EQ(Quoted(absl::StrCat(std::string(39, 'a'), "\xC3\xBC")),
+            absl::StrCat("\"", std::string(39, 'a'), "...\""));
   // A stray continuation, an overlong form, a surrogate, and a value beyond U+10FFFF.
   for (const char* text : {"\x80", "\xC0\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80"}) {
-    EXPECT_EQ(Quoted(text), InQuotes(std::string(std::strlen(text), '?')));
+    EXPECT_EQ(Quoted(text), absl::StrCat("\"", std::string(std::strlen(text), '?'), "\""));
   }
 }
 

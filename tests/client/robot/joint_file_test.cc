@@ -72,7 +72,7 @@ TEST(LooseJointFile, PosesAndPlanarValuesHaveColumns) {
 }
 
 TEST_F(JointFile, ErrorsNameTheLine) {
-  EXPECT_THAT(Read("shoulder,elbo\n"), HasSubstr("joints.csv:1: \"elbo\" is no joint"));
+  EXPECT_THAT(Read("shoulder,elbo\n"), HasSubstr("joints.csv:1: \"elbo\" is not a joint"));
   EXPECT_THAT(Read("follow\n1\n"), HasSubstr(":1: \"follow\" follows shoulder; leave it out"));
   EXPECT_THAT(Read("bolt\n1\n"), HasSubstr(":1: \"bolt\" is fixed"));
   EXPECT_THAT(Read("elbow,elbow\n"), HasSubstr(":1: \"elbow\" has two columns"));

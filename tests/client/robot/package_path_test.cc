@@ -69,7 +69,7 @@ TEST_F(PackagePath, OtherNamesAreFiles) {
   EXPECT_EQ(Resolve("a.stl"), file);
   EXPECT_EQ(Resolve("file://" + file), file);
   EXPECT_EQ(Resolve(file), file);
-  EXPECT_THAT(Resolve("b.stl"), HasSubstr("there is no file"));
+  EXPECT_THAT(Resolve("b.stl"), HasSubstr("no such file"));
 }
 
 TEST_F(PackagePath, RefusalSaysWhereItWasLookedFor) {

@@ -133,7 +133,8 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:19: </lnk> where <link> of line 12 is to be closed"},
       {{"</robot>", ""}, "the file ends before </robot>"},
       {{"<link name=\"flange\"/>", "<xacro:flange/>"}, "expand the file with 'xacro' first"},
-      {{"<?xml version=\"1.0\"?>", "<!DOCTYPE robot>"}, "arm.urdf:1: document types are not read"},
+      {{"<?xml version=\"1.0\"?>", "<!DOCTYPE robot>"},
+       "arm.urdf:1: document types are not supported"},
       {{"<robot name=\"arm\">", "<robot>"}, "arm.urdf:2: <robot> lacks name"},
       {{"size=\"2 2 1\"", "size=\"2 2 1"}, "is not closed"},
   };

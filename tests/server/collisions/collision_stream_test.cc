@@ -567,7 +567,7 @@ TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsRunningOnesEnd) {
   Stream stream(*collisions_);
   stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));
   server_->BeginDrain();
-  ExpectRefused({}, grpc::StatusCode::UNAVAILABLE, "draining");
+  ExpectRefused({}, grpc::StatusCode::UNAVAILABLE, "shutting down");
   EXPECT_THAT(stream.Ask(MoveX(1, 1)).columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
   EXPECT_FALSE(server_->WaitIdle(std::chrono::milliseconds(0)));
   EXPECT_TRUE(stream.Finish().ok());
