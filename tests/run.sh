@@ -133,8 +133,7 @@ test_preset() {  # test_preset PRESET EXCLUDED_LABELS TARGET...
 
 if [[ $mode != tidy ]]; then
   run_part "format" check_format
-  # server and tests still exceed the limits.
-  run_part "prose" python3 tests/prose.py core client proto docker README.md .github
+  run_part "prose" python3 tests/prose.py
 fi
 case $mode in
   quick)

@@ -37,7 +37,7 @@ struct Caller {
   Permission permission = Permission::kAdmin;
   // Prefix of all visible IDs: ends in "/", or is empty for all IDs.
   std::string prefix;
-  // Distinguishes successive tokens of one name. Never shown.
+  // Distinguishes successive tokens with the same name. Never shown.
   uint64_t token = 0;
 
   bool sees_all() const { return prefix.empty(); }

@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace {
 
-// Whether its box has to be read from the store. A body has none, nor vertices of its own.
+// Returns true if the box must be read from the store. A body has neither a box nor vertices.
 bool WantsBox(const HullChange& change) {
   return change.record.vertex_count > 0 && !change.has_box && !change.damaged;
 }
@@ -69,7 +69,7 @@ void WatchStream::Open() {
   RunOn(readers_, [this, target = *target, start = *start] { Begin(target, start); });
 }
 
-// What the server has acknowledged by now, or another one over the same store, is told.
+// The watch includes every change acknowledged so far by this server or by a peer.
 void WatchStream::Begin(const WatchTarget& target, const WatchStart& start) {
   const auto should_stop = [this] { return call().ShouldStop(); };
   const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
@@ -107,13 +107,13 @@ absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
   return WatchStart{true, request().after_revision(), request().store_id()};
 }
 
-// Sends what is next, or has the registry call this again. One at a time runs, or is due.
+// Sends the next changes, or arms the watch to call this again. At most one call runs or is due.
 void WatchStream::TellNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
     absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
     if (!piece.ok()) return FinishCall(piece.status());
-    // It may be called again by now.
+    // A concurrent call may already be running.
     if (piece->waits) return;
     is_synced_ = piece->synced || (is_synced_ && !piece->anew);
     const bool is_mark = piece->revision > sent_revision_;
@@ -127,9 +127,8 @@ void WatchStream::TellNext() {
   }
 }
 
-// Reads what is missing from the store: the box of each hull as it is by now, and nothing for one
-// that is gone by now, which is told later. One hull after another, so that they need not be in
-// memory together.
+// Reads the missing boxes at the current revisions of their hulls, hull by hull to bound memory.
+// Drops hulls that were deleted; a later piece reports the deletion.
 absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
   std::vector<HullChange> loaded;
   loaded.reserve(piece->changes.size());

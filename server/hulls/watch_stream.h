@@ -16,8 +16,8 @@
 
 namespace hulld::server {
 
-// One WatchHulls call: takes what is to be told next from the registry, sends it, and comes for
-// more once that was written. When there is nothing, the registry calls back; no thread waits.
+// One WatchHulls call. Takes the next changes from the registry, sends them, and takes more after
+// they are written. If none are pending, the registry calls back; no thread waits.
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
@@ -44,17 +44,18 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void TellNext();
   absl::Status LoadBoxes(WatchPiece* piece);
   void Tell(const WatchPiece& piece);
-  // Has it look whether it should stop.
+  // Makes the stream check if it should stop.
   void Nudge();
 
   Registry& registry_;
   WorkerPool& readers_;
-  // Guards the beginning and the end of watch_ against threads that cancel. Between these it stays.
+  // Guards the creation and release of watch_ against threads that cancel; it does not change in
+  // between.
   std::mutex watch_mutex_;
   std::shared_ptr<ChangeWatch> watch_;
-  // What was there has been told.
+  // The initial state has been sent.
   bool is_synced_ = false;
-  // The revision in the header that was sent last.
+  // Revision of the last sent header.
   uint64_t sent_revision_ = 0;
 };
 

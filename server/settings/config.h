@@ -67,7 +67,7 @@ struct Limits {
   // one client.
   uint64_t max_concurrent_batches = 32;
   uint64_t max_batches_per_client = 16;
-  // The longest time of one request, or of one message of StreamCollisions and WatchCollisions;
+  // The longest time per request, or per message of StreamCollisions and WatchCollisions;
   // zero: unlimited.
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
@@ -142,7 +142,7 @@ struct Config {
   // clients. A certificate of SEPARATED takes about 50 bytes, one of TOUCHING about 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
-  // The limit of one row of several, which may be the last row of a nearly full message.
+  // The limit of a single row, which may be the last row of a nearly full message.
   static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;

@@ -11,7 +11,7 @@ namespace hulld::server {
 
 inline constexpr uint64_t kNoGroupLimit = std::numeric_limits<uint64_t>::max();
 
-// Returns the limit in the directory of one group, or kNoGroupLimit.
+// Returns the limit in a group's directory, or kNoGroupLimit.
 using GroupLimit = std::function<uint64_t(const std::filesystem::path& directory)>;
 
 // Returns the least limit of the control group of this process and its ancestors, which bind it,

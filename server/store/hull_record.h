@@ -44,7 +44,7 @@ struct StoredHull {
   friend bool operator==(const StoredHull&, const StoredHull&) = default;
 };
 
-// Revisions of one incarnation of a hull: of its creation, of the last change of its vertex set,
+// Revisions of a hull's incarnation: of its creation, of the last change of its vertex set,
 // and of its base.
 struct HullRevisions {
   uint64_t create = 0;
@@ -62,7 +62,7 @@ inline void SetRevisions(const HullRevisions& revisions, StoredHull* hull) {
   hull->layout.base_revision = revisions.base;
 }
 
-// Two versions of one incarnation of a hull with the same base: all growth between them is in
+// Two versions of a hull's incarnation with the same base: all growth between them is in
 // deltas.
 struct HullGrowth {
   StoredHull before;

@@ -18,7 +18,7 @@
 
 namespace hulld::server {
 
-// Peer servers' changes of one ID.
+// Peer servers' changes to an ID.
 struct PeerChange {
   // Revision of the latest change: that of the present hull or body, or the one at which it ended.
   uint64_t revision = 0;

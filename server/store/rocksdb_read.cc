@@ -1,4 +1,4 @@
-// Reading a store: single values, all hulls, the vertices of one hull.
+// Reading a store: single values, all hulls, a hull's vertices.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 

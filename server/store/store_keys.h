@@ -47,7 +47,7 @@ inline constexpr char kWriterPrefix = 'w';
 inline constexpr char kBasePrefix = 'b';
 inline constexpr char kDeltaPrefix = 'd';
 inline constexpr char kBodyPrefix = 'p';
-// Vertices of one part of a base: 768 KiB.
+// Vertices per part of a base: 768 KiB.
 inline constexpr size_t kBasePartVertices = 32768;
 
 std::string HullKey(std::string_view hull_id);

@@ -19,9 +19,9 @@
 namespace hulld::server {
 namespace {
 
-// Pairs between two looks at the clock.
+// Number of pairs between two reads of the clock.
 constexpr size_t kPairsPerPoll = 16;
-// A watch lasts for many changes; how many is a guess.
+// Rounds per watch over which preparation pays off. A guess.
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
 constexpr size_t kEntryHeaderBytes = 4;
@@ -32,7 +32,7 @@ bool IsContact(v1::Relation relation) {
   return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
 }
 
-// What became of a pair; UNSPECIFIED when it is as it was.
+// Returns the kind of the pair's event; UNSPECIFIED if the pair is unchanged.
 v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, bool is_within) {
   switch (relation) {
     case v1::RELATION_OVERLAPPING:
@@ -75,7 +75,7 @@ void CollisionWatch::StartWork() {
   };
   if (is_telling_) return work(lane_, &CollisionWatch::Tell);
   if (has_message_) {
-    // What opens resolves all hulls.
+    // The first message resolves all hulls.
     if (!is_open_) return work(long_readers_, &CollisionWatch::TakeMessage);
     const bool is_short = request().update().placements_size() <= kMostShortUpdate;
     if (is_short) return work(pool_, &CollisionWatch::TakeMessage);
@@ -131,7 +131,7 @@ absl::Status CollisionWatch::HandleMessage() {
 }
 
 absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
-  // NaN, too.
+  // Also refuses NaN.
   if (open.has_clearance() && !(open.clearance() >= 0)) {
     return absl::InvalidArgumentError(
         absl::StrCat("clearance is ", open.clearance(), "; it must be a length of at least 0"));
@@ -167,7 +167,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   std::iota(all_hulls.begin(), all_hulls.end(), size_t{0});
   if (absl::Status s = FollowPieces(all_hulls); !s.ok()) return s;
 
-  // It is worth the wait, as each hull is asked about again and again.
+  // Preparation pays off, because each hull is queried repeatedly.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
   const absl::Status resolved =
       table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
@@ -185,8 +185,8 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   return AskAbout(all);
 }
 
-// From now on changes of the hulls are noticed: those that come before they are resolved are told
-// twice, and none is missed.
+// Starts watching the hulls. A change before the hulls are resolved is reported twice, and none is
+// missed.
 absl::Status CollisionWatch::WatchHulls() {
   WatchTarget target;
   target.bodies = target.varies = true;
@@ -205,9 +205,9 @@ absl::Status CollisionWatch::WatchHulls() {
   return absl::OkStatus();
 }
 
-// From now on, changes of the hulls of pieces are noticed, for those of `hulls`, as the table
-// numbers them, that are bodies. A body that changes after this is noticed itself: then it is
-// followed, and resolved, once more. As Registry::FindBodies where a body cannot be read.
+// Starts watching the hulls of the pieces of those table entries that are bodies. A body that
+// changes later is reported itself, then followed and resolved again. Errors as
+// Registry::FindBodies if a body cannot be read.
 absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   if (!registry_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
   std::vector<std::string> ids;
@@ -222,7 +222,7 @@ absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
     pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
   }
   difference.Settle();
-  // Those are watched all the while.
+  // Hulls that are placed themselves are always watched.
   const auto is_placed = [this](const std::string& id) { return hulls_of_.contains(id); };
   std::erase_if(difference.added, is_placed);
   std::erase_if(difference.dropped, is_placed);
@@ -232,14 +232,14 @@ absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   return absl::OkStatus();
 }
 
-// The client is to hear of a hull, or of a body and the hulls of its pieces.
+// Queues a hull, or a body and the hulls of its pieces, to be sent.
 void CollisionWatch::TellOf(size_t hull) {
   hulls_to_tell_.push_back(hull);
   TellOfPieces(hull);
 }
 
-// The client is to hear of those hulls of a body's pieces that it did not hear of yet: a body may
-// have been resolved before they were followed.
+// Queues the hulls of a body's pieces that the client lacks: a body may have been resolved before
+// its pieces were followed.
 void CollisionWatch::TellOfPieces(size_t hull) {
   const HullView& view = *table_.hull(hull);
   if (view.body == nullptr) return;
@@ -257,7 +257,7 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
     const uint32_t placement = changed[i];
     const absl::Status before = table_.problem(placement);
     table_.Move(placement, ReadPose(update.poses(), i));
-    // It may lack a hull, too.
+    // The placement may also lack a hull.
     const absl::Status& now = table_.problem(placement);
     if (!now.ok() && now != before) problems_to_tell_.push_back(placement);
   }
@@ -268,7 +268,7 @@ void CollisionWatch::TakeChanges() {
   const absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
   if (!piece.ok()) return EndWork(piece.status());
   if (piece->waits) return EndWork(absl::OkStatus());
-  // There may be more.
+  // More changes may be pending.
   Locked([this] { are_hulls_due_ = true; });
   const absl::Status status = HandleChanges(*piece);
   if (!status.ok()) return EndWork(status);
@@ -277,10 +277,10 @@ void CollisionWatch::TakeChanges() {
   Tell();
 }
 
-// Hulls and bodies of the table, each once.
+// Returns the distinct hulls and bodies of the table that the piece affects.
 std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
   if (piece.anew) {
-    // Which of them changed is not known.
+    // The changes are unknown.
     std::vector<size_t> all(table_.hull_ids().size());
     std::iota(all.begin(), all.end(), size_t{0});
     return all;
@@ -317,7 +317,7 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
       if (!is_there) problems_to_tell_.push_back(i);
     }
   }
-  // Where nothing changed any more, the revision moved on, which is told.
+  // Without a changed hull, only the revision is sent.
   return AskAbout(changed);
 }
 
@@ -331,7 +331,7 @@ absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
   return absl::OkStatus();
 }
 
-// Asks and tells until the round is told, a message is full, or it is the turn of others.
+// Answers pairs and fills replies until the round is sent, a message is full, or the slice ends.
 void CollisionWatch::Tell() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   bool is_full = !TellHulls();
@@ -365,7 +365,7 @@ void CollisionWatch::Tell() {
   });
 }
 
-// False when the message is full before all is told.
+// Returns false if the message is full before everything is added.
 bool CollisionWatch::TellHulls() {
   while (next_hull_ < hulls_to_tell_.size() || next_piece_hull_ < piece_hulls_to_tell_.size() ||
          next_problem_ < problems_to_tell_.size()) {

@@ -25,14 +25,13 @@
 
 namespace hulld::server {
 
-// One WatchCollisions call. It works in rounds: each takes up one message of the client, or the
-// hulls and bodies that the registry says have changed, asks about the pairs that are concerned,
-// and tells how they are other than before. A round begins when the one before is told and its
-// replies are written. Meanwhile messages wait in gRPC's window, and changes in the registry, where
-// the last state of each hull wins; so a client that reads slowly costs a message of memory.
+// One WatchCollisions call. Works in rounds: a round takes one message of the client, or the
+// pending changes of hulls and bodies, answers the affected pairs again, and sends the differences.
+// A round starts after the replies of the previous one are written. Until then, messages wait in
+// gRPC's window and changes in the registry, which keeps the last state of each hull; a slow client
+// therefore costs the memory of one message.
 //
-// The mutex guards which work is under way. What the work itself uses belongs to the one task that
-// runs.
+// The mutex guards which task is running. The data of a round belongs to that task alone.
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
                                             v1::WatchCollisionsRequest> {
  public:
@@ -56,13 +55,13 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   }
   void OnDone() override;
 
-  // The following require the mutex.
+  // The functions below require the mutex.
   void StartWork() override;
   bool IsWorking() const override { return is_working_; }
   void OnMessage() override;
   void OnNoMessage(const absl::Status& why) override;
 
-  // The following are the work.
+  // The functions below run in the round's task.
   void TakeMessage();
   absl::Status HandleMessage();
   absl::Status HandleOpen(v1::CollisionWatchOpen& open);
@@ -80,7 +79,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status TellPair(WatchedPair& pair);
   void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
                 const std::optional<PiecePair>& pieces);
-  // The task ends; `error`, if there is one, ends the call.
+  // Ends the task; an error ends the call.
   void EndWork(const absl::Status& error);
 
   Registry& registry_;
@@ -91,13 +90,13 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
 
   // Guarded by the mutex.
   bool is_working_ = false;
-  // A message was read and waits to be taken up.
+  // A message has been read and is not yet handled.
   bool has_message_ = false;
   bool has_said_all_ = false;
-  // The registry has changes, or has not been asked yet.
+  // The registry has changes, or was not queried yet.
   bool are_hulls_due_ = false;
 
-  // Belongs to the work. Written once, before hulls can be due.
+  // Owned by the task. Written before hulls can be due, and not changed afterwards.
   std::shared_ptr<ChangeWatch> watch_;
   // Covers placements and pairs.
   MemoryCharge charge_;
@@ -105,14 +104,14 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   QueryOptions options_;
   PlacementTable table_;
   WatchedPairs pairs_;
-  // The hulls of each ID, as indices into the table's.
+  // Indices into the table's hulls, by ID.
   std::unordered_multimap<std::string, size_t> hulls_of_;
   FollowedPieces pieces_;
   uint64_t messages_ = 0;
-  // Every change of a hull up to this one is taken into account.
+  // Every change of a hull up to this revision is included.
   uint64_t revision_ = 0;
 
-  // The round that is being told: what is next of hulls, problems and pairs.
+  // Progress of sending the round: the next hull, problem, and pair.
   bool is_telling_ = false;
   bool answers_message_ = false;
   std::vector<size_t> hulls_to_tell_;
@@ -124,7 +123,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   size_t next_pair_ = 0;
   RungCounts rungs_;
   v1::WatchCollisionsResponse reply_;
-  // The size of the reply, estimated.
+  // Estimated size of the reply.
   size_t reply_bytes_ = 0;
 };
 

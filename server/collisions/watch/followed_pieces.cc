@@ -11,7 +11,7 @@
 namespace hulld::server {
 namespace {
 
-// An ID among those of a body, and by itself with the nodes of a map and of a set: a guess.
+// Bytes of an ID, in a body's list and with the nodes of a map and of a set. A guess.
 size_t BytesOf(const std::string& id) { return 2 * id.size() + 256; }
 
 }  // namespace
@@ -34,7 +34,7 @@ void FollowedPieces::Set(size_t body, std::span<const std::string> hull_ids,
   const std::span<const std::string> before =
       known == hulls_of_.end() ? std::span<const std::string>() : known->second;
   if (std::ranges::equal(before, hull_ids)) return;
-  // First what comes, so that what stays is neither added nor dropped.
+  // Adds before it drops, so that hulls that stay are neither added nor dropped.
   for (const std::string& id : hull_ids) {
     const auto [hull, is_new] = hulls_.try_emplace(id);
     if (is_new) difference->added.push_back(id);

@@ -13,28 +13,28 @@
 
 namespace hulld::server {
 
-// The hulls of the pieces of watched bodies: which bodies each concerns, and at which revision the
-// client was told of it. Bodies are numbered by the owner. Not thread-safe.
+// The hulls of the pieces of watched bodies, with the bodies that use each and the revision last
+// sent to the client. The owner numbers the bodies. Not thread-safe.
 class FollowedPieces {
  public:
-  // What came to be of concern, and what is no longer.
+  // Hulls to watch, and hulls to stop watching.
   struct Difference {
     std::vector<std::string> added;
     std::vector<std::string> dropped;
 
-    // Leaves out what one body gave up and another took, in either order: it is of concern all the
-    // while. Cost: O(n log n).
+    // Removes hulls that are both added and dropped, because a piece moved between bodies. Cost:
+    // O(n log n).
     void Settle();
   };
 
-  // The hulls of the pieces of a body from now on, each once; none where it is no body. Cost:
-  // O(log n) for each hull that it has or had, unless these are the same.
+  // Sets the distinct hulls of a body's pieces; empty if the ID is not a body. Cost: O(log n) per
+  // old or new hull, unless the set is unchanged.
   void Set(size_t body, std::span<const std::string> hull_ids, Difference* difference);
 
-  // The bodies of which this is the hull of a piece, ascending.
+  // Returns the bodies with a piece of this hull, ascending.
   std::set<size_t> BodiesOf(const std::string& hull_id) const;
 
-  // Whether the client is to be told of this hull, which is one that is followed; notes that it is.
+  // Returns true if the client lacks this version of a followed hull, and marks it as sent.
   bool IsNews(const HullRecord& hull);
 
   size_t MemoryBytes() const { return bytes_; }
@@ -42,7 +42,7 @@ class FollowedPieces {
  private:
   struct Followed {
     std::set<size_t> bodies;
-    // As told; 0 before.
+    // The version last sent; 0 before.
     uint64_t create_revision = 0;
     uint64_t revision = 0;
   };

@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Up to this many placements are compared with all others; for more, building a tree costs less.
+// Up to this many placements are compared with all others; for more, a tree costs less.
 constexpr size_t kMostCompared = 16;
 
 uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
@@ -130,7 +130,7 @@ void WatchedPairs::EndAsking() {
 }
 
 size_t WatchedPairs::MemoryBytes() const {
-  // A pair among those of two placements, among those that are asked about, and by its key.
+  // Bytes of a pair, with its numbers in two placements, in the selection, and by its key.
   constexpr size_t kPerPair = sizeof(WatchedPair) + 3 * sizeof(uint32_t) + 48;
   return pairs_.size() * kPerPair +
          pairs_of_.size() * (sizeof(std::vector<uint32_t>) + sizeof(uint32_t)) +

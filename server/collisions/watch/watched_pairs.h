@@ -18,44 +18,43 @@
 
 namespace hulld::server {
 
-// What is kept of a pair from one answer to the next.
+// The state of a pair between answers.
 struct WatchedPair {
   uint32_t a = 0;
   uint32_t b = 0;
   PairCache cache;
-  // As it was told last; SEPARATED of pairs that were not told of.
+  // The last reported relation; SEPARATED for pairs that were not reported.
   v1::Relation relation = v1::RELATION_SEPARATED;
   bool is_within_clearance = false;
   bool is_asked = false;
 
-  // Whether the client was told that it is close.
+  // True if the client has an event that says the pair is close.
   bool is_told() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
-// The pairs of a watch by their placements, and which of them a change concerns. Pairs are those of
-// a list, or, of a scene, those that were told and those whose bounding boxes meet: the others are
-// farther apart than the clearance, so nothing is kept of them. Not thread-safe.
+// The pairs of a watch by placement, and the pairs that a change affects. A list names its pairs. A
+// scene keeps the pairs that were reported and the pairs with bounding boxes that meet; all other
+// pairs are farther apart than the clearance. Not thread-safe.
 class WatchedPairs {
  public:
   WatchedPairs() = default;
-  // The pairs of an `open` whose pairs, groups and movers are valid for this many placements.
-  // max_pairs: the most pairs of a scene of which something is kept (--max-pairs-per-batch).
+  // open: its pairs, groups, and movers are valid for this number of placements. max_pairs: maximum
+  // number of pairs kept for a scene (--max-pairs-per-batch).
   WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
-  // The pairs that these placements, which moved or changed, have or come to have are to be asked
-  // about; each placement once. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) a placement, or
-  // O(n log n) for all of them together, beyond what it finds.
+  // Selects the pairs of the changed or moved placements, which are distinct, to be answered again,
+  // including new pairs. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n
+  // log n) for all of them, plus the number of pairs found.
   absl::Status AskAbout(std::span<const uint32_t> changed, const PlacementTable& table);
-  // The points that the caches of these pairs name are no more.
+  // Clears the points in the caches of this placement's pairs, which no longer exist.
   void ForgetPoints(uint32_t placement);
 
-  // Those to be asked about, by number, until EndAsking.
+  // Numbers of the selected pairs, until EndAsking.
   std::span<const uint32_t> asked() const { return asked_; }
   WatchedPair& pair(uint32_t number) { return pairs_[number]; }
-  // Drops what need not be kept of those that were asked about.
+  // Drops the selected pairs that need not be kept.
   void EndAsking();
 
-  // Bytes.
   size_t MemoryBytes() const;
 
  private:
@@ -67,7 +66,7 @@ class WatchedPairs {
   absl::Status AskAboutPair(uint32_t a, uint32_t b);
 
   std::vector<WatchedPair> pairs_;
-  // The pairs of each placement.
+  // Pair numbers by placement.
   std::vector<std::vector<uint32_t>> pairs_of_;
   std::vector<uint32_t> asked_;
 
@@ -78,9 +77,9 @@ class WatchedPairs {
   uint32_t movers_ = 0;
   double clearance_ = 0;
   std::vector<Box> boxes_;
-  // By both placements, the lower one in the upper half.
+  // Pair numbers by both placements; the lower placement is in the upper half of the key.
   std::unordered_map<uint64_t, uint32_t> numbers_;
-  // Places in pairs_ that hold none.
+  // Unused entries of pairs_.
   std::vector<uint32_t> free_;
 };
 

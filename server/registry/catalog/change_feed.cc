@@ -10,16 +10,16 @@
 namespace hulld::server {
 namespace {
 
-// A hull, or a body, that changed.
+// The last change of a hull or body.
 struct Changed {
   std::string id;
-  // Both null when it went.
+  // Both null for a deletion.
   std::shared_ptr<RegisteredHull> hull;
   std::shared_ptr<const Body> body;
   bool is_body = false;
-  // When the incarnation began that is there, or that went.
+  // Start of the current incarnation, or of the deleted one.
   uint64_t create_revision = 0;
-  // When the incarnation before that ended; 0 where all watches were told of that already.
+  // End of the previous incarnation; 0 if every watch reported it.
   uint64_t former_end = 0;
 
   bool went() const { return hull == nullptr && body == nullptr; }
@@ -34,31 +34,31 @@ HullChange DeletionOf(const std::string& id, uint64_t revision, bool is_body) {
   return change;
 }
 
-// With its places in the order of revisions and by ID. About what two nodes of maps take.
+// Bytes of a change with two map nodes; approximate.
 uint64_t BytesOf(const std::string& id) { return 2 * id.size() + sizeof(Changed) + 160; }
 
 }  // namespace
 
-// What watches of one target were not told yet.
+// The watches of a target, and the changes that some of them have not reported.
 struct WatchInterest {
   WatchTarget target;
-  // IDs beside those of the target (WatchAlso).
+  // Watched IDs in addition to the target's (WatchAlso).
   std::set<std::string> more_ids;
   std::set<std::shared_ptr<ChangeWatch>> watches;
   size_t armed = 0;
-  // In due_.
+  // Queued in due_.
   bool is_due = false;
 
-  // Each hull once, at its last change.
+  // By revision; each hull appears at its last change only.
   std::map<uint64_t, Changed> changes;
   std::unordered_map<std::string, uint64_t> revision_of;
-  // Those of `changes` that went.
+  // Number of deletions in `changes`.
   size_t deletions = 0;
   uint64_t bytes = 0;
-  // The last change, whether it is kept or not. Watches whose cursors are before it are behind.
+  // The last change, including dropped ones, and the number of watches with a cursor before it.
   uint64_t last_revision = 0;
   size_t behind = 0;
-  // What changed up to this one is known no more.
+  // Changes up to this revision were dropped before all watches had reported them.
   uint64_t lost_revision = 0;
 };
 
@@ -144,7 +144,8 @@ void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
   revision_ = revision;
 }
 
-// What a watch of hulls alone is told is of the hull that there is, or was.
+// Returns the state as a watch of this target reports it: for a watch without bodies, an ID exists
+// only while a hull has it.
 std::optional<ChangeFeed::State> ChangeFeed::AsToldTo(const WatchTarget& target,
                                                       const State& state) {
   if (target.bodies || (!state.is_body && state.other_kind_began == 0)) return state;
@@ -226,7 +227,7 @@ void ChangeFeed::NoteBegan(const std::string& id, bool is_body) {
 
 void ChangeFeed::RememberDeletion(const std::string& id, const State& state) {
   deletions_.push_back({state.revision, id, state.is_body});
-  // The key is to be that of the last one.
+  // The key must refer to the ID of the last deletion.
   gone_.erase(id);
   gone_.emplace(deletions_.back().id, Gone{state.revision});
   if (deletions_.size() <= kMostDeletions) return;
@@ -242,7 +243,7 @@ void ChangeFeed::Count(uint64_t before, uint64_t now) {
 }
 
 std::shared_ptr<WatchInterest> ChangeFeed::FindInterest(const WatchTarget& target) const {
-  // Only a prefix and a single hull are likely to be watched by many.
+  // Only a prefix or a single hull is likely to have several watches.
   if (target.varies || target.ids.size() > 1) return nullptr;
   const auto& by_name = target.ids.empty() ? by_prefix_ : by_id_;
   const auto found = by_name.find(target.ids.empty() ? target.prefix : target.ids.front());
@@ -313,7 +314,7 @@ std::shared_ptr<ChangeWatch> ChangeFeed::Open(const WatchTarget& target,
   }
   watch->interest->watches.insert(watch);
   watches_.insert(watch);
-  // The thread waits for marks only while there are watches.
+  // The thread waits for marks only while watches exist.
   if (watches_.size() == 1) wake_.notify_one();
   return watch;
 }
@@ -327,7 +328,7 @@ void ChangeFeed::Close(const std::shared_ptr<ChangeWatch>& watch) {
   if (interest->watches.empty()) RemoveInterest(interest);
 }
 
-// Drops what the interest knows once no watch of it is behind.
+// Drops the changes of the interest when none of its watches is behind.
 void ChangeFeed::MoveCursor(ChangeWatch& watch, uint64_t revision) {
   WatchInterest& interest = *watch.interest;
   const bool was_behind = watch.cursor < interest.last_revision;
@@ -481,7 +482,7 @@ void ChangeFeed::Run() {
   }
 }
 
-// Nothing changed of what the waiting watches are about, or they would have been told.
+// A watch still waits, so its target did not change, but the revision advanced.
 void ChangeFeed::NudgeForMarks() {
   for (const auto& watch : watches_) {
     if (!watch->is_armed || watch->told == revision_) continue;

@@ -28,143 +28,140 @@ namespace hulld::server {
 
 struct WatchInterest;
 
-// A client of the feed that wants to be told of changes. Guarded by the mutex of the feed.
+// A client of the feed. Guarded by the feed's mutex.
 struct ChangeWatch : std::enable_shared_from_this<ChangeWatch> {
   enum class Stage {
-    // Resumes: is told what went since.
+    // A resumed watch: reports deletions since its revision.
     kDeletions,
-    // Is told what is there, in the order of IDs.
+    // Lists existing hulls in the order of IDs.
     kPresent,
-    // Is told what changes.
+    // Reports changes.
     kChanges,
   };
 
   std::shared_ptr<WatchInterest> interest;
-  // Called on the feed's thread, without any lock.
+  // Called on the feed's thread without locks.
   std::function<void()> on_ready;
 
   Stage stage = Stage::kChanges;
-  // What is there is told where it changed after this revision.
+  // Existing hulls are listed if they changed after this revision.
   uint64_t after_revision = 0;
-  // The last deletion that was told, by its revision; the last hull that was told, by its ID.
+  // Revision of the last reported deletion, and ID of the last listed hull.
   uint64_t last_deletion = 0;
   std::string last_id;
-  // Where a store finds records: those that are told next, or why they could not be read, while
-  // they are there; whether they are being read; and how often that was begun.
+  // If the store finds records: the next page of the list, or the error of its read; true while a
+  // read is in flight; and the number of reads started.
   std::optional<absl::StatusOr<FoundRecords>> found;
   bool is_reading = false;
   uint64_t readings = 0;
-  // Every change up to this one was told, once the stages before kChanges are over.
+  // In kChanges: every change up to this revision was reported.
   uint64_t cursor = 0;
-  // The cursor when something was told last.
+  // The cursor at the last report.
   uint64_t told = 0;
-  // kChanges: `synced` is due once the cursor is there; none when it was told.
+  // In kChanges: `synced` is due when the cursor reaches this revision; no value after it was sent.
   std::optional<uint64_t> synced_at;
-  // What was told is the state of the store at the cursor, so that it is known what is new.
+  // The reported state is that of the store at the cursor, so creations can be recognized.
   bool is_exact = false;
   bool anew = false;
-  // on_ready is due when something changes.
+  // on_ready is due at the next change.
   bool is_armed = false;
-  // The next piece does not wait, whatever there is to tell.
+  // The next piece does not wait, even if it is empty.
   bool is_nudged = false;
 };
 
-// Tells watches which hulls, and which bodies, changed. Guarded by its owner's mutex (the
-// registry's), which `Locked` shows; its thread takes that mutex, too. An ID is that of a hull or
-// of a body; watches of hulls alone are not told of what the ID is while it is a body's.
+// Notifies watches of changes of hulls and bodies. Guarded by the registry's mutex, which a
+// `Locked` proves to be held; the feed's thread also takes it. An ID belongs to a hull or to a
+// body; a watch of hulls alone does not see an ID while a body has it.
 //
-// What changed is kept once for all watches of the same target, their interest: each hull at its
-// last change only, in the order of revisions. A watch is a cursor in that order. So a change costs
-// O(log n) for each target that the hull falls under, however many watch it; a slow watch costs
-// what its cursor is behind by in hulls, not in changes; and what all watches of an interest were
-// told is dropped. Targets are found by the ID, and by each length of a prefix that is watched.
+// Watches of the same target share an interest, which keeps the last change of each hull in the
+// order of revisions; a watch is a cursor in it. A change thus costs O(log n) per target that
+// includes the hull, however many watches it has; a slow watch costs the number of changed hulls,
+// not of changes. An interest drops its changes when all of its watches have passed them. Targets
+// are found by the ID and by each watched length of a prefix.
 //
-// A watch that was told everything is armed. The first change after that makes its interest due:
-// O(1) under the mutex. The feed's thread then calls on_ready of all that were armed, without the
-// mutex; each comes for its next piece whenever it can send one, and is armed again when there is
-// none.
+// A watch without pending changes is armed. The first change afterwards makes its interest due, in
+// O(1); the feed's thread then calls on_ready of all armed watches without the mutex. Each takes
+// its next piece when it can send one, and is armed again if nothing is pending.
 //
-// What went leaves no trace in the store. A bounded number of deletions is remembered, for watches
-// that resume and, within an interest, for those that are behind. One that needs to know of more
-// starts anew.
+// A deletion leaves no trace in the store. The feed remembers a bounded number of deletions for
+// watches that resume and, per interest, for watches that are behind. A watch that needs older ones
+// starts over.
 class ChangeFeed {
  public:
-  // How many deletions are remembered; with IDs of the greatest length, 25 MiB, which no budget
-  // counts.
+  // Maximum number of remembered deletions; at most 25 MiB with IDs of maximum length, which no
+  // budget counts.
   static constexpr size_t kMostDeletions = 1 << 16;
-  // Hulls that are looked at, or told of, at a time: some 50 us under the mutex.
+  // Maximum number of hulls visited or reported per hold of the mutex: some 50 us.
   static constexpr size_t kMostPerPiece = 512;
 
-  // What watches were not told yet counts against the budget. mark_interval: how often a watch is
-  // told that the revision moved on.
+  // Pending changes are charged to the budget. mark_interval: the interval at which a watch without
+  // changes learns the current revision.
   ChangeFeed(FairMutex& order, MemoryBudget& budget, std::chrono::milliseconds mark_interval);
   ChangeFeed(const ChangeFeed&) = delete;
   ChangeFeed& operator=(const ChangeFeed&) = delete;
   // Requires that all watches are closed.
   ~ChangeFeed();
 
-  // What the store holds is of this revision, and nothing is known of what went before; first of
-  // all.
+  // Begins at the revision of the loaded store, without history. Call before all other functions.
   void Begin(uint64_t revision);
 
-  // A change was committed. It was given the record's revision; of a deletion, `revision`.
-  // Cost: O(log n) for each target that the ID falls under, and a hash of the ID for each length of
-  // a watched prefix.
+  // Note a committed change at the revision of its record; a deletion at `revision`. Cost: O(log n)
+  // per target that includes the ID, and one hash per watched length of a prefix.
   void NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
-  // The same of a body. former: that of which it takes the place; null for none.
+  // Note a change of a body. former: the body that it replaces, or null.
   void NoteBodyPut(Locked& locked, const BodyRecord* former,
                    const std::shared_ptr<const Body>& body);
   void NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision);
-  // Other servers made one of the other, by more than one change; told as one.
+  // Note that peer servers turned a hull into a body, or a body into a hull, by several changes;
+  // reported as a single change.
   void NoteBecameBody(Locked& locked, const HullRecord& former,
                       const std::shared_ptr<const Body>& body);
   void NoteBecameHull(Locked& locked, const BodyRecord& former,
                       const std::shared_ptr<RegisteredHull>& hull);
-  // What cannot be told was given this revision: watches that wait are told that it moved on.
+  // Notes a revision whose change cannot be described; waiting watches learn the revision only.
   void NoteOther(const Locked& locked, uint64_t revision);
 
-  // Starts at the stage kChanges, with what is committed from now on.
+  // Opens a watch in kChanges, for changes committed later.
   std::shared_ptr<ChangeWatch> Open(const WatchTarget& target, std::function<void()> on_ready);
-  // Nothing is to be told any more. An on_ready that is due by then still comes.
+  // Closes a watch. An on_ready that is already due is still called.
   void Close(const std::shared_ptr<ChangeWatch>& watch);
 
-  // What changes of `added` from now on is told, too, and what changes of `dropped` no more.
-  // Requires a target that varies; what is dropped was added, once. Cost: a hash for each ID.
+  // Adds and removes watched IDs; later changes count. Requires a target that varies; `dropped`
+  // must have been added before. Cost: one hash per ID.
   void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
                  std::span<const std::string> dropped);
 
   static const WatchTarget& TargetOf(const ChangeWatch& watch);
-  // Whether all that went after this revision is remembered.
+  // True if all deletions after this revision are remembered.
   bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
-  // Moves a watch back to where everything is told, and says so.
+  // Moves a watch back to the start of the list; its next piece says so.
   void StartAnew(ChangeWatch& watch);
-  // Some of what went after watch.last_deletion and up to the cursor. Returns false after the last.
+  // Adds deletions after watch.last_deletion, up to the cursor. Returns false after the last.
   bool TakeDeletions(ChangeWatch& watch, const std::function<bool(const std::string&)>& is_there,
                      WatchPiece* piece);
-  // The watch is to be told of nothing that changed until now.
+  // Skips all pending changes.
   void SkipChanges(ChangeWatch& watch) { MoveCursor(watch, revision_); }
-  // Some of what changed after the cursor. Arms the watch where there is nothing to tell.
+  // Adds changes after the cursor. Arms the watch if it has none.
   void TakeChanges(ChangeWatch& watch, WatchPiece* piece);
-  // Whether what changed after the cursor is known no more, so that the watch must start anew.
+  // True if changes after the cursor were dropped, so that the watch must start over.
   bool IsLost(const ChangeWatch& watch) const;
 
-  // The watch waits until it is woken, or something changes.
+  // Makes the watch wait for a wake-up or a change.
   void Arm(ChangeWatch& watch);
-  // A watch that waits comes for its next piece.
+  // Calls on_ready of a waiting watch.
   void Wake(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
-  // Whether an ID that is among the deletions that are remembered began anew since, as a hull, or
-  // as a body where these count.
+  // True if a remembered deleted ID was created again as a hull or, if `bodies`, as a body.
   bool BeganAnew(const std::string& id, bool bodies) const {
     const auto found = gone_.find(id);
     return found == gone_.end() || (bodies && found->second.is_body_now);
   }
 
-  // Has a watch come for its next piece although nothing changed.
+  // Calls on_ready of a watch although nothing changed.
   void Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
-  // Nudges all; there is nothing to tell from now on.
+  // Nudges all watches; later pieces are empty.
   void End(Locked& locked);
   bool has_ended() const { return has_ended_; }
 
@@ -175,19 +172,19 @@ class ChangeFeed {
   };
   using Interests = std::vector<std::shared_ptr<WatchInterest>>;
   enum class Life { kBegan, kChanged, kReplaced, kEnded };
-  // What is committed now of an ID.
+  // The committed state of an ID.
   struct State {
-    // The revision of the change.
+    // Revision of the change.
     uint64_t revision;
-    // When the incarnation began that is there, or that went.
+    // Start of the current incarnation, or of the deleted one.
     uint64_t create_revision;
     Life life;
     bool is_body = false;
-    // One of them, or none when it went.
+    // At most one is set; both are null for a deletion.
     std::shared_ptr<RegisteredHull> hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
-    // Not 0: what the ID was before was of the other kind and ended by the same change; this is the
-    // create_revision of that.
+    // If the change replaced a hull by a body or a body by a hull: create_revision of the former.
+    // Otherwise 0.
     uint64_t other_kind_began = 0;
   };
   struct Deletion {
@@ -211,38 +208,38 @@ class ChangeFeed {
   void Forget(WatchInterest& interest);
   void Count(uint64_t before, uint64_t now);
   void MakeReady(const std::shared_ptr<ChangeWatch>& watch);
-  // The thread.
+  // The feed's thread.
   void Run();
   void NudgeForMarks();
 
   FairMutex& order_;
   const std::chrono::milliseconds mark_interval_;
 
-  // The rest is guarded by order_.
+  // The members below are guarded by order_.
   uint64_t revision_ = 0;
-  // In the order of revisions. What went up to deletions_begin_ is not remembered.
+  // By revision. Deletions up to deletions_begin_ are not remembered.
   std::deque<Deletion> deletions_;
   uint64_t deletions_begin_ = 0;
-  // The last of these for each ID, where no hull began under the ID since: its revision, and
-  // whether a body did; by the ID in `deletions_`.
+  // The last deletion of each ID that no hull has used since: its revision, and true if a body has
+  // used the ID since. The key refers to the ID in `deletions_`.
   struct Gone {
     uint64_t revision;
     bool is_body_now = false;
   };
   std::unordered_map<std::string_view, Gone> gone_;
 
-  // By a prefix, and by an ID: the interests in it.
+  // Interests by prefix, and by ID.
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_prefix_;
-  // How many interests in prefixes are of each length.
+  // Number of interests by length of their prefix.
   std::map<size_t, size_t> prefix_lengths_;
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_id_;
   std::set<std::shared_ptr<ChangeWatch>> watches_;
 
-  // What is kept for watches that are behind.
+  // Bytes of all pending changes.
   uint64_t bytes_ = 0;
   MemoryCharge charge_;
 
-  // For the thread.
+  // Input of the thread.
   ConditionVariable wake_;
   Interests due_;
   std::vector<std::shared_ptr<ChangeWatch>> ready_;

@@ -252,7 +252,7 @@ struct WatchPiece {
   // Every change up to this revision was sent before, is in `changes`, or was superseded.
   uint64_t revision = 0;
   std::vector<HullChange> changes;
-  // As in v1::WatchHullsResponse.
+  // Fields of v1::WatchHullsResponse.
   bool synced = false;
   bool anew = false;
 };

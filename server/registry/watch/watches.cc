@@ -65,16 +65,16 @@ absl::StatusOr<WatchPiece> Watches::Take(ChangeWatch& watch) {
   return piece;
 }
 
-// Some of what is there. What changes behind the walk is told after it.
+// Adds the next existing hulls. A change behind the walk is reported after it.
 void Watches::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
-  // What changed before the first step need not be told twice.
+  // Changes before the first step are part of the list.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = ChangeFeed::TargetOf(watch);
   const std::string& prefix = target.ids.empty() ? target.prefix : target.ids.front();
   const auto is_watched = [&](const std::string& id) {
     return target.ids.empty() ? id.starts_with(prefix) : id == prefix;
   };
-  // What is damaged has no revision that can be read.
+  // A damaged record has no readable revision.
   const auto is_new = [&watch](uint64_t revision) {
     return watch.after_revision == 0 || revision > watch.after_revision;
   };
@@ -111,7 +111,7 @@ void Watches::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
 
 void Watches::Extend(ChangeWatch& watch, std::span<const std::string> added,
                      std::span<const std::string> dropped) {
-  // Others pass in between.
+  // Releases the mutex between slices.
   const auto in_slices = [this](std::span<const std::string> ids, const auto& take) {
     while (!ids.empty()) {
       const size_t count = std::min<size_t>(ids.size(), kMostLookupsPerHold);

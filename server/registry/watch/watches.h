@@ -18,16 +18,16 @@
 
 namespace hulld::server {
 
-// Opens watches, and gives each what it is told next. A watch passes through three stages: what
-// went since it was told last, where it resumes; what is there, in the order of IDs; and what
-// changes, which the ChangeFeed notes. What is there is taken from the catalog, or from the store
-// where the catalog knows only a part (RecordReader).
+// Opens watches and takes their next pieces. A watch passes through three stages: the deletions
+// since its last report, if it resumes; the existing hulls, in the order of IDs; and the changes,
+// which the ChangeFeed notes. Existing hulls come from the catalog, or from the store if the
+// catalog holds only a part (RecordReader).
 //
-// Invariant: what changes while a watch is told what is there is told after it, so nothing is
-// missed. Takes the registry's mutex, for some ten microseconds at a time.
+// Invariant: a change during the list is reported after it, so none is missed. Holds the registry's
+// mutex for some ten microseconds per step.
 class Watches {
  public:
-  // All must outlive this. The mutex is the registry's.
+  // All must outlive this. `mutex` is the registry's.
   Watches(const Store& store, FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
           ChangeFeed& feed, RecordReader& lister)
       : store_(store),
@@ -39,7 +39,7 @@ class Watches {
   Watches(const Watches&) = delete;
   Watches& operator=(const Watches&) = delete;
 
-  // As in Registry.
+  // Implement the functions of Registry with these names.
   absl::StatusOr<std::shared_ptr<ChangeWatch>> Open(const WatchTarget& target,
                                                     const WatchStart& start,
                                                     std::function<void()> on_ready);

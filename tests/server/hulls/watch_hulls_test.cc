@@ -33,7 +33,7 @@ class Watch {
   }
 
   bool Read(v1::WatchHullsResponse* message) { return reader_->Read(message); }
-  // The next message that is no progress mark.
+  // Returns the next message that is not a progress mark.
   v1::WatchHullsResponse Next() {
     v1::WatchHullsResponse message;
     while (reader_->Read(&message)) {
@@ -41,7 +41,7 @@ class Watch {
     }
     return message;
   }
-  // What is told up to and with the message that says `synced`.
+  // Returns the events up to and including the message with `synced`.
   std::vector<std::string> ReadUntilSynced() {
     std::vector<std::string> texts;
     v1::WatchHullsResponse message;
@@ -197,10 +197,10 @@ TEST_F(WatchHulls, EndsAtItsDeadline) {
   ASSERT_TRUE(server_->WaitIdle(std::chrono::hours(1)));
 }
 
-// A client that reads nothing while much changes: the changes are acknowledged all the same, and it
-// finds each hull once when it reads on.
+// A client does not read while many hulls change. The changes are acknowledged nevertheless, and
+// the client gets each hull once when it resumes reading.
 TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
-  // gRPC reads ahead for its clients, as much as it sees fit; here 64 KiB, a tenth of the changes.
+  // gRPC reads ahead for its clients without a fixed limit; here 64 KiB, a tenth of the changes.
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
@@ -231,10 +231,10 @@ TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
   EXPECT_LT(events, kHulls * kRounds);
 }
 
-// The state of the store as the events of a watch say.
+// The state of the store according to the events of a watch.
 class Mirror {
  public:
-  // For each hull, when it was created and when it changed last.
+  // Revisions of the creation and of the last change of each hull.
   using State = std::map<std::string, std::pair<uint64_t, uint64_t>>;
 
   void Fold(const v1::WatchHullsResponse& message) {
@@ -248,7 +248,7 @@ class Mirror {
     header_ = message.header();
     is_synced_ = is_synced_ || message.synced();
   }
-  // The call is another one.
+  // A new call begins.
   void Resume() { is_synced_ = false; }
 
   const State& state() const { return state_; }
@@ -297,7 +297,7 @@ class Mirror {
   bool is_synced_ = false;
 };
 
-// Random changes by several writers, each on hulls of its own, so that it knows their histories.
+// Makes random changes to its own hulls, so that it knows their histories.
 class Writer {
  public:
   Writer(v1::HullService::Stub& stub, int number)
@@ -306,7 +306,7 @@ class Writer {
   void Run(int changes) {
     for (int i = 0; i < changes; ++i) Change(absl::StrCat(name_, random_() % 8));
   }
-  // What became of a hull: at which revision, and as what; {0, 0} stands for no hull.
+  // States of each hull by revision; {0, 0} after a deletion.
   using History = std::map<std::string, std::map<uint64_t, std::pair<uint64_t, uint64_t>>>;
   const History& history() const { return history_; }
 
@@ -379,7 +379,7 @@ class Writer {
   History history_;
 };
 
-// What a watch said when its header was of this revision.
+// Reported states, with the revision of the header.
 using Moments = std::vector<std::pair<uint64_t, Mirror::State>>;
 
 // Checks each state against the histories at its revision. A hull that changed since may be
@@ -396,7 +396,7 @@ void ExpectTrue(const Moments& moments, const Writer::History& histories) {
         ASSERT_EQ(told_state, at) << id << " at " << revision;
         continue;
       }
-      // Superseded: no older than the last that was told before, and a state that there was.
+      // Superseded: a state that existed, no older than the last one reported.
       bool was_there = told_state.first == 0;
       for (const auto& [changed_at, after] : history) was_there = was_there || after == told_state;
       ASSERT_TRUE(was_there) << id << " at " << revision;
@@ -417,7 +417,7 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
     threads.emplace_back([&, n] {
       std::mt19937_64 random(n);
       Mirror& mirror = mirrors[n];
-      // The first is never cut.
+      // The first call is never cut.
       while (true) {
         v1::WatchHullsRequest request;
         request.set_after_revision(mirror.header().revision());
@@ -431,7 +431,7 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
           mirror.Fold(message);
           if (mirror.is_synced())
             moments[n].emplace_back(mirror.header().revision(), mirror.state());
-          // Created last of all.
+          // The hull that is created last.
           if (mirror.is_synced() && mirror.state().contains("end")) return;
         }
       }
@@ -463,7 +463,7 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
   }
 }
 
-// The client's watch goes on where it was when the server comes back.
+// The client's watch resumes when the server comes back.
 TEST_F(WatchHulls, TheClientGoesOnAfterARestart) {
   Config config = TestConfig();
   config.listen = "unix:" + ::testing::TempDir() + absl::StrCat("watch_", getpid(), ".sock");
@@ -476,7 +476,7 @@ TEST_F(WatchHulls, TheClientGoesOnAfterARestart) {
   std::unique_ptr<v1::HullService::Stub> before = std::move(hulls_);
   Restart(config);
   Create("b");
-  // Another store: it starts anew.
+  // Another store: the watch starts over.
   do {
     message = watch.Next();
     ASSERT_TRUE(message.ok()) << message.status();

@@ -9,7 +9,7 @@ namespace {
 
 using State = Ledger::State;
 
-// Where a thread waits for `object` to change.
+// Blocks until `object` changes so that the condition holds.
 void WaitFor(const void* object, bool (*holds)(const void*), const void* context,
              const std::source_location& where = std::source_location::current()) {
   while (!holds(context)) {
@@ -40,7 +40,7 @@ void Watcher::Run() {
   if (is_refused_) return;
   while (!is_ending_) {
     const absl::StatusOr<WatchPiece> piece = registry.TakeChanges(*watch_);
-    // What is there cannot be read: once more.
+    // The store cannot be read at the moment; retry.
     if (absl::IsUnavailable(piece.status()) && simulation_.store.failed() > 0) continue;
     if (!piece.ok()) Scheduler::Current().Fail(piece.status().ToString());
     if (piece->anew) told_ = {};
@@ -50,7 +50,7 @@ void Watcher::Run() {
     if (piece->waits) WaitUntilReady();
   }
   registry.CloseWatch(watch_);
-  // It holds this.
+  // The watch holds a reference to this.
   watch_ = nullptr;
 }
 
@@ -87,12 +87,12 @@ void Watcher::Take(const HullChange& change) {
   ++simulation_.reached.told;
 }
 
-// As HullEventKind says. state: what it is told of now.
+// Returns true if the event's kind, as HullEventKind defines it, fits the received state.
 bool Watcher::MayBeOfKind(size_t hull, const HullChange& change, size_t state) const {
   const Ledger& ledger = simulation_.ledger();
   const uint64_t incarnation = change.record.create_revision;
   size_t first = told_[hull];
-  // A hull that came and went is not told of.
+  // A hull that was created and deleted in between is not reported.
   while (first + 1 < state && ledger.At(hull, first + 1).revision <= revision_) ++first;
   const State& before = ledger.At(hull, first);
   bool another_was_there = false;
@@ -114,7 +114,7 @@ bool Watcher::MayBeOfKind(size_t hull, const HullChange& change, size_t state) c
   return false;
 }
 
-// Chunks that brought no vertex are not told.
+// Chunks without a new vertex are not reported.
 bool Watcher::KnowsAll() const {
   for (size_t hull = 0; hull < kHulls; ++hull) {
     const Ledger& ledger = simulation_.ledger();

@@ -9,15 +9,15 @@
 
 namespace hulld::server {
 
-// Watches all hulls, and ends the schedule when it is told what never was.
+// A watch of all hulls. Fails the schedule if it receives an event of a state that never existed.
 class Watcher : public std::enable_shared_from_this<Watcher> {
  public:
   explicit Watcher(Simulation& simulation) : simulation_(simulation) {}
 
-  // Until End.
+  // Receives events until End.
   void Run();
-  // Waits until the watch was told all that the store keeps, and ends it. So a change that nobody
-  // tells it of is a thread that waits for ever. No client may be left.
+  // Waits until the watch has received the stored state of every hull, then ends it. A change that
+  // is never reported thus appears as a thread that waits forever. Requires: no client is left.
   void End();
 
  private:
@@ -32,9 +32,9 @@ class Watcher : public std::enable_shared_from_this<Watcher> {
   bool is_refused_ = false;
   bool is_ready_ = false;
   bool is_ending_ = false;
-  // Up to which all was told; 0 before that is known.
+  // Everything up to this revision was received; 0 before the first header.
   uint64_t revision_ = 0;
-  // What it was told last of each hull, by the number of its state.
+  // Number of the last received state of each hull.
   std::array<size_t, kHulls> told_{};
 };
 
