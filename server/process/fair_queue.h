@@ -14,14 +14,11 @@ namespace hulld::server {
 // Unit of fair scheduling: a client, which is a token or, without tokens, an address; and one of
 // its connections, 0 if unknown.
 struct ClientId {
-  constexpr ClientId(uint64_t client = 0, uint64_t of_client = 0)
-      : number(client), connection(of_client) {}
-
-  uint64_t number;
-  uint64_t connection;
+  uint64_t number = 0;
+  uint64_t connection = 0;
 };
 // The server itself.
-inline constexpr ClientId kNoClient = 0;
+inline constexpr ClientId kNoClient = {};
 
 // A queue with fair scheduling: clients take turns, one item each, and so do the connections of a
 // client. The items of a connection stay in order. A client with many items therefore delays only

@@ -26,8 +26,8 @@ namespace hulld::server {
 
 // Clients in fair scheduling of the threads that read the store, besides readers that load points:
 // pending record reads, and reads for watches.
-inline constexpr ClientId kRecordReader = 1;
-inline constexpr ClientId kWatchReader = 2;
+inline constexpr ClientId kRecordReader = {1};
+inline constexpr ClientId kWatchReader = {2};
 
 // Reads records from a store that finds them, of which the catalog holds only a part: loads the
 // record of an ID into the catalog (of the hull or of the body, or the absence of both), and lists

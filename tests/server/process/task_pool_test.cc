@@ -116,15 +116,15 @@ TEST(TaskPool, ConnectionsOfAClientTakeTurns) {
 TEST(TaskPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
   HeldPool held;
   Order order;
-  for (const char* name : {"a1", "a2", "a3"}) held.pool().Submit(order.Task(name), 1);
-  held.pool().Submit(order.Task("b1"), 2);
+  for (const char* name : {"a1", "a2", "a3"}) held.pool().Submit(order.Task(name), {1});
+  held.pool().Submit(order.Task("b1"), {2});
   // Two long calls of one client share the turns of a client.
   TaskPool::Lane a(held.pool());
   TaskPool::Lane also_a(held.pool());
   TaskPool::Lane b(held.pool());
-  for (const char* name : {"slice a1", "slice a2"}) a.Submit(order.Task(name), 1);
-  for (const char* name : {"slice A1", "slice A2"}) also_a.Submit(order.Task(name), 1);
-  for (const char* name : {"slice b1", "slice b2"}) b.Submit(order.Task(name), 2);
+  for (const char* name : {"slice a1", "slice a2"}) a.Submit(order.Task(name), {1});
+  for (const char* name : {"slice A1", "slice A2"}) also_a.Submit(order.Task(name), {1});
+  for (const char* name : {"slice b1", "slice b2"}) b.Submit(order.Task(name), {2});
   held.Release();
   held.End();
   EXPECT_THAT(order.names(), ElementsAre("a1", "b1", "a2", "a3", "slice a1", "slice b1", "slice A1",
@@ -142,8 +142,8 @@ TEST(WorkerPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
       released.get_future().wait();
     });
     held.get_future().wait();
-    for (const char* name : {"a1", "a2", "a3"}) pool.Submit(order.Task(name), 1);
-    for (const char* name : {"b1", "b2"}) pool.Submit(order.Task(name), 2);
+    for (const char* name : {"a1", "a2", "a3"}) pool.Submit(order.Task(name), {1});
+    for (const char* name : {"b1", "b2"}) pool.Submit(order.Task(name), {2});
     EXPECT_EQ(pool.waiting(), 5u);
     released.set_value();
   }

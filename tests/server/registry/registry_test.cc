@@ -115,7 +115,8 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
         client);
     return opened.get_future().get();
   };
-  std::vector<AppendSession> sessions = {open("a", 1), open("b", 1), open("c", 1), open("d", 2)};
+  std::vector<AppendSession> sessions = {open("a", {1}), open("b", {1}), open("c", {1}),
+                                         open("d", {2})};
   // All of them wait for the only thread.
   std::promise<void> released;
   writers.Submit([&] { released.get_future().wait(); });
