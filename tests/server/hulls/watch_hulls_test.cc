@@ -21,7 +21,6 @@ namespace watch_hulls_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 // One WatchHulls call.
 class Watch {
@@ -409,10 +408,12 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
   constexpr int kChanges = 250;
   constexpr int kWatches = 3;
   std::vector<Writer> writers;
+  writers.reserve(kWriters);
   for (int w = 0; w < kWriters; ++w) writers.emplace_back(*hulls_, w);
   std::vector<Mirror> mirrors(kWatches);
   std::vector<Moments> moments(kWatches);
   std::vector<std::thread> threads;
+  threads.reserve(kWatches);
   for (int n = 0; n < kWatches; ++n) {
     threads.emplace_back([&, n] {
       std::mt19937_64 random(n);
@@ -438,6 +439,7 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
     });
   }
   std::vector<std::thread> writing;
+  writing.reserve(kWriters);
   for (Writer& writer : writers) writing.emplace_back([&] { writer.Run(kChanges); });
   for (std::thread& thread : writing) thread.join();
   Create("end");

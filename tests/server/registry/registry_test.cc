@@ -152,6 +152,7 @@ TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
   // The builder polls this while it processes a large chunk.
   int polls = 0;
   std::vector<Vector> points;
+  points.reserve(20'000);
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
   const auto result = Append(session, 2, std::move(points), [&] {
     ++polls;
@@ -207,6 +208,7 @@ TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
   EXPECT_EQ(view.served->query_hull().canonical(), nullptr);
   std::vector<const Hull*> made(4);
   std::vector<std::thread> threads;
+  threads.reserve(made.size());
   for (const Hull*& hull : made) {
     threads.emplace_back([&] { hull = *registry_.reader().Canonical(view, {}); });
   }
@@ -308,6 +310,7 @@ TEST_F(RegistryTest, FrequentlyQueriedHullsArePrepared) {
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   const AppendSession session = Open("h");
   std::vector<Vector> points;
+  points.reserve(20'000);
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
   std::promise<absl::StatusOr<uint64_t>> deleted;
   std::promise<absl::StatusOr<ChunkResult>> next;
