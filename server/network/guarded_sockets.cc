@@ -105,12 +105,14 @@ size_t HalfOpenStreams() { return half_open_streams; }
 
 }  // namespace hulld::server
 
-// The functions below replace the C library's; guarded_sockets.h explains the reason.
+// The functions below replace the C library's; guarded_sockets.h explains the reason. The C library
+// names their parameters with reserved identifiers.
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name)
 
 extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
   using Function = ssize_t (*)(int, msghdr*, int);
-  static const auto next = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "recvmsg"));
-  const ssize_t bytes = next(descriptor, message, flags);
+  static const auto kNext = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "recvmsg"));
+  const ssize_t bytes = kNext(descriptor, message, flags);
   if (bytes <= 0) return bytes;
   hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
   if (slot == nullptr || slot->connection == 0) return bytes;
@@ -122,12 +124,12 @@ extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
 
 extern "C" int close(int descriptor) {
   using Function = int (*)(int);
-  static const auto next = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "close"));
+  static const auto kNext = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "close"));
   hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
-  if (slot == nullptr || slot->connection == 0) return next(descriptor);
+  if (slot == nullptr || slot->connection == 0) return kNext(descriptor);
   // Holds the mutex during the close, so that ShutDown never meets another socket of this number.
   const std::lock_guard lock(slot->mutex);
-  const int result = next(descriptor);
+  const int result = kNext(descriptor);
   const int error = errno;
   const std::function<void()> on_closed = std::move(slot->on_closed);
   slot->Clear();
@@ -135,3 +137,5 @@ extern "C" int close(int descriptor) {
   errno = error;
   return result;
 }
+
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)

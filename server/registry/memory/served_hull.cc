@@ -67,8 +67,9 @@ absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& rec
       should_stop, [this] { return is_made(); },
       [&] {
         absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
-        if (made.ok()) Keep(*std::move(made));
-        return made.status();
+        if (!made.ok()) return made.status();
+        Keep(*std::move(made));
+        return absl::OkStatus();
       });
 }
 
