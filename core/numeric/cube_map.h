@@ -8,10 +8,9 @@
 #include "core/numeric/vector.h"
 
 // Addresses of directions on the surface of the cube [-1, 1]^3. A direction divided by its largest
-// component lies on one of six faces. Face 2 k holds the directions with component k largest and
-// positive, face 2 k + 1 those with it negative. The coordinates on a face are the two components
-// after k, cyclically. A map divides each face into side x side cells, row by row along the first
-// coordinate.
+// component lies on one of six faces: 2 k if component k is largest and positive, 2 k + 1 if it is
+// largest and negative. The coordinates on a face are the two components after k, cyclically. A map
+// divides each face into side x side cells, row by row along the first coordinate.
 namespace hulld {
 
 // The two components after component k, cyclically: [k] and [k + 1].

@@ -14,9 +14,9 @@ namespace hulld {
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
 // The 3x3 determinant of rounded coordinate differences has the sign of fl(det) if |fl(det)| >
-// fl(factor * fl(permanent)), without underflow. Its error may exceed that bound: it is up to 8 u
-// permanent, because the rounding of the last sum preserves the sign and does not count. Proven:
-// Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic, table 2 (o3derrboundA).
+// fl(factor * fl(permanent)), without underflow. The error itself may be larger, up to 8 u
+// permanent: rounding the last sum preserves the sign, so the bound omits it. Proven: Shewchuk
+// 1997, Adaptive Precision Floating-Point Arithmetic, table 2 (o3derrboundA).
 inline constexpr double kOrient3dErrorFactor = (7 + 56 * kUnitRoundoff) * kUnitRoundoff;
 
 // The 2x2 counterpart, with an error of up to 4 u permanent. Proven: Shewchuk 1997 (ccwerrboundA).

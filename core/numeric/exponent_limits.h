@@ -19,9 +19,9 @@ inline constexpr int kAboveAllExponents = 1024;
 // The contribution of underflow to the bounds of Orient2d and Orient3d. A product that underflows
 // errs by at most 2^-1075; sums never err by underflow. 2x2: two products. 3x3 with differences of
 // at most D: six products times D, and three products: (6 D + 3) 2^-1075 and roundings of these,
-// less than (D + 1) times this constant. The bound also covers 18 2^-1075 more if D < 1 and the
-// nine components, too, are products that may have underflowed, each times two products of two.
-// Proven.
+// less than (D + 1) times this constant. If D < 1 and the nine components are themselves products
+// that may have underflowed, each enters two products of two: 18 2^-1075 more, which the bound
+// covers. Proven.
 inline constexpr double kUnderflowError = 0x1p-1070;
 
 // Differences of doubles up to this in magnitude do not overflow. Proven.
@@ -39,7 +39,7 @@ inline constexpr double kExpansionMin = 0x1p-306;
 inline constexpr double kExpansionMax = 0x1p330;
 
 // The plane of a triangle (see kPlaneErrorFactor): its bound is stored as a float per |p| + |a|.
-// Outside this range of slopes e and f are first scaled by powers of two to |e|, |f| in [1/2, 1).
+// Outside this range of slopes, e and f are first scaled by powers of two to |e|, |f| in [1/2, 1).
 // With that, and |p| + |a| between kPlaneMinCoordinate and kPlaneMaxCoordinate, no product
 // overflows (2^166 * 2^600), and underflow, at most 2^-1070 in total, is below 2^-50 of the slack,
 // 16 u |e||f| (|p| + |a|) >= 2^-1011. Outside these ranges a plane is never certain. Proven.

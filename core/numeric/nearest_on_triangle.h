@@ -24,10 +24,10 @@ struct EdgeProjections {
   double on_ac;  // (c - a) . x
 };
 
-// Finds the part in floating point, up to rounding: near the boundary of two parts it may be
-// either, and weights of the interior that are near 0 may be negative. project(corner), for the
-// corners 0 to 2, returns EdgeProjections; the caller chooses its rounding, and it is called only
-// for corners that are needed. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
+// Finds the part in floating point, up to rounding: near the boundary of two parts the result may
+// be either one, and weights of the interior that are near 0 may be negative. project(corner), for
+// corners 0 to 2, returns EdgeProjections, rounded as the caller chooses; it is called only for the
+// corners needed. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
 template <typename Project>
 inline TriangleNearest FindNearestOnTriangle(Project project) {
   const EdgeProjections from_a = project(0);

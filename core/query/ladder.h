@@ -20,16 +20,15 @@ namespace hulld {
 
 // A relation and, for Purpose::kEvidence, its evidence.
 struct Decision {
-  // Not defaulted: a compiler would then clear the storage for every kind of axis, half a kilobyte.
+  // A defaulted constructor would clear the storage for every kind of axis, half a kilobyte.
   Decision() {}  // NOLINT
 
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
   std::variant<std::monostate, Vector, IntegerVector> axis;
-  // Overlapping: none, or four pairs with differences that contain 0 strictly inside their hull.
-  // Touching: none, or three pairs, repetitions included, with differences that contain 0 in their
-  // hull.
+  // Overlapping: none, or four pairs; the hull of their differences contains 0 strictly inside.
+  // Touching: none, or three pairs, repetitions included; the hull of their differences contains 0.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
   uint64_t directions_tried = 0;
@@ -44,8 +43,8 @@ enum class Purpose {
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound
 // proves it: bounding spheres; the suggestion of the cache; for the relation alone, bounds of the
 // hulls along the line of their centers; the hulls in floating point; exact arithmetic. Fills
-// `decision`, which must be as constructed. Requires: tolerance >= 0. Updates the cache, which may
-// be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,
+// `decision`, which must be newly constructed. Requires: tolerance >= 0. Updates the cache, which
+// may be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,
 // returned true; only the exact rung polls it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     const std::function<bool()>& should_stop, Decision& decision);

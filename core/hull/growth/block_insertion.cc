@@ -149,8 +149,8 @@ class BlockInsertion {
     lists.Take(outside, seen);
   }
 
-  // Returns the points of a sample that the map of directions cannot reject, nor, if there are
-  // many, a finer map.
+  // Returns the points of a sample that neither the map of directions nor, if many remain, a finer
+  // map can reject.
   std::vector<Vector> SurvivorsOf(size_t stride) {
     surface_.MeasureBefore(vertices_, points_.size() / stride, kBlockMapFineness,
                            kBlockWalksPerPoint, poll_);

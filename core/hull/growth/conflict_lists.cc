@@ -81,7 +81,8 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
   return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
 }
 
-// After some insertions, all of them far out, most of a cloud is inside or never will be.
+// True if most points are outside, judged after the first insertions. These add far points, so most
+// of a cloud is inside by then, or never will be.
 bool ConflictLists::IsMostlyOutside(size_t insertions) {
   if (insertions != kTrialInsertions || !is_trial_) return false;
   return 8 * (waiting_ + insertions) > 7 * taken_;

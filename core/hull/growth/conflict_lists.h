@@ -38,8 +38,8 @@ class ConflictLists {
   ConflictLists(Surface& surface, VertexTable& vertices, StopPoll& poll)
       : surface_(surface), vertices_(vertices), poll_(poll) {}
 
-  // Takes points anywhere; points inside are counted and dropped. Requires: no pending points.
-  // Cost: as many tests a point as the surface has triangles.
+  // Takes points at any location; points inside are counted and dropped. Requires: no pending
+  // points. Cost: one test per point and triangle of the surface.
   void Take(std::span<const Vector> points);
   // Takes points that see seen[i] strictly. Requires: no pending points.
   void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
@@ -94,13 +94,14 @@ class ConflictLists {
   size_t waiting_ = 0;
   size_t taken_ = 0;
   size_t moved_ = 0;
-  // True if points from anywhere were taken.
+  // True if the points were taken without triangles that they see.
   bool is_trial_ = false;
   // Largest absolute coordinate of a point.
   double size_ = 0;
 
   // Scratch for a distribution: the lists to empty, their blocks, the targets' planes, the results
-  // of MatchPlanes, and, by match + 1, the number of points and the place of the next one.
+  // of MatchPlanes, and, indexed by match + 1, the number of points and the position of the next
+  // one.
   std::vector<List> sources_;
   ScratchList<const PointBlock*> source_blocks_;
   std::vector<PlaneWithBound> planes_;

@@ -73,13 +73,13 @@ class HullBuilder {
   // Returns the vertices, in no particular order. Adding them to an empty builder yields the same
   // hull. Cost: O(V).
   std::vector<Vector> Vertices() const;
-  // Returns the vertices created by the last successful Add, as many as its counts call outside.
+  // Returns the vertices created by the last successful Add; their number is its counts' `outside`.
   // Adding them to the builder's previous state yields the same hull. Cost: O(points of that
   // block).
   std::vector<Vector> NewVertices() const;
 
-  // Memory, by capacities, in bytes. Below 230 a vertex from 1000 vertices on; inside points are
-  // not kept. Cost: O(1) from dimension 3 on.
+  // Memory, by capacities, in bytes. Below 230 bytes per vertex from 1000 vertices on; inside
+  // points are not kept. Cost: O(1) from dimension 3 on.
   size_t MemoryBytes() const;
   // Size of the last Add's journal when it ended, in bytes, beyond MemoryBytes(). At most
   // proportional to its changes, regardless of the size of the hull; 0 if its limits could not end

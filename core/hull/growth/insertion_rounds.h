@@ -12,9 +12,9 @@
 
 namespace hulld {
 
-// The numbers 0 ... n-1 in rounds, each four times the previous one, with every round spread evenly
-// and irregularly over all of them: a biased randomized insertion order without a permutation in
-// memory. Source: Amenta, Choi and Rote 2003, Incremental Constructions con BRIO.
+// Divides the numbers 0 ... n-1 into rounds, each four times as large as the previous one and
+// spread evenly but irregularly over all numbers: a biased randomized insertion order that stores
+// no permutation. Source: Amenta, Choi and Rote 2003, Incremental Constructions con BRIO.
 class InsertionRounds {
  public:
   // Requires: n < 2^32.

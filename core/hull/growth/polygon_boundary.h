@@ -32,8 +32,8 @@ class PolygonBoundary {
            journal_.capacity() * sizeof(Change);
   }
 
-  // Journal of changes: starts it; restores the state at its start; ends it and keeps the changes;
-  // returns its size. The table undoes its vertices itself. Cost: the changes.
+  // Journal of changes: StartJournal starts it, Undo restores the state at its start, EndJournal
+  // keeps the changes. The table undoes its vertices itself. Cost: the changes.
   void StartJournal() { has_journal_ = true; }
   void Undo();
   void EndJournal() {

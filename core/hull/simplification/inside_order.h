@@ -23,7 +23,7 @@ class InsideOrder {
   InsideOrder(const InsideOrder&) = delete;
   InsideOrder& operator=(const InsideOrder&) = delete;
 
-  // The fewest vertices that this order starts with.
+  // The number of vertices that this order starts with, the fewest that it supports.
   size_t least() const { return least_; }
   // Returns the number of leading vertices that reduces the error to `error`, or `most` if that is
   // not reached earlier. At least least(). Requires: most >= least().

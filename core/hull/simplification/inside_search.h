@@ -17,10 +17,10 @@ namespace hulld {
 // Chooses vertices of a hull of dimension 2 or 3: few for a given error, or a given number for a
 // small error.
 //
-// Starts with farthest first. For a solid, attempts to improve: spreads somewhat fewer vertices
-// more evenly (Relaxation), and continues farthest first from there until the error is reached or
-// the vertices are used up. Each attempt continues from the end of the previous one. The best
-// choice found counts, so the result is never worse than farthest first alone.
+// Starts with farthest first. For a solid, then tries to improve the choice: each attempt takes the
+// previous attempt's vertices, spreads somewhat fewer of them more evenly (Relaxation), and
+// continues farthest first until the error is reached or the vertices are used up. The best choice
+// found counts, so the result is never worse than farthest first alone.
 class InsideSearch {
  public:
   // max_error: the caller's length unit; 0: no limit. most: vertices, at least dimension + 1 and at

@@ -35,8 +35,8 @@ class SupportFunction {
   double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 
  private:
-  // A box of order_[first, end), and the index of its second half; the first half is the next node.
-  // 0: a leaf.
+  // The box of the vertices order_[first, end). The first half is the next node; `second_half` is
+  // the index of the second half, 0 for a leaf.
   struct Node {
     Vector low;
     Vector high;

@@ -18,14 +18,14 @@ namespace hulld {
 // A growing subset of the vertices of a hull of dimension 3. The next one is always the vertex
 // farthest from the hull of the chosen ones, as far as rounding permits.
 //
-// The hull of the chosen vertices grows exactly, like any hull, and each other vertex waits in the
-// list of a triangle that it sees strictly: a vertex of the whole is outside the hull of any other
-// vertices. The distance to that triangle bounds the distance to the hull. A vertex is assigned to
-// the triangle with the plane that it is highest above, which is the nearest if the vertex lies
-// over it. Later triangles may be nearer; this is tested only when a vertex appears to be the
-// farthest of all. Source: Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists; Kamenev
-// 1992, A Class of Adaptive Algorithms for Approximating Convex Bodies by Polyhedra, for the order
-// and its quality.
+// The hull of the chosen vertices grows exactly, like any hull. Each remaining vertex waits in the
+// list of a triangle that it sees strictly; one exists, because each vertex of the full hull is
+// outside the hull of any other vertices. The distance to that triangle bounds the distance to the
+// hull. A vertex is assigned to the triangle with the plane that it is highest above, which is the
+// nearest triangle if the vertex lies over it. Later triangles may be nearer; this is tested only
+// when a vertex appears to be the farthest of all. Source: Barber, Dobkin and Huhdanpaa 1996
+// (Quickhull) for the lists; Kamenev 1992, A Class of Adaptive Algorithms for Approximating Convex
+// Bodies by Polyhedra, for the order and its quality.
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must

@@ -64,9 +64,9 @@ class MapFrame {
 // the coordinates of a frame.
 class DirectionMap {
  public:
-  // The location of a point: its cell, that cell's first corner among all corners, the position
-  // from there to the opposite corner along either side, from 0 to 1, and its distance m from c,
-  // the largest absolute component in the frame.
+  // The location of a point: its cell, the index of the cell's first corner, the position in the
+  // cell along both sides, from 0 to 1, and the distance m from c, the largest absolute component
+  // in the frame.
   struct Place {
     size_t cell;
     size_t corner;

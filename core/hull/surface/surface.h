@@ -92,7 +92,7 @@ class Surface {
     TriangleId triangle;
   };
   // Locates a point; fast if the last point in its cell of the map was near it. Returns nothing if
-  // the walk is longer than the surface warrants. Requires: a known interior point.
+  // the walk exceeds the length expected for the surface. Requires: a known interior point.
   std::optional<Location> Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
     const size_t cell = directions_->PlaceOf(point).cell;
@@ -132,14 +132,16 @@ class Surface {
   // Returns the insertion steps since the last call, for a poll: one for each insertion, and more
   // for insertions that change many triangles or search many for their place.
   uint64_t TakeSteps() { return std::exchange(steps_, 0); }
-  // Call before many insertions: measures the surface for its present size during them.
+  // Call before many insertions: starts to measure the surface for its present size, if it has
+  // doubled.
   void BeginInsertions(const VertexTable& vertices);
-  // Completes the deferred housekeeping of insertions in two steps.
+  // Call after insertions by RemoveVisible and JoinToBoundary, which defer housekeeping to this
+  // call.
   void FinishInsertions(const VertexTable& vertices);
 
-  // Journal of changes: starts it; restores the state at its start, except hints for walks; ends it
-  // and keeps the changes. Requires: no journal for the first, a journal for the second and third.
-  // Cost: the changes.
+  // Journal of changes: StartJournal starts it, Undo restores the state at its start except hints
+  // for walks, EndJournal keeps the changes. Requires: no journal for StartJournal, a journal for
+  // the other two. Cost: the changes.
   void StartJournal();
   void Undo();
   void EndJournal();
@@ -153,11 +155,12 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Remeasures the surface if a map is worth that for looking up `points` points; if the surface
-  // has changed much since the last measurement, around a center and in a frame for its present
-  // shape. fineness: the map has at most this many times the cells per side of a map for single
-  // points. Returns true if it remeasured; false also if no interior point is known or the poll
-  // stopped, with walks as its steps. Cost: at most `walks_per_point` walks for each point.
+  // Remeasures the surface if the map is worth that for looking up `points` points. If the surface
+  // has changed much since the last measurement, the new map has a center and a frame for its
+  // present shape. fineness: the map has at most this many times as many cells per side as a map
+  // for single points. Returns true if it remeasured; false also if no interior point is known or
+  // the poll stopped, with walks as its steps. Cost: at most `walks_per_point` walks for each
+  // point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll);
   // False if the map rejected too few of the points looked up since the last measurement.
@@ -229,8 +232,8 @@ class Surface {
   // for all. As the polytope grows, early measurements are low but not wrong.
   struct Measurement {
     DirectionMap map;
-    // Triangles at which the directions leave the surface: of the last row's corners before the
-    // current one, and of the previous row's corners from there on.
+    // Triangles at which the corners' directions leave the surface: of the current row before the
+    // current corner, and of the previous row from there on.
     std::vector<TriangleId> hint;
     // The previous value of the last entry.
     TriangleId hint_before = 0;

@@ -88,8 +88,8 @@ double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
 
 // Crosses edges that have the point on their far side. The ray from the interior point through the
 // point meets the plane of the next triangle no later, and sooner unless both are coplanar. A walk
-// can therefore cycle only among coplanar triangles, and not for ever after it starts to choose at
-// random. Returns nothing if the walk is longer than the surface warrants.
+// can therefore cycle only among coplanar triangles, and leaves the cycle after it starts to choose
+// at random. Returns nothing if the walk exceeds the length expected for the surface.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
                                                double size, TriangleId start,
                                                uint64_t& steps) const {

@@ -47,9 +47,9 @@ struct BodyCounts {
 // of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
 //
 // The search descends two box trees simultaneously, nearest boxes first. If only the relation and
-// the clearance are requested, it stops at the first pair that no other pair can outdo, and names
-// that pair. If further details are requested, it names the pair with the least separation.
-// Swapping A and B mirrors the answer, and the named pair does not depend on threads.
+// the clearance are requested, it stops at the first pair that settles both, and names that pair.
+// If further details are requested, it names the pair with the least separation. Swapping A and B
+// mirrors the answer, and the named pair does not depend on threads.
 //
 // Certificates do not count among these details. If requested, the certificates of pieces that
 // prove the relation are found after the relation is known.

@@ -24,10 +24,9 @@ struct PieceCertificate {
 
 // Finds, in steps, the certificates that prove the relation of two bodies, in ascending order of
 // A's piece, then B's. OVERLAPPING: one certificate, for the deciding pair. TOUCHING and SEPARATED:
-// one for each pair not settled by its boxes, the least boxes of both pieces along the world axes,
-// over the real numbers. Pairs with disjoint boxes need no certificate, because a verifier can
-// compute the boxes from vertices and poses. The boxes here are rounded outwards, so a few pairs
-// may be certified without need.
+// one for each pair, except pairs of pieces with disjoint exact bounding boxes along the world
+// axes: a verifier can compute these boxes from vertices and poses. The boxes here are rounded
+// outwards, so a few pairs may be certified without need.
 //
 // Cost: six support points for each piece, O(log n) boxes for each piece of A, and the exact
 // relation of each certified pair.

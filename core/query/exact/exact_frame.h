@@ -8,7 +8,7 @@
 
 namespace hulld {
 
-// A rotation over the integers: it maps p to rows p / norm. Common factors that are cheap to find
+// A rotation over the integers: it maps p to (rows p) / norm. Common factors that are cheap to find
 // are removed, so that the identity and rotations by 90, 120 and 180 degrees have entries of 0, 1
 // and -1 and the norm 1, for any scale of their quaternions.
 struct SmallRotation {

@@ -23,14 +23,14 @@ struct ExactSearchResult {
   // if separated.
   std::optional<IntegerVector> axis;
   uint64_t directions_tried = 0;
-  // Touching, if known: pairs with differences that contain 0 in their hull, with repetitions.
+  // Touching, if known: pairs, with repetitions; the hull of their differences contains 0.
   uint32_t pair_count = 0;
   std::array<VertexPair, 3> pairs = {};
 };
 
 // The integers of an exact search. The answer is the same for all widths, axis and pairs included.
 enum class ExactWidth {
-  kNarrowest,  // the least that are certain to hold every number that may come up
+  kNarrowest,  // the narrowest that certainly hold every number of the search
   k1Word,      // coordinates of 55 bits
   k2Words,     // of 119
   k3Words,     // of 183
@@ -40,9 +40,9 @@ enum class ExactWidth {
 
 // Decides the relation of two non-empty hulls exactly. `end`: the final state of a floating-point
 // search without a verdict, which usually shows the relation at once; may be null. `with_axis`:
-// requests the axis, at an extra cost if it is not needed anyway in integers of any size. `width`,
-// for tests: FAILED_PRECONDITION if the pair's numbers may exceed it. CANCELLED: should_stop, which
-// may be empty, returned true.
+// requests the axis, at the cost of its conversion to integers of any size. `width`, for tests:
+// FAILED_PRECONDITION if the pair's numbers may exceed it. CANCELLED: should_stop, which may be
+// empty, returned true.
 //
 // A flat Minkowski difference C, of dimension below 3, has no interior. Either its plane or line
 // misses the origin, or C is thickened along coordinate axes outside its span. Thickening preserves

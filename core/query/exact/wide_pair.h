@@ -245,8 +245,8 @@ class WidePair {
     std::array<Coordinates, kKept> kept;
   };
 
-  // Returns the candidates that floating point leaves of a large hull. Empty for a small hull, to
-  // stand for all vertices.
+  // Returns the candidates of a large hull that floating point cannot exclude. For a small hull,
+  // returns an empty list, which stands for all vertices.
   template <typename Candidates>
   std::span<const uint32_t> CandidatesOf(const Side& side, const Direction& n,
                                          Candidates candidates) const {
@@ -272,8 +272,8 @@ class WidePair {
             WideIntegerOf<kWords>(t.z(), exponent)};
   }
 
-  // Returns the norm of a hull's rotation times its translation over 2^exponent. With the rows and
-  // norm n_B of a body, and n_P of its piece: n_P (rows_B t_P + n_B t_B).
+  // Returns the norm of a hull's rotation times its translation over 2^exponent. For a piece P of a
+  // body B with norms n_P and n_B: n_P (rows_B t_P + n_B t_B).
   static Coordinates ScaledTranslation(const PlacedHull& placed, const SmallFrame::Side& side,
                                        int exponent) {
     Coordinates scaled;

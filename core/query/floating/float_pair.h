@@ -101,7 +101,7 @@ class FloatPair {
   static Vector InnerPoint(const PlacedHull& placed);
   // Returns the greatest amount by which a candidate's value may be below the maximum. Products of
   // edges may be outside the range of directions. Even then nothing overflows, and the underflow,
-  // 2^-1070, is far below the part of `error`, which is at least 2^-41 S^3.
+  // 2^-1070, is far below the contribution of `error`, at least 2^-41 S^3.
   double Slack(const PlainVector& n_W, double error) const {
     return 2 * (kSupportErrorFactor * LargestComponent(n_W) * size_) +
            kDirectionErrorFactor * error * size_;

@@ -148,10 +148,10 @@ class Simplex {
     }
   }
 
-  // Finds the nearest part of the triangle of the newest corner p, and of p + e and p + f. The edge
-  // between the latter two and its ends are not nearest, because p was farther toward the origin;
-  // so three of the seven parts that FindNearestOnTriangle distinguishes need no test. `normal`: e
-  // x f.
+  // Finds the nearest part of the triangle p, p + e, p + f, with p its newest corner. The edge
+  // opposite to p and the ends of that edge are not nearest, because p was farther toward the
+  // origin; so three of the seven parts that FindNearestOnTriangle distinguishes need no test.
+  // `normal`: e x f.
   enum class Part { kCorner, kEdgeToQ, kEdgeToR, kInside };
   static Part NearestPart(const PlainVector& p, const PlainVector& e, const PlainVector& f,
                           const PlainVector& normal, PlainVector& n) {
@@ -335,9 +335,10 @@ class FloatSearch {
     return false;
   }
 
-  // Returns true if |separation| <= tolerance is certain: A - B has a point that near to the origin
-  // and, along some direction, reaches no farther than that beyond it. `farthest` is the vertex
-  // farthest along n. Tests the reach first, because a reach that is too long is cheap to detect.
+  // Returns true if |separation| <= tolerance is certain: A - B has a point within the tolerance of
+  // the origin and, along some direction, reaches at most the tolerance beyond it. `farthest` is
+  // the vertex farthest along n. Tests the reach first, because a reach that is too long is cheap
+  // to detect.
   bool IsWithinTolerance(const PlainVector& n, const FloatPair::Support& farthest, double error) {
     if (!reach_is_short_) {
       const double allowed = tolerance_ * Norm(n);

@@ -18,7 +18,7 @@ struct FloatSearchResult {
   // Separated: n.(a - b) < 0 throughout, exactly as given. Otherwise the last direction tried, a
   // hint.
   Vector axis = Vector::Zero();
-  // Overlapping: four pairs with differences that contain the origin strictly inside their hull.
+  // Overlapping: four pairs; the hull of their differences contains the origin strictly inside.
   // Otherwise the end of the search, a hint.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
@@ -28,15 +28,14 @@ struct FloatSearchResult {
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
 // 1988), but only until the sign of the separation shows. The walk may err; every claim is
 // certified. SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside
-// a tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: both
-// a point of A - B and a plane that A - B does not reach beyond are within the tolerance of the
-// origin. `first`: the initial direction, for example from A's center to B's. Requires:
-// pair.usable().
+// a tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a
+// point of A - B and a supporting plane of A - B are both within the tolerance of the origin.
+// `first`: the initial direction, for example from A's center to B's. Requires: pair.usable().
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first);
 
-// Proves the suggestion of an earlier query's cache again; undecided if it cannot. Requires:
-// pair.usable(), and that the pairs of the cache are vertices of these hulls.
+// Proves the cached suggestion of an earlier query at the present poses; undecided if that fails.
+// Requires: pair.usable(), and that the pairs of the cache are vertices of these hulls.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);
 
 }  // namespace hulld

@@ -32,13 +32,14 @@ namespace hulld {
 // corners of its cell, and the same mean of their values bounds its value. For a round hull, the
 // loss shrinks with the square of the cell width.
 //
-// A cell is computed when a direction first leads into it, or on the second time: most hulls are
-// viewed from few sides. Its content does not depend on the time of computation. Thread-safe.
+// A cell is computed when the first direction, or the second, leads into it (Making), because most
+// hulls are viewed from few sides. Its content does not depend on the time of computation.
+// Thread-safe.
 class CenterBounds {
  public:
-  // When to compute a cell. At the first look, answers do not depend on earlier queries. At the
-  // second look, a hull with few queries costs less, because a cell costs as much as several
-  // queries; until then the bounds of the cell are unknown.
+  // Time at which a cell is computed. kAtFirstLook: answers do not depend on earlier queries.
+  // kAtSecondLook: a hull with few queries costs less, because a cell costs as much as several
+  // queries; the bounds of the cell are unknown until then.
   enum class Making { kAtFirstLook, kAtSecondLook };
 
   // Has no bounds: every bound is unknown.

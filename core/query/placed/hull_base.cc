@@ -78,8 +78,8 @@ void HullBase::Measure() {
   for (const Vector& p : points_) radius_ = std::max(radius_, RadiusTo(p - center_));
 }
 
-// Adds the point of largest size, in floating point, for which is_off holds: it is off the span so
-// far. The first of equal points wins.
+// Adds the point with the largest size, in floating point, among the points that is_off shows to be
+// outside the present span. The first of equal points wins.
 template <typename Size, typename IsOff>
 void HullBase::SpanWith(Size size, IsOff is_off) {
   uint32_t farthest = 0;

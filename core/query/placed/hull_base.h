@@ -33,7 +33,8 @@ struct MappedPoints {
 class HullBase {
  public:
   // Takes the vertices of a canonical snapshot, which must outlive the base. The result is
-  // prepared. should_stop: as for SupportMap, whose stopped() tells if the base is usable.
+  // prepared. should_stop: as for SupportMap; the base is not usable if its support map has
+  // stopped().
   HullBase(const Hull& hull, const std::function<bool()>& should_stop);
   // Takes one or more points with a hull of this dimension. The result is prepared.
   HullBase(MappedPoints mapped, int dimension);

@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// A growing hull that can be queried at every step at the price of a resting one.
+// A growing hull that can be queried at every step at the cost of a static one.
 //
 // A query needs a support function, and the support function of a union is the maximum over its
 // parts. A hull is therefore a prepared base, a few prepared levels, and a tail of the points that

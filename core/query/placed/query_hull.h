@@ -33,8 +33,8 @@ class QueryHull {
  public:
   // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.
   explicit QueryHull(const Hull& hull) : QueryHull(hull, {}) {}
-  // CANCELLED: should_stop, which may be empty, returned true. It is polled every few milliseconds,
-  // and the memory needed meanwhile is O(V).
+  // CANCELLED: should_stop, which may be empty, returned true. It is polled every few milliseconds.
+  // Temporary memory: O(V).
   static absl::StatusOr<QueryHull> Prepare(const Hull& hull,
                                            const std::function<bool()>& should_stop);
 

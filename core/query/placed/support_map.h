@@ -32,9 +32,9 @@ namespace hulld {
 // oblong set are filled evenly.
 //
 // For points along a curve, as in a polygon, a prism or a cone, each cell may list many points
-// however small it is: all lists together would take about V^1.5. Squares with parts that list
-// points too often get no list, and directions there are looked up in a tree of boxes
-// (SupportTree).
+// however small it is: all lists together would take about V^1.5. A square is therefore left
+// without a list if its parts would list points too often; directions there are looked up in a tree
+// of boxes (SupportTree).
 //
 // The set need not be convex: points inside its hull are listed in few cells or in none, and flat
 // sets need no special case. Squares are widened by kCellMargin, so that a list also contains every

@@ -18,9 +18,9 @@
 namespace hulld {
 namespace {
 
-// Candidates are gathered for a window of consecutive placements. A window has about as many
-// placements as produced kCandidatesPerWindow candidates in the previous window, enough to keep the
-// threads busy.
+// Candidates are gathered for a window of consecutive placements. A window holds about as many
+// placements as would have produced kCandidatesPerWindow candidates in the previous window, enough
+// to keep the threads busy.
 constexpr uint64_t kCandidatesPerWindow = 16384;
 constexpr uint32_t kFirstPlacements = 16;
 constexpr uint32_t kMostPlacements = 1024;

@@ -13,9 +13,9 @@ namespace hulld {
 // A proof of a relation. Independent code can check it in O(V) exact operations from the vertices
 // and the poses.
 //
-// SEPARATED: the direction n, world frame, with max n.A < min n.B. TOUCHING: n not zero, max n.A <=
-// min n.B, and at most four pairs with differences that contain 0 in their hull. OVERLAPPING: no
-// direction, and at most six pairs with differences that contain 0 strictly inside their hull
+// SEPARATED: a direction n, world frame, with max n.A < min n.B. TOUCHING: n not zero, max n.A <=
+// min n.B, and at most four pairs; the hull of their differences contains 0. OVERLAPPING: no
+// direction, and at most six pairs; the hull of their differences contains 0 strictly inside
 // (Steinitz 1913). The direction is exact as given and of any length: in doubles if these suffice,
 // otherwise in integers.
 struct Certificate {

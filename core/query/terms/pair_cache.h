@@ -10,8 +10,8 @@
 namespace hulld {
 
 // A suggestion left by a query for the next query of the same two hulls at other poses: an axis
-// that separated them, or vertex pairs with differences that surrounded the origin. It is never an
-// answer: the next query proves the suggestion again, or drops it. Not thread-safe.
+// that separated them, or vertex pairs; the hull of their differences contained the origin. It is
+// never an answer: the next query proves the suggestion again, or drops it. Not thread-safe.
 struct PairCache {
   // World frame, from A toward B.
   std::optional<Vector> axis;

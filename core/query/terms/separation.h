@@ -16,8 +16,8 @@ struct Separation {
 
 // Points of A and B (world frame) that attain the separation. Separated: the nearest points.
 // Touching: a common point. Overlapping: points that coincide after the shortest translation that
-// ends the overlap. `error`: the distance of each point from a point of its hull, and from
-// attaining the separation, is at most this. If several pairs are equally good, one of them.
+// ends the overlap. `error` bounds the distance of each point from its hull, and from a point that
+// attains the separation. If several pairs are equally good, one of them.
 struct Witness {
   Vector p_WA;
   Vector p_WB;
