@@ -245,8 +245,8 @@ bool Server::Drain(std::chrono::milliseconds timeout) {
     const auto left = deadline - std::chrono::steady_clock::now();
     grpc_server_->Shutdown(std::chrono::system_clock::now() + left);
   });
-  // A server that is idle only after the deadline has cancelled calls, however late this thread
-  // notices.
+  // A server that became idle only after the deadline has cancelled calls, even if this thread
+  // notices late.
   const bool is_idle = admission_.WaitIdle(deadline) && std::chrono::steady_clock::now() < deadline;
   closing.join();
   return is_idle;

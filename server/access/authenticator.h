@@ -30,7 +30,7 @@ class Authenticator {
 
   // Returns true if the token of an authenticated caller is still valid, with the same rights.
   bool Knows(const Caller& caller) const;
-  // Number of changes of the tokens. Results of Authenticate stay valid while it is the same.
+  // Number of changes of the tokens. Results of Authenticate stay valid while it is unchanged.
   uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
 
  private:

@@ -37,8 +37,8 @@ class Guard {
   // Checks the files now. Thread-safe.
   void Reload();
 
-  // Sets the callback that runs after each change of the tokens, on the thread that found it; null:
-  // none. Blocks until the previous callback has returned.
+  // Sets the callback that runs after each change of the tokens, on the thread that detected it;
+  // null: none. Blocks until the previous callback has returned.
   void OnTokensChanged(std::function<void()> changed);
 
  private:

@@ -27,14 +27,14 @@ struct TlsIdentity {
 };
 
 // Reads --tls-cert, --tls-key, and --tls-client-ca, and checks that they are complete and match, so
-// that a half-done exchange of files is recognized. Requires: config.has_tls(). INVALID_ARGUMENT
+// that a partial replacement of the files is detected. Requires: config.has_tls(). INVALID_ARGUMENT
 // names the setting. An expired certificate is no error here.
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config);
 
 // Returns true if --tls-client-ca is set and its file is missing or holds no PEM block.
 bool HasLostAuthorities(const Config& config);
-// Returns the first certificate of PEM text that LoadTlsIdentity accepted. As an authority it
-// admits only the owner of its key.
+// Returns the first certificate of PEM text that LoadTlsIdentity accepted. As an authority of
+// clients, it admits only the owner of its key.
 std::string FirstCertificate(const std::string& certificates);
 
 // Returns OK if the certificate is valid at `now`. INVALID_ARGUMENT: it has expired, or is not

@@ -31,7 +31,8 @@ class TokenTable {
   // the line; it never quotes a hash.
   static absl::StatusOr<TokenTable> Parse(const std::string& text);
 
-  // Returns the owner of the token, if any. The time is independent of the matching part of a hash.
+  // Returns the owner of the token, if any. Takes the same time however long a prefix of a hash
+  // matches.
   std::optional<Caller> Find(const std::string& token) const;
 
   // Returns true if a token identifies this caller, with the same rights. Cost: O(tokens), some

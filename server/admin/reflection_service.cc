@@ -30,7 +30,7 @@ void AddFile(const FileDescriptor& file, std::set<const FileDescriptor*>& added,
   proto.SerializeToString(response->add_file_descriptor_proto());
 }
 
-// One stream of questions, each answered where it arrives.
+// A reflection stream. Each request is answered on arrival.
 class ReflectionStream
     : public ReadingStream<PulledStream<BidiReactor, reflection::ServerReflectionResponse>,
                            reflection::ServerReflectionRequest> {
@@ -48,7 +48,7 @@ class ReflectionStream
   }
 
   void OnMessage() override {
-    // The reply repeats it.
+    // The reply repeats the request.
     if (request().ByteSizeLong() > kMostRequestBytes) {
       return FinishCall(absl::InvalidArgumentError(
           absl::StrCat("the request has more than ", kMostRequestBytes, " bytes")));

@@ -140,8 +140,8 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
                       limits_.max_calls, "max-calls", kRetryCall);
   }
   size_t waiting = backlog_ ? backlog_(rpc) : 0;
-  // Tasks queued by streams, such as thousands of watches opened or notified together, keep out no
-  // single call: clients take turns.
+  // Tasks queued by streams, such as thousands of watches opened or notified together, must not
+  // crowd out single calls: clients take turns.
   if (kind == CallKind::kUnary) waiting = std::min(waiting, single_calls_);
   if (waiting >= limits_.max_waiting_calls) {
     return Overloaded(absl::StrCat(waiting, " calls wait for a thread"), limits_.max_waiting_calls,
@@ -174,7 +174,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   if (draining_) return Draining();
   const auto known = clients_.find(arrival.client);
   const Ticket::Client before = known == clients_.end() ? Ticket::Client{} : known->second;
-  // A call without a token does not begin one on its connection.
+  // A call without a token does not protect its connection from eviction.
   if (IsAnonymous(arrival.rpc) && connections_ != nullptr) {
     ticket.connection_ = connections_->Find(arrival.peer);
   }
@@ -243,7 +243,7 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
     }
     watched_changed_.notify_all();
   }
-  // The calls may leave before this returns.
+  // The calls may end before this returns.
   for (const std::function<void()>& end_call : waiting) end_call();
   return count;
 }
@@ -287,7 +287,7 @@ void Admission::CancelOverdue() {
       watched_.front().is_cancelled = true;
       cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
     }
-    // gRPC may call back, and the calls may leave, before this returns.
+    // gRPC may call back, and the calls may end, before this returns.
     lock.unlock();
     if (is_revoked) {
       grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,

@@ -54,10 +54,11 @@ bool UsesWriters(Rpc rpc);
 // revoked token, and cancels overdue calls that neither end nor poll, for example because the
 // client stopped reading.
 //
-// Each client has a share of calls, streams and batches. A part of all calls, and of each client's,
-// is reserved for single calls, so long calls never keep them out. Calls that need no token have
-// their own share, so they never keep out calls with a token, and they do not save their connection
-// from eviction. The first watch of health of a connection is free, because clients open one.
+// Each client has a share of calls, streams and batches. A part of all calls, and of each client's
+// share, is reserved for single calls, so that long calls never crowd them out. Calls without a
+// token have a share of their own, so that they never crowd out calls with a token, and they do not
+// protect their connection from eviction. The first health watch of a connection counts toward no
+// share, because clients open one by themselves.
 class Admission {
  public:
   // Sets the authenticator. Call before the first call; it must outlive this. Without one, all
@@ -135,7 +136,8 @@ class Admission {
   // Requires that no call runs.
   ~Admission();
 
-  // A client with more running calls than this takes turns with its own connections for every call.
+  // A client with more running calls than this gets no answer on arrival: its calls, and those of
+  // each of its connections, take turns in the pools.
   static constexpr uint64_t kFewCalls = 16;
 
   const Limits& limits() const { return limits_; }
@@ -144,8 +146,8 @@ class Admission {
   // Memory of the admitted requests.
   RequestMemory& request_memory() { return request_memory_; }
 
-  // Sets the function that returns the length of the queue a call would join, bounded by
-  // --max-waiting-calls. Call before the first call.
+  // Sets the function that returns the length of the queue that a call would join;
+  // --max-waiting-calls bounds it. Call before the first call.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
   // Properties of a call that admission depends on.

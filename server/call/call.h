@@ -24,7 +24,8 @@ namespace hulld::server {
 
 // Common part of all running calls, unary or stream: a member of each reactor with its lifetime.
 //
-// Begin comes first and End last, one time each. All functions may be called on any thread.
+// Begin must be called first and End last, each exactly once. All functions may be called on any
+// thread.
 class Call {
  public:
   // Context and admission must outlive this.

@@ -12,8 +12,8 @@ namespace hulld::server {
 class TraceContext {
  public:
   // Returns nullopt if `text` is not a traceparent: 00, a trace ID of 32 digits, a parent ID of 16
-  // and flags of 2, all in lower-case hexadecimal, separated by "-"; neither ID is zero. Of a
-  // version later than 00, only the fields defined by version 00 are parsed.
+  // and flags of 2, all in lower-case hexadecimal, separated by "-"; neither ID is zero. For a
+  // version later than 00, only the fields that version 00 defines are parsed.
   static std::optional<TraceContext> Parse(std::string_view text);
 
   std::string trace_id() const { return text_.substr(kTraceId, 32); }

@@ -27,10 +27,10 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 
 // hulld.v1.CollisionService: implements the contract in collision.proto on core's queries. A single
 // pair is answered on arrival, on gRPC's thread, if only its relation is wanted and its hulls are
-// of moderate size and ready (PairQuestion). Everything else runs on `pool`: single pairs and steps
-// of streams ahead of slices of batches, scenes and long steps. Work that may wait for the store,
-// or that builds canonical snapshots, runs on `readers` (hulls of a pair) or `long_readers` (hulls
-// of many). Pairs for TEXTBOOK_SAT are answered in slices that alternate with other calls.
+// of moderate size and ready (PairQuestion). Everything else runs on `pool`: single pairs and short
+// steps of streams before slices of batches, scenes and long steps. Work that may wait for the
+// store, or that builds canonical snapshots, runs on `readers` (hulls of a pair) or `long_readers`
+// (hulls of many). Pairs for TEXTBOOK_SAT are answered in slices that alternate with other calls.
 class CollisionService : public CollisionServiceOfBytes {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,

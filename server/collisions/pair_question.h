@@ -50,9 +50,9 @@ class PairSide {
 };
 
 // A CheckCollision call about two placements, each a hull or a body. It is answered in slices, so
-// that other calls get their turn: a query of two hulls in one, of which the largest takes some
-// milliseconds; the textbook's test and a search of bodies in as many as they take. Used by one
-// thread at a time.
+// that other calls get their turn. A query of two hulls takes one slice, of some milliseconds at
+// most; the textbook's test and a search of bodies take as many as they need. Used by one thread at
+// any time.
 class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
  public:
   // Reads everything except the hulls. `call` must not end before the question is answered.
@@ -62,8 +62,9 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   const PlacedLookup& lookup() const { return lookup_; }
   const std::function<bool()>& should_stop() const { return options_.should_stop; }
 
-  // Ends the call: with the error of `resolved`, the result of looking ids() up; at once if the
-  // answer takes some microseconds; otherwise on the pool, ahead of batches in the first slice.
+  // Answers and ends the call. resolved: the result of looking up ids(); its error ends the call.
+  // An answer that takes some microseconds is computed immediately; any other on the pool, with its
+  // first slice before those of batches.
   void Answer(absl::StatusOr<Resolved> resolved, TaskPool& pool);
 
  private:

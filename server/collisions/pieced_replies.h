@@ -68,10 +68,10 @@ struct PieceThreads {
   WaitingCalls& waiting;
 };
 
-// A stream with answers computed in pieces by all threads of a pool and sent in order. One slice at
-// a time works on a piece, each of about TaskPool::kSliceTime, so that other calls get their turn.
-// A bounded number of pieces is in flight, each with a bounded number of bytes; while a bounded
-// number of bytes is unsent, no slice starts, and no more of the head is queued. So memory is
+// A stream with answers computed in pieces by all threads of a pool and sent in order. A piece is
+// computed in slices of about TaskPool::kSliceTime, one after another, so that other calls get
+// their turn. A bounded number of pieces is in flight, each with a bounded number of bytes; while
+// too many bytes are unsent, no slice starts, and no more of the head is queued. So memory is
 // bounded, and a client that does not read delays no other client. The call's memory, HeldBytes and
 // answers in flight, counts against --memory-limit.
 //
@@ -89,9 +89,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
   // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
-  // Maximum size of a reply that is merged with the queued one, and of a reply that waits to be
-  // merged while slices run, though not much longer than kMostWait: a write costs both sides as
-  // much as a hundred pairs.
+  // A reply of at most kSmallReplyBytes is merged with the last queued one, because a write costs
+  // both sides as much as a hundred pairs. While slices run, a queued reply of that size waits to
+  // be merged, for about kMostWait.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
   static constexpr std::chrono::milliseconds kMostWait{2};
 
@@ -240,8 +240,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // RESOURCE_EXHAUSTED: no room for the call's memory. A small call is admitted all the same,
-  // because hulls in memory are served to calls that name few.
+  // RESOURCE_EXHAUSTED: no room for the call's memory. A small call is admitted regardless, so that
+  // calls about a few hulls in memory are always served.
   absl::Status Charge() {
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);

@@ -44,7 +44,7 @@ void ReplaceStream::OnMessage() {
   });
 }
 
-// Does all except building.
+// Handles a message, except for building.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
   switch (request().message_case()) {
@@ -105,7 +105,7 @@ void ReplaceStream::Commit() {
   // The registry answers on another thread after the commit.
   const Store& store = registry_.store();
   const auto done = [this, &store](const absl::StatusOr<ReplaceResult>& result) {
-    // Counted twice since the registry took it, which at worst evicts a snapshot.
+    // The memory was counted twice after the registry took it; at worst, that evicted a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
     call().LogChange(result->created ? "hull created" : "hull replaced",

@@ -43,7 +43,7 @@ class MigrationTarget {
 
 // INVALID_ARGUMENT, FAILED_PRECONDITION, UNAVAILABLE: as RocksDbStore::Open.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenRocksDbTarget(const std::string& data_dir);
-// As PostgresStore::Open; CANCELLED: a server is active over it.
+// As PostgresStore::Open; CANCELLED: a server is active on the database.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo);
 
 }  // namespace hulld::server

@@ -15,9 +15,9 @@
 namespace hulld::server {
 
 // Open connections, limited in total and per network. A connection is idle while no call runs on
-// it. If a new one exceeds a limit, the longest idle one is evicted: of the same network for the
-// limit per network. Connections of unix sockets belong to no network, and are never idle, because
-// their calls cannot be attributed. Thread-safe.
+// it. If a new connection exceeds a limit, the longest idle one is evicted; for the limit per
+// network, the longest idle one of that network. Connections of unix sockets belong to no network,
+// and are never idle, because their calls cannot be attributed. Thread-safe.
 class ConnectionTable {
  public:
   ConnectionTable(size_t most, size_t most_of_network)

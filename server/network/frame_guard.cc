@@ -116,7 +116,7 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
       return CountControlFrame();
     case kWindowUpdate:
-      // One for every few KiB that the client reads.
+      // Clients send one for every few KiB that they read.
       return Verdict::kAllowed;
     default:
       return CountControlFrame();

@@ -47,7 +47,8 @@ class TaskPool {
   // to a half fewer pairs (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
-  // Slices of a long call. Requires at destruction: no slice is queued; let each hold its owner.
+  // Slices of a long call. Requires at destruction: no slice is queued; each slice should therefore
+  // hold a reference to the lane's owner.
   class Lane {
    public:
     // The pool must outlive this.

@@ -23,8 +23,8 @@ struct Limits {
   // pairs at their defaults.
   uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
-  // Points that one hull can receive in total. A double counts up to the default exactly; no hull
-  // reaches it.
+  // Points that one hull can receive in total. Doubles count exactly up to the default, which no
+  // hull reaches.
   uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
@@ -85,7 +85,8 @@ struct Config {
   std::string tls_cert;
   std::string tls_key;
   std::string tls_client_ca;
-  // The tokens that may call (server/access/token_table.h); empty: everyone who can connect.
+  // File of the tokens that may call (server/access/token_table.h); empty: everyone who can connect
+  // may call.
   std::string tokens_file;
   // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
   int threads = 0;

@@ -28,7 +28,7 @@ class Writer {
   std::string bytes_;
 };
 
-// Whatever is missing is zero or empty; then ok() is false from there on.
+// Missing values read as zero or empty, and ok() is false from then on.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : rest_(bytes) {}
@@ -41,7 +41,8 @@ class Reader {
     return number;
   }
   std::string NextText() { return std::string(NextBytes(Next<uint64_t>())); }
-  // A number of entries of at least this many bytes each; none when there is no room for them.
+  // Reads a number of entries of at least this many bytes each; 0, and not ok(), if the remaining
+  // bytes are too few.
   uint64_t NextCount(size_t least_bytes) {
     const uint64_t count = Next<uint64_t>();
     ok_ = ok_ && count <= rest_.size() / least_bytes;

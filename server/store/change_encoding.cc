@@ -14,7 +14,7 @@ void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string v
 
 namespace {
 
-// Deletes all of an incarnation but its record.
+// Deletes all keys of an incarnation except its record.
 void DropIncarnation(rocksdb::WriteBatch& batch, const StoredHull& hull,
                      const VertexLayout& layout) {
   const uint64_t incarnation = hull.record.create_revision;
@@ -45,8 +45,8 @@ void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
   }
 }
 
-// The first body makes the store one that an older hulld does not open: it would give the body's ID
-// to a hull.
+// The first body raises the store's format, so that an older hulld cannot open it and create a hull
+// under the ID of a body.
 void EncodeBody(rocksdb::WriteBatch& batch, const StoredBody& body, bool deleted) {
   const std::string key = BodyKey(body.record.body_id);
   if (deleted) {

@@ -65,8 +65,8 @@ class PeerFeed {
   // Recover. UNAVAILABLE: the store cannot be reached.
   virtual absl::Status Fetch() = 0;
   // Sends the query of the next Fetch, which then returns the changes committed before this call.
-  // Does not block, so any thread may call it. The next call that excludes Fetch must be Fetch. If
-  // the query cannot be sent, Fetch sends it.
+  // Does not block, so any thread may call it. Fetch must follow before the next Commit or Recover.
+  // If the query cannot be sent, Fetch sends it.
   virtual void StartFetch() {}
   // Returns the peer changes that Commit and Fetch found since the last call, also if they failed.
   virtual PeerChanges TakeChanges() = 0;

@@ -25,8 +25,8 @@
 namespace hulld::server {
 namespace {
 
-// RocksDB's diagnostics, in the server's log. It would write them to a file of its own, and abort
-// once the disk is full and that file cannot be written (observed: an assertion of 7.8).
+// RocksDB's diagnostics, in the server's log. RocksDB would write them to a file of its own, and
+// abort when the disk is full and that file cannot be written (observed: an assertion of 7.8).
 class Diagnostics : public rocksdb::Logger {
  public:
   Diagnostics() : Logger(rocksdb::InfoLogLevel::WARN_LEVEL) {}

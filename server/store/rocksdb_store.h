@@ -111,7 +111,7 @@ class RocksDbStore : public Store {
   absl::Status MakeDirectories();
   rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
-  // OpenDb, with the room of the reserve if the disk is full.
+  // Opens the database, with the space of the reserve if the disk is full.
   absl::Status OpenDbInRoom();
   // Opens the database for reading, without its lock.
   rocksdb::Status OpenForReading();
@@ -175,8 +175,8 @@ class RocksDbStore : public Store {
 
   // Held while the log is written or synced.
   std::mutex log_mutex_;
-  // The error after which the log must not be written: only reads go on, until Recover reopens the
-  // database.
+  // The error after which the log must not be written: only reads continue, until Recover reopens
+  // the database.
   absl::Status failure_;
 
   std::atomic<uint64_t> seen_failed_syncs_ = 0;

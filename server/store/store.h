@@ -23,7 +23,7 @@ namespace hulld::server {
 // Durability of a committed change.
 enum class Durability {
   kMemory,   // lost when the server ends
-  kRelaxed,  // survives the end of the server; that of the machine only after some time
+  kRelaxed,  // survives a crash of the server; of the machine only after some time
   kSync,     // on disk: survives both
 };
 
@@ -49,7 +49,7 @@ enum class VertexChange {
 struct Change {
   // The hull after the change, or the deleted hull.
   StoredHull hull;
-  // The store's revision after the change; hull.record.revision is lower where no vertex changed.
+  // The store's revision after the change; hull.record.revision is lower if no vertex changed.
   uint64_t revision = 0;
   // True if the change gets a new revision. False for points that change no vertex.
   bool takes_revision = true;

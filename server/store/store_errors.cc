@@ -12,7 +12,7 @@ namespace hulld::server {
 
 namespace {
 
-// Also where RocksDB knows only the text of the system's error.
+// Returns true if the disk is full, even if only the text of the system's error shows it.
 bool SaysDiskFull(const rocksdb::Status& status) {
   const std::string cause = status.ToString();
   return status.IsNoSpace() || absl::StrContains(cause, std::strerror(ENOSPC)) ||

@@ -43,7 +43,7 @@ absl::Status WrongSize(std::string_view value) {
       absl::StrCat("a value of ", value.size(), " bytes, which is not a valid size"));
 }
 
-// The numbers of a StoredHull, in the order in which they are kept.
+// The numbers of a StoredHull, in stored order.
 using StoredNumbers = std::array<uint64_t, 13>;
 
 }  // namespace

@@ -69,7 +69,7 @@ std::string Seal(std::string_view key, std::string value);
 absl::StatusOr<std::string_view> Unseal(std::string_view key, std::string_view sealed);
 
 std::string EncodeNumber(uint64_t number);
-// DATA_LOSS: the value has another size. So for the following decoders.
+// DATA_LOSS: the value has the wrong size. The same holds for the decoders below.
 absl::StatusOr<uint64_t> DecodeNumber(std::string_view value);
 // Encodes all fields but the ID, which is the key.
 std::string EncodeStoredHull(const StoredHull& hull);

@@ -26,14 +26,13 @@ namespace hulld::server {
 // pieces, so a known body is complete in memory, counted like memory that calls hold for long.
 //
 // Invariants:
-//   - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
-//     the ID wait in the entry and resume in order after it, or, if a peer server committed first,
-//     after its change is applied
-//     (ReadBarrier::Defer).
-//   - A body becomes visible to all readers atomically after its commit. A refusal leaves the
-//     former state.
-//   - A hull and a body never share an ID: a put is refused if a hull has it, and waits if the
-//     creation or end of a hull is in flight.
+// - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
+//   the ID wait in the entry and resume in order after it, or, if a peer server committed first,
+//   after its change is applied (ReadBarrier::Defer).
+// - A body becomes visible to all readers atomically after its commit. A refusal leaves the former
+//   state.
+// - A hull and a body never share an ID: a put is refused if a hull has it, and waits if the
+//   creation or end of a hull is in flight.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class BodyRegistry {
@@ -48,14 +47,15 @@ class BodyRegistry {
   // Loads all bodies of a store that does not find records. Call after loading the hulls.
   absl::Status Load(Locked& locked);
 
-  // Creates or replaces a body atomically for all readers, and assigns its revisions. Replies as
-  // above. Requires: valid IDs and poses (not checked), and between one and --max-pieces-per-body
-  // pieces. The hulls of the pieces need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED:
-  // if_revision does not match; RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is
-  // full; UNAVAILABLE: as above.
+  // Creates or replaces a body atomically for all readers, and assigns its revisions. Calls `done`,
+  // on this or another thread, after the change is committed or refused. Requires: valid IDs and
+  // poses (not checked), and between one and --max-pieces-per-body pieces. The hulls of the pieces
+  // need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match;
+  // RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: the store
+  // cannot be written.
   void Put(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
-  // Removes a body. Replies with the store's revision, as above.
-  // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
+  // Removes a body. Replies with the store's revision, as Put. NOT_FOUND; ABORTED: if_revision does
+  // not match; RESOURCE_EXHAUSTED: the disk is full; UNAVAILABLE: the store cannot be written.
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
   // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
   // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is

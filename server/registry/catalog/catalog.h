@@ -28,16 +28,14 @@ namespace hulld::server {
 // the outcome of changes here. The catalog makes no decisions and never blocks.
 //
 // Invariants:
-//   - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither
-//   is
-//     unknown (IsKnown). Known absence of both hull and body is an entry of the hull table.
-//   - The tables hold the last committed version of each known entry, of revision() or earlier.
-//   They
-//     also hold entries being created: a hull in kCreating, a body without a committed version.
-//   - Every change of what readers see of a hull is in recent_changes(), whatever caused it.
+// - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither is
+//   unknown (IsKnown). Known absence of both hull and body is an entry of the hull table.
+// - The tables hold the last committed version of each known entry, of revision() or earlier. They
+//   also hold entries being created: a hull in kCreating, a body without a committed version.
+// - Every change of what readers see of a hull is in recent_changes(), whatever caused it.
 //
-// Guarded by the registry's mutex, which every function requires unless it says that it takes no
-// lock.
+// Guarded by the registry's mutex, which every function requires unless its comment says that it
+// takes no lock.
 class Catalog {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;

@@ -119,7 +119,7 @@ class KnownHulls {
   std::vector<uint32_t> due_;
   // Reads from the store, in the order of processing; empty between lookups.
   std::deque<Loading> ahead_;
-  // The hulls of due_ from this index on were already scanned for hulls to read.
+  // Position in due_: the hulls from here on were already scanned for hulls to read.
   size_t ahead_end_ = 0;
   // Changes before this position were applied; empty before the first lookup.
   std::optional<uint64_t> next_change_;

@@ -152,13 +152,13 @@ class RegisteredHull {
   // A thread prepares live(), or is about to.
   bool is_preparing() const { return served_.is_preparing; }
   void SetPreparing(bool prepares) { served_.is_preparing = prepares; }
-  // Preparing starts with all points committed so far.
+  // Call when preparation starts; it covers all points committed so far.
   void ResetWear() { served_.points_since_prepared = 0; }
   // live() was prepared: the next reader gets a new version.
   void NotePrepared(Locked& locked);
   // True if most points of live() are no longer vertices. Preparing drops them, which bounds memory
-  // when points swallow each other and no reader asks. It costs a fraction of appending those
-  // points.
+  // while new points replace old vertices and no reader queries the hull. It costs a fraction of
+  // appending those points.
   bool IsWorn() const;
   uint64_t points_since_prepared() const { return served_.points_since_prepared; }
 

@@ -42,7 +42,8 @@ struct RegistryState {
   // preparers: metrics of the queue of hulls to prepare.
   RegistryState(Store& store, const Limits& limits, std::optional<PoolMetrics> preparers);
 
-  // Apply a committed change of a hull, whose HullState has left the change in flight behind.
+  // Apply a committed change of a hull. Requires: its HullState no longer counts the change as in
+  // flight.
   void ApplyCreation(Locked& locked, const HullPointer& hull, const StoredHull& stored);
   // hull: not in the catalog; takes the place of `former`.
   void ApplyReplacement(Locked& locked, const HullPointer& former, const HullPointer& hull,

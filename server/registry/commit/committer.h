@@ -37,10 +37,10 @@ struct CommitStatistics {
 // the order of their records. The completions of a refused batch run within one hold of it, which
 // makes a refusal safe: between the emptying of the queue and the last completion, no change that
 // builds on a refused one can be submitted. The completions of a committed batch release it after
-// every kMostPerHold: each change stands alone, and later submissions follow as they do during a
-// commit. The queue has its own mutex, so that the committer's thread takes the next batch without
-// waiting for the records. That mutex is taken after `order`, and no callback runs under it. No
-// lock is held during store calls.
+// every kMostPerHold: each of them leaves a consistent state, and a submission in between is like
+// one during the commit. The queue has its own mutex, so that the committer's thread takes the next
+// batch without waiting for the records. That mutex is taken after `order`, and no callback runs
+// under it. No lock is held during store calls.
 class Committer {
  public:
   // Completion of a change: OK if it is committed, else the reason for the refusal; and the change,
@@ -64,9 +64,9 @@ class Committer {
     virtual ~Peers() = default;
     // Returns the hulls that only grew and whose growth is to be fetched (PeerChange::growth).
     virtual std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const = 0;
-    // Applies the changes: after the superseded changes were refused, latest first, and before the
-    // committed changes of the same batch, which follow them, complete. No change of these IDs is
-    // in flight then.
+    // Applies the changes. Called after the superseded local changes were refused, latest first,
+    // and before the committed changes of the same batch complete, which have later revisions. No
+    // change of these IDs is in flight.
     virtual void Apply(Locked& order, const PeerChanges& changes) = 0;
     // All commits of peer servers before this time are applied: a query for them was sent then, and
     // answered.

@@ -81,8 +81,8 @@ class MemoryBudget {
     Account& operator=(const Account&) = delete;
     ~Account() { Close(); }
 
-    // Sets the memory excluding parts, and if a writer needs it and the parts; marks the account as
-    // just used. Cost: O(1).
+    // Sets the memory excluding parts; is_for_writing: a writer needs it and the parts. Marks the
+    // account as just used. Cost: O(1).
     void Set(uint64_t bytes, bool is_for_writing);
     // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
     void Hold(std::vector<std::shared_ptr<MemoryPart>> parts);

@@ -51,7 +51,7 @@ class ReadBarrier {
   }
   virtual void End() {}
 
-  // Blocks until all changes that were submitted, and that peer servers had committed, before the
+  // Blocks until all changes that were submitted here, or committed by peer servers, before the
   // call are applied. CANCELLED: should_stop, which may be empty, returned true. UNAVAILABLE: the
   // store cannot be queried. Cost: one store query, shared by all waiting calls.
   absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);

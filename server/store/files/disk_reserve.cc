@@ -28,7 +28,7 @@ IOStatus DiskReserve::Ensure() {
   if (is_made_) return IOStatus::OK();
   is_made_ = files_.FileExists(path_, IOOptions(), nullptr).ok();
   if (is_made_) return IOStatus::OK();
-  // Under its name only when it has all of its room.
+  // Renamed only after all of its space is allocated.
   const std::string unfinished = path_ + ".new";
   std::unique_ptr<rocksdb::FSWritableFile> file;
   IOStatus status = files_.NewWritableFile(unfinished, rocksdb::FileOptions(), &file, nullptr);

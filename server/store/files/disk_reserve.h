@@ -9,8 +9,7 @@
 
 namespace hulld::server {
 
-// A file that only takes room, so that there is some to give up when the disk is full. One thread
-// at a time.
+// A file that reserves disk space, which is released when the disk is full. Not thread-safe.
 class DiskReserve {
  public:
   // files must outlive this.

@@ -11,7 +11,7 @@ using rocksdb::IODebugContext;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
-// Any file that is written; its syncs are watched.
+// A file open for writing. Counts its failed syncs.
 class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
  public:
   File(LogFileSystem& system, std::unique_ptr<rocksdb::FSWritableFile> file)
@@ -71,11 +71,12 @@ class LogFileSystem::Log : public File {
     return Note(data, status);
   }
 
-  // Through the file that is open: when RocksDB closes it, it sets the size that it believes in.
+  // Truncates the open file itself, because RocksDB sets the size that it has recorded when it
+  // closes the file.
   IOStatus CutTo(uint64_t size) {
     is_cut_ = true;
     IOStatus cut = FSWritableFileOwnerWrapper::Truncate(size, IOOptions(), nullptr);
-    // Not that of this class, which refuses: the file is cut.
+    // Calls the base class, because Sync of this class refuses after a cut.
     // NOLINTNEXTLINE(bugprone-parent-virtual-call)
     if (cut.ok()) cut = FSWritableFileOwnerWrapper::Sync(IOOptions(), nullptr);
     return cut;
@@ -114,7 +115,7 @@ void LogFileSystem::NoteCommitted() {
   }
 }
 
-// A mark that could not be written stays a lower bound. Logged once for each row of failures.
+// If a write fails, the mark remains a lower bound. Logs only the first of successive failures.
 void LogFileSystem::WriteMark() {
   mark_changed_ = true;
   const IOStatus written = mark_file_->Write(mark_);
@@ -183,7 +184,7 @@ IOStatus LogFileSystem::CutUncommitted() {
   return IOStatus::OK();
 }
 
-// One that is closed.
+// Cuts a closed log.
 IOStatus LogFileSystem::Cut(const std::string& name, const LogState& log) {
   std::unique_ptr<rocksdb::FSWritableFile> file;
   IOStatus cut = ReopenWritableFile(name, rocksdb::FileOptions(), &file, nullptr);
@@ -215,7 +216,7 @@ IOStatus LogFileSystem::NewDirectory(const std::string& name, const IOOptions& o
   return opened;
 }
 
-// The mark is on disk before the log is gone.
+// The mark is on disk before the log is deleted.
 IOStatus LogFileSystem::Forget(const std::string& name) {
   {
     const std::lock_guard lock(mutex_);

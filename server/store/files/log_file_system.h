@@ -21,7 +21,7 @@ namespace hulld::server {
 // After a failed write the rest of the log can be cut off: a refused change must not appear when
 // the log is read again. A log that is cut while RocksDB has it open takes no more writes.
 //
-// The committed part that is on disk is kept in a mark (log_mark.h), so that a start notices a log
+// A mark (log_mark.h) records the committed part that is on disk, so that a start detects a log
 // that lost some of it. The mark costs one write of 512 bytes to the page cache for each commit,
 // and no sync: it is synced in the background and before a log is deleted.
 //
@@ -34,8 +34,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
       : FileSystemWrapper(base), directory_(std::move(directory)) {}
   const char* Name() const override { return "LogFileSystem"; }
 
-  // Called whenever the database's lock was taken, before anything else is done with it; an error
-  // gives the lock back. Set before the first lock.
+  // Sets the callback that runs whenever the database's lock was taken, before any other operation;
+  // its error releases the lock. Call before the first lock.
   void OnLocked(std::function<rocksdb::IOStatus()> locked) { locked_ = std::move(locked); }
 
   // Keeps the mark in the file of this path from now on. `mark` is the file's current content.
@@ -86,7 +86,7 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   bool IsLog(const std::string& name) const;
   rocksdb::IOStatus NoteSync(const rocksdb::IOStatus& status);
   rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
-  // Before a log is deleted.
+  // Removes a log from the mark, before the log is deleted.
   rocksdb::IOStatus Forget(const std::string& name);
   // The following require the mutex.
   void NoteCommitted();

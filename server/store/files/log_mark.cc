@@ -98,7 +98,7 @@ absl::StatusOr<std::optional<Decoded>> ReadNewest(rocksdb::FileSystem& files,
   return newest;
 }
 
-// Empty: the log holds these bytes.
+// Returns the difference; empty if the log holds these bytes.
 absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::string& path,
                                     const LogMark::Synced& synced) {
   const std::string name = std::filesystem::path(path).filename();
@@ -136,7 +136,7 @@ IOStatus SyncDirectoryOf(rocksdb::FileSystem& files, const std::string& path) {
   return opened.ok() ? directory->Fsync(IOOptions(), nullptr) : opened;
 }
 
-// Under its name only when it is whole and on disk.
+// Renamed only after it is complete and on disk.
 IOStatus Make(rocksdb::FileSystem& files, const std::string& path, const Slot& slot) {
   const std::string unfinished = path + ".new";
   std::unique_ptr<rocksdb::FSWritableFile> file;

@@ -35,7 +35,7 @@ struct LogMark {
 
 // "000012.log" in `directory`, as RocksDB names it.
 std::string LogPath(const std::string& directory, uint64_t number);
-// The number in such a name; none where it is another file.
+// Returns the number in such a name; nullopt for another file.
 std::optional<uint64_t> LogNumber(const std::string& path);
 
 // Returns the first log in `directory` that is missing, is shorter than `mark` says, or differs in
@@ -62,8 +62,8 @@ class LogMarkFile {
                                 const LogMark& mark, bool replace,
                                 std::unique_ptr<LogMarkFile>* result);
 
-  // Overwrites the older slot. Survives the end of the process; the end of the machine only after
-  // Sync. One thread at a time.
+  // Overwrites the older slot. The result survives a crash of the process; of the machine only
+  // after Sync. Not thread-safe.
   rocksdb::IOStatus Write(const LogMark& mark);
   // Any thread.
   rocksdb::IOStatus Sync() { return file_->Sync(rocksdb::IOOptions(), nullptr); }

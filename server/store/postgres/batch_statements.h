@@ -10,7 +10,7 @@
 
 namespace hulld::server {
 
-// Statements that prepare the ones of StatementsOf in a session.
+// Returns SQL that prepares the statements of StatementsOf in a session.
 std::string PrepareBatchStatements();
 
 // Statements that apply a batch of changes to the tables, except the row of the store: deletions

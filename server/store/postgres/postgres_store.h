@@ -100,7 +100,7 @@ class PostgresStore : public Store, public PeerFeed {
 
   std::string kind() const override { return "postgres"; }
   std::string id() const override { return id_; }
-  // Follows the value of synchronous_commit when this was opened, which the sessions keep.
+  // Given by the value of synchronous_commit when this was opened, which the sessions keep.
   Durability durability() const override { return durability_; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }

@@ -29,7 +29,7 @@ class SessionPool {
   // query must be finished or dropped, on any thread, before the next one if there is only one
   // session.
   std::unique_ptr<Session> TryStart(std::span<const Statement> statements);
-  // statements: the same.
+  // statements: as passed to TryStart.
   absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
                                            std::span<const Statement> statements);
   void GiveUp(std::unique_ptr<Session> session) {
