@@ -149,8 +149,8 @@ class Client {
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
 
-  // Watches pairs begin and cease to collide. The timeout bounds the time to reconnect to a lost
-  // server.
+  // Watches pairs for collisions that begin or end. The timeout bounds the time to reconnect to a
+  // lost server.
   std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;

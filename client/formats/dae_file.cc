@@ -124,7 +124,7 @@ absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
 // No post-processing: assimp then neither joins nor drops vertices.
 absl::Status ReadThroughAssimp(const std::string& path, const MeshVisitor& visit) {
   Assimp::Importer importer;
-  // COLLADA: otherwise assimp turns what is not Y_UP.
+  // COLLADA: otherwise assimp rotates files that are not Y_UP.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   const aiScene* scene = nullptr;
   std::string problem;

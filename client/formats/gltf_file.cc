@@ -53,7 +53,7 @@ std::array<double, 3> operator*(const Affine& a, const std::array<double, 3>& p)
   return q;
 }
 
-// A primitive of a mesh where a node shows it.
+// A primitive of a mesh, placed by a node.
 struct Primitive {
   std::string node;
   // The node's number, or that of the mesh if the file has no nodes.
@@ -65,7 +65,7 @@ struct Primitive {
 
 using PrimitiveVisitor = std::function<absl::Status(const Primitive& primitive)>;
 
-// Extensions that change how surfaces look, not where they are, and the one that is implemented.
+// True for extensions that affect only the appearance of surfaces, and for the implemented one.
 bool IsKnownExtension(const std::string& name) {
   for (const char* prefix : {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
                              "KHR_lights_punctual", "KHR_mesh_quantization"}) {
@@ -90,7 +90,7 @@ std::string PercentDecoded(const std::string& text) {
   return decoded;
 }
 
-// Once an error is found, every function returns at once, and Run returns the error.
+// After an error, every function returns immediately, and Run returns the error.
 class GltfWalk {
  public:
   GltfWalk(ByteSource* source, const PrimitiveVisitor& visit) : source_(source), visit_(visit) {}
@@ -118,7 +118,7 @@ class GltfWalk {
     return found == object.fields().end() ? nullptr : &found->second;
   }
 
-  // The object under `key`; empty if it is missing.
+  // Returns the object under `key`; empty if it is missing.
   const Struct& ObjectOf(const Struct& object, const std::string& key) {
     const Value* const value = Find(object, key);
     if (value == nullptr) return Struct::default_instance();
@@ -156,7 +156,7 @@ class GltfWalk {
     return Integer(*value, key);
   }
 
-  // The numbers under `key`; empty if it is missing.
+  // Returns the numbers under `key`; empty if it is missing.
   std::vector<double> NumbersOf(const Struct& object, const std::string& key, int count) {
     const ListValue& list = ListOf(object, key);
     std::vector<double> numbers;
@@ -171,7 +171,7 @@ class GltfWalk {
     return numbers;
   }
 
-  // Element `index` of a list at the root, such as "nodes".
+  // Returns element `index` of a list at the root, such as "nodes".
   const Struct& Element(const std::string& list, size_t index) {
     const auto& values = ListOf(root_, list).values();
     if (index >= static_cast<size_t>(values.size())) {
@@ -342,7 +342,7 @@ class GltfWalk {
     const unsigned char* at(size_t i) const { return data + i * stride; }
   };
 
-  // The elements that `object`, an accessor or a part of a sparse one, has in its buffer view.
+  // Returns the elements of `object`, an accessor or a part of a sparse one, in its buffer view.
   View ViewOf(const Struct& object, size_t count, size_t size, const std::string& what) {
     const Struct& view = Element("bufferViews", IntegerOf(object, "bufferView").value_or(0));
     const size_t buffer = IntegerOf(view, "buffer").value_or(std::numeric_limits<size_t>::max());
@@ -412,7 +412,8 @@ class GltfWalk {
     return indices;
   }
 
-  // A position as KHR_mesh_quantization defines it: integers as they are, or over the largest one.
+  // Returns a position as KHR_mesh_quantization defines it: integers unchanged, or divided by the
+  // largest one.
   static std::array<double, 3> Position(const unsigned char* bytes, ScalarType type,
                                         bool normalized) {
     double largest = 1;
@@ -522,7 +523,7 @@ class GltfWalk {
     status_ = visit_(*primitive);
   }
 
-  // X_WN: null where nothing moves the mesh.
+  // X_WN: null for the identity.
   void VisitMesh(size_t mesh, const Affine* X_WN, Primitive primitive) {
     for (const Value& value : ListOf(Element("meshes", mesh), "primitives").values()) {
       if (!value.has_struct_value()) Fail("a primitive is not an object");
@@ -531,7 +532,7 @@ class GltfWalk {
     }
   }
 
-  // Returns no value where the node does not move what it holds.
+  // Returns nullopt if the node has no transform.
   std::optional<Affine> TransformOf(const Struct& node) {
     const std::vector<double> columns = NumbersOf(node, "matrix", 16);
     const std::vector<double> t = NumbersOf(node, "translation", 3);

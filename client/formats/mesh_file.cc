@@ -40,7 +40,7 @@ void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
   }
 }
 
-// The triangles of a mesh in parts: part_of gives the part of each.
+// Returns the triangles of a mesh in parts. part_of: the part of each triangle.
 std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uint32_t>& part_of,
                                  const std::vector<std::string>& names) {
   constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
@@ -72,9 +72,10 @@ std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uin
   return parts;
 }
 
-// The parts of a mesh that hang together.
+// Returns the connected components of a mesh.
 std::vector<MeshPart> Components(const TriangleMesh& mesh) {
-  // Each vertex leads to another of its component, and in the end to one that stands for it.
+  // Each vertex leads to another one of its component, and finally to the component's
+  // representative.
   std::vector<uint32_t> leader(mesh.vertices.size());
   std::map<std::array<double, 3>, uint32_t> first;
   for (uint32_t i = 0; i < leader.size(); ++i) {

@@ -23,27 +23,27 @@ struct TriangleMesh {
 // names the file and the place.
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path);
 
-// A part of a file, under the name that the file has for it; empty where it has none.
+// A part of a file. The name is the file's, or empty.
 struct MeshPart {
   std::string name;
   TriangleMesh mesh;
 };
 
 enum class SplitBy {
-  // What the file names: objects and groups of obj, solids of stl, nodes of gltf and dae. Parts of
-  // one name are one part; off has no names, and is one part.
+  // By name: objects and groups of obj, solids of stl, nodes of gltf and dae. Parts with the same
+  // name form one part; off has no names and forms one part.
   kName,
-  // What hangs together: triangles that share a vertex, at the same coordinates. "component-1" and
-  // so on, in the order of the file.
+  // By connected component: triangles that share a vertex, at the same coordinates, belong
+  // together. Named "component-1" and so on, in the order of the file.
   kComponent,
 };
 
-// Reads the mesh of a file, as ReadMesh does, in parts. Vertices that no triangle names belong to
-// no part; parts without triangles are left out. INVALID_ARGUMENT also when there is no triangle.
+// Reads the mesh of a file, as ReadMesh does, in parts. Vertices without a triangle belong to no
+// part; parts without triangles are omitted. INVALID_ARGUMENT also if the file has no triangle.
 absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split);
 
-// The readers of each format. Those of parts keep vertices that no triangle names, and parts
-// without triangles; glTF and COLLADA place each mesh as its node says.
+// Readers by format. Readers of parts keep vertices without a triangle and parts without triangles.
+// The readers of glTF and COLLADA apply the transform of each node to its meshes.
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts);

@@ -19,7 +19,7 @@ class ObjWalk {
     std::string continued;
     for (std::string_view line; source_->ReadLine(&line);) {
       const std::string_view content = Trim(line);
-      // Comments often hold paths of Windows.
+      // Comments often contain Windows paths, which may end in a backslash.
       const bool is_comment = continued.empty() && !content.empty() && content.front() == '#';
       if (!is_comment && !content.empty() && content.back() == '\\') {
         continued.append(content.substr(0, content.size() - 1)).push_back(' ');

@@ -22,10 +22,10 @@ struct ObjReceiver {
   std::function<void(std::string_view keyword, std::string_view name)> name;
 };
 
-// Reads an OBJ file, the one reader of the format. A backslash continues a line, except in
+// Reads an OBJ file; the only reader of the format. A backslash continues a line, except in
 // comments; a face may precede its vertices; negative numbers count back from the last vertex
-// before the face. INVALID_ARGUMENT names the line, also if there is no vertex, or a face names one
-// that is missing.
+// before the face. INVALID_ARGUMENT names the line, also if the file has no vertex, or a face names
+// a missing one.
 absl::Status WalkObj(ByteSource* source, const ObjReceiver& receiver);
 
 }  // namespace hulld

@@ -19,7 +19,7 @@ constexpr size_t kTriangleBytes = 50;
 // character, at the latest the high byte of the count if there are less than 2^24 triangles.
 constexpr size_t kBytesToClassify = 1024;
 
-// Text is a sequence of words: lines matter only behind `solid` and `endsolid`, where the name is
+// Text is a sequence of words: lines matter only after `solid` and `endsolid`, where the name is
 // the rest of the line.
 class StlText {
  public:

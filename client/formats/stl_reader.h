@@ -28,10 +28,10 @@ struct StlReceiver {
 };
 
 // Reads an STL file, text or binary. Text starts with `solid` and has no control characters in its
-// first KiB; keywords are of any letter case, and normals of any kind or missing.
-// INVALID_ARGUMENT names line or byte, and the number of facets read: a file that is cut short, has
-// no facet, or is binary and has room for more whole triangles than it declares. Other bytes after
-// the last triangle are ignored.
+// first KiB; keywords may have any letter case, and normals are ignored and may be missing.
+// INVALID_ARGUMENT, with the line or byte and the number of facets read: the file is truncated or
+// has no facet, or a binary file has room for more whole triangles than it declares. Other bytes
+// after the last triangle are ignored.
 absl::Status WalkStl(ByteSource* source, const StlReceiver& receiver);
 
 }  // namespace hulld

@@ -17,10 +17,10 @@ using PieceCertificates = google::protobuf::RepeatedPtrField<v1::PieceCertificat
 // are in this relation; otherwise FAILED_PRECONDITION, which names the pieces and the missing
 // proof. Exact, from the definitions in the proto files alone, as CheckCertificate.
 //
-// Each certificate must prove its own relation of its own pair, and none may be stronger than that
-// of the bodies. One must prove that of the bodies, unless it is SEPARATED. Every other pair must
-// be settled, unless the bodies are OVERLAPPING: a hull is empty, or the least axis-aligned boxes
-// of both in the world have no common point, exactly.
+// Each certificate must prove its own relation for its own pair. None of these relations may be
+// stronger than that of the bodies, and one must equal it, unless the bodies are SEPARATED. Every
+// pair without a certificate must be settled, unless the bodies are OVERLAPPING: one of its hulls
+// is empty, or the exact bounding boxes of both along the world axes are disjoint.
 //
 // Cost: about a microsecond per vertex of each piece and of each certificate; about a nanosecond
 // per pair of pieces.

@@ -62,8 +62,8 @@ class TriangleTree {
     Point3 low;
     Point3 high;
   };
-  // The triangles order_[first, end), and the index of the second child; the first child is the
-  // next node. 0: a leaf.
+  // The triangles order_[first, end). The first child is the next node; `second_half` is the index
+  // of the second child, 0 for a leaf.
   struct Node {
     Box box;
     uint32_t first;

@@ -16,8 +16,8 @@
 
 namespace hulld {
 
-// WatchCollisions, message by message: reports the begin and the end of collisions of pairs. After
-// a lost connection the watch resumes: it opens another call with the current poses, reports the
+// WatchCollisions, message by message: reports collisions of pairs as they begin and end. After a
+// lost connection the watch resumes: it opens another call with the current poses, reports the
 // changes since the loss without repeating events, and ends them with another `synced`. Code that
 // folds the events need not handle connections. Next and Update may each be called by one thread,
 // the same or different ones; Cancel by any.
