@@ -608,7 +608,8 @@ class GltfWalk {
     for (size_t i = 0; i < is_child.size(); ++i) {
       if (!is_child[i]) roots.push_back(i);
     }
-    if (!is_child.empty() && roots.empty()) return Fail("each node is the child of another one");
+    if (!is_child.empty() && roots.empty())
+      return Fail("no node is a root: each one is the child of another");
     if (!roots.empty()) return VisitNodes(roots);
     for (size_t i = 0; i < CountOf("meshes") && ok(); ++i) {
       std::string name = TextOf(Element("meshes", i), "name");

@@ -242,7 +242,9 @@ absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {
       ok = ParseUnsigned(NextToken(&content), &index) && index < mesh->vertices.size();
       corners.push_back(static_cast<uint32_t>(index));
     }
-    if (!ok) return source->ErrorAtLine("a face is its number of corners and that many vertices");
+    if (!ok)
+      return source->ErrorAtLine(
+          "a face needs its number of corners and that many vertices, as in 3 0 1 2");
     AddPolygon(corners, mesh);
   }
   return absl::OkStatus();

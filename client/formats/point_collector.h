@@ -62,7 +62,7 @@ class PointCollector {
       y = options_.scale[1].Apply(y);
       z = options_.scale[2].Apply(z);
       if (!std::isfinite(x) || !std::isfinite(y) || !std::isfinite(z)) {
-        return error_at("scaled, a coordinate is beyond the largest double");
+        return error_at("a scaled coordinate exceeds the largest double; use a smaller scale");
       }
     }
     return AddScaled(x, y, z, error_at);

@@ -111,7 +111,7 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
       }
       if (std::find(reader.columns_.begin(), reader.columns_.end(), *place) !=
           reader.columns_.end()) {
-        return source->ErrorAtLine(Quoted(cell) + " has two columns");
+        return source->ErrorAtLine(Quoted(cell) + " has two columns; remove one");
       }
       reader.columns_.push_back(*place);
       names_joint = true;
@@ -121,7 +121,7 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
   if (!source->status().ok()) return source->status();
   if (!names_joint) {
     return absl::InvalidArgumentError(
-        absl::StrCat(source->name(), ": it has no header with joint names"));
+        absl::StrCat(source->name(), ": no header with joint names; start the file with one"));
   }
   absl::Status good = CheckRotations(*source, robot, variables, reader.columns_);
   if (!good.ok()) return good;

@@ -97,8 +97,8 @@ class TagWalk {
     if (at_ >= text_.size() || text_[at_] != '>') return Error("a tag </... is not closed by >");
     if (open_.empty()) return Error(absl::StrCat("</", name, "> has no matching start tag"));
     if (name != open_.back().name) {
-      return Error(absl::StrCat("</", name, "> where <", open_.back().name, "> of line ",
-                                open_.back().line, " is to be closed"));
+      return Error(absl::StrCat("</", name, "> does not close <", open_.back().name, "> of line ",
+                                open_.back().line));
     }
     Advance(1);
     open_.pop_back();

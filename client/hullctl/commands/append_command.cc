@@ -230,7 +230,7 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
   if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite || input.skip_zero ||
       !input.format.empty() || input.chunk_points != 0) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--split takes no other option than --create; the file name gives the format"));
+        "--split can be combined only with --create; the file name gives the format"));
   }
   const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
   return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);
@@ -291,9 +291,8 @@ void AddAppendCommand(Command program, Invocation* invocation) {
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
-      "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl, "
-      "gltf,\n"
-      "dae.\n"
+      "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl,\n"
+      "gltf, dae.\n"
       "--create creates the hull with its first points; a refused file leaves none behind.\n"
       "--resume needs the same files, options, and writer as before.\n"
       "--split can be repeated: a body that has all parts is not changed.\n"

@@ -131,7 +131,7 @@ class BatchRun {
     }
     if (begin + part.first_pair() != *next || count > end - *next ||
         !AreParallel(part.columns(), count)) {
-      return absl::InternalError("the answers do not follow one another");
+      return absl::InternalError("the answers are out of order");
     }
     if (run_.json()) PrintMessage(part, begin);
     for (size_t i = 0; i < count; ++i, ++*next) {
@@ -168,7 +168,7 @@ class BatchRun {
     const v1::HullVersion* const a = VersionOf(request_->pairs(static_cast<int>(2 * pair)));
     const v1::HullVersion* const b = VersionOf(request_->pairs(static_cast<int>(2 * pair + 1)));
     if (a == nullptr || b == nullptr || row.certificate == nullptr) {
-      return absl::InternalError("the answers lack the hulls or the certificates they are about");
+      return absl::InternalError("the answers lack hulls or certificates that they refer to");
     }
     auto verification = CheckRow(row, first_ + pair, *a, *b);
     if (!verification.ok()) return verification;

@@ -344,9 +344,8 @@ void AddBenchCommand(Command program, Invocation* invocation) {
   load.SetDetails(
       "Creates hulls and deletes them at the end, also after Ctrl-C. Without --rate, each client\n"
       "sends its next request after an answer. With --rate, requests are due at fixed times, and\n"
-      "latencies count from these, so that queueing behind a slow request is visible. Requests "
-      "are\n"
-      "not retried; latencies are those of successful ones.");
+      "latencies count from these, so that queueing behind a slow request is visible. Requests\n"
+      "are not retried; latencies are those of successful ones.");
   load.SetExamples(
       {{"Four clients, as fast as possible", "hullctl bench load --clients 4 --duration 30s"},
        {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},

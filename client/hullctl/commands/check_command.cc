@@ -215,11 +215,9 @@ void AddCheckCommand(Command program, Invocation* invocation) {
           "output, instead of the answer")
       .ValueName("FILE");
   command.SetDetails(
-      "Lengths are in the unit of the points. For a body ('hullctl body --help'), the answer "
-      "names\n"
-      "the deciding pieces, and its certificate has one part for each pair of pieces that boxes "
-      "do\n"
-      "not decide; --output json shows them. --textbook takes hulls only.");
+      "Lengths are in the unit of the points. For a body ('hullctl body --help'), the answer\n"
+      "names the deciding pieces, and its certificate has one part for each pair of pieces that\n"
+      "boxes do not decide; --output json shows them. --textbook takes hulls only.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

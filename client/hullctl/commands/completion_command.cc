@@ -74,7 +74,7 @@ void AddCompletionCommand(Command program, Invocation* invocation) {
 void AddManCommand(Command program, Invocation* invocation) {
   auto folder = std::make_shared<std::string>();
   Command command = program.AddCommand("__man", "Write the manual pages");
-  command.AddText("FOLDER", folder.get(), "Where to").Required();
+  command.AddText("FOLDER", folder.get(), "Directory to write to").Required();
   command.Hide();
   command.OnGiven([=] {
     invocation->needs_server = false;

@@ -186,13 +186,11 @@ void AddContextCommand(Command program, Invocation* invocation) {
     };
   };
   command.SetDetails(
-      "Contexts are kept in $XDG_CONFIG_HOME/hullctl/contexts.json, by default below ~/.config, "
-      "with\n"
-      "paths of token files, never tokens. Precedence: an option; the context of --context; the\n"
-      "environment; the context of $HULLCTL_CONTEXT or of 'context use'; the default. A context\n"
-      "applies only to its own server: if --server or $HULLCTL_SERVER gives another, its token "
-      "and\n"
-      "authorities are ignored, too.");
+      "Contexts are kept in $XDG_CONFIG_HOME/hullctl/contexts.json, by default below ~/.config,\n"
+      "with paths of token files, never tokens. Precedence: an option; the context of --context;\n"
+      "the environment; the context of $HULLCTL_CONTEXT or of 'context use'; the default. A\n"
+      "context applies only to its own server: if --server or $HULLCTL_SERVER gives another, its\n"
+      "token and authorities are ignored, too.");
   Command add = command.AddCommand("add", "Save --server and its options under a name");
   add.AddText("NAME", &arguments->name, "Name of the context").Required();
   add.AddFlag("--replace", &arguments->replace, "Replace an existing context of this name");
@@ -202,19 +200,21 @@ void AddContextCommand(Command program, Invocation* invocation) {
                    {"", "hullctl context add here --server 127.0.0.1:50551"}});
   add.OnGiven(act([=] { return Add(*invocation, *arguments); }));
   Command use = command.AddCommand("use", "Select a context for later commands");
-  use.AddText("NAME", &arguments->name, "Its name").Completes(ValueKind::kContext);
-  use.AddFlag("--none", &arguments->none, "Use none");
+  use.AddText("NAME", &arguments->name, "Name of the context").Completes(ValueKind::kContext);
+  use.AddFlag("--none", &arguments->none, "Select no context");
   use.SetExamples({{"", "hullctl context use cell-3"},
                    {"Another one for one command", "hullctl list --context here"}});
   use.OnGiven(act([=] { return Use(*invocation, *arguments); }));
   Command list = command.AddCommand("list", "List the contexts");
   list.OnGiven(act([=] { return ListContexts(*invocation); }));
   Command show = command.AddCommand("show", "Show the settings in force and the source of each");
-  show.AddText("NAME", &arguments->name, "Show them as with --context NAME")
+  show.AddText("NAME", &arguments->name, "Show the settings as with --context NAME")
       .Completes(ValueKind::kContext);
   show.OnGiven(act([=] { return Show(*invocation, *arguments); }));
   Command remove = command.AddCommand("remove", "Forget a context");
-  remove.AddText("NAME", &arguments->name, "Its name").Required().Completes(ValueKind::kContext);
+  remove.AddText("NAME", &arguments->name, "Name of the context")
+      .Required()
+      .Completes(ValueKind::kContext);
   remove.OnGiven(act([=] { return Remove(*invocation, *arguments); }));
 }
 

@@ -25,7 +25,7 @@ ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absen
   } else if (run.names()) {
     run.out << hull_id << "\n";
   } else {
-    run.out << hull_id << (response->created() ? " created" : " exists already") << " at revision "
+    run.out << hull_id << (response->created() ? " created" : " already exists") << " at revision "
             << response->hull().create_revision() << "\n";
   }
   return ExitCode::kDone;

@@ -134,10 +134,9 @@ void AddMeshCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
       "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.\n"
-      "--verify takes nothing from the server but vertices: that the simplification is inside or\n"
-      "outside, and how far from the hull it is, is found out by exact arithmetic of hullctl's "
-      "own.\n"
-      "One that is invalid is not written.");
+      "--verify uses only vertices from the server: hullctl's own exact arithmetic shows that the\n"
+      "simplification is inside or outside, and within its error of the hull. An invalid\n"
+      "simplification is not written.");
   command.SetExamples({{"", "hullctl mesh spider -o spider-hull.obj"},
                        {"At most 16 vertices, enclosing the hull",
                         "hullctl mesh spider --max-vertices 16 --outside -o simple.obj"}});

@@ -54,13 +54,10 @@ void AddVerifyCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("verify", "Check the certificate of a recorded answer");
   command.AddText("FILE", path.get(), "The answer; - is standard input").Required();
   command.SetDetails(
-      "FILE is written by 'hullctl check A B --record FILE'. The vertices come from the server; "
-      "the\n"
-      "arithmetic is exact and shares no code with it. The answer for a hull that has changed "
-      "since\n"
-      "cannot be checked, which does not mean that it is wrong; 'hullctl check --verify' checks "
-      "an\n"
-      "answer immediately.");
+      "FILE is written by 'hullctl check A B --record FILE'. The vertices come from the server;\n"
+      "the arithmetic is exact and shares no code with it. The answer for a hull that has changed\n"
+      "since cannot be checked, which does not mean that it is wrong; 'hullctl check --verify'\n"
+      "checks an answer immediately.");
   command.SetExamples(
       {{"", "hullctl check arm box --record answer.json"}, {"", "hullctl verify answer.json"}});
   command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });

@@ -285,13 +285,12 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
   command.SetDetails(
-      "A body is dragged as a whole; the hulls of its pieces are shown on their own only if "
-      "named.\n"
-      "The page queries hulld through hullctl: it never sees your token, and without --edit it\n"
-      "changes nothing on the server. The hull of a FILE is created on the server, under view/, "
-      "and\n"
-      "deleted at the end; with a read-only token, the file is shown without its hull. Press ? on\n"
-      "the page for its keys. --png runs chromium or another browser of its family.");
+      "A body is dragged as a whole; the hulls of its pieces are shown on their own only if\n"
+      "named. The page queries hulld through hullctl: it never sees your token, and without\n"
+      "--edit it changes nothing on the server. The hull of a FILE is created on the server,\n"
+      "under view/, and deleted at the end; with a read-only token, the file is shown without its\n"
+      "hull. Press ? on the page for its keys. --png runs chromium or another browser of its\n"
+      "family.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},

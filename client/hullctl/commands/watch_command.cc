@@ -189,7 +189,7 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command.AddFlag("--exact", &options->exact, "Only the hull with exactly this ID");
   command
       .AddText("--scene", &options->scene,
-               "Print pairs of a scene as they begin and end to collide, instead")
+               "Watch the pairs of a scene instead: print collisions that begin and end")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command.AddFlag("--until-synced", &options->until_synced, "Exit after the initial state");
@@ -197,11 +197,10 @@ void AddWatchCommand(Command program, Invocation* invocation) {
                     "Exit after N events, or a few more that arrive together",
                     [options](uint64_t number) { options->events = number; });
   command.SetDetails(
-      "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body, "
-      "its\n"
-      "number of pieces. The initial state comes first (PRESENT) and ends with a line '# synced'.\n"
-      "Then come CREATED, CHANGED, REPLACED, and DELETED; of many changes at once, only the last\n"
-      "state of each hull is printed.\n"
+      "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body,\n"
+      "its number of pieces. The initial state comes first (PRESENT) and ends with a line\n"
+      "'# synced'. Then come CREATED, CHANGED, REPLACED, and DELETED; of many changes at once,\n"
+      "only the last state of each hull is printed.\n"
       "With --scene: kind (ENTER, TOUCH, EXIT; with a clearance, NEAR and FAR; LOST if a hull is\n"
       "deleted), the two placements, the revisions of their hulls or bodies, and, for bodies, the\n"
       "deciding pieces. Poses are fixed; pairs change as hulls grow and bodies are replaced.\n"

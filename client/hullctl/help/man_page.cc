@@ -130,7 +130,7 @@ std::string ManPage(const CommandDescription& program, const CommandDescription&
   if (!is_program) {
     AppendHeading("see also", &page);
     absl::StrAppend(&page, "\\fB", Escaped(program.name),
-                    "\\fR(1) tells of the options of every command, contexts and exit codes.\n");
+                    "\\fR(1) describes the options of every command, contexts, and exit codes.\n");
   }
   return page;
 }

@@ -185,12 +185,10 @@ void AddCoverCommand(Command program, Invocation* invocation) {
       "included. A body stands for its pieces at their exact poses. The decision is exact:\n"
       "triangles are cut in integers of any length, so the list is complete and has no false\n"
       "entries. Distances are computed in floating point: the largest distance for one hull, a\n"
-      "lower bound of it for several. Only the surface is checked: one hull that holds it holds "
-      "the\n"
-      "interior; several may leave a hollow within a solid. An ID that ends in / stands for all\n"
-      "hulls with this prefix. Triangles count from 0, in the order of the file; polygons are "
-      "fans\n"
-      "of triangles. Triangles that stick out are an answer: exit code 0.");
+      "lower bound of it for several. Only the surface is checked: a hull that contains it also\n"
+      "contains the interior; several hulls may leave a cavity in a solid. An ID that ends in /\n"
+      "stands for all hulls with this prefix. Triangles count from 0, in the order of the file;\n"
+      "polygons are fans of triangles. Triangles that stick out are an answer: exit code 0.");
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
                        {"The pieces of a body together", "hullctl cover chair chair.obj"},
                        {"All hulls with a prefix", "hullctl cover chair/ chair.obj"}});

@@ -49,8 +49,8 @@ absl::StatusOr<std::vector<MeshPiece>> ScaledPieces(std::vector<MeshPart> parts,
     for (const Vector& p : part.mesh.vertices) {
       for (const double x : p) {
         if (!std::isfinite(x)) {
-          return absl::InvalidArgumentError(
-              absl::StrCat(file, ": a scaled coordinate exceeds the largest double"));
+          return absl::InvalidArgumentError(absl::StrCat(
+              file, ": a scaled coordinate exceeds the largest double; use a smaller scale"));
         }
         piece.hull.xyz.push_back(x);
       }

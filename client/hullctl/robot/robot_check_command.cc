@@ -491,8 +491,7 @@ ExitCode RobotCheck::Run() {
   }
   PrintTotals();
   if (beyond_limits_ > kMostWarnings) {
-    run_.err << "hullctl: warning: " << beyond_limits_
-             << " waypoints are beyond limits of joints\n";
+    run_.err << "hullctl: warning: " << beyond_limits_ << " waypoints exceed limits of joints\n";
   }
   if (stopped_) run_.err << "hullctl: stopped after " << waypoints_ << " waypoints\n";
   if (failed_ == 0) return stopped_ ? ExitCode::kRequestFailed : ExitCode::kDone;
@@ -560,22 +559,18 @@ void DescribeRobotCheck(Command command) {
   command.SetDetails(
       std::string(kRobotHelp) +
       "\n"
-      "Pairs of shapes on one link are never checked. Without --srdf, links connected by a joint, "
-      "or\n"
-      "by joints through links without shapes, are excluded, too, as in MoveIt: they touch by\n"
-      "design. Planar and floating joints do not count here. With --srdf, exactly the pairs that "
-      "it\n"
-      "disables are excluded.\n"
+      "Pairs of shapes on one link are never checked. Without --srdf, links connected by a joint,\n"
+      "or by joints through links without shapes, are excluded, too, as in MoveIt: they touch by\n"
+      "design. Planar and floating joints do not count here. With --srdf, exactly the pairs that\n"
+      "it disables are excluded.\n"
       "\n"
       "A joint without a value is at 0, or in the middle of its limits if these exclude 0. In\n"
       "--joints, a planar joint J has the columns J/x, J/y and J/theta, a floating one J/trans_x,\n"
       "J/trans_y, J/trans_z, J/rot_x, J/rot_y, J/rot_z and J/rot_w, as in MoveIt. A\n"
       "value beyond its limits gives a warning. One configuration prints every pair and its\n"
-      "separation. For several waypoints, pairs are printed as they begin (ENTER) and end (LEAVE) "
-      "to\n"
-      "collide or touch, and the first contact at the end. Only the waypoints are checked, not "
-      "the\n"
-      "motion between them. A collision is an answer: exit code 0.");
+      "separation. For several waypoints, pairs are printed as they begin (ENTER) and end (LEAVE)\n"
+      "to collide or touch, and the first contact at the end. Only the waypoints are checked, not\n"
+      "the motion between them. A collision is an answer: exit code 0.");
   command.SetExamples(
       {{"All joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
        {"One joint bent", "hullctl robot check arm.urdf --joint elbow_joint=2.5"},

@@ -105,7 +105,7 @@ std::string LastLine(const fs::path& log) {
   for (const auto line : absl::StrSplit(text, '\n', absl::SkipWhitespace())) {
     last.assign(line.data(), line.size());
   }
-  return last.empty() ? "it said nothing" : last;
+  return last.empty() ? "it printed nothing" : last;
 }
 
 }  // namespace

@@ -83,13 +83,14 @@ void PageSession::OnMessage(std::string_view json) {
 
 void PageSession::Edit(ViewEdit edit) {
   if (edits_ == nullptr) {
-    page_->SendText(ProblemMessage("This page may only look; start 'hullctl view --edit'."));
+    page_->SendText(ProblemMessage(
+        "This page is read-only; to edit hulls, restart with 'hullctl view --edit'."));
     return;
   }
   {
     const std::lock_guard lock(mutex_);
     if (!known_.contains(edit.hull_id)) {
-      page_->SendText(ProblemMessage("There is no hull \"" + edit.hull_id + "\" on show."));
+      page_->SendText(ProblemMessage("The hull \"" + edit.hull_id + "\" is not shown."));
       return;
     }
   }

@@ -28,7 +28,7 @@ class Reader {
   std::string Text(const std::string& name) {
     const Value* const value = Find(name);
     if (value == nullptr) return "";
-    if (value->kind_case() != Value::kStringValue) Complain(name, "is not a text");
+    if (value->kind_case() != Value::kStringValue) Complain(name, "is not a string");
     return value->string_value();
   }
   double Number(const std::string& name) {
@@ -51,7 +51,7 @@ class Reader {
       const double number = value.number_value();
       if (!(number >= 0) || number > std::numeric_limits<uint32_t>::max() ||
           number != std::floor(number)) {
-        Complain(name, "holds what is not an index");
+        Complain(name, "contains a value that is not an index");
         return {};
       }
       indices.push_back(static_cast<uint32_t>(number));
@@ -90,7 +90,7 @@ ViewQuestion ReadQuestion(Reader* reader) {
   question.objects = reader->Indices("objects");
   const ListValue& poses = reader->List("poses");
   if (poses.values_size() != static_cast<int>(7 * question.objects.size())) {
-    reader->Complain("poses", "needs seven numbers for each of objects");
+    reader->Complain("poses", "needs seven numbers for each entry of objects");
     return question;
   }
   question.poses.resize(question.objects.size());
@@ -100,7 +100,7 @@ ViewQuestion ReadQuestion(Reader* reader) {
   }
   const std::vector<uint32_t> pair = reader->Indices("pair");
   if (pair.size() == 2 && pair[0] != pair[1]) question.pair.emplace(pair[0], pair[1]);
-  if (!pair.empty() && !question.pair) reader->Complain("pair", "is not two objects");
+  if (!pair.empty() && !question.pair) reader->Complain("pair", "does not name two objects");
   question.tolerance = reader->Number("tolerance");
   question.certificate = reader->Flag("certificate");
   question.rest = reader->Flag("rest");
@@ -131,12 +131,14 @@ GeometryWish ReadSimplification(Reader* reader) {
 ViewEdit ReadEdit(Reader* reader) {
   ViewEdit edit;
   const std::string action = reader->Text("action");
-  if (action != "append" && action != "delete") reader->Complain("action", "is none of an edit");
+  if (action != "append" && action != "delete") {
+    reader->Complain("action", "is neither append nor delete");
+  }
   if (action == "delete") edit.action = ViewEdit::Action::kDelete;
   edit.hull_id = reader->Text("hullId");
   for (const Value& number : reader->List("points").values()) {
     if (number.kind_case() != Value::kNumberValue) {
-      reader->Complain("points", "holds what is not a number");
+      reader->Complain("points", "contains a value that is not a number");
       return edit;
     }
     edit.points.push_back(number.number_value());
@@ -198,7 +200,7 @@ absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
   } else if (type == "edit") {
     message.edit = ReadEdit(&reader);
   } else {
-    reader.Complain("type", "is none that the bridge knows");
+    reader.Complain("type", "is unknown to the bridge");
   }
   if (!reader.status().ok()) return reader.status();
   return message;

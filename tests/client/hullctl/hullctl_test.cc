@@ -44,7 +44,7 @@ class HullctlTest : public testing::Test {
 
 TEST_F(HullctlTest, CreateGetListAndDelete) {
   EXPECT_EQ(Ask({"create", "a/1"}).out, "a/1 created at revision 1\n");
-  EXPECT_EQ(Ask({"create", "a/1", "--if-absent"}).out, "a/1 exists already at revision 1\n");
+  EXPECT_EQ(Ask({"create", "a/1", "--if-absent"}).out, "a/1 already exists at revision 1\n");
   EXPECT_THAT(Ask({"get", "a/1"}).out, HasSubstr("vertices    0\n"));
   EXPECT_THAT(Ask({"list", "a"}).out, AllOf(StartsWith("HULL"), HasSubstr("\na/1 ")));
   const Ran wrong = Ask({"delete", "a/1", "--if-revision", "9"});

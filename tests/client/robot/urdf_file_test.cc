@@ -130,7 +130,7 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "mimics itself through other joints"},
       {{"<parent link=\"base\"/>", "<parent link=\"lower\"/>"}, "is part of a cycle of joints"},
       {{"</link>\n  <joint name=\"elbow\"", "</lnk>\n  <joint name=\"elbow\""},
-       "arm.urdf:19: </lnk> where <link> of line 12 is to be closed"},
+       "arm.urdf:19: </lnk> does not close <link> of line 12"},
       {{"</robot>", ""}, "the file ends before </robot>"},
       {{"<link name=\"flange\"/>", "<xacro:flange/>"}, "expand the file with 'xacro' first"},
       {{"<?xml version=\"1.0\"?>", "<!DOCTYPE robot>"},

@@ -52,7 +52,7 @@ TEST(ManPage, RepeatsTheHelpInRoff) {
       ".TP\n\\fB\\-o\\fR, \\fB\\-\\-out\\fR \\fIFILE\\fR\nWhere to.\n"
       ".PP\n\\&.starts with a dot\n.nf\n  an  indented\\eline\n.fi\nflows on\n"
       ".SH EXAMPLES\n.nf\n# As root\n$ tool fix \\-\\-all\n.fi\n"
-      ".SH SEE ALSO\n\\fBtool\\fR(1) tells of the options of every command, contexts and exit "
+      ".SH SEE ALSO\n\\fBtool\\fR(1) describes the options of every command, contexts, and exit "
       "codes.\n");
 }
 

@@ -98,7 +98,7 @@ TEST(Protocol, EditsAreRead) {
   EXPECT_EQ(remove->edit->action, ViewEdit::Action::kDelete);
 
   EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"replace","hullId":"a"})"),
-              HasSubstr("none of an edit"));
+              HasSubstr("neither append nor delete"));
   EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"append","hullId":"a","points":[]})"),
               HasSubstr("three numbers"));
   EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"append","hullId":"a","points":[1,2,3,4]})"),
@@ -113,14 +113,15 @@ TEST(Protocol, MessagesThatAreWrongAreRefused) {
   EXPECT_NE(ErrorOf("no json"), "");
   EXPECT_NE(ErrorOf("[]"), "");
   EXPECT_THAT(ErrorOf("{}"), HasSubstr("type"));
-  EXPECT_THAT(ErrorOf(R"({"type":"delete"})"), HasSubstr("none that the bridge knows"));
+  EXPECT_THAT(ErrorOf(R"({"type":"delete"})"), HasSubstr("unknown to the bridge"));
   EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0],"poses":[1,2,3]})"),
               HasSubstr("seven numbers"));
   EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[-1],"poses":[1,0,0,0,0,0,0]})"),
               HasSubstr("not an index"));
   EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0.5],"poses":[1,0,0,0,0,0,0]})"),
               HasSubstr("not an index"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","pair":[4,4]})"), HasSubstr("not two objects"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","pair":[4,4]})"),
+              HasSubstr("does not name two objects"));
   EXPECT_THAT(ErrorOf(R"({"type":"question","update":-1})"), HasSubstr("whole number"));
   EXPECT_THAT(ErrorOf(R"({"type":"question","tolerance":"much"})"), HasSubstr("not a number"));
 }
