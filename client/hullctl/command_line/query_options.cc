@@ -7,8 +7,8 @@ void QueryDetails::Apply(v1::Wanted* file_wanted, double* file_tolerance) const 
   if (tolerance.has_value()) *file_tolerance = *tolerance;
 }
 
-void AddWantedOptions(Command command, QueryDetails* wishes) {
-  v1::Wanted* const wanted = &wishes->wanted;
+void AddWantedOptions(Command command, QueryDetails* details) {
+  v1::Wanted* const wanted = &details->wanted;
   command.AddFlag(
       "--axis", [wanted] { wanted->set_axis(true); },
       "Show the separating or touching axis and its features");
@@ -34,19 +34,19 @@ void AddWantedOptions(Command command, QueryDetails* wishes) {
   command.AddLength(
       "--tolerance",
       "Allow the answer WITHIN_TOLERANCE for separations up to this, for speed (default 0: exact)",
-      [wishes](double length) { wishes->tolerance = length; });
+      [details](double length) { details->tolerance = length; });
 }
 
-void AddQueryOptions(Command command, QueryDetails* wishes) {
-  AddWantedOptions(command, wishes);
+void AddQueryOptions(Command command, QueryDetails* details) {
+  AddWantedOptions(command, details);
   command.AddFlag(
-      "--textbook", [wishes] { wishes->method = v1::METHOD_TEXTBOOK_SAT; },
+      "--textbook", [details] { details->method = v1::METHOD_TEXTBOOK_SAT; },
       "Use the textbook's separating-axis test instead of the certified search");
   command.AddFlag(
       "--verify",
-      [wishes] {
-        wishes->verify = true;
-        wishes->wanted.set_certificate(true);
+      [details] {
+        details->verify = true;
+        details->wanted.set_certificate(true);
       },
       "Check the certificate with hullctl's own exact arithmetic");
 }

@@ -21,11 +21,11 @@ struct QueryDetails {
 };
 
 // Declares --axis, --report, --certificate, --separation, --max-error, --witness, --clearance, and
-// --tolerance. `wishes` must outlive the parsing.
-void AddWantedOptions(Command command, QueryDetails* wishes);
+// --tolerance. `details` must outlive the parsing.
+void AddWantedOptions(Command command, QueryDetails* details);
 
 // Declares the same options plus --textbook and --verify.
-void AddQueryOptions(Command command, QueryDetails* wishes);
+void AddQueryOptions(Command command, QueryDetails* details);
 
 }  // namespace hulld
 

@@ -20,7 +20,7 @@ namespace {
 
 struct BatchArguments {
   std::string file;
-  QueryDetails wishes;
+  QueryDetails details;
   bool colliding = false;
 };
 
@@ -40,11 +40,11 @@ class BatchRun {
         bar_(run.err, run.shows_progress, "pairs", pairs.size() / 2) {
     v1::Wanted wanted = scene.request.wanted();
     tolerance_ = scene.request.tolerance();
-    arguments.wishes.Apply(&wanted, &tolerance_);
+    arguments.details.Apply(&wanted, &tolerance_);
     base_.set_tolerance(tolerance_);
     *base_.mutable_wanted() = std::move(wanted);
-    const bool textbook = arguments.wishes.method != v1::METHOD_UNSPECIFIED;
-    base_.set_method(textbook ? arguments.wishes.method : scene.method);
+    const bool textbook = arguments.details.method != v1::METHOD_UNSPECIFIED;
+    base_.set_method(textbook ? arguments.details.method : scene.method);
     if (!run.json()) return;
     *base_.mutable_placements() = scene.request.placements();
     if (scene.request.has_packed_placements()) {
@@ -141,7 +141,7 @@ class BatchRun {
       if (row.relation == v1::RELATION_UNSPECIFIED) {
         problem = FindProblem(pair_problems, *next - begin);
         ++failed_;
-      } else if (arguments_.wishes.verify) {
+      } else if (arguments_.details.verify) {
         auto verified = Verify(row, *next - begin);
         if (!verified.ok()) return verified.status();
         verification = *std::move(verified);
@@ -294,23 +294,23 @@ class BatchRun {
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
   const auto source = ByteSource::Open(arguments.file);
   if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadScene(source->get(), FormFor(arguments.wishes));
+  const auto scene = ReadScene(source->get(), FormFor(arguments.details));
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (absl::Status rest = RefuseUpdates(source->get(), "batch"); !rest.ok()) {
     return run.FailUsage(rest);
   }
-  return AnswerPairs(run, arguments.file, *scene, arguments.wishes, arguments.colliding);
+  return AnswerPairs(run, arguments.file, *scene, arguments.details, arguments.colliding);
 }
 
 }  // namespace
 
-BodyForm FormFor(const QueryDetails& wishes) {
-  return wishes.method == v1::METHOD_TEXTBOOK_SAT ? BodyForm::kPieces : BodyForm::kWhole;
+BodyForm FormFor(const QueryDetails& details) {
+  return details.method == v1::METHOD_TEXTBOOK_SAT ? BodyForm::kPieces : BodyForm::kWhole;
 }
 
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
-                     const QueryDetails& wishes, bool colliding) {
-  const BatchArguments arguments{file, wishes, colliding};
+                     const QueryDetails& details, bool colliding) {
+  const BatchArguments arguments{file, details, colliding};
   if (colliding && run.json()) {
     return run.FailUsage(absl::InvalidArgumentError(
         "--colliding cannot be combined with --output json, which prints every pair; use 'hullctl "
@@ -339,7 +339,7 @@ void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();
   Command command = program.AddCommand("batch", "Check many pairs of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
-  AddQueryOptions(command, &arguments->wishes);
+  AddQueryOptions(command, &arguments->details);
   command.AddFlag("--colliding", &arguments->colliding, "Omit separated pairs");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(kSceneFileHelp);

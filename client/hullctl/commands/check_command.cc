@@ -16,7 +16,7 @@ namespace {
 
 struct PairArguments {
   v1::CheckCollisionRequest request;
-  QueryDetails wishes;
+  QueryDetails details;
   std::string record;
 };
 
@@ -147,12 +147,13 @@ void PrintAnswer(const Invocation& run, const v1::CheckCollisionRequest& request
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
   double tolerance = 0;
-  arguments.wishes.Apply(request.mutable_wanted(), &tolerance);
+  arguments.details.Apply(request.mutable_wanted(), &tolerance);
   request.set_tolerance(tolerance);
-  request.set_method(arguments.wishes.method);
+  request.set_method(arguments.details.method);
   const Client client = run.MakeClient();
   VerifiedResponse answer;
-  const Verification* const verification = arguments.wishes.verify ? &answer.verification : nullptr;
+  const Verification* const verification =
+      arguments.details.verify ? &answer.verification : nullptr;
   if (verification != nullptr) {
     auto verified = CheckCollisionVerified(client, request);
     if (!verified.ok()) return run.Fail(verified.status());
@@ -200,7 +201,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
-  AddQueryOptions(command, &arguments->wishes);
+  AddQueryOptions(command, &arguments->details);
   AddFreshnessOptions(command, invocation);
   PairArguments* const checked = arguments.get();
   command
@@ -208,7 +209,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
           "--record",
           [checked](const std::string& path) {
             checked->record = path;
-            checked->wishes.wanted.set_certificate(true);
+            checked->details.wanted.set_certificate(true);
             return absl::OkStatus();
           },
           "Write request and answer, with its certificate, for 'hullctl verify'; - is standard "

@@ -37,9 +37,9 @@ void AddManCommand(Command program, Invocation* invocation);
 
 // Queries the pairs of a scene read from `file`, as 'hullctl batch' does.
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
-                     const QueryDetails& wishes, bool colliding);
+                     const QueryDetails& details, bool colliding);
 // Returns the form of bodies in queries. Certificates and the textbook's test apply to hulls only.
-BodyForm FormFor(const QueryDetails& wishes);
+BodyForm FormFor(const QueryDetails& details);
 
 }  // namespace hulld
 

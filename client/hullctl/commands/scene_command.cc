@@ -107,22 +107,22 @@ class SceneRun {
 
 struct SceneArguments {
   std::string file;
-  QueryDetails wishes;
+  QueryDetails details;
 };
 
 // Reads a scene that must end the source.
-absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& wishes) {
+absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& details) {
   const auto source = ByteSource::Open(file);
   if (!source.ok()) return source.status();
-  auto scene = ReadScene(source->get(), FormFor(wishes));
+  auto scene = ReadScene(source->get(), FormFor(details));
   if (!scene.ok()) return scene.status();
   if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) return rest;
   return scene;
 }
 
-ExitCode Find(const Invocation& run, const QueryDetails& wishes, Scene* read) {
+ExitCode Find(const Invocation& run, const QueryDetails& details, Scene* read) {
   double tolerance = read->request.tolerance();
-  wishes.Apply(read->request.mutable_wanted(), &tolerance);
+  details.Apply(read->request.mutable_wanted(), &tolerance);
   read->request.set_tolerance(tolerance);
   SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
@@ -137,7 +137,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'"));
   }
-  auto read = ReadWhole(arguments.file, arguments.wishes);
+  auto read = ReadWhole(arguments.file, arguments.details);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
     return run.FailUsage(absl::InvalidArgumentError(
@@ -145,23 +145,23 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
                      ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
                      "'hullctl scene check' or 'hullctl batch', or remove them")));
   }
-  return Find(run, arguments.wishes, &*read);
+  return Find(run, arguments.details, &*read);
 }
 
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
-  auto read = ReadWhole(arguments.file, arguments.wishes);
+  auto read = ReadWhole(arguments.file, arguments.details);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
-    return AnswerPairs(run, arguments.file, *read, arguments.wishes, /*colliding=*/false);
+    return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
   }
-  return Find(run, arguments.wishes, &*read);
+  return Find(run, arguments.details, &*read);
 }
 
 void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
   Command command = scene.AddCommand("check", "Answer the queries of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
-  AddWantedOptions(command, &arguments->wishes);
+  AddWantedOptions(command, &arguments->details);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "If the file names pairs, answers each, as 'hullctl batch' does. Otherwise finds all pairs\n"
@@ -183,7 +183,7 @@ void AddSceneCommand(Command program, Invocation* invocation) {
   Command command =
       program.AddCommand("scene", "Find all colliding pairs of a scene; manage scene files");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input");
-  AddWantedOptions(command, &arguments->wishes);
+  AddWantedOptions(command, &arguments->details);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\n"

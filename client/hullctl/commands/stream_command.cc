@@ -18,7 +18,7 @@ namespace {
 
 struct StreamArguments {
   std::string file;
-  QueryDetails wishes;
+  QueryDetails details;
   bool only_changes = false;
 };
 
@@ -129,7 +129,7 @@ ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
   auto pairs = PairsOf(*scene, arguments.file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());
   double tolerance = scene->request.tolerance();
-  arguments.wishes.Apply(scene->request.mutable_wanted(), &tolerance);
+  arguments.details.Apply(scene->request.mutable_wanted(), &tolerance);
   scene->request.set_tolerance(tolerance);
   StreamRun stream(run, *scene, *std::move(pairs));
   absl::Status status = stream.Open(scene->only_changes || arguments.only_changes);
@@ -155,7 +155,7 @@ void AddStreamCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<StreamArguments>();
   Command command = program.AddCommand("stream", "Check pairs repeatedly while poses change");
   command.AddText("FILE", &arguments->file, "A scene and updates; - is standard input").Required();
-  AddWantedOptions(command, &arguments->wishes);
+  AddWantedOptions(command, &arguments->details);
   command.AddFlag("--only-changes", &arguments->only_changes,
                   "Answer updates only with pairs whose relation changed");
   AddFreshnessOptions(command, invocation);

@@ -42,7 +42,7 @@ struct RobotCheckArguments {
   std::vector<std::string> ignored;
   bool adjacent = false;
   bool first = false;
-  QueryDetails wishes;
+  QueryDetails details;
 };
 
 // Objects of the queries: the parts of the robot, then its surroundings.
@@ -444,7 +444,7 @@ void RobotCheck::PrintTotals() {
   run_.out << "# separated " << counts_[v1::RELATION_SEPARATED] << " touching "
            << counts_[v1::RELATION_TOUCHING] << " overlapping "
            << counts_[v1::RELATION_OVERLAPPING];
-  if (arguments_.wishes.tolerance.value_or(0) > 0) {
+  if (arguments_.details.tolerance.value_or(0) > 0) {
     run_.out << " within_tolerance " << counts_[v1::RELATION_WITHIN_TOLERANCE];
   }
   run_.out << " failed " << failed_ << "\n";
@@ -475,7 +475,7 @@ ExitCode RobotCheck::Run() {
   scope.fixed_poses = cast_.fixed_poses;
   scope.pairs = pairs_;
   double tolerance = 0;
-  arguments_.wishes.Apply(&scope.wanted, &tolerance);
+  arguments_.details.Apply(&scope.wanted, &tolerance);
   scope.tolerance = tolerance;
   // A single waypoint is examined in detail.
   if (!many_ && tolerance == 0) scope.wanted.set_separation(true);
@@ -591,7 +591,7 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
   AddWaypointOptions(command, arguments);
   AddSceneOptions(command, arguments.get());
   command.AddFlag("--first", &arguments->first, "Stop at the first waypoint in contact");
-  AddWantedOptions(command, &arguments->wishes);
+  AddWantedOptions(command, &arguments->details);
   DescribeRobotCheck(command);
   command.OnGiven(
       [=] { invocation->action = [=] { return CheckRobot(*invocation, *arguments); }; });
