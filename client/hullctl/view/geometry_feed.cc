@@ -6,7 +6,7 @@ namespace hulld {
 namespace {
 
 // Pages request each hull once, and again if it changed after they received it.
-constexpr size_t kMostWishes = 1 << 20;
+constexpr size_t kMostShapes = 1 << 20;
 
 std::string MessageOf(const absl::Status& status) {
   return std::string(status.message().data(), status.message().size());
@@ -14,25 +14,25 @@ std::string MessageOf(const absl::Status& status) {
 
 }  // namespace
 
-std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
+std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeRequest& shape,
                      std::vector<std::string>* pieces) {
-  if (wish.file) {
-    if (*wish.file >= files.size()) return MissingFrame(wish, "no such file");
-    return MeshFrame(*wish.file, *files[*wish.file]);
+  if (shape.file) {
+    if (*shape.file >= files.size()) return MissingFrame(shape, "no such file");
+    return MeshFrame(*shape.file, *files[*shape.file]);
   }
-  if (wish.simplified) {
-    const auto mesh = client.GetHullMesh(*wish.simplified);
-    return mesh.ok() ? SimplifiedFrame(*wish.simplified, *mesh)
-                     : MissingFrame(wish, MessageOf(mesh.status()));
+  if (shape.simplified) {
+    const auto mesh = client.GetHullMesh(*shape.simplified);
+    return mesh.ok() ? SimplifiedFrame(*shape.simplified, *mesh)
+                     : MissingFrame(shape, MessageOf(mesh.status()));
   }
-  const std::string hull_id = wish.hull_id.value_or("");
+  const std::string hull_id = shape.hull_id.value_or("");
   const auto mesh = client.GetHullMesh(hull_id);
   if (mesh.ok()) return HullFrame(hull_id, *mesh);
   const auto body =
       absl::IsNotFound(mesh.status()) ? client.GetBody(hull_id) : absl::NotFoundError("");
   if (!body.ok()) {
     const bool is_neither = absl::IsNotFound(body.status());
-    return MissingFrame(wish, MessageOf(is_neither ? mesh.status() : body.status()));
+    return MissingFrame(shape, MessageOf(is_neither ? mesh.status() : body.status()));
   }
   for (const v1::Placement& piece : body->pieces()) {
     if (pieces != nullptr) pieces->push_back(piece.hull_id());
@@ -43,8 +43,8 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const Geomet
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
     : files_(std::make_shared<ShapeFiles>()),
       page_(std::move(page)),
-      worker_(kMostWishes, [&client, this](const Order& order) {
-        return page_->SendBinary(FrameFor(client, *order.files, order.wish));
+      worker_(kMostShapes, [&client, this](const Order& order) {
+        return page_->SendBinary(FrameFor(client, *order.files, order.shape));
       }) {}
 
 void GeometryFeed::Show(const ShapeFiles& files) {
@@ -53,11 +53,11 @@ void GeometryFeed::Show(const ShapeFiles& files) {
   worker_.Forget();
 }
 
-void GeometryFeed::Ask(const std::vector<GeometryWish>& wishes) {
+void GeometryFeed::Ask(const std::vector<ShapeRequest>& shapes) {
   const std::lock_guard lock(mutex_);
-  for (const GeometryWish& wish : wishes) {
-    if (worker_.Ask({wish, files_})) continue;
-    page_->SendBinary(MissingFrame(wish, "too many shapes wait to be sent"));
+  for (const ShapeRequest& shape : shapes) {
+    if (worker_.Ask({shape, files_})) continue;
+    page_->SendBinary(MissingFrame(shape, "too many shapes wait to be sent"));
   }
 }
 

@@ -23,11 +23,11 @@ class GeometryFeed {
 
   // Switches to another scene; drops pending requests.
   void Show(const ShapeFiles& files);
-  void Ask(const std::vector<GeometryWish>& wishes);
+  void Ask(const std::vector<ShapeRequest>& shapes);
 
  private:
   struct Order {
-    GeometryWish wish;
+    ShapeRequest shape;
     // Files of the scene of the request.
     std::shared_ptr<const ShapeFiles> files;
   };
@@ -42,7 +42,7 @@ class GeometryFeed {
 
 // Returns the frame for a request. For a body, `pieces`, unless null, receives the IDs of its
 // hulls.
-std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
+std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeRequest& shape,
                      std::vector<std::string>* pieces = nullptr);
 
 }  // namespace hulld

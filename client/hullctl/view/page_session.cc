@@ -137,15 +137,15 @@ void PageSession::Follow(v1::WatchHullsRequest request) {
       [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); }));
 }
 
-void PageSession::FollowToo(const std::vector<GeometryWish>& wishes) {
+void PageSession::FollowToo(const std::vector<ShapeRequest>& shapes) {
   std::string prefix = watched_.hull_id().empty() ? watched_.prefix() : watched_.hull_id();
   bool is_covered = true;
   {
     const std::lock_guard lock(mutex_);
-    for (const GeometryWish& wish : wishes) {
-      if (!wish.hull_id || !known_.insert(*wish.hull_id).second) continue;
-      is_covered = is_covered && watched_.hull_id().empty() && wish.hull_id->starts_with(prefix);
-      prefix = CommonPrefix(prefix, *wish.hull_id);
+    for (const ShapeRequest& shape : shapes) {
+      if (!shape.hull_id || !known_.insert(*shape.hull_id).second) continue;
+      is_covered = is_covered && watched_.hull_id().empty() && shape.hull_id->starts_with(prefix);
+      prefix = CommonPrefix(prefix, *shape.hull_id);
     }
   }
   if (is_covered) return;

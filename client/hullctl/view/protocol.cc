@@ -107,25 +107,25 @@ ViewQuestion ReadQuestion(Reader* reader) {
   return question;
 }
 
-std::vector<GeometryWish> ReadGeometry(Reader* reader) {
-  std::vector<GeometryWish> wishes;
-  for (const uint32_t file : reader->Indices("files")) wishes.emplace_back().file = file;
+std::vector<ShapeRequest> ReadGeometry(Reader* reader) {
+  std::vector<ShapeRequest> shapes;
+  for (const uint32_t file : reader->Indices("files")) shapes.emplace_back().file = file;
   for (const Value& hull : reader->List("hullIds").values()) {
-    wishes.emplace_back().hull_id = hull.string_value();
+    shapes.emplace_back().hull_id = hull.string_value();
   }
-  return wishes;
+  return shapes;
 }
 
-GeometryWish ReadSimplification(Reader* reader) {
-  GeometryWish wish;
-  v1::GetHullMeshRequest& request = wish.simplified.emplace();
+ShapeRequest ReadSimplification(Reader* reader) {
+  ShapeRequest shape;
+  v1::GetHullMeshRequest& request = shape.simplified.emplace();
   request.set_hull_id(reader->Text("hullId"));
   v1::Simplification* const simplification = request.mutable_simplification();
   simplification->set_side(reader->Text("side") == "outside" ? v1::SIMPLIFICATION_SIDE_OUTSIDE
                                                              : v1::SIMPLIFICATION_SIDE_INSIDE);
   simplification->set_max_error(reader->Number("maxError"));
   simplification->set_max_vertices(reader->Count("maxVertices"));
-  return wish;
+  return shape;
 }
 
 ViewEdit ReadEdit(Reader* reader) {
@@ -302,12 +302,12 @@ std::string MeshFrame(uint32_t file, const FileShape& shape) {
   return frame;
 }
 
-std::string MissingFrame(const GeometryWish& wish, const std::string& message) {
+std::string MissingFrame(const ShapeRequest& shape, const std::string& message) {
   JsonObject head;
   head.Add("kind", "missing");
-  if (wish.file) head.AddJson("file", std::to_string(*wish.file));
-  if (wish.hull_id) head.Add("hullId", *wish.hull_id);
-  if (wish.simplified) head.Add("simplified", wish.simplified->hull_id());
+  if (shape.file) head.AddJson("file", std::to_string(*shape.file));
+  if (shape.hull_id) head.Add("hullId", *shape.hull_id);
+  if (shape.simplified) head.Add("simplified", shape.simplified->hull_id());
   head.Add("message", message);
   return StartFrame(head.Close(), 0);
 }

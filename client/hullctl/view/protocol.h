@@ -82,7 +82,7 @@ struct ViewQuestion {
   bool certificate = false;
   bool rest = false;
 };
-struct GeometryWish {
+struct ShapeRequest {
   // Exactly one of the three is set; the first may be a body's.
   std::optional<std::string> hull_id;
   std::optional<uint32_t> file;
@@ -97,7 +97,7 @@ struct ViewEdit {
 };
 struct PageMessage {
   std::optional<std::string> show;
-  std::vector<GeometryWish> geometry;
+  std::vector<ShapeRequest> geometry;
   std::optional<ViewQuestion> question;
   std::optional<ViewEdit> edit;
 };
@@ -119,7 +119,7 @@ std::string HullFrame(const std::string& hull_id, const HullMesh& mesh);
 std::string BodyFrame(const v1::GetBodyResponse& body);
 std::string SimplifiedFrame(const v1::GetHullMeshRequest& request, const HullMesh& mesh);
 std::string MeshFrame(uint32_t file, const FileShape& shape);
-std::string MissingFrame(const GeometryWish& wish, const std::string& message);
+std::string MissingFrame(const ShapeRequest& shape, const std::string& message);
 
 // Returns "[1,2.5]": numbers that read back as the same doubles. Requires finite numbers; others
 // become null.

@@ -16,23 +16,23 @@ namespace {
 // Returns a frame for each file, hull, and body of the scene, and for each hull of a body.
 std::string AllFrames(const Client& client, const ViewScene& scene) {
   std::string frames = "[";
-  const auto add = [&](const GeometryWish& wish, std::vector<std::string>* pieces) {
-    const std::string frame = FrameFor(client, scene.files, wish, pieces);
+  const auto add = [&](const ShapeRequest& shape, std::vector<std::string>* pieces) {
+    const std::string frame = FrameFor(client, scene.files, shape, pieces);
     absl::StrAppend(&frames, frames.size() > 1 ? "," : "", QuoteJson(absl::Base64Escape(frame)));
   };
   for (uint32_t file = 0; file < scene.files.size(); ++file) {
-    GeometryWish wish;
-    wish.file = file;
-    add(wish, nullptr);
+    ShapeRequest shape;
+    shape.file = file;
+    add(shape, nullptr);
   }
   std::set<std::string> known;
   std::vector<std::string> wanted;
   for (const ViewObject& object : scene.objects) wanted.push_back(object.hull_id);
   for (size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i].empty() || !known.insert(wanted[i]).second) continue;
-    GeometryWish wish;
-    wish.hull_id = wanted[i];
-    add(wish, &wanted);
+    ShapeRequest shape;
+    shape.hull_id = wanted[i];
+    add(shape, &wanted);
   }
   return frames + "]";
 }
