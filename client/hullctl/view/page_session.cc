@@ -74,7 +74,7 @@ void PageSession::OnMessage(std::string_view json) {
   }
   if (message->show) Show(*message->show);
   if (!message->geometry.empty()) {
-    FollowToo(message->geometry);
+    WidenWatch(message->geometry);
     geometry_.Ask(message->geometry);
   }
   if (message->question) answers_.Ask(*message->question);
@@ -137,7 +137,7 @@ void PageSession::Follow(v1::WatchHullsRequest request) {
       [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); }));
 }
 
-void PageSession::FollowToo(const std::vector<ShapeRequest>& shapes) {
+void PageSession::WidenWatch(const std::vector<ShapeRequest>& shapes) {
   std::string prefix = watched_.hull_id().empty() ? watched_.prefix() : watched_.hull_id();
   bool is_covered = true;
   {

@@ -48,7 +48,7 @@ class PageSession final : public PageHandler {
   void Show(const std::string& key);
   void Edit(ViewEdit edit);
   // Also follows these pieces of bodies from now on.
-  void FollowToo(const std::vector<ShapeRequest>& shapes);
+  void WidenWatch(const std::vector<ShapeRequest>& shapes);
   // Replaces the current watch.
   void Follow(v1::WatchHullsRequest request);
   // Called by the thread of the follower of scene number `scene`.
