@@ -72,24 +72,24 @@ absl::Status HullFollower::Follow(HullWatch* watch) {
 
 void HullFollower::Take(const v1::WatchHullsResponse& response) {
   if (response.anew()) {
-    told_anew_.clear();
+    seen_since_restart_.clear();
     synced_ = false;
   }
   for (const v1::HullEvent& event : response.events()) {
     const std::string& id = event.hull().hull_id();
     if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {
       present_.erase(id);
-      told_anew_.erase(id);
+      seen_since_restart_.erase(id);
     } else {
       present_.insert(id);
-      if (!synced_) told_anew_.insert(id);
+      if (!synced_) seen_since_restart_.insert(id);
     }
     receive_(event, synced_);
   }
   if (response.synced() && !synced_) {
     synced_ = true;
     for (auto id = present_.begin(); id != present_.end();) {
-      if (told_anew_.contains(*id)) {
+      if (seen_since_restart_.contains(*id)) {
         ++id;
         continue;
       }
@@ -100,7 +100,7 @@ void HullFollower::Take(const v1::WatchHullsResponse& response) {
       receive_(gone, synced_);
       id = present_.erase(id);
     }
-    told_anew_.clear();
+    seen_since_restart_.clear();
   }
   request_.set_after_revision(response.header().revision());
   request_.set_store_id(response.header().store_id());

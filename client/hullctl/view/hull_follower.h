@@ -44,9 +44,9 @@ class HullFollower {
   v1::WatchHullsRequest request_;
   const Receiver receive_;
   const Complaint complain_;
-  // IDs reported and not deleted, and the subset reported since a restart from scratch.
+  // IDs reported and not deleted, and the subset reported since the watch restarted.
   std::unordered_set<std::string> present_;
-  std::unordered_set<std::string> told_anew_;
+  std::unordered_set<std::string> seen_since_restart_;
   bool synced_ = false;
 
   std::mutex mutex_;
