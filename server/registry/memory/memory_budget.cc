@@ -23,15 +23,15 @@ void MemoryBudget::Usage::Remove(Kind kind, uint64_t amount) {
 }
 
 void MemoryBudget::Account::Enter() {
-  Usage& books = *budget_.books_;
-  books.Add(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
-  books.Add(is_for_writing_ ? kForWriting : kForReading, pinned_);
+  Usage& usage = *budget_.usage_;
+  usage.Add(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
+  usage.Add(is_for_writing_ ? kForWriting : kForReading, pinned_);
 }
 
 void MemoryBudget::Account::Leave() {
-  Usage& books = *budget_.books_;
-  books.Remove(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
-  books.Remove(is_for_writing_ ? kForWriting : kForReading, pinned_);
+  Usage& usage = *budget_.usage_;
+  usage.Remove(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
+  usage.Remove(is_for_writing_ ? kForWriting : kForReading, pinned_);
 }
 
 void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
@@ -44,7 +44,7 @@ void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
   } else {
     used.splice(used.begin(), used, place_);
   }
-  const std::lock_guard lock(budget_.books_->mutex);
+  const std::lock_guard lock(budget_.usage_->mutex);
   Leave();
   bytes_ = bytes;
   is_for_writing_ = is_for_writing;
@@ -54,7 +54,7 @@ void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
 void MemoryBudget::Account::Hold(std::vector<std::shared_ptr<MemoryPart>> parts) {
   if (parts == parts_) return;
   {
-    const std::lock_guard lock(budget_.books_->mutex);
+    const std::lock_guard lock(budget_.usage_->mutex);
     for (const auto* const moved : {&parts_, &parts}) {
       for (const auto& part : *moved) {
         part->Leave();
@@ -73,7 +73,7 @@ void MemoryBudget::Account::Close() {
 
 void MemoryPart::Enter() {
   if (account_ == nullptr) {
-    if (pins_ > 0) books_->Add(MemoryBudget::kForReading, bytes_);
+    if (pins_ > 0) usage_->Add(MemoryBudget::kForReading, bytes_);
     return;
   }
   account_->Leave();
@@ -83,7 +83,7 @@ void MemoryPart::Enter() {
 
 void MemoryPart::Leave() {
   if (account_ == nullptr) {
-    if (pins_ > 0) books_->Remove(MemoryBudget::kForReading, bytes_);
+    if (pins_ > 0) usage_->Remove(MemoryBudget::kForReading, bytes_);
     return;
   }
   account_->Leave();
@@ -92,7 +92,7 @@ void MemoryPart::Leave() {
 }
 
 void MemoryPart::SetBytes(uint64_t bytes) {
-  const std::lock_guard lock(books_->mutex);
+  const std::lock_guard lock(usage_->mutex);
   if (bytes == bytes_) return;
   Leave();
   bytes_ = bytes;
@@ -100,7 +100,7 @@ void MemoryPart::SetBytes(uint64_t bytes) {
 }
 
 void MemoryPart::Pin(bool pins) {
-  const std::lock_guard lock(books_->mutex);
+  const std::lock_guard lock(usage_->mutex);
   Leave();
   pins_ += pins ? 1 : -1;
   Enter();
@@ -108,11 +108,11 @@ void MemoryPart::Pin(bool pins) {
 
 void MemoryCharge::Set(uint64_t bytes) {
   if (bytes == bytes_) return;
-  MemoryBudget::Usage& books = *budget_->books_;
+  MemoryBudget::Usage& usage = *budget_->usage_;
   const auto kind = static_cast<MemoryBudget::Kind>(use_);
-  const std::lock_guard lock(books.mutex);
-  books.Remove(kind, std::exchange(bytes_, bytes));
-  books.Add(kind, bytes);
+  const std::lock_guard lock(usage.mutex);
+  usage.Remove(kind, std::exchange(bytes_, bytes));
+  usage.Add(kind, bytes);
 }
 
 void MemoryBudget::Evict(Locked& owners) {
@@ -143,18 +143,18 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
 }
 
 bool MemoryBudget::IsOver(MemoryUse use) const {
-  const std::lock_guard lock(books_->mutex);
-  return books_->bytes[static_cast<size_t>(use)] > share(use);
+  const std::lock_guard lock(usage_->mutex);
+  return usage_->bytes[static_cast<size_t>(use)] > share(use);
 }
 
 uint64_t MemoryBudget::Total() const {
-  const std::lock_guard lock(books_->mutex);
-  return books_->bytes[kForReading] + books_->bytes[kForWriting] + books_->bytes[kAtRest];
+  const std::lock_guard lock(usage_->mutex);
+  return usage_->bytes[kForReading] + usage_->bytes[kForWriting] + usage_->bytes[kAtRest];
 }
 
 MemoryStatistics MemoryBudget::Statistics() const {
-  const std::lock_guard lock(books_->mutex);
-  const auto& bytes = books_->bytes;
+  const std::lock_guard lock(usage_->mutex);
+  const auto& bytes = usage_->bytes;
   return {bytes[kForReading] + bytes[kForWriting] + bytes[kAtRest], bytes[kForReading],
           bytes[kForWriting], limit_bytes_, evictions_};
 }

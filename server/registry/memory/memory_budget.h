@@ -146,7 +146,7 @@ class MemoryBudget {
   const uint64_t limit_bytes_;
   const std::array<uint64_t, 2> shares_;
   const FairMutex& owners_;
-  const std::shared_ptr<Usage> books_ = std::make_shared<Usage>();
+  const std::shared_ptr<Usage> usage_ = std::make_shared<Usage>();
   // The owners' mutex guards the members below. Non-empty accounts, most recently used first.
   std::list<Account*> used_;
   uint64_t evictions_ = 0;
@@ -158,7 +158,7 @@ class MemoryPart {
  public:
   // what: identifies the part within its account; never dereferenced.
   MemoryPart(MemoryBudget& budget, const void* what, uint64_t bytes = 0)
-      : books_(budget.books_), what_(what), bytes_(bytes) {}
+      : usage_(budget.usage_), what_(what), bytes_(bytes) {}
   MemoryPart(const MemoryPart&) = delete;
   MemoryPart& operator=(const MemoryPart&) = delete;
 
@@ -174,7 +174,7 @@ class MemoryPart {
   void Enter();
   void Leave();
 
-  const std::shared_ptr<MemoryBudget::Usage> books_;
+  const std::shared_ptr<MemoryBudget::Usage> usage_;
   const void* const what_;
   // Guarded by the budget's mutex.
   uint64_t bytes_ = 0;
