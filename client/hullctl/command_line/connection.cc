@@ -20,7 +20,7 @@ constexpr char kContextVariable[] = "HULLCTL_CONTEXT";
 // The context in force without --context: its name and the source of that name.
 struct NamedContext {
   std::string name;
-  std::string told_by;
+  std::string source;
 };
 
 NamedContext ContextInForce(const Invocation& invocation, const ContextFile& file) {
@@ -41,8 +41,7 @@ absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation
   if (named.name.empty()) return layers;
   auto context = FindContext(*file, named.name);
   if (!context.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(named.told_by, ": ", context.status().message()));
+    return absl::InvalidArgumentError(absl::StrCat(named.source, ": ", context.status().message()));
   }
   const bool by_option = !invocation.context.empty();
   const auto server = invocation.flags.find("server");
