@@ -83,14 +83,14 @@ class Ending {
 };
 
 // Prints messages until the watch ends, the callback returns true, or Ctrl-C.
-template <typename Watch, typename Tell>
-ExitCode TellAll(const Invocation& run, std::unique_ptr<Watch> watch, const Tell& tell) {
+template <typename Watch, typename Print>
+ExitCode PrintAll(const Invocation& run, std::unique_ptr<Watch> watch, const Print& print) {
   Ending<Watch> ending(std::move(watch));
   while (true) {
     const auto message = ending.watch().Next();
     if (!message.ok()) return ending.is_ended() ? ExitCode::kDone : run.Fail(message.status());
     if (run.json()) run.out << MessageJson(*message) << "\n";
-    const bool is_enough = tell(*message);
+    const bool is_enough = print(*message);
     run.out << std::flush;
     if (is_enough) return ExitCode::kDone;
   }
@@ -101,13 +101,13 @@ ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   (options.exact ? request.mutable_hull_id() : request.mutable_prefix())->assign(options.prefix);
   request.set_bodies(true);
   uint64_t events = 0;
-  const auto tell = [&](const v1::WatchHullsResponse& message) {
+  const auto print = [&](const v1::WatchHullsResponse& message) {
     if (!run.json()) PrintHullEvents(message, run);
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) ||
            (options.until_synced && message.synced());
   };
-  return TellAll(run, run.MakeClient().WatchHulls(request), tell);
+  return PrintAll(run, run.MakeClient().WatchHulls(request), print);
 }
 
 // Returns the watch of a scene with fixed poses.
@@ -152,7 +152,7 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   };
   uint64_t events = 0;
   bool is_synced = false;
-  const auto tell = [&](const v1::WatchCollisionsResponse& message) {
+  const auto print = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
       run.err << "hullctl: placement " << name(problem.placement()) << ": " << problem.message()
               << "\n";
@@ -175,7 +175,7 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);
   };
-  return TellAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), tell);
+  return PrintAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), print);
 }
 
 }  // namespace
