@@ -24,7 +24,7 @@ void Count(uint64_t what) {
   errno = before;
 }
 
-extern "C" void TellOfSignal(int) { Count(kSignal); }
+extern "C" void HandleSignal(int) { Count(kSignal); }
 
 }  // namespace
 
@@ -39,7 +39,7 @@ Interrupt::Interrupt(std::function<void()> on_interrupt) {
     }
   });
   struct sigaction action = {};
-  action.sa_handler = TellOfSignal;
+  action.sa_handler = HandleSignal;
   // The second signal has its previous action.
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, &before_int_);
