@@ -125,7 +125,7 @@ class RobotCheck {
   void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
   absl::Status AskAll(WaypointStream* stream);
   void Take(uint64_t waypoint, size_t pair, const AnswerRow& row, const std::string& problem);
-  void TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem);
+  void PrintFailure(uint64_t waypoint, size_t pair, const std::string& problem);
   void TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides);
   void PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row);
   std::string TextOf(size_t pair, const AnswerRow& row) const;
@@ -397,7 +397,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
     last_contact_ = waypoint;
   }
   if (row.relation == v1::RELATION_UNSPECIFIED) {
-    TellOfFailure(waypoint, pair, problem);
+    PrintFailure(waypoint, pair, problem);
   } else if (many_) {
     TakeOfMany(waypoint, pair, row, collides);
   } else {
@@ -405,7 +405,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
   }
 }
 
-void RobotCheck::TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem) {
+void RobotCheck::PrintFailure(uint64_t waypoint, size_t pair, const std::string& problem) {
   bar_.Clear();
   if (failed_++ >= kMostWarnings) return;
   run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
