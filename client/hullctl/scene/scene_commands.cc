@@ -104,8 +104,8 @@ class SceneSync {
                                       [&] { return client_.PutBody(BodyRequest(body)).status(); });
       if (!taken.ok()) return run_.Fail(taken);
     }
-    const absl::Status told = TakeStrangers(*strangers, changes, prune);
-    if (!told.ok()) return run_.Fail(told);
+    const absl::Status listed = TakeStrangers(*strangers, changes, prune);
+    if (!listed.ok()) return run_.Fail(listed);
     if (!run_.json() && !run_.names()) {
       run_.out << "# " << Counted(same_hulls_, "hull");
       if (!scene_.bodies.empty()) run_.out << " and " << Counted(same_bodies_, "body", "bodies");
@@ -129,8 +129,9 @@ class SceneSync {
       if (absl::Status done = put(); !done.ok()) return done;
     }
     const bool is_new = *change == Change::kCreate;
-    Tell(is_new ? "+" : "~", kept,
-         changes ? (is_new ? "created" : "replaced") : (is_new ? "to create" : "to replace"));
+    PrintChange(
+        is_new ? "+" : "~", kept,
+        changes ? (is_new ? "created" : "replaced") : (is_new ? "to create" : "to replace"));
     return absl::OkStatus();
   }
 
@@ -140,15 +141,15 @@ class SceneSync {
         const absl::Status deleted = DeleteKept(client_, stranger).status();
         if (!deleted.ok() && !absl::IsNotFound(deleted)) return deleted;
       }
-      Tell(prune ? "-" : "?", stranger,
-           !prune    ? "not in the file"
-           : changes ? "deleted"
-                     : "to delete");
+      PrintChange(prune ? "-" : "?", stranger,
+                  !prune    ? "not in the file"
+                  : changes ? "deleted"
+                            : "to delete");
     }
     return absl::OkStatus();
   }
 
-  void Tell(const char* mark, const Kept& kept, const char* what) {
+  void PrintChange(const char* mark, const Kept& kept, const char* what) {
     ++differences_;
     if (run_.json()) {
       run_.out << JsonObject()
