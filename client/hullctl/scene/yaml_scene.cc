@@ -384,7 +384,7 @@ class SceneParser {
     for (const auto& [key, value] : *entries) {
       absl::Status taken = key == "pairs"    ? TakePairs(value)
                            : key == "movers" ? TakeMovers(value)
-                                             : TakeWish(key, value);
+                                             : TakeQueryOption(key, value);
       if (!taken.ok()) return taken;
     }
     if (scene_.pairs.has_value() && !scene_.movers.empty()) {
@@ -424,7 +424,7 @@ class SceneParser {
     return absl::OkStatus();
   }
 
-  absl::Status TakeWish(const std::string& key, const YAML::Node& node) {
+  absl::Status TakeQueryOption(const std::string& key, const YAML::Node& node) {
     if (key == "max_error" || key == "clearance" || key == "tolerance") {
       const auto length = yaml_.Number(node, key);
       if (!length.ok()) return length.status();
