@@ -40,7 +40,7 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
 }
 
 // Returns true if bounds about the centers may settle a pair that spheres do not.
-bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
+bool CentersMaySettle(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
   if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
@@ -58,7 +58,7 @@ bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
 [[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
                                                         PlainVector& first) {
   constexpr double kLeastLikely = 0x1p-4;
-  if (!CentersMayTell(pair, n)) return std::nullopt;
+  if (!CentersMaySettle(pair, n)) return std::nullopt;
   const FloatPair::CenterView view = pair.ViewCenters(n);
   if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) return relation;
   if (const PlainVector likely = view.LikelyAxis(); SquaredNorm(likely) > kLeastLikely) {
