@@ -521,7 +521,7 @@ SupportMap::Support SupportMap::LookUpDeep(const Cell& cell, const Place& place,
   };
   consider(found.ids[1]);
   consider(found.ids[2]);
-  for (const uint32_t id : OthersOf(found)) consider(id);
+  for (const uint32_t id : RemainingOf(found)) consider(id);
   return best;
 }
 
@@ -548,7 +548,7 @@ void SupportMap::AppendCandidates(const PlainVector& n, double error, double lea
   if (cell.ids[3] < kLong) {
     consider(cell.ids[3]);
   } else {
-    for (const uint32_t id : OthersOf(cell)) consider(id);
+    for (const uint32_t id : RemainingOf(cell)) consider(id);
   }
   std::sort(candidates.begin() + begin, candidates.end());
   candidates.erase(std::unique(candidates.begin() + begin, candidates.end()), candidates.end());

@@ -101,7 +101,7 @@ class SupportMap {
   Support Scan(const PlainVector& n) const;
   const Cell& QuarterAt(const Cell& divided, const Place& place) const;
   // Returns the remaining points of a cell that lists more than four.
-  std::span<const uint32_t> OthersOf(const Cell& cell) const {
+  std::span<const uint32_t> RemainingOf(const Cell& cell) const {
     const size_t at = cell.ids[3] - kLong;
     return std::span(lists_).subspan(at + 1, lists_[at]);
   }
