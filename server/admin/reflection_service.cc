@@ -68,22 +68,22 @@ class ReflectionStream
         }
         return;
       case reflection::ServerReflectionRequest::kFileByFilename:
-        return TellFile(pool.FindFileByName(request().file_by_filename()),
-                        request().file_by_filename());
+        return ReplyWithFile(pool.FindFileByName(request().file_by_filename()),
+                             request().file_by_filename());
       case reflection::ServerReflectionRequest::kFileContainingSymbol:
-        return TellFile(pool.FindFileContainingSymbol(request().file_containing_symbol()),
-                        request().file_containing_symbol());
+        return ReplyWithFile(pool.FindFileContainingSymbol(request().file_containing_symbol()),
+                             request().file_containing_symbol());
       case reflection::ServerReflectionRequest::kFileContainingExtension:
         return Refuse(absl::StatusCode::kNotFound, "the contract has no extensions");
       case reflection::ServerReflectionRequest::kAllExtensionNumbersOfType:
-        return TellNoExtensions(pool, request().all_extension_numbers_of_type());
+        return ReplyWithoutExtensions(pool, request().all_extension_numbers_of_type());
       case reflection::ServerReflectionRequest::MESSAGE_REQUEST_NOT_SET:
         break;
     }
     Refuse(absl::StatusCode::kInvalidArgument, "the request has no query; set one of its fields");
   }
 
-  void TellFile(const FileDescriptor* file, const std::string& name) {
+  void ReplyWithFile(const FileDescriptor* file, const std::string& name) {
     if (file == nullptr) {
       return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", name, "\" is unknown"));
     }
@@ -91,7 +91,7 @@ class ReflectionStream
     AddFile(*file, added, reply().mutable_file_descriptor_response());
   }
 
-  void TellNoExtensions(const DescriptorPool& pool, const std::string& type) {
+  void ReplyWithoutExtensions(const DescriptorPool& pool, const std::string& type) {
     if (pool.FindMessageTypeByName(type) == nullptr) {
       return Refuse(absl::StatusCode::kNotFound, absl::StrCat("\"", type, "\" is unknown"));
     }
