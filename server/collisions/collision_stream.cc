@@ -292,7 +292,7 @@ void CollisionStream::DecideTogether() {
   if (is_placing_) {
     unclaimed_.Begin(static_cast<uint32_t>(moved_.size()));
   } else if (!BeginDeciding()) {
-    return TellDecided();
+    return EncodeDecided();
   }
   const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
@@ -342,7 +342,7 @@ void CollisionStream::TakePart() {
         is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);
       }
     }
-    if (unclaimed_.GiveBack(block) && !(is_placing && BeginDeciding())) return TellDecided();
+    if (unclaimed_.GiveBack(block) && !(is_placing && BeginDeciding())) return EncodeDecided();
     if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
   }
 }
@@ -366,7 +366,7 @@ void CollisionStream::Decide(uint32_t i) {
 }
 
 // Encodes the decided pairs, until the message is full or other calls are due.
-void CollisionStream::TellDecided() {
+void CollisionStream::EncodeDecided() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   is_decided_ = true;
   v1::AnswerColumns* const columns = reply().mutable_columns();
@@ -374,7 +374,7 @@ void CollisionStream::TellDecided() {
     if (next_asked_ % kPairsPerClockRead == 0) {
       if (call().ShouldStop()) break;
       if (std::chrono::steady_clock::now() >= end) {
-        return RunOn(lane_, [this] { TellDecided(); });
+        return RunOn(lane_, [this] { EncodeDecided(); });
       }
     }
     const auto [number, rung, is_changed] = decided_[next_asked_];
@@ -404,7 +404,7 @@ void CollisionStream::AnswerSlice() {
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
-  if (IsPlain()) return is_decided_ ? TellDecided() : DecideTogether();
+  if (IsPlain()) return is_decided_ ? EncodeDecided() : DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerClaim;
   while (next_asked_ < asked_.size()) {

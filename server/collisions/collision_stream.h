@@ -93,7 +93,7 @@ class CollisionStream
   ClaimedRange::Block Claim();
   void TakePart();
   void Decide(uint32_t i);
-  void TellDecided();
+  void EncodeDecided();
   void AnswerSlice();
   void SendAnswered();
   void SendPart(bool last);
