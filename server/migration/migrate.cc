@@ -109,7 +109,7 @@ class ProgressLines {
   explicit ProgressLines(std::ostream& err) : err_(err) {}
 
   void SetPhase(const char* phase) { phase_ = phase; }
-  void Tell(uint64_t done, uint64_t all) {
+  void Print(uint64_t done, uint64_t all) {
     const auto now = std::chrono::steady_clock::now();
     if (now < next_) return;
     next_ = now + kPause;
@@ -158,7 +158,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   if (!target.ok()) return Explain(to, target.status());
   ProgressLines lines(err);
   absl::StatusOr<Migration> migration =
-      Migration::Read(**source, [&lines](uint64_t done, uint64_t all) { lines.Tell(done, all); });
+      Migration::Read(**source, [&lines](uint64_t done, uint64_t all) { lines.Print(done, all); });
   if (!migration.ok()) return Explain(from, migration.status());
   absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
   if (!counts.ok()) return counts.status();
