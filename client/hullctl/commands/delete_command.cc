@@ -23,38 +23,39 @@ struct DeleteArguments {
 };
 
 // A hull to delete, with its revision in the list, if it was listed.
-struct Doomed {
+struct DeletionTarget {
   std::string hull_id;
   std::optional<uint64_t> if_revision;
 };
 
 // Returns true if the deletion is confirmed. A single hull given by name needs no confirmation;
 // more need --yes or a confirmation at the terminal.
-absl::StatusOr<bool> IsMeant(const Invocation& run, const DeleteArguments& arguments,
-                             const std::vector<Doomed>& doomed) {
-  if (arguments.yes || (doomed.size() == 1 && !arguments.has_prefix)) return true;
+absl::StatusOr<bool> IsConfirmed(const Invocation& run, const DeleteArguments& arguments,
+                                 const std::vector<DeletionTarget>& targets) {
+  if (arguments.yes || (targets.size() == 1 && !arguments.has_prefix)) return true;
   std::vector<std::string> ids;
-  ids.reserve(doomed.size());
-  for (const Doomed& hull : doomed) ids.push_back(hull.hull_id);
+  ids.reserve(targets.size());
+  for (const DeletionTarget& hull : targets) ids.push_back(hull.hull_id);
   return ConfirmDeletion(run, ids, "hull", "hulls");
 }
 
-absl::StatusOr<std::vector<Doomed>> Choose(const Client& client, const DeleteArguments& arguments) {
-  std::vector<Doomed> doomed;
+absl::StatusOr<std::vector<DeletionTarget>> Choose(const Client& client,
+                                                   const DeleteArguments& arguments) {
+  std::vector<DeletionTarget> targets;
   std::set<std::string> named;
   for (const std::string& hull_id : arguments.hull_ids) {
-    if (named.insert(hull_id).second) doomed.push_back({hull_id, arguments.if_revision});
+    if (named.insert(hull_id).second) targets.push_back({hull_id, arguments.if_revision});
   }
-  if (!arguments.has_prefix) return doomed;
+  if (!arguments.has_prefix) return targets;
   const auto listed = client.ListAllHulls(arguments.prefix);
   if (!listed.ok()) return listed.status();
   for (const v1::HullInfo& hull : listed->hulls()) {
     // Keeps hulls that changed since the list. A damaged hull has no revision.
     std::optional<uint64_t> revision;
     if (!hull.damaged()) revision = hull.revision();
-    doomed.push_back({hull.hull_id(), revision});
+    targets.push_back({hull.hull_id(), revision});
   }
-  return doomed;
+  return targets;
 }
 
 void PrintDeleted(const Invocation& run, const std::string& hull_id,
@@ -69,11 +70,11 @@ void PrintDeleted(const Invocation& run, const std::string& hull_id,
 }
 
 ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArguments& arguments,
-                   const std::vector<Doomed>& doomed) {
-  ProgressBar bar(run.err, run.shows_progress, "hulls", doomed.size());
+                   const std::vector<DeletionTarget>& targets) {
+  ProgressBar bar(run.err, run.shows_progress, "hulls", targets.size());
   uint64_t deleted = 0;
   ExitCode worst = ExitCode::kDone;
-  for (const Doomed& hull : doomed) {
+  for (const DeletionTarget& hull : targets) {
     const auto response = client.DeleteHull(hull.hull_id, hull.if_revision);
     const bool gone = absl::IsNotFound(response.status());
     if (gone && (arguments.if_exists || arguments.has_prefix)) continue;
@@ -90,8 +91,8 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
     if (!own) break;
   }
   bar.Clear();
-  if (worst == ExitCode::kDone || doomed.size() == 1) return worst;
-  run.err << "hullctl: deleted " << deleted << " of " << doomed.size() << " hulls\n";
+  if (worst == ExitCode::kDone || targets.size() == 1) return worst;
+  run.err << "hullctl: deleted " << deleted << " of " << targets.size() << " hulls\n";
   return worst;
 }
 
@@ -109,16 +110,16 @@ ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
     return usage("refusing to delete every hull of the server: --prefix is empty");
   }
   const Client client = run.MakeClient();
-  const auto doomed = Choose(client, arguments);
-  if (!doomed.ok()) return run.Fail(doomed.status());
-  if (doomed->empty()) {
+  const auto targets = Choose(client, arguments);
+  if (!targets.ok()) return run.Fail(targets.status());
+  if (targets->empty()) {
     run.err << "hullctl: no hull starts with " << Quoted(arguments.prefix) << "\n";
     return ExitCode::kDone;
   }
-  const auto meant = IsMeant(run, arguments, *doomed);
-  if (!meant.ok()) return run.FailUsage(meant.status());
-  if (!*meant) return usage("cancelled; nothing was deleted");
-  return DeleteAll(run, client, arguments, *doomed);
+  const auto confirmed = IsConfirmed(run, arguments, *targets);
+  if (!confirmed.ok()) return run.FailUsage(confirmed.status());
+  if (!*confirmed) return usage("cancelled; nothing was deleted");
+  return DeleteAll(run, client, arguments, *targets);
 }
 
 }  // namespace

@@ -50,21 +50,21 @@ absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& 
   return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
 }
 
-// Returns OK if the user confirms the deletion at the terminal, or if `doomed` is empty.
+// Returns OK if the user confirms the deletion at the terminal, or if `targets` is empty.
 // INVALID_ARGUMENT: no terminal, or the answer was no; `unless` states the consequence.
-absl::Status Confirm(const Invocation& run, const std::vector<Kept>& doomed,
+absl::Status Confirm(const Invocation& run, const std::vector<Kept>& targets,
                      const std::string& unless) {
-  if (doomed.empty()) return absl::OkStatus();
+  if (targets.empty()) return absl::OkStatus();
   std::vector<std::string> ids;
-  for (const Kept& kept : doomed) ids.push_back(kept.id);
-  const bool has_body = doomed.front().is_body;
-  const bool has_hull = !doomed.back().is_body;
-  const auto meant = ConfirmDeletion(run, ids, has_body ? "body" : "hull",
-                                     has_body && has_hull ? "bodies and hulls"
-                                     : has_body           ? "bodies"
-                                                          : "hulls");
-  if (!meant.ok()) return meant.status();
-  return *meant ? absl::OkStatus() : absl::InvalidArgumentError(unless);
+  for (const Kept& kept : targets) ids.push_back(kept.id);
+  const bool has_body = targets.front().is_body;
+  const bool has_hull = !targets.back().is_body;
+  const auto confirmed = ConfirmDeletion(run, ids, has_body ? "body" : "hull",
+                                         has_body && has_hull ? "bodies and hulls"
+                                         : has_body           ? "bodies"
+                                                              : "hulls");
+  if (!confirmed.ok()) return confirmed.status();
+  return *confirmed ? absl::OkStatus() : absl::InvalidArgumentError(unless);
 }
 
 struct SyncArguments {
@@ -88,8 +88,8 @@ class SceneSync {
     const auto strangers = Strangers(client_, scene_);
     if (!strangers.ok()) return run_.Fail(strangers.status());
     if (prune && changes && !yes) {
-      const absl::Status meant = Confirm(run_, *strangers, "cancelled; nothing was changed");
-      if (!meant.ok()) return run_.FailUsage(meant);
+      const absl::Status confirmed = Confirm(run_, *strangers, "cancelled; nothing was changed");
+      if (!confirmed.ok()) return run_.FailUsage(confirmed);
     }
     for (const HullDefinition& hull : scene_.hulls) {
       const auto xyz = PointsOf(hull);
@@ -218,17 +218,17 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
   const Client client = run.MakeClient();
-  const auto doomed = DefinedAndThere(client, *scene);
-  if (!doomed.ok()) return run.Fail(doomed.status());
-  if (doomed->empty()) {
+  const auto targets = DefinedAndThere(client, *scene);
+  if (!targets.ok()) return run.Fail(targets.status());
+  if (targets->empty()) {
     if (!run.json() && !run.names()) run.out << "# none of the file's hulls and bodies exist\n";
     return ExitCode::kDone;
   }
-  if (!arguments.yes && doomed->size() > 1) {
-    const absl::Status meant = Confirm(run, *doomed, "nothing was deleted");
-    if (!meant.ok()) return run.FailUsage(meant);
+  if (!arguments.yes && targets->size() > 1) {
+    const absl::Status confirmed = Confirm(run, *targets, "nothing was deleted");
+    if (!confirmed.ok()) return run.FailUsage(confirmed);
   }
-  for (const Kept& kept : *doomed) {
+  for (const Kept& kept : *targets) {
     const auto header = DeleteKept(client, kept);
     if (absl::IsNotFound(header.status())) continue;
     if (!header.ok()) return run.Fail(header.status());
