@@ -47,13 +47,13 @@ void BodyTable::Erase(Locked& locked, const std::string& id) {
 
 void BodyTable::DropSome(Locked& locked) {
   if (!most_.has_value()) return;
-  int asked = 0;
-  while (bytes_ > *most_ && asked < kMostAsked && !used_.empty()) {
+  int skipped = 0;
+  while (bytes_ > *most_ && skipped < kMostSkipped && !used_.empty()) {
     const std::string id = *used_.back();
     if (entries_.at(id).IsUnused()) {
       Erase(locked, id);
     } else {
-      ++asked;
+      ++skipped;
       used_.splice(used_.begin(), used_, std::prev(used_.end()));
     }
   }
