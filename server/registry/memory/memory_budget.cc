@@ -117,8 +117,8 @@ void MemoryCharge::Set(uint64_t bytes) {
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
-  const size_t most = std::min(kMostAsked, used_.size());
-  for (size_t asked = 0; asked < most && !used_.empty() && Total() > limit_bytes_; ++asked) {
+  const size_t most = std::min(kMostVisited, used_.size());
+  for (size_t visited = 0; visited < most && !used_.empty() && Total() > limit_bytes_; ++visited) {
     Account& account = *used_.back();
     used_.splice(used_.begin(), used_, account.place_);
     const uint64_t before = Total();

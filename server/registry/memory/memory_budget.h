@@ -113,8 +113,8 @@ class MemoryBudget {
     std::list<Account*>::iterator place_;
   };
 
-  // Maximum number of accounts visited by one eviction: some ten microseconds.
-  static constexpr size_t kMostAsked = 64;
+  // Maximum number of accounts that one eviction visits; takes about 10 us.
+  static constexpr size_t kMostVisited = 64;
 
   // limit_bytes: --memory-limit. reading_bytes: the readers' share; writers have the rest. owners:
   // the mutex that guards the accounts; it may not be constructed yet.
@@ -126,8 +126,8 @@ class MemoryBudget {
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
   // Evicts from accounts, least recently used first, until the memory is within the limit or
-  // kMostAsked accounts were visited. An account that cannot evict is visited again after all other
-  // accounts.
+  // kMostVisited accounts were visited. An account that cannot evict is visited again after all
+  // other accounts.
   void Evict(Locked& owners);
   // As Evict. RESOURCE_EXHAUSTED, with a retry delay: this use exceeds its share.
   absl::Status Check(Locked& owners, MemoryUse use);

@@ -105,7 +105,7 @@ TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreAskedAgain) {
   EXPECT_EQ(bytes(), 50);
 }
 
-// An owner that cannot evict is asked again only after all other owners; each eviction asks a few.
+// An owner that cannot evict is asked again only after all others; one eviction asks only a few.
 TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
   std::vector<std::unique_ptr<Owner>> owners;
   for (int i = 0; i < 200; ++i) {
@@ -114,7 +114,7 @@ TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
   }
   const MemoryCharge charge(budget_, MemoryUse::kWriting, 50);
   Evict();
-  EXPECT_EQ(asked_.size(), MemoryBudget::kMostAsked);
+  EXPECT_EQ(asked_.size(), MemoryBudget::kMostVisited);
   EXPECT_EQ(bytes(), 250);
   for (int i = 0; i < 3; ++i) Evict();
   EXPECT_EQ(bytes(), 200);
