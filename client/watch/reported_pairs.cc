@@ -76,7 +76,7 @@ bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
   const Pair pair(event->placement_a(), event->placement_b());
   const State now = {event->relation(), event->within_clearance()};
   State before;
-  if (const auto told = reported_.find(pair); told != reported_.end()) before = told->second;
+  if (const auto known = reported_.find(pair); known != reported_.end()) before = known->second;
   if (IsCollision(now.relation) || now.within_clearance) {
     reported_[pair] = now;
   } else {
@@ -92,13 +92,13 @@ bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
 }
 
 void ReportedPairs::ReportEnded(v1::WatchCollisionsResponse* message) {
-  for (auto told = reported_.begin(); told != reported_.end();) {
-    if (reported_again_->contains(told->first)) {
-      ++told;
+  for (auto known = reported_.begin(); known != reported_.end();) {
+    if (reported_again_->contains(known->first)) {
+      ++known;
       continue;
     }
-    *message->add_events() = EndOf(told->first, told->second);
-    told = reported_.erase(told);
+    *message->add_events() = EndOf(known->first, known->second);
+    known = reported_.erase(known);
   }
 }
 
