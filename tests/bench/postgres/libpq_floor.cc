@@ -178,14 +178,14 @@ LibpqFloor::Statement LibpqFloor::Fence() const {
   return {"fence", {Bigint(revision_), Bigint(batch_), Bigint(epoch_)}};
 }
 
-LibpqFloor::Statement LibpqFloor::Others() const {
+LibpqFloor::Statement LibpqFloor::FetchPeerChanges() const {
   return {"follow", {Bigint(batch_), Bigint(kMostFollowed + 1)}};
 }
 
 void LibpqFloor::Commit() {
   std::vector<Statement> statements = {{"BEGIN"}};
   if (shared_) {
-    Ask({{"BEGIN"}, {"turn"}, Others()});
+    Ask({{"BEGIN"}, {"turn"}, FetchPeerChanges()});
     statements.clear();
   }
   ++batch_;
@@ -204,6 +204,6 @@ void LibpqFloor::Commit() {
   Ask(statements);
 }
 
-void LibpqFloor::Follow() { Ask({Others()}); }
+void LibpqFloor::Follow() { Ask({FetchPeerChanges()}); }
 
 }  // namespace hulld::bench

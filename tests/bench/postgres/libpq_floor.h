@@ -35,7 +35,7 @@ class LibpqFloor {
   void Ask(const std::vector<Statement>& statements);
   std::vector<Statement> Puts() const;
   Statement Fence() const;
-  Statement Others() const;
+  Statement FetchPeerChanges() const;
 
   const bool shared_;
   const std::string hull_id_;
