@@ -294,9 +294,9 @@ void CollisionStream::DecideTogether() {
   } else if (!BeginDeciding()) {
     return EncodeDecided();
   }
-  const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
+  const size_t wanted = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
-  for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
+  for (size_t helpers = helpers_waiting_.load(); helpers < wanted; ++helpers) {
     ++helpers_waiting_;
     RunOn(lane_, [this] {
       --helpers_waiting_;

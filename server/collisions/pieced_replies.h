@@ -306,8 +306,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const auto least = std::chrono::nanoseconds(1);
     const double factor = std::chrono::duration<double>(TaskPool::kSliceTime) /
                           std::max<Clock::duration>(piece.elapsed, least);
-    const double wished = static_cast<double>(piece.units) * std::min(factor, 4.0);
-    piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
+    const double wanted = static_cast<double>(piece.units) * std::min(factor, 4.0);
+    piece_units_ = static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(most_units_)));
   }
 
   Registry& registry_;

@@ -111,9 +111,9 @@ TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
     ASSERT_EQ(answers.size(), 1U);
     EXPECT_TRUE(answers[0].has_certificate());
   }
-  for (const char* wish : {"--verify", "--certificate"}) {
-    const Ran json = AskJson({"check", "cube", "cube", wish});
-    EXPECT_EQ(MessagesIn<v1::CheckCollisionResponse>(json.out).size(), 1U) << wish;
+  for (const char* option : {"--verify", "--certificate"}) {
+    const Ran json = AskJson({"check", "cube", "cube", option});
+    EXPECT_EQ(MessagesIn<v1::CheckCollisionResponse>(json.out).size(), 1U) << option;
   }
 }
 
@@ -330,7 +330,7 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
 
-TEST_F(HullctlQuestions, WishesThatExcludeEachOtherAreExplained) {
+TEST_F(HullctlQuestions, ConflictingOptionsAreExplained) {
   Put("cube", server::Cube());
   Ran ran = Ask({"check", "cube", "cube", "--tolerance", "0.1", "--separation"});
   EXPECT_EQ(ran.code, 1);

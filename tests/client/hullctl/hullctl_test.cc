@@ -257,7 +257,7 @@ TEST_F(HullctlTest, AppendResumesWhereTheWriterStopped) {
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3));
 }
 
-TEST_F(HullctlTest, CheckPassesPosesAndWishesOn) {
+TEST_F(HullctlTest, CheckForwardsPosesAndOptions) {
   fake_.collision_answer.set_relation(v1::RELATION_SEPARATED);
   fake_.collision_answer.mutable_hull_a()->set_hull_id("a");
   fake_.collision_answer.mutable_axis()->set_kind(v1::AXIS_KIND_FACET_B);

@@ -139,7 +139,7 @@ TEST_F(CheckCollisionCall, ErrorsNameTheField) {
          "method is 7");
 }
 
-TEST_F(CheckCollisionCall, WishesThatAreMalformedOrExcludeEachOtherAreRefused) {
+TEST_F(CheckCollisionCall, MalformedOrConflictingRequestsAreRejected) {
   Put("cube", Cube());
   const auto expect = [&](const std::function<void(v1::CheckCollisionRequest*)>& change,
                           const std::string& what) {

@@ -70,7 +70,7 @@ TEST_F(ListAndDelete, AMissingHullDoesNotPreventOtherDeletions) {
   EXPECT_EQ(AskJson({"delete", "arm/2"}).code, 0);
 }
 
-TEST_F(ListAndDelete, WishesThatContradictEachOtherAreExplained) {
+TEST_F(ListAndDelete, ContradictoryArgumentsAreExplained) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"delete"},
         {"delete", "box", "--prefix", "arm/"},

@@ -181,7 +181,7 @@ TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
   EXPECT_THAT(Ask({"stream", cell_.path()}).out, HasSubstr("0\tell\tprobe\tOVERLAPPING"));
 }
 
-TEST_F(HullctlSceneBodies, BatchesProveBodiesAndWatchesTellOfThem) {
+TEST_F(HullctlSceneBodies, BatchesProveBodiesAndWatchesReportThem) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Ran ran = Ask({"batch", cell_.path(), "--verify"});
   EXPECT_EQ(ran.code, 0) << ran.err;

@@ -67,7 +67,7 @@ TEST(Protocol, QuestionMayNameNoPair) {
   EXPECT_FALSE(message->question->pair.has_value());
 }
 
-TEST(Protocol, WishesForGeometryAreRead) {
+TEST(Protocol, GeometryRequestsAreRead) {
   const auto message = ParsePageMessage(R"({"type":"geometry","files":[0,2],"hullIds":["a/b"]})");
   ASSERT_TRUE(message.ok()) << message.status();
   ASSERT_EQ(message->geometry.size(), 3);
