@@ -117,15 +117,15 @@ TEST_F(Watches, WatchesOfHullsResume) {
   while (message.ok() && !message->synced()) message = watch->Next();
   ASSERT_TRUE(message.ok()) << message.status();
   Lose([this] { Put("c", server::Cube()); });
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   do {
     message = watch->Next();
     ASSERT_TRUE(message.ok()) << message.status();
     EXPECT_FALSE(message->anew());
-    for (const v1::HullEvent& event : message->events()) told.push_back(event.hull().hull_id());
+    for (const v1::HullEvent& event : message->events()) reported.push_back(event.hull().hull_id());
   } while (!message->synced());
   // One event for its creation and one for its points, or one for both.
-  EXPECT_THAT(told, testing::AnyOf(ElementsAre("c"), ElementsAre("c", "c")));
+  EXPECT_THAT(reported, testing::AnyOf(ElementsAre("c"), ElementsAre("c", "c")));
   EXPECT_GT(waits_, 0);
 }
 

@@ -22,26 +22,26 @@ class Page : public PageChannel {
  public:
   bool SendText(std::string json) override {
     const std::lock_guard lock(mutex_);
-    told_.push_back(std::move(json));
+    messages_.push_back(std::move(json));
     changed_.notify_all();
     return true;
   }
   bool SendBinary(std::string /*frame*/) override { return true; }
 
-  std::string WaitForTold(size_t index) {
+  std::string WaitForMessage(size_t index) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return told_.size() > index; });
-    return told_[index];
+    changed_.wait(lock, [&] { return messages_.size() > index; });
+    return messages_[index];
   }
-  size_t told() {
+  size_t message_count() {
     const std::lock_guard lock(mutex_);
-    return told_.size();
+    return messages_.size();
   }
 
  private:
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<std::string> told_;
+  std::vector<std::string> messages_;
 };
 
 ViewEdit AppendOf(const std::string& hull_id, double x) {
@@ -53,7 +53,7 @@ class EditFeedTest : public ::testing::Test {
   EditFeedTest() {
     hulld_.PutHull("h", {});
     hulld_.PutHull("other", {});
-    // The first change blocks until Release, and with it all later ones.
+    // The first change blocks until Release, and so do all later changes.
     StreamScript hold;
     hold.hold_acks = true;
     hulld_.ScriptStreams({hold});
@@ -67,7 +67,7 @@ class EditFeedTest : public ::testing::Test {
   const std::shared_ptr<Page> page_ = std::make_shared<Page>();
 };
 
-TEST_F(EditFeedTest, MakesEveryChangeInItsOrderHoweverManyWait) {
+TEST_F(EditFeedTest, AppliesAllChangesInOrder) {
   constexpr int kEdits = 500;
   {
     EditFeed feed(*client_, page_);
@@ -82,9 +82,9 @@ TEST_F(EditFeedTest, MakesEveryChangeInItsOrderHoweverManyWait) {
   ASSERT_EQ(xyz.size(), 3 * kEdits);
   for (int i = 0; i < kEdits; ++i) EXPECT_EQ(xyz[3 * i], i);
   EXPECT_EQ(hulld_.calls("DeleteHull"), 1);
-  // Each answer is one of the server's; a thousand changes took few calls.
-  EXPECT_LE(page_->told(), 5);
-  EXPECT_THAT(page_->WaitForTold(page_->told() - 1), HasSubstr("other is deleted"));
+  // One message per server reply: a thousand changes take a few calls.
+  EXPECT_LE(page_->message_count(), 5);
+  EXPECT_THAT(page_->WaitForMessage(page_->message_count() - 1), HasSubstr("other is deleted"));
 }
 
 TEST_F(EditFeedTest, ReportsDroppedEdits) {
@@ -92,11 +92,11 @@ TEST_F(EditFeedTest, ReportsDroppedEdits) {
   const std::vector<double> many(size_t{3} << 20);
   feed.Ask(AppendOf("h", 0));
   for (int i = 0; i < 4; ++i) feed.Ask({ViewEdit::Action::kAppend, "other", many});
-  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("too many edits are pending"));
-  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("\"done\":false"));
+  EXPECT_THAT(page_->WaitForMessage(0), HasSubstr("too many edits are pending"));
+  EXPECT_THAT(page_->WaitForMessage(0), HasSubstr("\"done\":false"));
   hulld_.Release();
-  EXPECT_THAT(page_->WaitForTold(1), HasSubstr("h: 1 appended"));
-  EXPECT_THAT(page_->WaitForTold(2),
+  EXPECT_THAT(page_->WaitForMessage(1), HasSubstr("h: 1 appended"));
+  EXPECT_THAT(page_->WaitForMessage(2),
               HasSubstr(absl::StrCat("other: ", 3 * (many.size() / 3), " appended")));
 }
 
