@@ -59,8 +59,8 @@ read_licenses() {
     END { for (name in all) print name "\t" all[name] }' /usr/share/doc/*/copyright)
 }
 
-# Packages of the libraries that a program links. A file may have a name with /usr, one without, and
-# symbolic links; dpkg knows one of these names.
+# Packages of the libraries that a program links. One file can have several names (with /usr,
+# without it, symbolic links), and dpkg knows only one of them.
 packages_of_program() {
   local library real owner names=()
   local -A owner_of
@@ -139,7 +139,7 @@ for program in "${programs[@]}"; do
 done
 declare -A seen
 while read -r name version architecture; do
-  [[ -z ${seen[$name]-} ]] || continue  # of another architecture, too
+  [[ -z ${seen[$name]-} ]] || continue  # The same package of another architecture.
   seen[$name]=yes
   debian_package Package "$name" "$version" "$architecture"
 done < <(dpkg-query -W -f '${db:Status-Status} ${Package} ${Version} ${Architecture}\n' |
