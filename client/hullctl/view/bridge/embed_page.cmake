@@ -1,10 +1,10 @@
-# Generates page_files.cc, which holds the files of the viewer's page and three.js. The assembler includes them (.incbin), so
-# that half a megabyte adds no compile time. Sets page_files_source.
+# Generates page_files.cc, which embeds the files of the viewer's page and three.js; sets page_files_source to its path. The
+# assembler includes the files (.incbin), so their half megabyte adds no compile time.
 find_path(HULLD_THREE_JS three.min.js PATHS /usr/share/javascript/three NO_DEFAULT_PATH
-          DOC "Where three.js lies (Debian: libjs-three)")
+          DOC "Directory of three.js (Debian: libjs-three)")
 if(NOT HULLD_THREE_JS)
-  message(FATAL_ERROR "three.js is missing, which 'hullctl view' shows its page with: install libjs-three, or name its "
-                      "directory with -DHULLD_THREE_JS=DIR")
+  message(FATAL_ERROR "three.js not found (the page of 'hullctl view' uses it): install libjs-three, or pass its directory "
+                      "with -DHULLD_THREE_JS=DIR")
 endif()
 
 # hulld_embed_page(NAME FILE): embeds a file under the name used by the page.
