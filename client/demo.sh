@@ -14,7 +14,7 @@ export LC_ALL=C
 readonly build=$PWD/build/demo
 readonly work=$build/scenes
 readonly models=/usr/share/assimp/models/OBJ
-# About z, as a quaternion: (x, y, z) -> (-x, -y, z), exactly.
+# Quaternion of a half turn about z: maps (x, y, z) to (-x, -y, z) exactly.
 readonly half_turn=0,0,0,1
 wrong=0
 server_pid=
@@ -40,7 +40,7 @@ ctl() { "$build/bin/hullctl" --server "$address" "$@"; }
 # field NAME: prints the value of a row of a hullctl table read from standard input.
 field() { awk -F '  +' -v name="$1" '$1 == name { print $2 }'; }
 
-# expect WANT GOT: notes a wrong answer.
+# expect WANT GOT: reports and counts a wrong answer.
 expect() {
   [[ $1 == "$2" ]] && return 0
   printf '  WRONG: expected %s, got %s\n' "$1" "$2"
@@ -69,8 +69,8 @@ install_and_build() {
   { cmake --preset release -B "$build" -DHULLD_BUILD_TESTS=OFF &&
     cmake --build "$build" --target hulld hullctl --parallel "$(nproc)"; } 2>&1 |
     show_progress "$work/build.log" ||
-    { tail -n 40 "$work/build.log"; echo "The build failed: see $work/build.log"; exit 1; }
-  phase "Asking questions whose answers are known"
+    { tail -n 40 "$work/build.log"; echo "The build failed; see $work/build.log"; exit 1; }
+  phase "Running queries with known answers"
 }
 
 start_server() {
@@ -106,7 +106,7 @@ register() {
     "$(field edges <"$work/hull")" "$(field facets <"$work/hull")" "$(field audit <"$work/hull")"
 }
 
-# ask WANT QUESTION A B OPTION...: asks both methods.
+# ask WANT QUESTION A B OPTION...: checks the pair by both methods.
 ask() {
   local want=$1 question=$2 flag
   shift 2
@@ -122,11 +122,11 @@ ask() {
   done
 }
 
-# turned_about NAME SHIFT: the pose that turns a copy of a hull by half a turn about the vertical
-# line through its vertex of largest x, moved by SHIFT of the way toward the middle of the hull.
-# With SHIFT 0 the two share exactly that vertex, and the plane of constant x through it separates
-# the rest; a little inwards the line runs through the inside of both; a little outwards a gap opens.
-# Doubling a coordinate and turning by half a turn round nothing, so the touching is exact.
+# turned_about NAME SHIFT: prints the pose of a copy of a hull, turned by half a turn about a
+# vertical line. The line passes through the vertex of largest x, moved by the fraction SHIFT of the
+# way to the middle of the hull. With SHIFT 0, hull and copy share exactly that vertex. With a small
+# positive SHIFT they overlap; with a negative one there is a gap. Neither a half turn nor doubling
+# a coordinate rounds, so the contact is exact.
 turned_about() {
   ctl mesh "$1" | awk -v shift="$2" -v turn="$half_turn" '
     $1 == "v" { n++; x += $2; y += $3; if (n == 1 || $2 > vx) { vx = $2; vy = $3 } }
@@ -173,8 +173,8 @@ generated_scenes() {
   ask OVERLAPPING "centers 1 apart?" ball3000 ball100 --pose-b 1,0,0
 }
 
-# A writer streams ever larger balls into one hull while a reader asks whether it reaches a second
-# one. Answers name the revision that they were computed from.
+# A writer streams larger and larger balls into one hull while a reader asks whether it collides
+# with a second hull. Answers state the revision that they were computed from.
 streaming_scene() {
   local radius revision last moves=0 points=$work/live.fifo
   heading "A live hull grows while it is queried: does it reach the ball at distance 6?"
@@ -233,7 +233,7 @@ if ((wrong > 0)); then
 fi
 heading "All answers are as expected"
 cat <<END
-  To look at these scenes in a browser, drag things and see the answers change:
+  To open these scenes in a browser, where answers change as you drag hulls:
     $build/bin/hulld &
     $build/bin/hullctl view --demo
 END

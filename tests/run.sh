@@ -80,9 +80,9 @@ run_tests() {
   return $code
 }
 
-# Every source of core and every public header compiles by itself: neither a unity build nor a
-# precompiled header hides a missing include. Each source includes its own header first, so only
-# headers without a source, and client headers, are compiled separately.
+# Compiles every source of core and every public header by itself, because unity builds and
+# precompiled headers hide missing includes. A source of core includes its own header first, so of
+# core's headers only those without a source are compiled separately.
 check_includes() {
   cmake --install build/release --component devel --prefix build/includes >/dev/null || return 1
   local headers=$PWD/build/includes/include/hulld
@@ -90,14 +90,14 @@ check_includes() {
     while read -r file; do [[ $file == core/*.h && -e ${file%.h}.cc ]] || echo "$file"; done | sort |
     xargs -P "$jobs" -I{} sh -c 'echo "#include \"{}\"" |
       c++ -std=c++20 -fsyntax-only -I . -I "$1" -isystem /usr/include/eigen3 -x c++ - ||
-      { echo "{} includes too little"; exit 255; }' _ "$headers"
+      { echo "{} lacks an include"; exit 255; }' _ "$headers"
 }
 
 build_and_test_packages() {
   bash docker/debian/build.sh && bash tests/install/packages.sh build/release/packages
 }
 
-# A compiler of this code may take 1.5 GiB, so memory bounds the number of jobs, too.
+# One compiler process may use 1.5 GiB, so memory also limits the number of jobs.
 available_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2>/dev/null || true)
 jobs=$(nproc)
 by_memory=$((${available_kib:-1572864} / 1572864))
@@ -108,11 +108,11 @@ if [[ $install == yes ]]; then
 fi
 if command -v ccache >/dev/null; then
   export CMAKE_CXX_COMPILER_LAUNCHER=ccache
-  # Without the first, ccache caches nothing that uses a precompiled header; without the second, it
-  # reads these headers, 400 MB, for each file.
+  # Without CCACHE_SLOPPINESS, ccache caches no file that uses a precompiled header; without
+  # CCACHE_INODECACHE, it reads these headers, 400 MB, for each file.
   export CCACHE_SLOPPINESS=${CCACHE_SLOPPINESS:-pch_defines,time_macros}
   export CCACHE_INODECACHE=${CCACHE_INODECACHE:-1}
-  # A clone in another folder hits the same entries; its debug information may name this folder.
+  # Clones in other folders share the entries; their debug information may then name this folder.
   export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$PWD} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
 fi
 

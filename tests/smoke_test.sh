@@ -1,5 +1,5 @@
 #!/bin/bash
-# One question to a server, end to end: smoke_test.sh PROGRAMS
+# Sends one query to a server, end to end: smoke_test.sh PROGRAMS
 set -euo pipefail
 export PATH=$1:$PATH
 log=$(mktemp)

@@ -4,9 +4,9 @@
 #   bash tests/tidy.sh [BASE | --all]
 #
 # BASE: the commit to compare with; by default the merge base with origin/main, or the parent of
-# HEAD if that is HEAD itself. Uncommitted changes count. A changed header counts through the
-# sources of the same name in its folder. Requires the packages in docker/packages.txt under
-# [build], [test], and [tidy].
+# HEAD if that is HEAD itself. Includes uncommitted changes. For a changed header, checks the source
+# of the same name in its folder. Requires the packages in docker/packages.txt under [build],
+# [test], and [tidy].
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -43,8 +43,8 @@ list_files() {
 
 cmake --preset tidy >/dev/null
 cmake --build build/tidy --target hulld_proto_sources >/dev/null
-# The sources of the registry are compiled twice. The second time, in tests/server/schedules, is for
-# g++ only: clang 14 lacks std::source_location.
+# The registry is compiled a second time in tests/server/schedules. Omits that one, which needs g++:
+# clang 14 lacks std::source_location.
 python3 - build/tidy/compile_commands.json <<'PYTHON'
 import json, sys
 with open(sys.argv[1]) as file:
@@ -55,7 +55,7 @@ PYTHON
 known=$(grep -o "\"file\": \"$PWD/[^\"]*" build/tidy/compile_commands.json | sed "s|.*\"$PWD/||" | sort -u)
 files=$(comm -12 <(list_files "$@" | sort -u) <(echo "$known"))
 if [[ -z $files ]]; then
-  echo "no changed file to look at"
+  echo "no changed file to check"
   exit 0
 fi
 echo "$files" | wc -l | sed 's/$/ files/'

@@ -63,7 +63,8 @@ function origin_of(file,   command, line, names, fields, count, i, cpu, compiler
   return cpu == "" ? "" : "a virtual " cpu ", " compiler
 }
 
-# The origin of rows that name none: that of the hulls, without the generation, which may differ.
+# The origin of rows that name none: that of the hull rows, without the CPU generation, which may
+# differ.
 function usual_origin(   origin) {
   origin = origin_of("hull_build_" machine)
   sub(/ family [0-9]+ model [0-9]+/, "", origin)
@@ -154,7 +155,7 @@ function stream(   n, i, key, part) {
   measured()
 }
 
-# Leaves out clouds that cost as much as another one.
+# Omits clouds that cost as much as another cloud.
 function extremes(   n, i, part, a, b) {
   read_rows("hull_extremes_" machine)
   head("| points | number | vertices | at once, ms | times generic | one by one, ms | times generic |")
@@ -184,7 +185,7 @@ function set_name(set) {
   sub(/^sphere:/, "", set)
   return set
 }
-# As set_name, short, if the vertices are given elsewhere; for a scene, "N of SET".
+# A short set_name, for tables that state the vertices elsewhere; for a scene, "N of SET".
 function set_label(set) {
   sub(/of sphere:64/, "of 64 vertices", set)
   sub(/of ur5/, "UR5 links", set)
@@ -361,7 +362,7 @@ function overload(   fields) {
   measured()
 }
 
-# One row per workload and size, without some of both: hulld's step, Bullet's, and hulld's speedup.
+# One row per workload and size, for some of them: hulld's step, Bullet's, and hulld's speedup.
 function live(   fields, key, order_of, i, n, part) {
   head("| a step | vertices | hulld: p50 | p99 | Bullet: p50 | with its box | hulld faster | with its box |")
   while (next_row("query_live_" machine, fields)) {
@@ -382,7 +383,7 @@ function live(   fields, key, order_of, i, n, part) {
   measured()
 }
 
-# Of three sizes; leaves out questions about another hull.
+# Three sizes only; omits queries about another hull.
 function live_service(   fields, reader) {
   head("| vertices | question | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
   while (next_row("server_live_" machine, fields)) {

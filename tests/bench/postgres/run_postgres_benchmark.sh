@@ -4,15 +4,15 @@
 #
 #   bash tests/bench/postgres/run_postgres_benchmark.sh [MACHINE] [SUITE...]
 #
-# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill makes
-# HULLS hulls, 1000000 by default, in parts of SECONDS_EACH; start and cold use its last result,
-# also of an earlier run: "start cold" alone measures another program over the same hulls.
+# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill creates
+# HULLS (1000000) hulls, in parts that take SECONDS_EACH. start and cold use the hulls of the last
+# fill, also of an earlier run: "start cold" alone measures another program over the same hulls.
 #
 # Starts a PostgreSQL in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
 # synchronous_commit on, and stops it; existing data is reused. Under root it runs as the user
 # postgres. MACHINE names the files, as in commit_MACHINE.csv; epyc_gcc12 by default. HULLD: a
 # program to measure instead of the one built here. UNDER: a command that wraps each measurement,
-# such as one that waits for an idle machine. SECONDS_EACH (60) for each suite. Requires the
+# such as one that waits for an idle machine. SECONDS_EACH (60): the time per suite. Requires the
 # packages in docker/packages.txt under [build], [bench] and [test]. Client, servers and database
 # share the machine.
 set -euo pipefail
@@ -25,7 +25,7 @@ suites=("$@")
 folder=${FOLDER:-/tmp/hulld-bench-postgres}
 results=tests/bench/results/postgres
 hulls=${HULLS:-1000000}
-# Waiting threads yield the core to working ones, even if other programs run.
+# Waiting threads yield their cores to working threads, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 if [[ -z ${BENCHMARK:-} ]]; then

@@ -5,7 +5,7 @@
 #
 # MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
 # default. SUITEs are relation, contact, distance, motion, batch, scene, live, accuracy and trade;
-# all by default. REPETITIONS (5): the median counts. HULLD_DATA: the folder of meshes. Requires the
+# all by default. REPETITIONS (5): the rows hold their median. HULLD_DATA: the folder of meshes. Requires the
 # packages in docker/packages.txt under [build], [test] and [bench], and an otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
@@ -16,7 +16,7 @@ suites=("$@")
 ((${#suites[@]})) || suites=(relation contact distance motion batch scene live accuracy trade)
 results=tests/bench/results
 programs=build/release/bin
-# Waiting threads yield the core to working ones, even if other programs run.
+# Waiting threads yield their cores to working threads, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON -DHULLD_BENCH_NATIVE=ON >/dev/null
@@ -37,7 +37,7 @@ for suite in "${suites[@]}"; do
       "$programs/live_benchmark" "${VERTICES:-1000000}" "${SECONDS_EACH:-3}" >"$out"
       bash tests/bench/live/plot_live.sh "$machine"
       ;;
-    # Counts, equal on every machine.
+    # Counts are equal on every machine, so the file does not name one.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
     trade)
       "$programs/hulld-bench" trade --questions 4800 --csv "$out" --plot "$results/query_trade_$machine.svg"

@@ -3,22 +3,20 @@
 //
 //   live_workload_benchmark [HULLD [SCALE [WORK]]]
 //
-// Starts its own hulld for each, on a durable store. One row of CSV per case; ratios are to the
-// first case of the same work, except for the camera. SCALE, 1 by default: the amount of each.
-// WORK: only this one.
+// Starts a hulld with a durable store for each. Prints one row of CSV per case; ratios are relative
+// to the first case of the same workload, except for the camera. SCALE, 1 by default: the amount of
+// work. WORK: runs only this workload.
 //
 //   scene       FindCollisions over 1000 hulls of 64 vertices: at rest, directly after one of them
 //               received an acknowledged point, and directly after each of them did.
-//   stream      StreamCollisions that resolves its hulls again at every step, 1024 pairs of 32
-//   hulls
-//               of 1000 vertices and a probe, and one pair of a hull of 100000: at rest and
+//   stream      StreamCollisions that resolves its hulls again at every step: 1024 pairs of 32
+//               hulls of 1000 vertices and a probe, and one pair with a hull of 100000; at rest and
 //               directly after a point was acknowledged.
 //   camera      One ReplaceHull per frame of 848 x 480 depths in single precision, from which the
 //               client drops NaNs, then a query about the hull: the time of both, and of the query
 //               alone.
 //   cold scene  FindCollisions over 10000 hulls of 64 vertices: with all in memory, and as the
-//   first
-//               call after a restart, when each has to be read.
+//               first call after a restart, when each hull has to be read.
 
 #include <grpcpp/grpcpp.h>
 

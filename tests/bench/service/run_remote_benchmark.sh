@@ -5,8 +5,8 @@
 #   bash tests/bench/service/run_remote_benchmark.sh [MACHINE] [FLAG OF hulld...]
 #
 # TMPDIR: a folder on the disk to measure the durable store on. MACHINE names the file, as in
-# remote_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default. ROUNDS (9), of which the median
-# counts, of SECONDS_EACH (1) seconds each. HULLD_DATA: the folder with the links of the UR5.
+# remote_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default. Rows hold the median of ROUNDS
+# (9) of SECONDS_EACH (1) seconds. HULLD_DATA: the folder with the links of the UR5.
 # Requires the packages in docker/packages.txt under [build] and [bench], and an otherwise idle
 # machine: client and server share its cores.
 set -euo pipefail
@@ -16,7 +16,7 @@ machine=${1:-epyc_gcc12}
 shift || true
 flags=()
 for flag in "$@"; do flags+=("--hulld-flag=$flag"); done
-# Waiting threads yield the core to working ones, even if other programs run.
+# Waiting threads yield their cores to working threads, even if other programs run.
 export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
