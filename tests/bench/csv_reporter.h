@@ -9,9 +9,9 @@
 namespace hulld::bench {
 
 // Writes the file of --benchmark_out as the CSV kept in tests/bench/results/: one row for each
-// benchmark named "suite/workload/library", its median if repeated, with its counters, the
-// compiler, and the CPU in the time's row. Time is CPU time of the measuring thread, or real time
-// if the benchmark requests it.
+// benchmark named "suite/workload/library", with its counters, time (the median if repeated),
+// compiler, and CPU. Time is CPU time of the measuring thread, or real time if the benchmark
+// requests it.
 class CsvReporter : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override;
@@ -20,7 +20,7 @@ class CsvReporter : public benchmark::BenchmarkReporter {
  private:
   void WriteHeader(const Run& run);
 
-  // Counters of the first row, which all rows have.
+  // Names of the counters in the first row; all rows have the same.
   std::vector<std::string> columns_;
 };
 

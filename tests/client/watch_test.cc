@@ -51,8 +51,7 @@ class Watches : public server::ServerTest {
     server_.reset();
     std::filesystem::remove_all(directory_);
   }
-  // Gives `options_` a clock that advances under the test's control and while the client waits;
-  // with a patience of 2 s.
+  // Sets a patience of 2 s, and a clock that advances only by the test and while the client waits.
   void UseOwnClock() {
     options_.timeout = std::chrono::seconds(2);
     options_.retry.now = [this] {

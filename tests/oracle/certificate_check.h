@@ -20,9 +20,8 @@ struct Certificate {
 
 // Returns the defect of a certificate of a relation, or an empty string if it proves the relation.
 // Exact, from the certificate alone. SEPARATED: max n.A < min n.B, no pairs. TOUCHING: n not zero,
-// max n.A <= min n.B, and at most four pairs with differences that hold 0 in their hull.
-// OVERLAPPING: no direction, at most six pairs with differences that hold 0 strictly inside their
-// hull.
+// max n.A <= min n.B, and at most four pairs, with 0 in the hull of their differences. OVERLAPPING:
+// no direction, and at most six pairs, with 0 strictly inside the hull of their differences.
 std::string FaultOf(const Certificate& certificate, Relation relation, const WorldPoints& points);
 
 }  // namespace hulld::oracle

@@ -36,8 +36,8 @@ class PolarCone {
  public:
   explicit PolarCone(const std::vector<Vec<Int>>& points) : points_(points) {}
 
-  // Requires: `ray` is perpendicular to points that leave a single line for it. It or its opposite
-  // may be extreme.
+  // Adds `ray` or its opposite if it is extreme. Requires: `ray` is perpendicular to points that
+  // determine its line.
   void Try(const Vec<Int>& ray) {
     if (IsNull(ray)) return;
     bool negative = false;

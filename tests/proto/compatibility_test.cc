@@ -1,11 +1,11 @@
 // Contract of v1 with its clients, line by line in v1.txt: messages, fields with number, type, and
-// presence, enum values, RPCs, and numbers that must never be reused. A recorded line must stay
+// presence, enum values, RPCs, and numbers that must never be reused. Every recorded line must stay
 // true; new lines may be added. After an addition, record it:
 //
 //   HULLD_RECORD_CONTRACT=1 build/release/bin/proto_test --gtest_filter='Compatibility.*'
 //
-// This refuses while a recorded line is not true. Only a new version of the contract (hulld.v2) may
-// break one.
+// Recording fails while a recorded line is violated. Only a new version of the API (hulld.v2) may
+// violate one.
 
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.pb.h>

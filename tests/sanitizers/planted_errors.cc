@@ -6,7 +6,7 @@
 namespace hulld::planted {
 namespace {
 
-// The compiler must not see what becomes of a pointer: it would warn, or leave the defect out.
+// Hides what happens to a pointer from the compiler, which would warn or optimize the defect away.
 template <typename T>
 T* Hidden(T* pointer) {
   T* volatile hidden = pointer;

@@ -6,22 +6,22 @@
 
 namespace hulld::planted {
 
-// Functions with defects, as a library could have them. Compiled with sanitizers; each is to end
-// the process, at once or, for the leak, when it ends.
+// Functions with defects typical of libraries. Compiled with sanitizers, each must end the process:
+// immediately or, for the leak, at exit.
 
-// Requires that `value` is live; its callers break that.
+// Requires that `value` is live; its callers violate that.
 double Read(const double* value);
 
-// The sum of one value more than there are.
+// Sums the values and one beyond their end.
 double SumTooMany(const std::vector<double>& values);
 
-// Keeps `count` values, returns the last, and uses them after they are freed.
+// Fills `count` values, frees them, and returns the last.
 double LastOfFreed(size_t count);
 
-// Keeps nothing that it allocates.
+// Loses all the memory that it allocates.
 void Leak(size_t count);
 
-// value + 1, which overflows for the greatest.
+// Returns value + 1; overflows for the greatest int.
 int Successor(int value);
 
 }  // namespace hulld::planted

@@ -1,5 +1,5 @@
-// Compiled without sanitizers, as the tests that call the service are, and linked with a library
-// that has them: what the library does wrong is found all the same.
+// Compiled without sanitizers, like the tests that call the service, and linked with an
+// instrumented library: defects in the library are still detected.
 
 #include <gtest/gtest.h>
 
@@ -40,8 +40,8 @@ TEST(SanitizerDeathTest, ALibraryThatReadsPastTheTestsAllocationIsFound) {
 TEST(SanitizerDeathTest, ALibraryThatLeaksIsFound) {
   EXPECT_EXIT(
       {
-        // The last pointer may still stand where the stack was, on some processors: then it does
-        // not count as lost. Each call writes over that of the one before.
+        // On some processors the last pointer may remain on the dead stack and does not count as
+        // lost then. Each call overwrites the pointer of the previous one.
         for (int i = 0; i < 3; ++i) planted::Leak(1000);
         std::exit(0);
       },

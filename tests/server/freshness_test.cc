@@ -115,7 +115,8 @@ TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
   }
 }
 
-// They wait without a thread and release their resources although the store does not answer.
+// Waiting queries use no thread; cancelled ones release their resources although the store does not
+// answer.
 TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   Append(0, "h", 1);
   const auto collisions = v1::CollisionService::NewStub(Connect(0));

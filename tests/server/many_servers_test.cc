@@ -35,10 +35,10 @@ uint64_t NumberIn(const char* variable, uint64_t otherwise) {
 
 class ManyServers : public ManyServersTest {
  protected:
-  // The next piece arrives after its connection is gone.
+  // Delays the next piece until its connection is gone.
   static void Delay(CuttingProxy& proxy, Cut cut) {
     proxy.CutNext(cut);
-    // Clients may have no changes left for it.
+    // Clients may have no change left that could be held.
     proxy.DeliverOnceHeld(std::chrono::seconds(1));
   }
   Client ClientOf(size_t server) {

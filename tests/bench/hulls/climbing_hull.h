@@ -54,8 +54,8 @@ class ClimbingHull {
   }
 
  private:
-  // FCL starts climbing at 32 vertices. **Observed**, libccd, queries without history: a scan of 64
-  // takes 0.66 to 0.96 of the time of climbing, one of 72 to 220 1.2 to 2 times as long.
+  // FCL starts climbing at 32 vertices. **Observed**, libccd, queries without history: scanning
+  // takes 0.66 to 0.96 times as long as climbing for 64 vertices, and 1.2 to 2 times for 72 to 220.
   static constexpr size_t kScanLimit = 64;
 
   const Vector3& Scan(const Vector3& n) const {
@@ -110,7 +110,7 @@ class ClimbingHull {
   // all vertices are scanned.
   std::vector<uint32_t> starts_;
   std::vector<uint32_t> neighbors_;
-  // Spread over the hull: the farthest along some directions.
+  // Start vertices spread over the hull: the farthest along some directions.
   std::vector<uint32_t> seeds_;
 };
 

@@ -5,11 +5,11 @@
 //
 // with_box_us: the median of a step that also updates the bounding box; hulld always does, Bullet
 // by addPoint's default. One row of CSV per workload, number of vertices, and library. Both process
-// the same points and queries alternately, step by step; a Bullet turn that would take all the time
-// is omitted from most steps. hulld prepares in the background when queries have paid for it, as
-// the server does. Bullet appends a point to its list and builds nothing; the faster of its two
-// GJKs counts. The probe is a hull of 64 vertices near contact: its distance from touching, if the
-// hull were a sphere, is up to a tenth of the radius in either direction.
+// the same points and queries alternately, step by step; most steps omit a Bullet turn that would
+// take all the time. Like the server, hulld prepares in the background once queries have scanned as
+// much as preparation costs. Bullet appends a point to its list and builds nothing; the faster of
+// its two GJKs counts. The probe is a hull of 64 vertices near contact: if the growing hull were a
+// sphere, they would be separated or overlap by at most a tenth of its radius.
 
 #include <algorithm>
 #include <atomic>
@@ -180,7 +180,7 @@ class Run {
         pose.t = OnSphere(1 + kProbeRadius + random_.Between(-0.1, 0.1));
       }
       const int colliding = StepHulld(builder, live, mark, added, poses);
-      // At most half of the time.
+      // The peer gets at most half of the time.
       if (peer == nullptr) continue;
       if (peer_time < elapsed / 2 || step < 3) {
         const auto before = Clock::now();

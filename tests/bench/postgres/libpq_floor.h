@@ -14,9 +14,9 @@ namespace hulld::bench {
 // parameters of the same bytes, in the same pipelines, in sequence.
 class LibpqFloor {
  public:
-  // conninfo: a database where a hulld stored `hull_id`. It repeats the rows of that hull; no hulld
-  // may have the database open. shared: that hulld was one of many (--postgres-servers many). Ends
-  // the program with a message on any failure.
+  // conninfo: a database where a hulld stored `hull_id`; its rows are the model of the statements.
+  // No hulld may have the database open. shared: that hulld was one of many (--postgres-servers
+  // many). Ends the program with a message on any failure.
   LibpqFloor(const std::string& conninfo, const std::string& hull_id, bool shared);
 
   // Commits the changes of a single-point chunk. Cost: one round trip, or two if shared.

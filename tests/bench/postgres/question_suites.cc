@@ -144,7 +144,7 @@ void MeasureQuestions(const Arguments& arguments) {
       subjects.push_back(MakeSubject(arguments, name, server, bounded, turn));
     }
   }
-  // The read index of many, without hulld.
+  // The read index of --postgres-servers many, by libpq alone.
   std::unique_ptr<LibpqFloor> floor;
   if (arguments.clients == 1) {
     floor = stores.MakeLibpqFloor("many", "bench_libpq_questions");

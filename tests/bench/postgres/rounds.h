@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 // Ends the program with a message.
 [[noreturn]] void Fail(const std::string& what);
 
-// Returns seconds.
+// Returns the seconds since `start`.
 double Since(Clock::time_point start);
 // 0 for empty input.
 double Median(std::vector<double> values);
@@ -59,7 +59,7 @@ class Rows {
   Rows& operator=(const Rows&) = delete;
   ~Rows();
 
-  // Excludes the columns that each line ends with.
+  // row: without the columns that end each line.
   void Add(const std::string& row);
 
  private:

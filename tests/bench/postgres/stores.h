@@ -33,8 +33,8 @@ class Stores {
   // Starts gRPC alone.
   std::unique_ptr<ChildServer> StartFloor() const;
 
-  // Returns libpq alone, over a new database that a hulld of this kind filled with a hull with a
-  // writer of single-point chunks.
+  // Returns libpq alone, over a new database in which a hulld of this kind has stored a hull and
+  // the writer of its single-point chunks.
   std::unique_ptr<LibpqFloor> MakeLibpqFloor(const std::string& kind,
                                              const std::string& database) const;
 

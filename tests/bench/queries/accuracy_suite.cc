@@ -178,7 +178,7 @@ class Maker {
     Points a = Box(half_a);
     Points b = features == 0 ? Octahedron(half_b) : Box(half_b);
     Vector move = half_a + half_b;
-    // Free to slide, but in contact, along the other axes.
+    // Along the other axes, a random shift keeps the contact.
     for (size_t axis = std::max<size_t>(features, 1); axis < 3; ++axis) {
       const double reach = features == 0 ? half_a[axis] : move[axis];
       move[axis] = std::floor(random.Between(-reach, reach));

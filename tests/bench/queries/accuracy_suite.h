@@ -11,10 +11,10 @@
 namespace hulld::bench {
 
 // 4640 difficult queries on small hulls of 4 to 32 vertices: ellipsoids, boxes, prisms, needles,
-// plates, polygons, and boxes with nearly parallel edges; at contact as near as doubles allow, and
-// from 1e-3 down to 1e-15 of their size apart or deep; at sizes of 1e-6, 1 and 1e6, and at 1e6
-// times their size from the origin. Queries of the kind "contact" touch exactly: a vertex, edge or
-// facet meets another.
+// plates, polygons, and boxes with nearly parallel edges. The hulls are as near to contact as
+// doubles allow, or separated or overlapping by 1e-3 to 1e-15 of their size. Their sizes are 1e-6,
+// 1, and 1e6; some are 1e6 times their size away from the origin. Queries of the kind "contact"
+// touch exactly: a vertex, edge, or facet meets another.
 //
 // Every library receives the same geometry: rotations are rounded into the points, and a pose is an
 // exact translation.

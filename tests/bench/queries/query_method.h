@@ -38,9 +38,9 @@ class QueryMethod {
   virtual void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) = 0;
   // True if MeasureDepths is supported.
   virtual bool knows_depth() const = 0;
-  // Measures the penetration depth for each query; no value if the method finds none (as when it
-  // finds the hulls apart). Includes the results of the method's usual contact query: normal and
-  // witness points.
+  // Measures the penetration depth for each query; no value if the method reports none, for example
+  // because it finds the hulls separated. Includes the results of the method's usual contact query:
+  // normal and witness points.
   virtual void MeasureDepths(size_t first, std::span<std::optional<double>> depths) = 0;
   virtual bool knows_distance() const = 0;
   // As MeasureDepths, for the distance of separated hulls.
@@ -121,25 +121,25 @@ class MethodOf final : public QueryMethod {
   std::vector<Placed> b_;
 };
 
-// Returns the signed separation of non-empty hulls to the precision of a double: hulld's, with an
-// error of 1e-15 of the hulls' sizes, far below its default and that of other methods.
+// Returns the signed separation of non-empty hulls to the precision of a double: computed by hulld
+// to within 1e-15 of the hulls' sizes, far below its default error and that of other methods.
 double BestSeparation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB);
 
 // Returns hulld itself.
 std::unique_ptr<QueryMethod> MakeHulld();
 // Returns hulld with QueryOptions::tolerance.
 std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name);
-// Returns hulld, exact, on hulls simplified from inside to within max_error: never reports a false
-// collision.
+// Returns hulld, exact, on inner simplifications of the hulls with an error of at most max_error:
+// never reports a false collision.
 std::unique_ptr<QueryMethod> MakeHulldSimplified(double max_error, std::string name);
 
 // The separating axis test as taught in courses: transforms all points into the world, then
 // projects every point on facet normals and cross products of edges; early exit, no certificate.
-// `perturbation` moves each coordinate by a random part of itself of up to that size, a common
+// perturbation: each coordinate changes by a random fraction of itself, at most this; a common
 // workaround for degenerate input.
 std::unique_ptr<QueryMethod> MakeTextbookInDouble(double perturbation = 0);
 
-// GJK to the sign, without any bound or certificate.
+// GJK that stops once it knows the sign of the separation; without error bounds or a certificate.
 std::unique_ptr<QueryMethod> MakePlainGjkInDouble();
 std::unique_ptr<QueryMethod> MakePlainGjkInFloat();
 

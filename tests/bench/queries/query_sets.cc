@@ -16,8 +16,8 @@ namespace hulld::bench {
 namespace {
 
 constexpr size_t kHullsPerSet = 32;
-// Sets of hulls with more than kLargeHull vertices contain fewer hulls, as their copies fill the
-// memory.
+// Number of hulls in a set of hulls with more than kLargeHull vertices: fewer, because placed
+// copies fill the memory.
 constexpr size_t kLargeHullsPerSet = 8;
 constexpr size_t kLargeHull = 5000;
 

@@ -42,15 +42,17 @@ struct QuerySet {
   std::vector<PlacedHull> b;
 };
 
-// Returns hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and
-// 1.5), or "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries
-// if missing). "mating:V" has kContact only: face on face without a rotation, like stacked boxes
-// and assembled parts; blocks of 8 vertices, or parts of about V. Poses are random. Fixed seeds:
-// the same name and regime give the same queries.
+// Returns hulls by name. Fixed seeds: the same name and regime give the same queries.
 //
-// In kContact coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
-// that every library receives the same geometry. Elsewhere libraries that need a rotation matrix
-// round it; except for kTouch, the error is far below the distance to contact.
+//   "sphere:V"  V random points on an ellipsoid with axes between 0.5 and 1.5, at random poses
+//   "ur5"       the links of the robot arm in HULLD_DATA (../shared/data), at random poses;
+//               no queries if missing
+//   "mating:V"  kContact only: parts of about V vertices (blocks for 8), face on face without a
+//               rotation, like stacked boxes and assembled parts
+//
+// In kContact, coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
+// that every library receives the same geometry. In other regimes, libraries that need a rotation
+// matrix round it; except in kTouch, the error is far below the distance to contact.
 QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count);
 
 }  // namespace hulld::bench

@@ -15,10 +15,10 @@ namespace hulld::bench {
 // Returns a connection that is not shared.
 std::shared_ptr<grpc::Channel> ConnectAlone(const std::string& address);
 
-// One stream of single-point chunks, into an existing hull. Each point lies slightly farther out
-// than the previous one in its direction, which it covers, so that the number of vertices stays
-// approximately constant. Requires: a hull within a radius of 1.1 about the origin. Ends the
-// program if a call fails or a point was not outside.
+// One stream of single-point chunks, into an existing hull. Each point lies slightly outside the
+// previous point in its direction and covers it, so that the number of vertices stays approximately
+// constant. Requires: a hull within a radius of 1.1 about the origin. Ends the program if a call
+// fails or a point was not outside.
 class GrowingWriter {
  public:
   GrowingWriter(const std::shared_ptr<grpc::Channel>& channel, const std::string& hull_id,

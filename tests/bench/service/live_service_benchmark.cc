@@ -3,15 +3,20 @@
 //
 //   live_service_benchmark [HULLD [VERTICES...]]
 //
-// For each number of vertices (by default 64 to 1000000, in powers of ten from 1000 on): starts its
+// For each number of vertices (by default 64 to 1000000, in powers of ten from 1000 on), starts its
 // own hulld on a durable store and runs single queries about a hull of that many vertices and a
-// probe near it: at rest; directly after each acknowledged chunk with an outside point; about
-// another hull at that time, which shows the cost of the append to any following call; while
-// another connection streams such chunks at full rate; about another hull during that, which shows
-// the cost of the machine's load alone; and as the first query after a restart. One row of CSV per
-// case: the queries' percentiles, their ratios to the case at rest, and the writer's rate, which
-// the row "writer alone" has without any reader. The cases alternate, so that machine drift affects
-// all of them.
+// probe near it:
+//
+// - at rest;
+// - directly after each acknowledged chunk with an outside point;
+// - then about another hull, which shows the cost of the append to any following call;
+// - while another connection streams such chunks at full rate;
+// - during that about another hull, which shows the cost of the machine's load alone;
+// - as the first query after a restart.
+//
+// One row of CSV per case: percentiles of the queries, their ratios to the case at rest, and the
+// writer's rate. The row "writer alone" has that rate without a reader. The cases alternate, so
+// that machine drift affects all of them.
 
 #include <grpcpp/grpcpp.h>
 

@@ -84,7 +84,7 @@ struct Row {
   std::vector<double> times = {};
 };
 
-// `first`: the case that ratios are to.
+// first: the reference of the ratios.
 void Print(Row row, Row first) {
   std::sort(row.times.begin(), row.times.end());
   std::sort(first.times.begin(), first.times.end());
@@ -102,8 +102,8 @@ void Print(Row row, Row first) {
 
 std::string HullId(int i) { return "live/" + std::to_string(i); }
 
-// Creates hulls 0 to count - 1 on several concurrent connections, so that they share the disk's
-// waits.
+// Creates hulls 0 to count - 1 on several concurrent connections, so that they share syncs of the
+// disk.
 void MakeHulls(const std::string& address, int count, int vertices) {
   constexpr int kConnections = 8;
   std::vector<std::jthread> threads;

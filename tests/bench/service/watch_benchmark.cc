@@ -5,8 +5,8 @@
 // Starts its own hulld with an in-memory store. Rows of CSV, times in microseconds:
 //
 //   floor              a round trip of StreamCollisions with one pair: the cost of any message
-//   one watcher        from an acknowledged append, as its writer reads it, to the event, as the
-//                      watcher reads it; 0 if the event comes first
+//   one watcher        from the writer reading an append's ack to the watcher reading the event;
+//                      0 if the event comes first
 //   1000 watchers      likewise, for all of 1000 that watch one hull
 //   flood              kFloodHulls hulls that change as fast as their writers can, with a watcher
 //                      that reads and one that does not: changes and events per second, and the

@@ -41,8 +41,8 @@ class Measurement {
   bool too_slow() const { return too_slow_; }
   double nanoseconds() const { return 1e9 * Median(seconds_) / static_cast<double>(range_.count); }
 
-  // Query by query, so that it can be abandoned. Then runs again for the time: some methods prepare
-  // data on the first query.
+  // Runs query by query, so that it can stop early. Then runs all again and measures that: some
+  // methods prepare data on the first query.
   void RunFirst(double max_seconds) {
     const double start = ThreadSeconds();
     for (size_t i = 0; i < range_.count && !too_slow_; ++i) {
@@ -204,7 +204,7 @@ Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& me
                         {method, &QueryMethod::Answer, questions.near_contact},
                         {}});
     Measured& last = measured.back();
-    // The depth is never less than exact for a tolerance.
+    // Depths do not depend on a tolerance.
     if (method->knows_depth() && each.family != TradeFamily::kTolerance) {
       last.depth.emplace(method, &QueryMethod::MeasureDepths, questions.depth);
       last.depth->RunFirst(settings.max_seconds);

@@ -153,7 +153,7 @@ TEST_F(GuardedServer, AContextHoldsAllThatAServerWants) {
   EXPECT_EQ(added.code, 0) << added.err;
   EXPECT_EQ(added.out, "context guarded added and selected\n");
   EXPECT_EQ(RunTool({"list"}).code, 0);
-  // Its token stays with its server.
+  // The token of a context is for its server only.
   const Ran elsewhere = RunTool({"context", "show", "--server", "127.0.0.1:1"});
   EXPECT_EQ(elsewhere.out, "server  127.0.0.1:1  (--server)\n");
   // A variable overrides it; an option overrides both.

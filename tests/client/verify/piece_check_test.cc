@@ -160,7 +160,7 @@ TEST_F(Touching, AMovedVertexIsNoticed) {
               HasSubstr("pieces 1 of A and 0 of B"));
   b_.hulls[0][13] = 0;
   EXPECT_THAT(Fault(kTouching, {Contact(), Beside()}, a_, b_), IsEmpty());
-  // Out of its box, into that of a pair decided by boxes.
+  // Moves a vertex out of its box, into the box of a pair decided by boxes.
   a_.hulls[0][12] = 2.5;
   EXPECT_THAT(Fault(kTouching, {Contact(), Beside()}, a_, b_),
               HasSubstr("pieces 0 of A and 0 of B have no certificate"));

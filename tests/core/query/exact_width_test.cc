@@ -194,8 +194,8 @@ TEST(ExactWidth, CornersUpToTheLimitOfEachWidth) {
   WidthCheck check;
   std::array<bool, 400> reached = {};
   for (int bits = 2; bits <= 330; ++bits) {
-    // The translation is 2^(bits - 2), a unit 1: own coordinates have at most 53 bits, so the hulls
-    // are small or far from the unit by a power of two.
+    // Doubles have 53 bits: up to 52, the coordinates of the boxes themselves have `bits` bits;
+    // beyond that, the boxes keep 52 and their translation is 2^bits.
     const int large = std::min(bits, 52);
     const double half = std::ldexp(1.0, large) - 1;
     const double far = std::ldexp(1.0, bits);

@@ -57,12 +57,11 @@ struct SeedFile {
 };
 std::vector<SeedFile> SeedFiles();
 
-// Changes the structure of `content` at places that `next` chooses (a number below its argument):
-// swaps, repeats or drops lines, numbers and blocks, puts limits in the place of numbers and of
-// binary words, counts up or down, or cuts the file.
+// Mutates `content` once: swaps, repeats, or drops a line, number, or binary word, replaces a
+// number or word by an extreme value, or truncates the file. next(n) chooses a number below n.
 void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* content);
 
-// Words and numbers that these files are made of, right and wrong.
+// Words and numbers of these formats, valid and invalid.
 const std::vector<std::string>& FileTokens();
 
 }  // namespace hulld::fuzz

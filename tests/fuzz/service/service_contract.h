@@ -18,7 +18,7 @@ struct CallManner {
   bool raw = false;
 };
 
-// Returns the violation of the API contract by the status of a call, or empty.
+// Returns how the status of a call violates the API contract; empty if it does not.
 std::string CheckStatus(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
 
 // Returns the name of a code, e.g. "NOT_FOUND".

@@ -71,7 +71,7 @@ class ServiceProgram {
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0, service_.store_id_}; }
-  // Sets the call's deadline, rarely one that has passed.
+  // Sets the call's deadline; rarely, one that has already passed.
   void Hurry(grpc::ClientContext& context, CallManner& manner);
   void Note(std::string finding);
   void Reach(const std::string& what) { ++service_.reached_[what]; }
@@ -138,7 +138,7 @@ class ServiceProgram {
   v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
   v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
-  // Sometimes returns the request in its other form.
+  // Sometimes returns the request in packed form.
   template <typename Request>
   std::optional<Request> MaybePacked(const Request& request) {
     if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {

@@ -69,7 +69,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     } else {
       AppendPoints();
     }
-    // Otherwise a call was abandoned, and this one with it.
+    // null: another call was abandoned, and this watch with it.
     manner.cancelled = std::exchange(watch_, nullptr) == nullptr;
     told = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
     for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {

@@ -36,13 +36,13 @@ struct Outcome {
   std::string replies;
 };
 
-// A call, as the tests below need it.
+// What the tests below know of a call.
 struct CallRule {
   Permission needed;
   // The messages of a request about a hull.
   std::function<std::vector<std::string>(const std::string& hull_id)> request;
-  // Form of the refusal of a hull outside the caller's prefix: the call's status, an entry in its
-  // reply, or none because the call names no hull.
+  // How the call refuses a hull outside the caller's prefix: by its status, by an entry in its
+  // reply, or not at all, as it names no hull.
   enum { kByStatus, kInReply, kNoHull } refusal;
 };
 
@@ -60,7 +60,7 @@ std::vector<std::string> WithBodyId(const std::string& body_id) {
   return {request.SerializeAsString()};
 }
 
-// Every call of the contract. A new one must be given its rule here.
+// Every call of the API; a new one needs a rule here.
 const std::map<std::string, CallRule>& Rules() {
   static const auto* const rules = new std::map<std::string, CallRule>{
       {"hulld.v1.HullService.CreateHull",
@@ -206,7 +206,7 @@ class Access : public ServerTest {
 
   ~Access() override { std::filesystem::remove(path_); }
 
-  // Every call that the server knows, by its own account: "hulld.v1.Service.Method".
+  // Returns every call that reflection lists, as "hulld.v1.Service.Method".
   std::set<std::string> KnownCalls() {
     const Outcome services = Run("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                  {}, {std::string(":\0", 2)});
@@ -378,7 +378,7 @@ TEST_F(Access, EveryCallNeedsItsRole) {
   }
 }
 
-// Not by the code, not by the message, not by the reply.
+// Neither the code nor the message nor the reply differs from that of a missing hull.
 TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
   for (const auto& [call, rule] : Rules()) {
     if (rule.refusal == CallRule::kNoHull) continue;

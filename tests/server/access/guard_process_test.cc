@@ -107,7 +107,7 @@ TEST_F(GuardProcess, NoSecretReachesTheLog) {
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::OK);
   EXPECT_EQ(Call(address, kToken, authority_, true), grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_EQ(Call(address, kWrongToken, authority_), grpc::StatusCode::UNAUTHENTICATED);
-  // An operator's mistakes: the token itself is stored, and half of a key.
+  // Operator mistakes: a token instead of its hash, and a truncated key.
   WriteTokens(absl::StrCat("robot read-only * ", kToken, "\n"));
   WriteSecret(directory_ + "/key", identity_.key.substr(0, identity_.key.size() / 2));
   hulld.Signal(SIGHUP);

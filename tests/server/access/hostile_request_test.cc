@@ -29,7 +29,7 @@ constexpr bool kKeepsWhatWasFreed = true;
 constexpr bool kKeepsWhatWasFreed = false;
 #endif
 
-// A field of /proc/PID/status, in KiB.
+// Returns a field of /proc/PID/status, in KiB.
 long StatusField(pid_t pid, const std::string& name) {
   std::ifstream file("/proc/" + std::to_string(pid) + "/status");
   std::string line;
@@ -48,7 +48,7 @@ grpc::ByteBuffer EmptyPlacements() {
   return grpc::ByteBuffer(&slice, 1);
 }
 
-// Sends the bytes as a batch, on a connection of its own; how that ended.
+// Sends the bytes as a batch over a separate connection; returns its status.
 grpc::StatusCode SendBatch(const std::string& address, const grpc::ByteBuffer& request) {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
@@ -109,12 +109,12 @@ TEST_F(HostileRequest, AuthorizedCallersTakeLittleMemory) {
   ExpectLittleMemory({}, grpc::RESOURCE_EXHAUSTED);
 }
 
-// gRPC's own service took a thread for each stream, without a token.
+// Regression test: gRPC's own reflection service used a thread per stream, without a token.
 TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
   using grpc::reflection::v1alpha::ServerReflection;
   using grpc::reflection::v1alpha::ServerReflectionRequest;
   using grpc::reflection::v1alpha::ServerReflectionResponse;
-  // Fewer than one connection may have.
+  // Below the limit of one connection.
   constexpr int kStreams = 80;
   Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--log-format", "json",
                  "--max-anonymous-calls", std::to_string(kStreams * Limits::kAnonymousShare)});

@@ -193,13 +193,13 @@ TEST_F(Revocation, RevokingTheLastTokenRefusesEverything) {
     ExpectRevoked(create("kept secret"));
     ExpectRevoked(create("gone secret"));
     EXPECT_THAT(log.text(), HasSubstr("error --tokens-file " + path_));
-    // Once.
+    // Logged once.
     EXPECT_EQ(log.text().find("all tokens are revoked"),
               log.text().rfind("all tokens are revoked"));
   }
 }
 
-// An unreadable file is no revocation.
+// An unreadable file revokes nothing.
 TEST_F(Revocation, DoesNotFollowFromAFileThatCannotBeRead) {
   ReplaceTokens(kept_ + "half a li");
   grpc::ClientContext context;

@@ -162,7 +162,7 @@ TEST_F(Tls, HalfAnExchangeIsNotTaken) {
   EXPECT_EQ(Connect(Trusting(other_)), grpc::StatusCode::OK);
 }
 
-// The highest version that a client which offers only `version` gets; empty when it is refused.
+// Returns the version negotiated with a client that offers only `version`; empty if refused.
 std::string HandshakeWith(int port, int version) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address = {};

@@ -24,7 +24,7 @@ using ::testing::Not;
 
 constexpr char kTraceparent[] = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01";
 
-// The value of a key in metadata; empty when it is not there.
+// Returns the value of a key in metadata; empty if missing.
 std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata,
                     const char* key) {
   const auto found = metadata.find(key);
@@ -112,7 +112,7 @@ TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
   const CapturedLog log;
   {
     Appender again(*hulls_, "a", "put");
-    // Applied before.
+    // Applied already.
     ASSERT_TRUE(again.Append(1, Cube()).has_value());
     ASSERT_TRUE(again.Finish().ok());
   }

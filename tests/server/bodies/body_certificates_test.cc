@@ -354,7 +354,8 @@ TEST_F(BodyProofs, ATooLargeRowFailsAlone) {
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(80, PlacementOf("cube"))).ok());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("heap");
-  // 10000 pairs touch; then 8000, which take slightly more bytes if all six pairs are distinct.
+  // 10000 pairs touch, too many for a proof; then 8000, whose proof is too large only if the six
+  // vertex pairs of each are distinct.
   *request.add_placements() = PlacementOf("heap", 1, 0, 0);
   *request.add_placements() = PlacementOf("less", 1, 0, 0);
   *request.add_placements() = PlacementOf("cube", 1, 0, 0);

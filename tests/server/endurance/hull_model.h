@@ -16,7 +16,7 @@ namespace hulld::server {
 // possible states; reading the hull decides.
 class HullModel {
  public:
-  // The effect of a call.
+  // Effect of a call: applied, not applied, or unknown.
   enum class Outcome { kDone, kNothing, kUnknown };
   // Returns the outcome by the status of a change: a refused request has changed nothing.
   static Outcome OutcomeOf(const absl::Status& status);

@@ -37,8 +37,8 @@ class RestartableServer : public ::testing::Test {
  protected:
   std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
 
-  // Returns channel arguments that reconnect immediately while the server starts. Connecting may
-  // take a second, which gRPC treats as the minimum backoff.
+  // Returns channel arguments that reconnect immediately while the server starts. An attempt to
+  // connect may take a second: gRPC takes the minimum backoff as its time limit.
   static grpc::ChannelArguments ReconnectAtOnce() {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);

@@ -214,7 +214,7 @@ TEST(FairMutexTest, WaitingOnAConditionIsNoHold) {
   locked.Unlock();
   const Clock::duration elapsed = Clock::now() - begin;
   const std::lock_guard lock(mutex);
-  // However long this thread was descheduled, this remains for holds.
+  // Time spent waiting does not count as holding the mutex.
   EXPECT_LE(mutex.Statistics().longest, elapsed - waited);
 }
 

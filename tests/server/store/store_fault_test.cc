@@ -99,7 +99,7 @@ TEST_F(StoreFault, UnsyncedChangesAreNotAcknowledged) {
 TEST_F(StoreFault, StallCountsContinueAfterReopening) {
   Start();
   RocksDbStore& store = hulls_->store();
-  // One file that was not compacted is one too many.
+  // Makes a single uncompacted file a reason to stall.
   const auto stall = [&store] {
     EXPECT_TRUE(store.db()
                     .SetOptions({{"level0_file_num_compaction_trigger", "1"},

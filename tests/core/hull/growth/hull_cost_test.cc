@@ -46,8 +46,8 @@ std::vector<Vector> GrowingShells(Random& random, size_t n) {
   return points;
 }
 
-// With points inserted one by one, none does much more than its share of the housekeeping: besides
-// the triangles that it removes and creates, its work grows like the square of a logarithm.
+// When points are inserted one by one, none does much more than its share of the housekeeping:
+// apart from removing and creating triangles, its work is O(log^2 n).
 TEST(HullCost, NoSinglePointStalls) {
   const uint64_t seed = TestSeed(501);
   Random random(seed);

@@ -256,7 +256,7 @@ TEST(LiveHull, ThreadsDoNotWaitForEachOther) {
     Random random(TestSeed(946));
     growing.Add(RandomOnSphere(random, 50, 1));
   }
-  std::mutex mutex;  // of the mark, as a server's of its records
+  std::mutex mutex;  // guards the mark, as the server's mutex does
   std::atomic<bool> ending = false;
   const auto mark = [&] {
     const std::lock_guard lock(mutex);

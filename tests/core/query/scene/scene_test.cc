@@ -208,7 +208,7 @@ TEST(Scene, CandidatesAreGatheredInStepsAndTakeABitEachAtMost) {
     EXPECT_EQ(found, expected) << a;
     EXPECT_EQ(candidates.Next(), std::nullopt);
   }
-  // The list of a few, and a bit for each.
+  // A list of the few candidates, and one bit for each placement.
   EXPECT_LT(candidates.MemoryBytes(), 2 * 1200 * sizeof(uint32_t) + kPlacements / 8 + 64);
 }
 

@@ -110,9 +110,9 @@ TEST(PoseProduct, TwoTranslationsAddUpExactly) {
   EXPECT_EQ(product.translation_error(), 0);
 }
 
-// Two cubes that share a face in the frame of a rotated body: in the world hardly any of their
-// corners is a double. The least step of a cube, far below the rounding of the product, separates
-// them or makes them overlap.
+// Two cubes that share a face in the frame of a rotated body: in the world, doubles represent
+// hardly any of their corners. The least step of a cube, far below the rounding of the product,
+// separates them or makes them overlap.
 TEST(PoseProduct, ContactIsThatOfTheUnroundedProduct) {
   Random random(TestSeed(3));
   const Hull cube = BuildHull(LatticeCube(2, 1));

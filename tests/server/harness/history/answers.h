@@ -19,7 +19,7 @@ std::unique_ptr<grpc::ClientContext> NewContext();
 
 void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen);
 
-// Returns the hull that a body's piece lacks, parsed from an error message; empty if the message is
+// Returns the missing hull of a body's piece, parsed from an error message; empty if the message is
 // about something else.
 std::string MissingPiece(const std::string& said);
 

@@ -127,8 +127,7 @@ struct Operation {
 // Operations of all clients, by hull ID. Recording is thread-safe.
 class HullHistory {
  public:
-  // Returns the time in nanoseconds of the machine's monotonic clock, strictly later than all
-  // before.
+  // Returns the machine's monotonic time in nanoseconds, strictly later than all earlier results.
   uint64_t Tick();
   // Requires: invoked and returned are ticks of this clock, in this order, or returned is
   // UINT64_MAX.

@@ -40,8 +40,8 @@ struct SpecifiedHull {
   std::string Key() const;
 };
 
-// Applies an operation to `hull`. Returns false if the hull may not answer so. Not for pairs,
-// batches, or queries about a body.
+// Applies an operation to `hull`. Returns false if the specification forbids its answer. Not for
+// pairs, batches, or queries about a body.
 bool Step(SpecifiedHull& hull, const Operation& operation);
 // As Step, for joint operations. `find` returns the other hulls that the operation names and the
 // hulls of the body's pieces, by ID.

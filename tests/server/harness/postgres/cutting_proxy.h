@@ -23,7 +23,7 @@ class CuttingProxy {
     kBeforeCommit,
     // PostgreSQL commits; the connection is cut before its answer is forwarded.
     kAfterCommit,
-    // Cuts the connection to hulld. Deliver forwards the piece that contains BEGIN.
+    // Cuts the connection to hulld, and holds the piece that contains BEGIN until Deliver.
     kHold,
     // As kHold, for the piece that contains COMMIT and no BEGIN.
     kHoldCommit,

@@ -62,9 +62,9 @@ class ManyServersTest : public ::testing::Test {
     bool any_freshness = false;
   };
   using Fault = std::function<void()>;
-  // Runs clients that call at random and sometimes switch servers; one with an unanswered call
-  // continues when a server answers a read. The faults occur in order, evenly spread over the
-  // calls. Finally queries every server about every hull.
+  // Runs clients that call at random and sometimes switch servers; after an unanswered call, a
+  // client continues once a server answers a read. The faults occur in order, evenly spread over
+  // the calls. Finally queries every server about every hull.
   void Run(const Calls& calls, const std::vector<Fault>& faults, HullHistory& history);
   // Expects that a change gets no answer for a while because the database is unreachable. The
   // change creates a hull outside of any history.
@@ -79,7 +79,7 @@ class ManyServersTest : public ::testing::Test {
     Server(const std::string& program, const std::string& conninfo_file);
     ~Server();
 
-    // Waits for the server to listen, which must happen.
+    // Waits until the server listens; aborts the program if it does not.
     void AwaitListening();
 
     std::unique_ptr<Process> process;

@@ -23,8 +23,8 @@ class PostgresCluster {
   static PostgresCluster& Shared();
 
   PostgresCluster() : PostgresCluster(WalIn{}) {}
-  // Keeps its log in 1 MiB segments in an empty directory that belongs to the server
-  // (GiveToServer).
+  // Writes its write-ahead log, in segments of 1 MiB, to an empty directory that belongs to the
+  // server (GiveToServer).
   struct WalIn {
     std::string directory;
   };
@@ -78,9 +78,9 @@ class PostgresCluster {
  private:
   void MakeDirectory();
   void InitializeData(const std::vector<std::string>& options);
-  // Copies the data directory that initdb makes, cached in the build folder: a copy takes a seventh
-  // of the time, and hundreds of tests need one. All clusters of a build have one system
-  // identifier.
+  // Copies a data directory that initdb made once, cached in the build folder: a copy takes a
+  // seventh of the time, and hundreds of tests need one. Therefore all clusters of a build have the
+  // same system identifier.
   void MakeData();
   std::vector<pid_t> Children() const;
   void WaitForEnd();

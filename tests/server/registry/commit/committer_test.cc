@@ -233,7 +233,7 @@ TEST_F(CommitterTest, ManyCompletionsYieldExceptBetweenRefusals) {
     constexpr uint64_t kMany = 3 * Committer::kMostPerHold;
     for (uint64_t revision = 3; revision < kMany; ++revision) Submit(revision);
     std::future<void> last = Submit(kMany);
-    // A refusal takes all of them, as if they were one batch; otherwise 1 is a separate batch.
+    // A refusal ends all of them together; otherwise the first is a separate batch.
     gate.outcome.set_value(outcome);
     last.wait();
     passer.join();
