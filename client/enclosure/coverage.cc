@@ -122,7 +122,7 @@ double DistanceToTriangle(const Point& p, const Point& a, const Point& b, const 
 }
 
 // Returns the vertices in the world, rounded.
-std::vector<Point> VerticesOf(const PlacedHull& piece) {
+std::vector<Point> VerticesOf(const CoveringPiece& piece) {
   std::vector<Point> vertices;
   const std::vector<double>& xyz = piece.mesh->xyz;
   for (size_t i = 0; i + 2 < xyz.size(); i += 3) {
@@ -154,9 +154,9 @@ double DistanceTo(const HullMesh& piece, const std::vector<Point>& vertices, con
 // Covers one mesh with prepared pieces.
 class Cover {
  public:
-  Cover(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh)
+  Cover(const std::vector<CoveringPiece>& pieces, const TriangleMesh& mesh)
       : pieces_(pieces), mesh_(mesh) {
-    for (const PlacedHull& piece : pieces) {
+    for (const CoveringPiece& piece : pieces) {
       grid_.Include(piece.mesh->xyz);
       grid_.Include(std::span(piece.X_WH).last(3));
     }
@@ -164,7 +164,7 @@ class Cover {
   }
 
   absl::Status Prepare() {
-    for (const PlacedHull& piece : pieces_) {
+    for (const CoveringPiece& piece : pieces_) {
       auto region = ConvexRegion::Make(*piece.mesh, piece.X_WH, grid_);
       if (!region.ok()) return region.status();
       regions_.push_back(*std::move(region));
@@ -280,7 +280,7 @@ class Cover {
            2;
   }
 
-  const std::vector<PlacedHull>& pieces_;
+  const std::vector<CoveringPiece>& pieces_;
   const TriangleMesh& mesh_;
   CommonExponent grid_;
   std::vector<ConvexRegion> regions_;
@@ -293,7 +293,7 @@ class Cover {
 
 }  // namespace
 
-absl::StatusOr<Coverage> CoverMesh(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh,
+absl::StatusOr<Coverage> CoverMesh(const std::vector<CoveringPiece>& pieces, const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress) {
   Cover cover(pieces, mesh);
   if (absl::Status ready = cover.Prepare(); !ready.ok()) return ready;

@@ -38,7 +38,7 @@ struct Coverage {
 };
 
 // A convex piece: a hull at a pose. `mesh` is never null.
-struct PlacedHull {
+struct CoveringPiece {
   std::shared_ptr<const HullMesh> mesh;
   RigidPose X_WH = kNoMotion;
 };
@@ -58,7 +58,8 @@ struct PlacedHull {
 //
 // `progress` receives the number of finished triangles. INTERNAL: facets that do not match their
 // vertices. Cost: one test per vertex and facet, and exact arithmetic for each cut.
-absl::StatusOr<Coverage> CoverMesh(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh,
+absl::StatusOr<Coverage> CoverMesh(const std::vector<CoveringPiece>& pieces,
+                                   const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress);
 
 }  // namespace hulld

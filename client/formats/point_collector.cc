@@ -15,7 +15,7 @@ PointCollector::PointCollector(ReadOptions options, BlockReceiver receive)
 
 absl::Status PointCollector::Flush() {
   if (block_.size() == 0) return absl::OkStatus();
-  return receive_(std::exchange(block_, PointBlock()));
+  return receive_(std::exchange(block_, PointChunk()));
 }
 
 std::string PointCollector::NonFiniteMessage(double x, double y, double z) const {

@@ -18,7 +18,7 @@ namespace hulld {
 
 // Consecutive points of a file, n x 3, all finite: in `xyz_float` if the file's scalars are floats,
 // otherwise in `xyz`. The other vector is empty.
-struct PointBlock {
+struct PointChunk {
   std::vector<double> xyz;
   std::vector<float> xyz_float;
 
@@ -26,7 +26,7 @@ struct PointBlock {
 };
 
 // Receives a block. An error ends the reading and is its result.
-using BlockReceiver = std::function<absl::Status(PointBlock block)>;
+using BlockReceiver = std::function<absl::Status(PointChunk block)>;
 
 struct ReadOptions {
   // Points per block; the last block of a file may be smaller. 0: about 1 MiB of coordinates.
@@ -120,7 +120,7 @@ class PointCollector {
   ReadOptions options_;
   bool is_scaled_;
   BlockReceiver receive_;
-  PointBlock block_;
+  PointChunk block_;
   ReadCounts counts_;
 };
 

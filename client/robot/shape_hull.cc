@@ -180,7 +180,7 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
   ShapeHull hull;
   ReadRequest request{file, *format, {}, {}};
   request.options.scale = shape.scale;
-  const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+  const auto counts = ReadPoints(request, [&](const PointChunk& block) {
     hull.xyz.insert(hull.xyz.end(), block.xyz.begin(), block.xyz.end());
     hull.xyz.insert(hull.xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     return absl::OkStatus();

@@ -34,7 +34,7 @@ std::vector<std::string> SkippedTexts(const ReadCounts& counts) {
   return texts;
 }
 
-v1::PointBlock ToProto(const PointBlock& block) {
+v1::PointBlock ToProto(const PointChunk& block) {
   v1::PointBlock points;
   points.mutable_xyz()->Add(block.xyz.begin(), block.xyz.end());
   points.mutable_xyz_float()->Add(block.xyz_float.begin(), block.xyz_float.end());

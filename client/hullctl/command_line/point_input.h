@@ -36,7 +36,7 @@ std::vector<std::string> SkippedTexts(const ReadCounts& counts);
 // that a mistyped name changes nothing. total_bytes: the size of all files, 0 if unknown.
 absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint64_t* total_bytes);
 
-v1::PointBlock ToProto(const PointBlock& block);
+v1::PointBlock ToProto(const PointChunk& block);
 
 }  // namespace hulld
 

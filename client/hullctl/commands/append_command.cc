@@ -48,7 +48,7 @@ class FileAppender {
       file_bytes = bytes;
       bar_.Update(bytes_before_ + bytes, appender_ ? appender_->totals().points_sent : 0);
     };
-    const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+    const auto counts = ReadPoints(request, [&](const PointChunk& block) {
       if (interrupted) return absl::CancelledError("interrupted");
       outcome.stream = Take(block);
       return outcome.stream;
@@ -90,7 +90,7 @@ class FileAppender {
   uint64_t resumed_points() const { return resumed_points_; }
 
  private:
-  absl::Status Take(const PointBlock& block) {
+  absl::Status Take(const PointChunk& block) {
     if (appender_ == nullptr) {
       if (absl::Status status = Create(); !status.ok()) return status;
       if (absl::Status status = Open(); !status.ok()) return status;

@@ -73,7 +73,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
         file_bytes = bytes;
         bar.Update(bytes_before + bytes, points);
       };
-      const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+      const auto counts = ReadPoints(request, [&](const PointChunk& block) {
         points += block.size();
         stream = sink(ToProto(block));
         return stream;

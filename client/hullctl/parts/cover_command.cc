@@ -53,7 +53,7 @@ class PieceFetcher {
     return absl::OkStatus();
   }
 
-  std::vector<PlacedHull> Take() { return std::move(pieces_); }
+  std::vector<CoveringPiece> Take() { return std::move(pieces_); }
 
  private:
   absl::Status AddAll(const std::string& prefix) {
@@ -81,7 +81,7 @@ class PieceFetcher {
 
   const Client& client_;
   std::map<std::string, std::shared_ptr<const HullMesh>> meshes_;
-  std::vector<PlacedHull> pieces_;
+  std::vector<CoveringPiece> pieces_;
 };
 
 void PrintCoverageJson(const Invocation& run, const TriangleMesh& mesh, const Coverage& coverage) {
@@ -149,7 +149,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   for (const std::string& hull : hulls) {
     if (absl::Status added = fetcher.Add(hull); !added.ok()) return run.Fail(added);
   }
-  const std::vector<PlacedHull> pieces = fetcher.Take();
+  const std::vector<CoveringPiece> pieces = fetcher.Take();
   ProgressBar bar(run.err, run.shows_progress, "triangles", mesh->triangles.size());
   auto coverage = CoverMesh(pieces, *mesh, [&bar](uint64_t done) { bar.Update(done); });
   bar.Clear();

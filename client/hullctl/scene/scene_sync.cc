@@ -24,7 +24,7 @@ absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
   std::vector<double> xyz;
   ReadRequest request{hull.file, *format, {}, {}};
   request.options.scale.fill(hull.scale);
-  const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+  const auto counts = ReadPoints(request, [&](const PointChunk& block) {
     xyz.insert(xyz.end(), block.xyz.begin(), block.xyz.end());
     xyz.insert(xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     return absl::OkStatus();

@@ -31,7 +31,7 @@ absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
     if (id == prefix_ + HullSegment(name)) name = absl::StrCat(ids_.size(), "-", name);
   }
   return Add(name, [&request](const Client::PointSink& sink) {
-    return ReadPoints(request, [&sink](const PointBlock& block) { return sink(ToProto(block)); })
+    return ReadPoints(request, [&sink](const PointChunk& block) { return sink(ToProto(block)); })
         .status();
   });
 }

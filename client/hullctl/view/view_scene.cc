@@ -48,7 +48,7 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
     step *= 2;
   };
   return ReadPoints(request,
-                    [&](const PointBlock& block) {
+                    [&](const PointChunk& block) {
                       for (size_t i = 0; i < block.xyz.size(); i += 3) {
                         keep(block.xyz[i], block.xyz[i + 1], block.xyz[i + 2]);
                       }

@@ -13,18 +13,18 @@
 namespace hulld {
 namespace coverage_test {
 
-PlacedHull Placed(HullMesh mesh, const RigidPose& X_WH) {
+CoveringPiece Placed(HullMesh mesh, const RigidPose& X_WH) {
   return {std::make_shared<const HullMesh>(std::move(mesh)), X_WH};
 }
 
-Coverage Cover(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh) {
+Coverage Cover(const std::vector<CoveringPiece>& pieces, const TriangleMesh& mesh) {
   const auto coverage = CoverMesh(pieces, mesh, [](uint64_t) {});
   EXPECT_TRUE(coverage.ok()) << coverage.status();
   return *coverage;
 }
 
 Coverage Cover(const std::vector<HullMesh>& hulls, const TriangleMesh& mesh) {
-  std::vector<PlacedHull> pieces;
+  std::vector<CoveringPiece> pieces;
   for (const HullMesh& hull : hulls) pieces.push_back(Placed(hull, kNoMotion));
   return Cover(pieces, mesh);
 }
@@ -59,7 +59,7 @@ TEST(Coverage, TwoHalvesEncloseTheWhole) {
 
 // A box rotated by a third turn about the diagonal (1, 1, 1), and moved, takes its axes with it.
 TEST(Coverage, APieceStandsAtItsPose) {
-  const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
+  const CoveringPiece turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
   EXPECT_TRUE(Cover({turned}, BoxMesh({10, 0, 0}, {13, 1, 2})).uncovered.empty());
   const Coverage coverage = Cover({turned}, BoxMesh({10, 0, 0}, {13.5, 1, 2}));
   EXPECT_FALSE(coverage.uncovered.empty());
@@ -70,7 +70,7 @@ TEST(Coverage, APieceStandsAtItsPose) {
 // lie on an edge of the box, although a rotation rounded to doubles would move the edge. A point
 // off by the smallest step is outside.
 TEST(Coverage, APoseIsNotRounded) {
-  const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {5, 1, 1}), {2, 0, 0, 1, 0, 0, 0});
+  const CoveringPiece turned = Placed(BoxHull({0, 0, 0}, {5, 1, 1}), {2, 0, 0, 1, 0, 0, 0});
   for (const double s : {0.1, 0.3, 0x1.123456789abcdp-3}) {
     // Rounded to few digits, so that its multiples by three and four are exact.
     const double t = std::ldexp(std::round(std::ldexp(s, 40)), -40);

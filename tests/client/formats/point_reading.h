@@ -36,19 +36,19 @@ class TempFile {
 struct PointsRead {
   absl::Status status;
   ReadCounts counts;
-  std::vector<PointBlock> blocks;
+  std::vector<PointChunk> blocks;
 
   // All coordinates in order, floats widened.
   std::vector<double> xyz() const {
     std::vector<double> all;
-    for (const PointBlock& block : blocks) {
+    for (const PointChunk& block : blocks) {
       all.insert(all.end(), block.xyz.begin(), block.xyz.end());
       all.insert(all.end(), block.xyz_float.begin(), block.xyz_float.end());
     }
     return all;
   }
   bool all_float() const {
-    for (const PointBlock& block : blocks) {
+    for (const PointChunk& block : blocks) {
       if (!block.xyz.empty()) return false;
     }
     return !blocks.empty();
@@ -60,7 +60,7 @@ struct PointsRead {
 
 inline PointsRead ReadFile(const std::string& path, PointFormat format, ReadOptions options = {}) {
   PointsRead result;
-  const auto counts = ReadPoints(ReadRequest{path, format, options, {}}, [&](PointBlock block) {
+  const auto counts = ReadPoints(ReadRequest{path, format, options, {}}, [&](PointChunk block) {
     result.blocks.push_back(std::move(block));
     return absl::OkStatus();
   });

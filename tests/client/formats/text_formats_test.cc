@@ -143,7 +143,7 @@ TEST(Blocks, TheReceiversErrorEndsTheReading) {
   ReadRequest request{file.path(), PointFormat::kXyz, {}, {}};
   request.options.points_per_block = 1;
   int calls = 0;
-  const auto counts = ReadPoints(request, [&](const PointBlock&) {
+  const auto counts = ReadPoints(request, [&](const PointChunk&) {
     return ++calls == 2 ? absl::AbortedError("enough") : absl::OkStatus();
   });
   EXPECT_EQ(counts.status(), absl::AbortedError("enough"));
