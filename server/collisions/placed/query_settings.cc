@@ -43,7 +43,7 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                                    "; it must be a length of at least 0"));
   }
   options.max_textbook_axes = limits.max_textbook_axes;
-  // One question computes on a thread at a time.
+  // A thread computes one query at a time, so a query may use the whole budget of a request.
   options.max_depth_bytes = limits.request_memory;
   options.max_piece_certificates = Config::kMaxPieceCertificates;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };

@@ -62,8 +62,7 @@ void HullChanges::CreateLocked(Locked& locked, const std::string& id, bool if_ab
   if (!if_absent) {
     Answer<CreateResult>(
         locked, done,
-        WithReason(absl::AlreadyExistsError(absl::StrCat(
-                       QuotedHull(id), " exists; delete it first, or set if_absent to use it")),
+        WithReason(absl::AlreadyExistsError(absl::StrCat(QuotedHull(id), " already exists")),
                    v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
   } else if (existing->state.damaged()) {
     Answer<CreateResult>(locked, done, existing->state.damage());
