@@ -72,7 +72,8 @@ build() { cmake --build --preset "$1" --parallel "$jobs" --target "${@:2}"; }
 run_tests() {
   local preset=$1 code=0
   shift
-  ctest --preset "$preset" --parallel "$jobs" "$@" | tee build/ctest.log || code=1
+  # Many tests wait for a disk or another process.
+  ctest --preset "$preset" --parallel $((jobs + 1)) "$@" | tee build/ctest.log || code=1
   grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
   echo "slowest:"
   sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' build/ctest.log |
