@@ -106,9 +106,11 @@ if TYPE_CHECKING:
     )
     from hulld.geometry.points import PointsLike, as_points
     from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
-    from hulld.local_server import Local, LocalServer, local
+    from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
+    from hulld.robot.answers import RobotCheck
+    from hulld.robot.robot import Robot
     from hulld.verification import VerificationError, Verifier
     from hulld.watches import CollisionWatch, HullWatch
 
@@ -192,6 +194,8 @@ __all__ = [
     "ReplacedHull",
     "ResourceExhaustedError",
     "RetryPolicy",
+    "Robot",
+    "RobotCheck",
     "Rung",
     "Scene",
     "ScenePart",
@@ -210,6 +214,7 @@ __all__ = [
     "__version__",
     "all_pairs",
     "as_points",
+    "check",
     "find_program",
     "local",
     "pack_poses",
@@ -236,6 +241,8 @@ _MODULES = (
     "local_server",
     "programs",
     "retry",
+    "robot.answers",
+    "robot.robot",
     "verification",
     "watches",
     "aio",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import collections
+import functools
+import hashlib
 import os
 import re
 import shutil
@@ -14,8 +16,11 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from hulld.answers.collisions import Collision
 from hulld.client import Client
 from hulld.connection import PathLike
+from hulld.geometry.points import PointsLike, as_points
+from hulld.geometry.poses import PoseLike
 from hulld.programs import find_program
 
 if TYPE_CHECKING:
@@ -25,6 +30,8 @@ _LISTENING = re.compile(r"listening on (\S+)")
 #: The last lines of the server's log that are kept.
 _LINES = 200
 _START_SECONDS = 60.0
+#: The hulls of check() that are kept for further calls.
+_MOST_SHAPES = 64
 _STOP_SECONDS = 10.0
 # Its input is a pipe from us: it ends when we end, however that happens, and takes the server
 # along, and its folder, $0.
@@ -229,3 +236,54 @@ def local(
     gives an AsyncClient.
     """
     return Local(LocalServer(data_dir=data_dir, options=options, binary=binary), client)
+
+
+@functools.cache
+def _shared() -> tuple[Client, threading.Lock, collections.OrderedDict[str, None]]:
+    """The client of a server in memory that ends with this process; a lock for check(), and the IDs
+    of its hulls, the oldest first."""
+    return Client(LocalServer().start().address), threading.Lock(), collections.OrderedDict()
+
+
+_starting = threading.Lock()
+
+
+def shared_client() -> Client:
+    """The client of a server in memory that all of this process shares. It starts at the first
+    call."""
+    with _starting:
+        return _shared()[0]
+
+
+def check(
+    a: PointsLike,
+    b: PointsLike,
+    *,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
+    **query: Any,
+) -> Collision:
+    """The relation of the convex hulls of two point sets, in one line:
+
+        hulld.check(points_a, points_b, separation=True).separation.value
+
+    a, b: n x 3 points, or objects with `vertices` or `points`, as in append_points. query: the
+    keyword arguments of Client.check_collision. A server in memory answers; it starts at the first
+    call, ends with this process, and keeps the latest 64 point sets.
+    """
+    points = [as_points(a, "a"), as_points(b, "b")]
+    client = shared_client()
+    _, lock, known = _shared()
+    with lock:
+        ids = []
+        for array in points:
+            digest = hashlib.blake2b(array.tobytes(), key=array.dtype.str.encode(), digest_size=16)
+            ids.append(f"check/{digest.hexdigest()}")
+            if ids[-1] not in known:
+                client.replace_hull(ids[-1], array, create=True)
+            known[ids[-1]] = None
+            known.move_to_end(ids[-1])
+        answer = client.check_collision((ids[0], pose_a), (ids[1], pose_b), **query)
+        while len(known) > _MOST_SHAPES:
+            client.delete_hull(known.popitem(last=False)[0])
+    return answer

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Union
+from typing import Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +11,26 @@ import numpy.typing as npt
 from hulld.arguments import as_array, as_floats
 from hulld.wire import MessageWriter
 
-#: n x 3 numbers in the caller's length unit.
-PointsLike = npt.ArrayLike
+
+
+class _Mesh(Protocol):
+    """A mesh of trimesh, Open3D, or hulld."""
+
+    @property
+    def vertices(self) -> Any:
+        ...
+
+
+class _Cloud(Protocol):
+    """A point cloud of Open3D, or a mesh of meshio or PyVista."""
+
+    @property
+    def points(self) -> Any:
+        ...
+
+
+#: n x 3 numbers in the caller's length unit, or an object with these as `vertices` or `points`.
+PointsLike = Union[npt.ArrayLike, _Mesh, _Cloud]
 Points = Union[npt.NDArray[np.float64], npt.NDArray[np.float32]]
 
 _XYZ, _XYZ_FLOAT = 1, 2  # fields of PointBlock
@@ -21,14 +39,17 @@ _XYZ, _XYZ_FLOAT = 1, 2  # fields of PointBlock
 def as_points(points: PointsLike, name: str = "points") -> Points:
     """An n x 3 array of float64 or float32 that holds the same numbers, exactly.
 
-    points: n x 3, the caller's length unit; a single point of shape (3,) counts as 1 x 3. float64
-    and float32 stay as they are, and so does their memory. float16 and integers are widened. No
-    copy is made where none is needed.
+    points: n x 3, the caller's length unit, or an object with these as `vertices` or `points`: of
+    trimesh, Open3D, meshio, PyVista, or hulld. A single point of shape (3,) counts as 1 x 3.
+    float64 and float32 stay as they are, and so does their memory. float16 and integers are
+    widened. No copy is made where none is needed.
 
     ValueError: another shape; a coordinate that is masked or not finite (the message names it);
     numbers that no double holds, such as integers beyond 2^53 or long doubles. TypeError: not
     numbers, such as booleans or complex numbers.
     """
+    if not isinstance(points, np.ndarray):
+        points = getattr(points, "vertices", getattr(points, "points", points))
     array = as_array(points, name)
     if array.size == 0 and array.ndim < 2:
         array = array.reshape(0, 3)

@@ -1,0 +1,1 @@
+"""Robots: descriptions, kinematics, and checks for collisions."""

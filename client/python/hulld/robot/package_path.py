@@ -1,0 +1,86 @@
+"""Finds the files that a robot description names."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Iterator, Mapping
+
+_PACKAGE_DEPTH = 3
+_MOST_FOLDERS = 10_000
+
+
+def resolve_file(
+    name: str,
+    description: str | os.PathLike[str],
+    packages: Mapping[str, str | os.PathLike[str]],
+) -> pathlib.Path:
+    """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
+    the description's folder.
+
+    A package is the first folder with the file among: that of `packages`, alone; DIR/PACKAGE, or
+    DIR itself if it is named PACKAGE, for each DIR of ROS_PACKAGE_PATH, and packages at most three
+    folders below it; DIR/share/PACKAGE for each DIR of AMENT_PREFIX_PATH; the nearest folder above
+    the description that is named PACKAGE or contains one. FileNotFoundError lists them.
+    """
+    scheme, separator, rest = name.partition("://")
+    if not separator or scheme == "file":
+        path = pathlib.Path(description).parent / (rest if separator else name)
+        if path.is_file():
+            return path
+        raise FileNotFoundError(f"no such file: {path}")
+    package, _, file = rest.partition("/")
+    if scheme not in ("package", "model") or not package or not file:
+        raise FileNotFoundError(f"{name!r} is not a package file; write package://PACKAGE/FILE")
+    tried: dict[str, None] = {}
+    for folder in _folders_of(package, description, packages):
+        if (folder / file).is_file():
+            return folder / file
+        tried[str(folder)] = None
+    named = [*tried][:8]
+    more = f" and {len(tried) - len(named)} more" if len(tried) > len(named) else ""
+    raise FileNotFoundError(
+        f"no folder of the package {package!r} holds {file}; set its folder with "
+        f"packages={{{package!r}: DIR}} (looked in {', '.join(named)}{more})"
+    )
+
+
+def _folders_of(
+    package: str,
+    description: str | os.PathLike[str],
+    packages: Mapping[str, str | os.PathLike[str]],
+) -> Iterator[pathlib.Path]:
+    if package in packages:
+        yield pathlib.Path(packages[package])
+        return
+    ros = [pathlib.Path(one) for one in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if one]
+    for entry in ros:
+        if entry.name == package:
+            yield entry
+        yield entry / package
+    for entry in ros:
+        yield from _packages_below(entry, package)
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(":"):
+        if prefix:
+            yield pathlib.Path(prefix, "share", package)
+    for folder in pathlib.Path(os.path.abspath(description)).parents:
+        if folder.name == package:
+            yield folder
+        yield folder / package
+
+
+def _packages_below(folder: pathlib.Path, package: str) -> Iterator[pathlib.Path]:
+    """The folders named `package`, level by level, each level in the order of its paths."""
+    level, seen = [folder], 0
+    for _ in range(_PACKAGE_DEPTH):
+        below: list[pathlib.Path] = []
+        for at in level:
+            try:
+                below += [e for e in at.iterdir() if e.is_dir() and not e.name.startswith(".")]
+            except OSError:
+                continue
+        seen += len(below)
+        if seen > _MOST_FOLDERS:
+            return
+        level = sorted(below)
+        yield from (entry for entry in level if entry.name == package)

@@ -1,0 +1,424 @@
+"""A robot, checked for collisions with itself and its surroundings."""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import threading
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld import arguments
+from hulld.calls.freshness import Freshness
+from hulld.client import Client
+from hulld.errors import NotFoundError, error_class
+from hulld.geometry.placements import Placements, PlacementsLike
+from hulld.geometry.poses import PoseLike, pack_pose
+from hulld.local_server import shared_client
+from hulld.robot.answers import RobotCheck, collect
+from hulld.robot.description import Description, PoseNumbers
+from hulld.robot.kinematics import compose, joint_values, link_poses, stacked
+from hulld.robot.meshes import MeshLoader, read_pieces
+from hulld.robot.package_path import resolve_file
+from hulld.robot.shapes import primitive_points
+from hulld.robot.urdf import read_disabled_pairs, read_urdf
+
+#: One configuration (dof), many (n x dof), or values by the names of variables.
+Configurations = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
+
+# Enough to amortize a round trip, and within the limits of a server with default settings.
+_PAIRS_PER_CALL = 1 << 16
+_PLACEMENTS_PER_CALL = 1 << 16
+
+
+@dataclass(frozen=True)
+class Part:
+    """A hull of a robot: a shape, or a convex piece of a mesh. name: that of the link, followed by
+    /1, /2, and so on if the link has several. points: n x 3, in the frame of the shape. X_LS: its
+    pose in the frame of the link. excess: the hull extends at most this far beyond the shape."""
+
+    name: str
+    link: int
+    X_LS: PoseNumbers
+    points: npt.NDArray[np.float64]
+    excess: float
+
+
+class Robot:
+    """A robot description with a hull for each shape: joint values in, exact answers about the
+    resulting poses out. Made by from_urdf. Any thread may use it.
+
+    The first check registers the hulls. `close`, or the end of a `with` block, deletes them.
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        parts: Sequence[Part],
+        left_out: set[tuple[int, int]],
+        client: Client | None,
+        prefix: str | None,
+    ) -> None:
+        """left_out: pairs of links that are not checked, the lower index first."""
+        self._description = description
+        self.parts = tuple(parts)
+        self._pairs = [
+            (a, b)
+            for a, part in enumerate(parts)
+            for b, other in enumerate(parts[a + 1 :], a + 1)
+            if part.link != other.link and (part.link, other.link) not in left_out
+        ]
+        self._client = client
+        self._prefix = prefix
+        self._lock = threading.Lock()
+        self._hull_ids: list[str] = []
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        srdf: str | os.PathLike[str] | None = None,
+        packages: Mapping[str, str | os.PathLike[str]] | None = None,
+        adjacent: bool = False,
+        split: bool = True,
+        load_mesh: MeshLoader | None = None,
+        client: Client | None = None,
+        prefix: str | None = None,
+    ) -> Self:
+        """Reads a URDF file and its meshes; asks no server.
+
+        Boxes are exact, meshes become their convex hulls; cylinders, spheres, and capsules become
+        enclosing polyhedra. Shapes of one link are not checked against each other. Without `srdf`,
+        neither are adjacent links, which a joint connects, or joints through links without shapes;
+        `adjacent` includes these. srdf: a file whose disabled pairs, and no others, are left out.
+
+        packages: folders by the name in package://NAME/; others are searched in ROS_PACKAGE_PATH,
+        AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of several named
+        convex parts, as V-HACD and CoACD write OBJ, becomes one hull per part. load_mesh: reads
+        mesh files, as trimesh.load_mesh; None: STL and OBJ are read here.
+
+        client: of the server that answers; None: a private one in memory, shared by all robots of
+        this process. prefix: keeps the hulls under this ID prefix, as in "arm/"; None: `close`
+        deletes them.
+
+        ValueError: the description, the SRDF, or a mesh is malformed; the message names file and
+        line. OSError: a file is missing.
+        """
+        description = read_urdf(path)
+        left_out = set() if adjacent else description.adjacent_pairs()
+        if srdf is not None:
+            left_out = read_disabled_pairs(srdf, description)
+        parts: list[Part] = []
+        for index, link in enumerate(description.links):
+            found: list[tuple[PoseNumbers, npt.NDArray[np.float64], float]] = []
+            for shape in link.shapes:
+                if shape.kind != "mesh":
+                    found.append((shape.X_LS, *primitive_points(shape)))
+                    continue
+                try:
+                    file = resolve_file(shape.mesh, path, packages or {})
+                    pieces = read_pieces(file, shape.scale, split, load_mesh)
+                except (OSError, ValueError) as error:
+                    place = f"{os.fspath(path)}:{shape.line}: link {link.name!r}"
+                    raise type(error)(f"{place}: {error}") from None
+                found += [(shape.X_LS, points, 0.0) for points in pieces]
+            for number, (X_LS, points, excess) in enumerate(found, 1):
+                name = f"{link.name}/{number}" if len(found) > 1 else link.name
+                parts.append(Part(name, index, X_LS, points, excess))
+        if not parts:
+            raise ValueError(
+                f"{os.fspath(path)}: no link has a <collision> element, so nothing can collide"
+            )
+        return cls(description, parts, left_out, client, prefix)
+
+    # --- Kinematics ---
+
+    @property
+    def name(self) -> str:
+        return self._description.name
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The names of the links, parents before children."""
+        return tuple(link.name for link in self._description.links)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """The names of the columns of configurations: a joint, radians or meters; J/x, J/y, and
+        J/theta of a planar joint J; J/trans_x, J/trans_y, J/trans_z, J/rot_x, J/rot_y, J/rot_z, and
+        J/rot_w of a floating one. Fixed joints and joints that mimic have none."""
+        return tuple(variable.name for variable in self._description.variables)
+
+    @property
+    def dof(self) -> int:
+        """The number of variables."""
+        return len(self._description.variables)
+
+    @property
+    def limits(self) -> npt.NDArray[np.float64]:
+        """dof x 2: lower and upper limit; infinite where there is none."""
+        joints = self._description.joints
+        rows = [joints[v.joint].limits for v in self._description.variables]
+        return np.array([row or (-np.inf, np.inf) for row in rows]).reshape(-1, 2)
+
+    @property
+    def rest(self) -> npt.NDArray[np.float64]:
+        """dof: 0 for each variable, or the middle of its limits if they exclude 0; 1 for the w of a
+        rotation."""
+        return np.array(self._description.rest())
+
+    def link_poses(self, q: Configurations, *, base: PoseLike = None) -> npt.NDArray[np.float64]:
+        """Forward kinematics: the poses of all links as w x y z x y z, n x links x 7, or links x 7
+        for one configuration. q, base: as in `check`. The quaternions are not normalized."""
+        values = self._configurations(q)
+        poses = link_poses(
+            self._description, pack_pose(base).tolist(), joint_values(self._description, values)
+        )
+        array = stacked(poses, len(values))
+        is_single = not isinstance(q, Mapping) and np.ndim(q) == 1
+        return array[0] if is_single else array
+
+    def _configurations(self, q: Configurations) -> npt.NDArray[np.float64]:
+        """n x dof finite numbers. ValueError, TypeError: q is something else."""
+        if isinstance(q, Mapping):
+            return self._by_name(q)
+        array = arguments.as_floats(arguments.as_array(q, "q"), "q").astype(np.float64, copy=False)
+        rows = array[np.newaxis] if array.ndim == 1 else array
+        if rows.ndim != 2 or rows.shape[1] != self.dof:
+            raise ValueError(
+                f"q has the shape {array.shape}; {self.name} takes ({self.dof},) or (n, "
+                f"{self.dof}): {', '.join(self.variables)}"
+            )
+        finite = np.isfinite(array)
+        if not finite.all():
+            at = tuple(int(index) for index in np.argwhere(~finite)[0])
+            raise ValueError(f"q{arguments.place(at)} is {array[at]}")
+        for index, joint in enumerate(self._description.joints):
+            if joint.kind == "floating":
+                w = [c for c, v in enumerate(self._description.variables) if v.joint == index]
+                zero = ~rows[:, w[3:]].any(axis=1)
+                if zero.any():
+                    raise ValueError(
+                        f"q[{int(np.argmax(zero))}]: the quaternion of {joint.name} is zero; any "
+                        "other is a rotation"
+                    )
+        return rows
+
+    def _by_name(self, q: Mapping[str, npt.ArrayLike]) -> npt.NDArray[np.float64]:
+        columns = {name: arguments.as_array(values, f"q[{name!r}]") for name, values in q.items()}
+        unknown = [name for name in columns if name not in self.variables]
+        if unknown:
+            raise ValueError(
+                f"{unknown[0]!r} is no variable of {self.name}, which has "
+                f"{', '.join(self.variables)}"
+            )
+        sizes = {column.size for column in columns.values() if column.ndim > 0}
+        if len(sizes) > 1 or any(column.ndim > 1 for column in columns.values()):
+            raise ValueError("q takes a number or n numbers for each name, the same n for all")
+        rows = np.tile(self.rest, (sizes.pop() if sizes else 1, 1))
+        for name, column in columns.items():
+            floats = arguments.as_floats(column, f"q[{name!r}]")
+            rows[:, self.variables.index(name)] = floats
+        return self._configurations(rows)
+
+    # --- Checks ---
+
+    def check(
+        self,
+        q: Configurations,
+        *,
+        scene: PlacementsLike | None = None,
+        ignore: Iterable[tuple[str, str]] = (),
+        base: PoseLike = None,
+        separation: bool = False,
+        clearance: float | None = None,
+        tolerance: float = 0.0,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
+    ) -> RobotCheck:
+        """Checks configurations for collisions of the robot with itself and with a scene.
+
+        q: one configuration (dof), many (n x dof), in the order of `variables`, or values by name,
+        as in {"elbow": 1.5}, with the other variables at rest. Values beyond limits are used, with
+        a warning. scene: placements of hulls and bodies on the server of `client`. ignore: pairs of
+        names of links, parts, or IDs of the scene. base: the pose of the root link. separation,
+        clearance, tolerance: as in Client.check_collision. timeout: of each call, for some thousand
+        configurations.
+
+        Poses are computed in floating point, and answers are exact for these poses. The motion
+        between configurations is not checked.
+
+        ValueError: q has another shape, or no pair is left. NotFoundError: a hull of the scene is
+        missing.
+        """
+        values = self._configurations(q)
+        joints = joint_values(self._description, values)
+        around = Placements.of([] if scene is None else scene)
+        names = [part.name for part in self.parts] + _names_of(around)
+        pairs = self._pairs_to_check(names, around, ignore)
+        self._warn_of_limits(joints, len(values))
+        X_WL = link_poses(self._description, pack_pose(base).tolist(), joints)
+        poses = stacked([compose(X_WL[part.link], part.X_LS) for part in self.parts], len(values))
+        ids, moving = self._registered() + around.ids, len(self.parts)
+        indices = around.indices + np.uint32(moving)
+        per_call = max(1, min(_PAIRS_PER_CALL // len(pairs), _PLACEMENTS_PER_CALL // moving))
+        batches = []
+        for first in range(0, max(1, len(values)), per_call):
+            some = poses[first : first + per_call]
+            lanes = np.arange(len(some), dtype=np.uint32)[:, np.newaxis, np.newaxis]
+            # The scene follows all copies of the robot.
+            shift = np.uint32(moving) * np.where(
+                pairs < moving, lanes, np.uint32(max(0, len(some) - 1))
+            )
+            placed = Placements(
+                ids,
+                np.concatenate([some.reshape(-1, 7), around.poses]),
+                np.concatenate([np.tile(np.arange(moving, dtype=np.uint32), len(some)), indices]),
+            )
+            batch = self.client.check_collisions(
+                placed,
+                (pairs + shift).reshape(-1, 2),
+                separation=separation,
+                clearance=clearance,
+                tolerance=tolerance,
+                freshness=freshness,
+                timeout=timeout,
+            )
+            unanswered = np.flatnonzero(batch.answers.relations == 0)
+            if unanswered.size:
+                row = int(unanswered[0])
+                a, b = pairs[row % len(pairs)]
+                problem = batch.problem(row)
+                where = f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}"
+                if problem is None:
+                    raise error_class("INTERNAL")(f"{where}: the server gave no reason")
+                message = f"{where}: {problem.message}"
+                raise error_class(problem.code)(message, code=problem.code, reason=problem.reason)
+            batches.append(batch.answers)
+        return collect(names, pairs, batches)
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs of parts that `check` asks about, by name."""
+        return [(self.parts[a].name, self.parts[b].name) for a, b in self._pairs]
+
+    def _pairs_to_check(
+        self, names: Sequence[str], around: Placements, ignore: Iterable[tuple[str, str]]
+    ) -> npt.NDArray[np.uint32]:
+        """Indices into `names`."""
+        moving = len(self.parts)
+        aliases = [{part.name, self._description.links[part.link].name} for part in self.parts]
+        aliases += [
+            {name, around.ids[index]} for name, index in zip(names[moving:], around.indices)
+        ]
+        pairs = [*self._pairs]
+        pairs += [(a, b) for a in range(moving) for b in range(moving, len(names))]
+        for one, other in ignore:
+            kept = [
+                (a, b)
+                for a, b in pairs
+                if not (
+                    (one in aliases[a] and other in aliases[b])
+                    or (other in aliases[a] and one in aliases[b])
+                )
+            ]
+            if len(kept) == len(pairs):
+                raise ValueError(
+                    f"ignore: {(one, other)!r} is not a checked pair; pass names of links, parts, "
+                    "or IDs of the scene"
+                )
+            pairs = kept
+        if not pairs:
+            raise ValueError(
+                f"no pair of {self.name} is left to check; adjacent=True includes adjacent links"
+            )
+        return np.array(pairs, np.uint32)
+
+    def _warn_of_limits(self, values: Sequence[Sequence[Any]], count: int) -> None:
+        for joint, (value, *_) in zip(self._description.joints, values):
+            if joint.limits is None or joint.kind == "fixed":
+                continue
+            lower, upper = joint.limits
+            column = np.broadcast_to(value, count)
+            beyond = np.flatnonzero(~((lower <= column) & (column <= upper)))
+            if beyond.size:
+                of_many = f", in {beyond.size} of {count} configurations" if count > 1 else ""
+                warnings.warn(
+                    f"{joint.name} is at {column[beyond[0]]}, beyond its limits {lower} to {upper}"
+                    + of_many,
+                    stacklevel=3,
+                )
+
+    # --- Hulls on the server ---
+
+    @property
+    def client(self) -> Client:
+        """The client of the server that answers. Hulls of a scene are registered with it."""
+        return self._client or shared_client()
+
+    def _registered(self) -> list[str]:
+        """The IDs of the parts' hulls, which exist."""
+        with self._lock:
+            if self._hull_ids:
+                return self._hull_ids
+            root = self._prefix
+            if root is None:
+                root = f"robot/{secrets.token_hex(6)}/"
+            ids: list[str] = []
+            for part in self.parts:
+                name = re.sub(r"[^A-Za-z0-9._-]", "_", part.name[:100])
+                name = name if name[0].isalnum() else "x" + name
+                count = sum(one.startswith(root + name) for one in ids)
+                ids.append(f"{root}{name}" + (f"-{count + 1}" if root + name in ids else ""))
+            try:
+                for hull_id, part in zip(ids, self.parts):
+                    self.client.replace_hull(hull_id, part.points, create=True)
+            except BaseException:
+                self._delete(ids)
+                raise
+            self._hull_ids = ids
+            return ids
+
+    def _delete(self, ids: Iterable[str]) -> None:
+        for hull_id in ids if self._prefix is None else ():
+            try:
+                self.client.delete_hull(hull_id)
+            except NotFoundError:
+                pass
+
+    def close(self) -> None:
+        """Deletes the hulls, unless a prefix keeps them. A later check registers them again."""
+        with self._lock:
+            ids, self._hull_ids = self._hull_ids, []
+            self._delete(ids)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return (
+            f"Robot({self.name}: {self.dof} variables, {len(self.parts)} parts, "
+            f"{len(self._pairs)} pairs)"
+        )
+
+
+def _names_of(scene: Placements) -> list[str]:
+    """The ID of each placement, followed by its index if the ID has several."""
+    ids = [scene.ids[index] for index in scene.indices]
+    return [f"{one}[{i}]" if ids.count(one) > 1 else one for i, one in enumerate(ids)]
