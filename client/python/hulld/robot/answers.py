@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -138,17 +139,13 @@ def collect(
 ) -> RobotCheck:
     """The answers of batches with all pairs of some configurations each."""
 
-    def column(name: str) -> npt.NDArray[np.generic] | None:
+    def column(name: str) -> Any:
         parts = [getattr(batch, name) for batch in batches]
-        if parts[0] is None:
-            return None
-        whole: npt.NDArray[np.generic] = np.concatenate(parts).reshape(-1, len(pairs))
-        return whole
+        return None if parts[0] is None else np.concatenate(parts).reshape(-1, len(pairs))
 
     relations = column("relations")
     separations, bounds = column("separations"), column("separation_bounds")
     within = column("within_clearance")
-    assert relations is not None
     strength = _STRENGTH[relations]
     strongest = strength.max(axis=1)
     rows = np.arange(len(relations))

@@ -93,8 +93,9 @@ def link_poses(
             continue
         joint = robot.joints[link.parent_joint]
         X_WJ = compose(poses[joint.parent], joint.X_PJ)
-        is_fixed = joint.kind == "fixed"
-        poses.append(X_WJ if is_fixed else compose(X_WJ, _motion_of(joint, values[link.parent_joint])))
+        if joint.kind != "fixed":
+            X_WJ = compose(X_WJ, _motion_of(joint, values[link.parent_joint]))
+        poses.append(X_WJ)
     return poses
 
 

@@ -7,6 +7,7 @@ import pathlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -52,14 +53,25 @@ class Mesh:
         edges = np.minimum(start, end) * len(self.vertices) + np.maximum(start, end)
         _, edge = np.unique(edges, return_inverse=True)
         balance = np.bincount(edge.reshape(-1), np.sign(end - start))
-        return len(corners) > 0 and not balance.any()
+        return len(corners) > 0 and not bool(balance.any())
+
+    def volume(self) -> float:
+        """0 if the mesh is not closed, or if the volume is below its rounding error."""
+        if not self.is_closed():
+            return 0.0
+        volume = enclosed_volume(self.vertices, self.triangles)
+        rounding = 2.0**-52 * len(self.triangles) * self._diagonal() ** 3
+        return volume if volume > rounding else 0.0
+
+    def _diagonal(self) -> float:
+        return float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
 
     def is_convex(self) -> bool:
         """True if the mesh is closed, has at most 4096 vertices, and no vertex lies outside the
         plane of a triangle by more than a thousandth of the mesh's diagonal."""
         if len(self.vertices) > _MOST_CONVEX_VERTICES or not self.is_closed():
             return False
-        tolerance = _RELATIVE_TOLERANCE * float(np.linalg.norm(np.ptp(self.vertices, axis=0)))
+        tolerance = _RELATIVE_TOLERANCE * self._diagonal()
         a, b, c = (self.vertices[self.triangles[:, corner]] for corner in range(3))
         normals = np.cross(b - a, c - a)
         lengths = np.linalg.norm(normals, axis=1)
@@ -72,20 +84,27 @@ class Mesh:
             heights = normals[some] @ self.vertices.T - (normals[some] * a[some]).sum(1)[:, None]
             lowest, highest = min(lowest, heights.min()), max(highest, heights.max())
         # All triangles may face inward.
-        return highest <= tolerance or lowest >= -tolerance
+        return bool(highest <= tolerance or lowest >= -tolerance)
+
+
+def enclosed_volume(vertices: Points, triangles: npt.NDArray[Any]) -> float:
+    """The volume within a closed mesh."""
+    a, b, c = (vertices[triangles[:, corner]] - vertices[0] for corner in range(3))
+    return abs(float((a * np.cross(b, c)).sum())) / 6
 
 
 def read_pieces(
     path: pathlib.Path, scale: Scale, split: bool, load_mesh: MeshLoader | None
-) -> list[Points]:
-    """The points of a mesh file, each coordinate times its factor of the scale, rounded once.
+) -> list[tuple[Points, float]]:
+    """The points of a mesh file, each coordinate times its factor of the scale, rounded once; and
+    the volume of the mesh, 0 if it is unknown.
 
-    split: a file of several named parts that are all convex gives the points of each. load_mesh:
-    reads the file; None: STL and OBJ are read here. ValueError names the file and its defect.
+    split: a file of several named parts that are all convex gives each. load_mesh: reads the file;
+    None: STL and OBJ are read here. ValueError names the file and its defect.
     """
     if load_mesh is not None:
         points = as_points(load_mesh(path), str(path)).astype(np.float64)
-        return [np.stack([_scaled(points[:, i], scale[i]) for i in range(3)], axis=1)]
+        return [(np.stack([_scaled(points[:, i], scale[i]) for i in range(3)], axis=1), 0.0)]
     reader = {".obj": _read_obj, ".stl": _read_stl}.get(path.suffix.lower())
     if reader is None:
         raise ValueError(
@@ -96,8 +115,8 @@ def read_pieces(
     if split:
         pieces = mesh.pieces()
         if len(pieces) > 1 and all(piece.is_convex() for piece in pieces):
-            return [piece.vertices for piece in pieces]
-    return [mesh.vertices]
+            return [(piece.vertices, piece.volume()) for piece in pieces]
+    return [(mesh.vertices, mesh.volume())]
 
 
 def _scaled(values: Points, factor: Fraction) -> Points:
@@ -106,7 +125,8 @@ def _scaled(values: Points, factor: Fraction) -> Points:
         return values
     distinct, place = np.unique(values, return_inverse=True)
     products = [float(Fraction(value) * factor) for value in distinct.tolist()]
-    return np.array(products)[place.reshape(-1)]
+    scaled: Points = np.array(products)[place.reshape(-1)]
+    return scaled
 
 
 def _number(word: str, factor: Fraction, place: str) -> float:
@@ -252,7 +272,8 @@ def _read_text_stl(
         place, word, name = next(text, ("", "", ""))
         if not place:
             raise ValueError(
-                f"{end}: the file ends after {len(parts)} facets, before {expected}; is it complete?"
+                f"{end}: the file ends after {len(parts)} facets, before {expected}; is it "
+                "complete?"
             )
         if expected and word.lower() not in expected.split(" or "):
             raise ValueError(
@@ -262,7 +283,9 @@ def _read_text_stl(
 
     for place, word, name in text:
         if word != "solid":
-            raise ValueError(f'{place}: {word!r} after {len(parts)} facets where "solid" is expected')
+            raise ValueError(
+                f'{place}: {word!r} after {len(parts)} facets where "solid" is expected'
+            )
         part = number_of.setdefault(name, len(number_of))
         while take("facet or endsolid")[0] == "facet":
             # `normal` and three words, which may be missing and are not used.

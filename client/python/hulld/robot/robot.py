@@ -8,7 +8,7 @@ import secrets
 import threading
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self, Union
 
@@ -25,7 +25,7 @@ from hulld.local_server import shared_client
 from hulld.robot.answers import RobotCheck, collect
 from hulld.robot.description import Description, PoseNumbers
 from hulld.robot.kinematics import compose, joint_values, link_poses, stacked
-from hulld.robot.meshes import MeshLoader, read_pieces
+from hulld.robot.meshes import MeshLoader, enclosed_volume, read_pieces
 from hulld.robot.package_path import resolve_file
 from hulld.robot.shapes import primitive_points
 from hulld.robot.urdf import read_disabled_pairs, read_urdf
@@ -36,19 +36,22 @@ Configurations = Union[npt.ArrayLike, Mapping[str, npt.ArrayLike]]
 # Enough to amortize a round trip, and within the limits of a server with default settings.
 _PAIRS_PER_CALL = 1 << 16
 _PLACEMENTS_PER_CALL = 1 << 16
+_SWELL_TO_WARN = 1.5
 
 
 @dataclass(frozen=True)
 class Part:
     """A hull of a robot: a shape, or a convex piece of a mesh. name: that of the link, followed by
     /1, /2, and so on if the link has several. points: n x 3, in the frame of the shape. X_LS: its
-    pose in the frame of the link. excess: the hull extends at most this far beyond the shape."""
+    pose in the frame of the link. excess: the hull extends at most this far beyond the shape.
+    mesh_volume: 0 if it is unknown."""
 
     name: str
     link: int
     X_LS: PoseNumbers
     points: npt.NDArray[np.float64]
-    excess: float
+    excess: float = 0.0
+    mesh_volume: float = 0.0
 
 
 class Robot:
@@ -118,10 +121,10 @@ class Robot:
             left_out = read_disabled_pairs(srdf, description)
         parts: list[Part] = []
         for index, link in enumerate(description.links):
-            found: list[tuple[PoseNumbers, npt.NDArray[np.float64], float]] = []
+            found: list[Part] = []
             for shape in link.shapes:
                 if shape.kind != "mesh":
-                    found.append((shape.X_LS, *primitive_points(shape)))
+                    found.append(Part(link.name, index, shape.X_LS, *primitive_points(shape)))
                     continue
                 try:
                     file = resolve_file(shape.mesh, path, packages or {})
@@ -129,10 +132,10 @@ class Robot:
                 except (OSError, ValueError) as error:
                     place = f"{os.fspath(path)}:{shape.line}: link {link.name!r}"
                     raise type(error)(f"{place}: {error}") from None
-                found += [(shape.X_LS, points, 0.0) for points in pieces]
-            for number, (X_LS, points, excess) in enumerate(found, 1):
-                name = f"{link.name}/{number}" if len(found) > 1 else link.name
-                parts.append(Part(name, index, X_LS, points, excess))
+                found += [Part(link.name, index, shape.X_LS, p, 0.0, v) for p, v in pieces]
+            if len(found) > 1:
+                found = [replace(part, name=f"{link.name}/{i + 1}") for i, part in enumerate(found)]
+            parts += found
         if not parts:
             raise ValueError(
                 f"{os.fspath(path)}: no link has a <collision> element, so nothing can collide"
@@ -184,7 +187,8 @@ class Robot:
         )
         array = stacked(poses, len(values))
         is_single = not isinstance(q, Mapping) and np.ndim(q) == 1
-        return array[0] if is_single else array
+        poses_of_links: npt.NDArray[np.float64] = array[0] if is_single else array
+        return poses_of_links
 
     def _configurations(self, q: Configurations) -> npt.NDArray[np.float64]:
         """n x dof finite numbers. ValueError, TypeError: q is something else."""
@@ -369,6 +373,7 @@ class Robot:
         with self._lock:
             if self._hull_ids:
                 return self._hull_ids
+            client = self.client
             root = self._prefix
             if root is None:
                 root = f"robot/{secrets.token_hex(6)}/"
@@ -380,12 +385,26 @@ class Robot:
                 ids.append(f"{root}{name}" + (f"-{count + 1}" if root + name in ids else ""))
             try:
                 for hull_id, part in zip(ids, self.parts):
-                    self.client.replace_hull(hull_id, part.points, create=True)
+                    client.replace_hull(hull_id, part.points, create=True)
             except BaseException:
                 self._delete(ids)
                 raise
             self._hull_ids = ids
+            for hull_id, part in zip(ids, self.parts):
+                self._warn_of_swell(hull_id, part)
             return ids
+
+    def _warn_of_swell(self, hull_id: str, part: Part) -> None:
+        if part.mesh_volume == 0:
+            return
+        hull = self.client.get_hull_mesh(hull_id)
+        ratio = enclosed_volume(hull.vertices, hull.triangles) / part.mesh_volume
+        if ratio >= _SWELL_TO_WARN:
+            warnings.warn(
+                f"the hull of {part.name} has {ratio:.4g} times the volume of its mesh and may "
+                "collide where the mesh does not; use a convex decomposition of the mesh",
+                stacklevel=4,
+            )
 
     def _delete(self, ids: Iterable[str]) -> None:
         for hull_id in ids if self._prefix is None else ():

@@ -44,7 +44,9 @@ def read_urdf(path: str | os.PathLike[str]) -> Description:
             )
         parent, child = (_end_of(element, end, links) for end in ("parent", "child"))
         if child in joint_above:
-            raise element.error(f"link {child!r} is the child of two joints; the second is {joint!r}")
+            raise element.error(
+                f"link {child!r} is the child of two joints; the second is {joint!r}"
+            )
         ends[joint], joint_above[child] = (parent, child), joint
     _check_mimics(joints)
 
@@ -99,8 +101,8 @@ def _ordered(
     roots = [link for link in links if link not in joint_above]
     if len(roots) > 1:
         raise links[roots[1]].error(
-            f"link {roots[1]!r} has no parent joint, like {roots[0]!r}; exactly one link may be the "
-            "root"
+            f"link {roots[1]!r} has no parent joint, like {roots[0]!r}; exactly one link may be "
+            "the root"
         )
     children: dict[str, list[str]] = {link: [] for link in links}
     for joint in sorted(ends, reverse=True):
@@ -221,9 +223,7 @@ def _check_mimics(joints: dict[str, Element]) -> None:
             mimic = joints[leader].first("mimic")
 
 
-def read_disabled_pairs(
-    path: str | os.PathLike[str], robot: Description
-) -> set[tuple[int, int]]:
+def read_disabled_pairs(path: str | os.PathLike[str], robot: Description) -> set[tuple[int, int]]:
     """The pairs of links that an SRDF file disables, the lower index first: those of
     disable_collisions, and those of disable_default_collisions without enable_collisions.
     ValueError names file and line: malformed XML, or a link that the robot lacks."""
