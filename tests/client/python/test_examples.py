@@ -42,23 +42,24 @@ def test_the_gripper_stops_above_the_egg(tmp_path: pathlib.Path) -> None:
 
 def test_a_robot_of_two_links_hits_its_base(tmp_path: pathlib.Path) -> None:
     said = run("robot_self_collision.py", "--samples", 100, cwd=tmp_path)
-    assert re.search(r"^[1-9][0-9]* of 100 poses collide; 1 pairs asked about$", said, re.M)
+    assert re.search(r"^[1-9][0-9]* of 100 configurations collide$", said, re.M)
+    assert re.search(r"^[0-9]+ configurations a second, 1 pairs each$", said, re.M)
     assert "base - lower: " in said
 
 
 def test_a_ur5_hits_itself(tmp_path: pathlib.Path, data: pathlib.Path) -> None:
-    said = run(
-        "robot_self_collision.py", data / "example-robot-data", "--samples", 100, cwd=tmp_path
-    )
-    assert "upper_arm_link: 3528 points, " in said
-    assert re.search(r"^[1-9][0-9]* of 100 poses collide; 11 pairs asked about$", said, re.M)
-    # Joined links, and links that the SRDF excludes, are left out.
+    folder = data / "example-robot-data/robots/ur_description"
+    files = [folder / "urdf/ur5_robot.urdf", folder / "srdf/ur5.srdf"]
+    said = run("robot_self_collision.py", *files, "--samples", 100, cwd=tmp_path)
+    assert "Robot(ur5: 6 variables, 8 parts, 18 pairs)" in said
+    assert re.search(r"^[1-9][0-9]* of 100 configurations collide$", said, re.M)
+    # Pairs that the SRDF disables are left out.
     assert "base_link - shoulder_link" not in said and "wrist_1_link - wrist_2_link" not in said
 
 
 def test_the_trade_leaves_open_what_is_near(tmp_path: pathlib.Path) -> None:
     said = run("trade_plot.py", "trade.png", cwd=tmp_path)
-    rows = re.findall(r"^ *([0-9.e-]+) +[0-9.]+ +([0-9.]+)%$", said, re.M)
-    assert [row[0] for row in rows] == ["0", "1e-12", "1e-09", "1e-06", "0.001"]
+    rows = re.findall(r"^ *([0-9.e-]+) +[0-9.]+ +[0-9.]+x +([0-9.]+)%$", said, re.M)
+    assert [row[0] for row in rows] == ["0", "1e-15", "1e-12", "1e-09", "1e-06", "0.001"]
     assert rows[0][1] == "0.0" and float(rows[-1][1]) > 10
     assert (tmp_path / "trade.png").exists() or "matplotlib is not installed" in said

@@ -8,6 +8,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -80,6 +81,59 @@ def test_the_server_ends_with_a_script_that_is_killed() -> None:
     # The process that watches the server removes it a moment later.
     while pathlib.Path(address.removeprefix("unix:")).parent.exists():
         time.sleep(0.01)
+
+
+def test_two_point_sets_are_checked_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert hulld.check(CUBE, CUBE + (1, 0, 0)).relation.name == "TOUCHING"
+    apart = hulld.check(CUBE, CUBE.tolist(), pose_b=(3, 0, 0), separation=True)
+    assert apart.separation is not None and abs(apart.separation.value - 2) < 1e-12
+    assert hulld.check(CUBE, CUBE, pose_a=(0, 0, 5), clearance=4.5).within_clearance
+    for bad in ((CUBE * float("nan"), CUBE), (CUBE, CUBE[:, :2])):
+        with pytest.raises(ValueError, match="^[ab]"):
+            hulld.check(*bad)
+    with pytest.raises(TypeError, match="separate"):
+        hulld.check(CUBE, CUBE, separate=True)
+    # The latest point sets stay for further calls.
+    monkeypatch.setattr("hulld.local_server._MOST_SHAPES", 5)
+    for x in range(4):
+        hulld.check(CUBE, CUBE + (x, 0, 0))
+    kept = list(hulld.local_server.shared_client().list_hulls("check/"))
+    assert len(kept) == 4
+    hulld.check(CUBE + (9, 0, 0), CUBE + (10, 0, 0))
+    assert len(list(hulld.local_server.shared_client().list_hulls("check/"))) == 5
+
+
+def test_threads_check_at_once() -> None:
+    found: list[str] = []
+
+    def ask(x: int) -> None:
+        found.append(hulld.check(CUBE, CUBE + (x, 0, 0)).relation.name)
+
+    threads = [threading.Thread(target=ask, args=(x,)) for x in (2, 3, 4, 5)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == ["SEPARATED"] * 4
+
+
+def test_the_shared_server_ends_with_the_process() -> None:
+    script = (
+        "import hulld\n"
+        "print(hulld.check([(0, 0, 0)], [(0, 0, 1)]).relation.name)\n"
+        "print(hulld.local_server.shared_client().server)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    relation, address = done.stdout.split()
+    assert relation == "SEPARATED" and done.stderr == ""
+    with hulld.Client(address, retry=hulld.RetryPolicy(max_attempts=1)) as client:
+        # The process that watches the server ends it a moment later.
+        while pathlib.Path(address.removeprefix("unix:")).exists():
+            time.sleep(0.01)
+        with pytest.raises(hulld.UnavailableError):
+            client.get_status()
 
 
 def test_programs_are_found_by_variable_path_and_build(

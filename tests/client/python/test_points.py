@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import hulld
+from conftest import CUBE
 
 
 def test_doubles_and_floats_keep_their_memory() -> None:
@@ -56,3 +59,30 @@ def test_what_are_no_numbers_is_refused() -> None:
     for bad in (np.array([["a", "b", "c"]]), np.zeros((1, 3), complex)):
         with pytest.raises(TypeError, match="not numbers"):
             hulld.as_points(bad)
+
+
+def test_meshes_and_clouds_of_other_libraries_are_points(either: Any, name: str) -> None:
+    class Buffer:
+        """As the vectors of Open3D: an array only for numpy."""
+
+        def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
+            return CUBE if dtype is None else CUBE.astype(dtype)
+
+    class Mesh:  # of trimesh or Open3D
+        vertices: Any = Buffer()
+        triangles = faces = np.zeros((1, 3), int)
+
+    class Cloud:  # of Open3D, meshio, or PyVista
+        points: Any = CUBE.astype(np.float32)
+
+    for shape in (Mesh(), Cloud(), Buffer()):
+        assert hulld.as_points(shape).tolist() == CUBE.tolist()
+    done = either.append_points(name, Mesh(), create=True)
+    assert done.counts.received == 8 and done.vertex_count == 8
+    assert either.replace_hull(name, Cloud()).hull.counts.received == 8
+    # A mesh of this library, too.
+    assert len(hulld.as_points(either.get_hull_mesh(name))) == 8
+    broken = Mesh()
+    broken.vertices = CUBE * np.nan
+    with pytest.raises(ValueError, match=r"points\[0\]\.x is nan"):
+        hulld.as_points(broken)
