@@ -1,12 +1,21 @@
-"""Answers in notebooks: a table, and the viewer's page if hullctl is found."""
+"""Answers in notebooks: a table, and the viewer's page if hullctl is found.
+
+The page is 1.1 MB, all but some kilobytes of it the same for every answer. The first cell of a
+process carries this part, compressed; the frames of all cells are filled from there.
+"""
 
 from __future__ import annotations
 
+import base64
+import gzip
+import hashlib
 import html
 import json
 import os
 import pathlib
+import secrets
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -19,6 +28,25 @@ if TYPE_CHECKING:
 
 _PATIENCE = 15.0  # seconds for hullctl, which reads each hull's mesh
 _HEIGHT = 480  # pixels
+
+# The content of a page is between these two.
+_START, _END = '<script type="application/json" id="recording">', "</script>"
+_MARK = "<!-- recording -->"
+_FILL = """(async () => {
+  const pages = window.hulldPages ??= {}, found = (id) => document.getElementById(id);
+  while (!found("FRAME")) await new Promise(requestAnimationFrame);
+  pages["KEY"] ??= found("hulld-KEY")?.textContent;
+  if (pages["KEY"] === undefined) {
+    found("FRAME").srcdoc = "The cell that carries the viewer is gone. Restart the kernel.";
+    return;
+  }
+  const packed = Uint8Array.from(atob(pages["KEY"]), (c) => c.charCodeAt(0));
+  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const page = await new Response(plain).text();
+  found("FRAME").srcdoc = page.replace("MARK", () => RECORDING);
+})();"""
+#: The page without its content, by its key: the cell that carries it, None if it has no ID.
+_carriers: dict[str, str | None] = {}
 
 
 class Viewer:
@@ -54,11 +82,7 @@ class Viewer:
             page = self._page(shown, pairs)
         except (OSError, ValueError, subprocess.SubprocessError) as error:
             return f"{table}<p><small>No picture: {html.escape(str(error))}</small></p>"
-        # A frame of its own: the page's script reaches nothing of the notebook.
-        return (
-            f"<iframe sandbox='allow-scripts' style='width:100%;height:{_HEIGHT}px;border:0' "
-            f'srcdoc="{html.escape(page, quote=True)}"></iframe>{table}'
-        )
+        return _frame_of(page) + table
 
     def _page(self, shown: Placements | Sequence[str], pairs: Sequence[tuple[int, int]]) -> str:
         if self._connection is None:
@@ -116,6 +140,38 @@ class Viewer:
         if self._connection.token:
             kept["HULLD_TOKEN"] = self._connection.token
         return kept
+
+
+def _frame_of(page: str) -> str:
+    """A frame of its own, so that the page's script reaches nothing of the notebook; and what fills
+    it."""
+    before, start, rest = page.partition(_START)
+    recording, end, after = rest.partition(_END)
+    if not end:
+        raise ValueError("this hullctl writes pages of another form; use that of the same version")
+    shell = gzip.compress((before + start + _MARK + end + after).encode(), mtime=0)
+    key = hashlib.blake2b(shell, digest_size=8).hexdigest()
+    carrier = ""
+    # A cell that runs again replaces its output.
+    if key not in _carriers or _carriers[key] == (_cell() or ""):
+        _carriers[key] = _cell()
+        carrier = f"<div hidden id='hulld-{key}'>{base64.b64encode(shell).decode()}</div>"
+    frame = f"hulld-frame-{secrets.token_hex(8)}"
+    content = json.dumps(recording).replace("<", "\\u003c")
+    fill = _FILL.replace("FRAME", frame).replace("KEY", key).replace("MARK", _MARK)
+    return (
+        f"{carrier}<iframe id='{frame}' sandbox='allow-scripts' "
+        f"style='width:100%;height:{_HEIGHT}px;border:0'></iframe>"
+        f"<script>{fill.replace('RECORDING', content)}</script>"
+    )
+
+
+def _cell() -> str | None:
+    """The ID of the notebook's cell that runs; None: unknown."""
+    try:
+        return str(sys.modules["IPython"].get_ipython().get_parent()["metadata"]["cellId"])
+    except (AttributeError, KeyError, TypeError):
+        return None
 
 
 def scene_json(placements: Placements, pairs: Sequence[tuple[int, int]]) -> str:

@@ -431,10 +431,9 @@ class Robot:
         self.close()
 
     def __repr__(self) -> str:
-        return (
-            f"Robot({self.name}: {self.dof} variables, {len(self.parts)} parts, "
-            f"{len(self._pairs)} pairs)"
-        )
+        counts = {"variable": self.dof, "part": len(self.parts), "pair": len(self._pairs)}
+        texts = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts.items()]
+        return f"Robot({self.name}: {', '.join(texts)})"
 
 
 def _names_of(scene: Placements) -> list[str]:
