@@ -101,10 +101,10 @@ class Robot:
         Boxes are exact, meshes become their convex hulls; cylinders, spheres, and capsules become
         enclosing polyhedra. Shapes of one link are not checked against each other. Without `srdf`,
         neither are adjacent links, which a joint connects, or joints through links without shapes;
-        `adjacent` includes these. srdf: a file whose disabled pairs, and no others, are left out.
+        `adjacent` includes these. srdf: a file; exactly the pairs that it disables are left out.
 
-        packages: folders by the name in package://NAME/; others are searched in ROS_PACKAGE_PATH,
-        AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of several named
+        packages: folders by the name in package://NAME/. Names without a folder are searched in
+        ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of several named
         convex parts, as V-HACD and CoACD write OBJ, becomes one hull per part. load_mesh: reads
         mesh files, as trimesh.load_mesh; None: STL and OBJ are read here.
 
@@ -414,7 +414,7 @@ class Robot:
                 pass
 
     def close(self) -> None:
-        """Deletes the hulls, unless a prefix keeps them. A later check registers them again."""
+        """Deletes the hulls, unless a prefix keeps them. The next check registers them."""
         with self._lock:
             ids, self._hull_ids = self._hull_ids, []
             self._delete(ids)
