@@ -30,7 +30,7 @@ def compose(X_AB: Columns, X_BC: Columns) -> list[Any]:
         w * c + a * y + (z * b - x * d),
         w * d + a * z + (x * c - y * b),
     ]
-    if all(np.ndim(one) == 0 and one == 0 for one in (p, q, r)):
+    if all(isinstance(one, float) and one == 0 for one in (p, q, r)):
         return rotation + list(X_AB[4:])
     # p + 2 (w v x p + v x (v x p)) / |q|^2
     scale = 2 / (w * w + x * x + y * y + z * z)
@@ -65,10 +65,12 @@ def _motion_of(joint: Joint, value: Columns) -> Columns:
 
 
 def joint_values(robot: Description, q: npt.NDArray[np.float64]) -> list[list[Any]]:
-    """The value of each joint, seven columns. q: n x dof. Mimic joints follow theirs."""
+    """The value of each joint, seven columns; for one configuration, seven numbers. q: n x dof.
+    Mimic joints follow theirs."""
     values: list[list[Any]] = [[0.0] * 7 for _ in robot.joints]
     for column, variable in enumerate(robot.variables):
-        values[variable.joint][variable.place] = np.ascontiguousarray(q[:, column])
+        one = float(q[0, column]) if len(q) == 1 else np.ascontiguousarray(q[:, column])
+        values[variable.joint][variable.place] = one
     for index, joint in enumerate(robot.joints):
         multiplier, offset, leader = 1.0, 0.0, index
         # A joint may mimic one that mimics another; the reader rejects cycles.

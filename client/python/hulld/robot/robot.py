@@ -115,6 +115,8 @@ class Robot:
         ValueError: the description, the SRDF, or a mesh is malformed; the message names file and
         line. OSError: a file is missing.
         """
+        if not isinstance(client, (Client, type(None))):
+            raise TypeError(f"client is {client!r}; it takes a hulld.Client")
         description = read_urdf(path)
         left_out = set() if adjacent else description.adjacent_pairs()
         if srdf is not None:

@@ -188,9 +188,12 @@ def test_defects_of_a_description_are_named(write: Write, old: str, new: str, me
     assert "arm.urdf:" in str(refused.value)
 
 
-def test_a_missing_description_is_no_value() -> None:
+def test_other_arguments_are_checked(write: Write) -> None:
     with pytest.raises(FileNotFoundError):
         hulld.Robot.from_urdf("/nowhere/arm.urdf")
+    for client in (hulld.AsyncClient(), "localhost"):
+        with pytest.raises(TypeError, match="it takes a hulld.Client"):
+            hulld.Robot.from_urdf(write(ARM), client=client)  # type: ignore[arg-type]
 
 
 def test_joints_that_mimic_need_no_limit(write: Write) -> None:
