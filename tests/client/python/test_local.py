@@ -94,13 +94,14 @@ def test_two_point_sets_are_checked_in_one_line(monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(TypeError, match="separate"):
         hulld.check(CUBE, CUBE, separate=True)
     # The latest point sets stay for further calls.
-    monkeypatch.setattr("hulld.local_server._MOST_SHAPES", 5)
-    for x in range(4):
+    monkeypatch.setattr("hulld.local_server._MOST_SHAPES", 3)
+    for x in range(9):
         hulld.check(CUBE, CUBE + (x, 0, 0))
-    kept = list(hulld.local_server.shared_client().list_hulls("check/"))
-    assert len(kept) == 4
-    hulld.check(CUBE + (9, 0, 0), CUBE + (10, 0, 0))
-    assert len(list(hulld.local_server.shared_client().list_hulls("check/"))) == 5
+    shared = hulld.local_server.shared_client()
+    kept = {hull.hull_id: hull.revision for hull in shared.list_hulls("check/")}
+    assert len(kept) == 3
+    hulld.check(CUBE, CUBE + (8, 0, 0))
+    assert kept == {hull.hull_id: hull.revision for hull in shared.list_hulls("check/")}
 
 
 def test_threads_check_at_once() -> None:
