@@ -256,12 +256,7 @@ def shared_client() -> Client:
 
 
 def check(
-    a: PointsLike,
-    b: PointsLike,
-    *,
-    pose_a: PoseLike = None,
-    pose_b: PoseLike = None,
-    **query: Any,
+    a: PointsLike, b: PointsLike, *, pose_a: PoseLike = None, pose_b: PoseLike = None, **query: Any
 ) -> Collision:
     """The relation of the convex hulls of two point sets, in one line:
 

@@ -19,7 +19,9 @@ def test_the_page_does_what_it_says(
     page: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robots = (SOURCE / "client/guide/ROBOTS.md").read_text(encoding="utf-8")
-    for name, content in re.findall(r"<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", robots, re.M | re.S):
+    for name, content in re.findall(
+        r"<!-- file: (\S+) -->\n```\w+\n(.*?)^```$", robots, re.M | re.S
+    ):
         (tmp_path / name).write_text(content)
     monkeypatch.chdir(tmp_path)
     text = page.read_text(encoding="utf-8")

@@ -12,7 +12,6 @@ from hulld.arguments import as_array, as_floats
 from hulld.wire import MessageWriter
 
 
-
 class _Mesh(Protocol):
     """A mesh of trimesh, Open3D, or hulld."""
 

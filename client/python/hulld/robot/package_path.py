@@ -11,9 +11,7 @@ _MOST_FOLDERS = 10_000
 
 
 def resolve_file(
-    name: str,
-    description: str | os.PathLike[str],
-    packages: Mapping[str, str | os.PathLike[str]],
+    name: str, description: str | os.PathLike[str], packages: Mapping[str, str | os.PathLike[str]]
 ) -> pathlib.Path:
     """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
     the description's folder.

@@ -104,9 +104,9 @@ class Robot:
         `adjacent` includes these. srdf: a file; exactly the pairs that it disables are left out.
 
         packages: folders by the name in package://NAME/. Names without a folder are searched in
-        ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of several named
-        convex parts, as V-HACD and CoACD write OBJ, becomes one hull per part. load_mesh: reads
-        mesh files, as trimesh.load_mesh; None: STL and OBJ are read here.
+        ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of
+        several named convex parts, as V-HACD and CoACD write OBJ, becomes one hull per part.
+        load_mesh: reads mesh files, as trimesh.load_mesh; None: STL and OBJ are read here.
 
         client: of the server that answers; None: a private one in memory, shared by all robots of
         this process. prefix: keeps the hulls under this ID prefix, as in "arm/"; None: `close`

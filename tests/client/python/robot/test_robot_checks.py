@@ -197,7 +197,9 @@ def test_a_trajectory_has_a_first_contact(chain: hulld.Robot) -> None:
         assert [one.relation.name for one in check] == [
             "SEPARATED", "SEPARATED", "TOUCHING", "OVERLAPPING", "SEPARATED",
         ]  # fmt: skip
-        assert check.first_contact == 2 and check.colliding.tolist() == [False] * 2 + [True] * 2 + [False]
+        assert check.first_contact == 2 and check.colliding.tolist() == [False] * 2 + [True] * 2 + [
+            False
+        ]
         assert (check.relation.name, check.pair) == ("OVERLAPPING", ("a", "c"))
     assert check.separations is not None
     assert check.separations.tolist() == pytest.approx([1, 0.5, 0, -1, 1])
@@ -247,7 +249,9 @@ def test_a_scene_stands_around(chain: hulld.Robot, client: hulld.Client, name: s
         chain.check([0, 0], scene=scene, ignore=[("a", "x")])
     with pytest.raises(ValueError, match="no pair of chain is left"):
         chain.check([0, 0], ignore=[("a", "c")])
-    with pytest.raises(hulld.NotFoundError, match='a with nowhere in configuration 0: hull "nowhere"'):
+    with pytest.raises(
+        hulld.NotFoundError, match='a with nowhere in configuration 0: hull "nowhere"'
+    ):
         chain.check([[0, 0], [1, 1]], scene=["nowhere"])
 
 

@@ -77,7 +77,9 @@ def test_variables_are_those_of_the_free_joints(write: Write) -> None:
     robot = hulld.Robot.from_urdf(write(ARM))
     # Depth first, siblings in the order of their joints' names.
     assert robot.links == ("base", "wagon", "ball", "upper", "hand", "finger", "tip")
-    free = [f"free/{n}" for n in ("trans_x", "trans_y", "trans_z", "rot_x", "rot_y", "rot_z", "rot_w")]
+    free = [
+        f"free/{n}" for n in ("trans_x", "trans_y", "trans_z", "rot_x", "rot_y", "rot_z", "rot_w")
+    ]
     assert list(robot.variables) == ["cart/x", "cart/y", "cart/theta", *free, "j1", "j2"]
     assert robot.dof == 12 and robot.limits[10:].tolist() == [[-1, 2], [1, 3]]
     assert np.isinf(robot.limits[:10]).all()
@@ -108,10 +110,14 @@ def test_joints_move_their_descendants(write: Write, rng: np.random.Generator) -
 
 @pytest.mark.parametrize("axis", ["0 0 -1", "0 1 0", "1 2 3"])
 def test_planar_joints_move_in_the_plane_of_their_axis(write: Write, axis: str) -> None:
-    text = ARM.replace('<child link="wagon"/><axis xyz="0 0 1"/>', f'<child link="wagon"/><axis xyz="{axis}"/>')
+    text = ARM.replace(
+        '<child link="wagon"/><axis xyz="0 0 1"/>', f'<child link="wagon"/><axis xyz="{axis}"/>'
+    )
     robot = hulld.Robot.from_urdf(write(text))
     n = np.array([float(word) for word in axis.split()])
-    poses = robot.link_poses({"cart/x": [3.0, 0, 0], "cart/y": [0, 4.0, 0], "cart/theta": [0, 0, 1.0]})
+    poses = robot.link_poses(
+        {"cart/x": [3.0, 0, 0], "cart/y": [0, 4.0, 0], "cart/theta": [0, 0, 1.0]}
+    )
     x, y, turned = matrices_of(poses[:, robot.links.index("wagon")])
     for moved, length in ((x, 3), (y, 4)):
         assert abs(n @ moved[:3, 3]) < 1e-12
@@ -151,15 +157,27 @@ def test_configurations_are_checked(write: Write) -> None:
     [
         ("</robot>", "", "[0-9]+: not valid XML"),
         ("<robot", '<!DOCTYPE r [<!ENTITY a "b">]><robot', "1: document types are not supported"),
-        ('<link name="hand">', '<xacro:m name="hand"/><link name="hand">', "11: <xacro:m> is a mac"),
+        (
+            '<link name="hand">',
+            '<xacro:m name="hand"/><link name="hand">',
+            "11: <xacro:m> is a mac",
+        ),
         ("robot", "scene", "1: the outermost element is <scene>, not <robot>"),
         (' name="arm"', "", '1: <robot> lacks name="..."'),
-        ('name="wagon"', 'name="ball"', "22: link 'ball' is defined twice; the first .* in line 20"),
+        (
+            'name="wagon"',
+            'name="ball"',
+            "22: link 'ball' is defined twice; the first .* in line 20",
+        ),
         ('"j2" type', '"j1" type', "8: joint 'j1' is defined twice"),
         ('type="prismatic"', 'type="screw"', "8: joint 'j2' has type 'screw'; types are fixed"),
         ('<child link="hand"/>', "", "8: joint 'j2' lacks <child"),
         ('<child link="hand"/>', '<child link="x"/>', "9: joint 'j2' has a child .* 'x'"),
-        ('<child link="hand"/>', '<child link="ball"/>', "21: link 'ball' is the child of two joints"),
+        (
+            '<child link="hand"/>',
+            '<child link="ball"/>',
+            "21: link 'ball' is the child of two joints",
+        ),
         ('<parent link="upper"/>', '<parent link="tip"/>', "11: link 'hand' is part of a cycle"),
         ('"0 0 3"', '"0 0 0"', "9: <axis> xyz must not be 0 0 0"),
         ('"0 0 3"', '"0 0"', "9: <axis> xyz takes 3 numbers, got 2"),
@@ -177,7 +195,11 @@ def test_configurations_are_checked(write: Write) -> None:
         ('<box size="1 1 1"/>', "", "2: <geometry> holds nothing"),
         ('<box size="1 1 1"/>', '<cylinder radius="1"/>', '2: <cylinder> lacks length="..."'),
         ('<box size="1 1 1"/>', '<mesh scale="1 1 1"/>', '2: <mesh> lacks filename="..."'),
-        ('<box size="1 1 1"/>', '<mesh filename="a" scale="1 0 1"/>', "2: <mesh> scale must not be"),
+        (
+            '<box size="1 1 1"/>',
+            '<mesh filename="a" scale="1 0 1"/>',
+            "2: <mesh> scale must not be",
+        ),
         (BOX, "", "arm.urdf: no link has a <collision> element"),
     ],
 )
@@ -238,7 +260,10 @@ def test_disabled_pairs_are_read(write: Write) -> None:
     assert pairs == others | {("base", "tip")}
     for bad, message in (
         ('<disable_collisions link1="tip"/>', 'arm.srdf:1: <disable_collisions> lacks link2="..."'),
-        ('<disable_default_collisions link="x"/>', "names the link 'x', which robot 'arm' does not"),
+        (
+            '<disable_default_collisions link="x"/>',
+            "names the link 'x', which robot 'arm' does not",
+        ),
     ):
         with pytest.raises(ValueError, match=message):
             read_disabled_pairs(write(f'<robot name="arm">{bad}</robot>', "arm.srdf"), robot)

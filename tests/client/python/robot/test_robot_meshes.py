@@ -32,10 +32,14 @@ def binary_stl(triangles: np.ndarray, count: int | None = None, header: bytes = 
 
 
 TRIANGLES = np.array([[(0, 0, 0), (1, 0, 0), (0, 2, 0)], [(0, 0, 3), (1, 0, 0), (0, 2, 0)]], "f4")
-FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 2 0\nendloop\nendfacet\n"
+FACET = (
+    "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 2 0\nendloop\nendfacet\n"
+)
 
 
-def points_of(path: pathlib.Path, data: str | bytes, scale: tuple[Fraction, ...] = ONE) -> np.ndarray:
+def points_of(
+    path: pathlib.Path, data: str | bytes, scale: tuple[Fraction, ...] = ONE
+) -> np.ndarray:
     path.write_bytes(data.encode() if isinstance(data, str) else data)
     ((points, _),) = read_pieces(path, scale, True, None)
     return points
@@ -71,9 +75,15 @@ def test_stl_is_read_in_both_forms(tmp_path: pathlib.Path) -> None:
         (binary_stl(TRIANGLES * np.float32("nan")), "triangle 0 has a coordinate not finite"),
         (f"solid\n{FACET}".encode(), "8: the file ends after 1 facets, before .*; is it complete?"),
         (f"solid\n{FACET[:56]}".encode(), "ends after 0 facets"),
-        (f"solid\n{FACET.replace('endloop', 'vertex 1 1 1')}endsolid".encode(), "7: 'vertex' after 0"),
+        (
+            f"solid\n{FACET.replace('endloop', 'vertex 1 1 1')}endsolid".encode(),
+            "7: 'vertex' after 0",
+        ),
         (f"solid\n{FACET.replace('0 2 0', '0 x 0')}endsolid".encode(), "6: 'x' is not a finite"),
-        (f"solid\n{FACET.replace('0 2 0', '0 1e999 0')}endsolid".encode(), "6: '1e999' is not a finite"),
+        (
+            f"solid\n{FACET.replace('0 2 0', '0 1e999 0')}endsolid".encode(),
+            "6: '1e999' is not a finite",
+        ),
         (b"v 0 0 0\n", "1: 'v' after 0 facets where \"solid\" is expected"),
     ],
 )
@@ -109,7 +119,11 @@ def test_scales_are_exact(tmp_path: pathlib.Path) -> None:
     # 3 in are 0.0762 m: the product is rounded once.
     assert points_of(tmp_path / "a.obj", "v 3 1 0.1\n", inch).tolist() == [[0.0762, -2, 0.0001]]
     triangle = np.full((1, 3, 3), 3, "f4")
-    assert points_of(tmp_path / "a.stl", binary_stl(triangle), inch)[0].tolist() == [0.0762, -6, 0.003]
+    assert points_of(tmp_path / "a.stl", binary_stl(triangle), inch)[0].tolist() == [
+        0.0762,
+        -6,
+        0.003,
+    ]
 
 
 @pytest.mark.parametrize("keyword", ["o convex_", "g hull_"])
@@ -167,7 +181,9 @@ def test_packages_are_searched_in_order(
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path}/ws:{tmp_path}/rpp/arm")
     assert resolve_file(name, urdf, {}) == ros
     assert resolve_file(name, urdf, {"arm": tmp_path / "elsewhere"}) == named
-    with pytest.raises(FileNotFoundError, match=r"package 'arm' holds b.stl; .*'arm': DIR.*elsewhere"):
+    with pytest.raises(
+        FileNotFoundError, match=r"package 'arm' holds b.stl; .*'arm': DIR.*elsewhere"
+    ):
         resolve_file("package://arm/b.stl", urdf, {"arm": tmp_path / "elsewhere"})
     for bad in ("package://arm", "package:///a.stl", "http://a/b.stl"):
         with pytest.raises(FileNotFoundError, match="write package://PACKAGE/FILE"):
@@ -177,8 +193,8 @@ def test_packages_are_searched_in_order(
 def test_a_defect_of_a_mesh_names_the_link(tmp_path: pathlib.Path) -> None:
     urdf = tmp_path / "a.urdf"
     urdf.write_text(
-        '<robot name="r">\n<link name="l">\n<collision><geometry><mesh filename="a.stl"/></geometry>'
-        "</collision></link></robot>"
+        '<robot name="r">\n<link name="l">\n<collision><geometry><mesh filename="a.stl"/>'
+        "</geometry></collision></link></robot>"
     )
     with pytest.raises(FileNotFoundError, match=r"a.urdf:3: link 'l': no such file: .*a.stl"):
         hulld.Robot.from_urdf(urdf)
