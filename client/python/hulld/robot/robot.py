@@ -343,9 +343,13 @@ class Robot:
                 )
             pairs = kept
         if not pairs:
-            raise ValueError(
-                f"no pair of {self.name} is left to check; adjacent=True includes adjacent links"
+            hint = (
+                "a pair needs two links with shapes, or a scene"
+                if len({part.link for part in self.parts}) < 2
+                else "the others are adjacent (adjacent=True includes them), disabled by the SRDF, "
+                "or ignored"
             )
+            raise ValueError(f"no pair of {self.name} is left to check; {hint}")
         return np.array(pairs, np.uint32)
 
     def _warn_of_limits(self, values: Sequence[Sequence[Any]], count: int) -> None:

@@ -166,6 +166,70 @@ def test_a_ur5_is_that_of_hullctl(
     ]
 
 
+def random_urdf(rng: np.random.Generator) -> str:
+    """A tree of 3 to 11 links with up to two shapes each, some of them bare, and joints of any
+    kind, some of which mimic."""
+    numbers = lambda count, low, high: " ".join(map(repr, rng.uniform(low, high, count).tolist()))
+    origin = lambda: f'<origin xyz="{numbers(3, -1, 1)}" rpy="{numbers(3, -1, 1)}"/>'
+    shapes = (
+        lambda: f'<box size="{numbers(3, 0.1, 0.6)}"/>',
+        lambda: f'<sphere radius="{numbers(1, 0.1, 0.6)}"/>',
+        lambda: f'<cylinder radius="{numbers(1, 0.1, 0.6)}" length="{numbers(1, 0.1, 0.6)}"/>',
+        lambda: f'<capsule radius="{numbers(1, 0.1, 0.6)}" length="{numbers(1, 0.1, 0.6)}"/>',
+    )
+    links = [f"link{i}" for i in rng.permutation(int(rng.integers(3, 12)))]
+    text, leaders = '<robot name="random">', []
+    for index, link in enumerate(links):
+        text += f'<link name="{link}">'
+        for _ in range(int(rng.choice([0, 1, 1, 2]))):
+            shape = shapes[int(rng.integers(len(shapes)))]()
+            text += f"<collision>{origin()}<geometry>{shape}</geometry></collision>"
+        text += "</link>"
+        if index == 0:
+            continue
+        kinds = ["fixed", "fixed", "revolute", "continuous", "prismatic", "planar", "floating"]
+        kind, name = str(rng.choice(kinds)), f"joint{rng.integers(1000)}-{index}"
+        text += (
+            f'<joint name="{name}" type="{kind}"><parent link="{links[int(rng.integers(index))]}"/>'
+            f'<child link="{link}"/>{origin()}<axis xyz="{numbers(3, -1, 1)}"/>'
+            '<limit lower="-1" upper="1"/>'
+        )
+        if kind in ("revolute", "continuous", "prismatic"):
+            if leaders and rng.random() < 0.3:
+                leader, (a, b) = rng.choice(leaders), rng.uniform(-1, 1, 2).tolist()
+                text += f'<mimic joint="{leader}" multiplier="{a}" offset="{b}"/>'
+            leaders.append(name)
+        text += "</joint>"
+    return text + "</robot>"
+
+
+def test_random_robots_are_those_of_hullctl(
+    tmp_path: pathlib.Path,
+    client: hulld.Client,
+    hullctl: Callable[..., list[dict[str, Any]]],
+    rng: np.random.Generator,
+) -> None:
+    path, compared = tmp_path / "random.urdf", 0
+    while compared < 12:
+        path.write_text(random_urdf(rng))
+        try:
+            robot = hulld.Robot.from_urdf(path, client=client)
+        except ValueError as error:
+            assert "no link has a <collision> element" in str(error)
+            continue
+        if not robot.pairs:
+            continue
+        with robot:
+            q = rng.uniform(-1, 1, robot.dof)
+            joints = [f"--joint={name}={x!r}" for name, x in zip(robot.variables, q.tolist())]
+            with warnings.catch_warnings():
+                # Joints that mimic may be beyond their limits.
+                warnings.simplefilter("ignore")
+                check = robot.check(q, separation=True)
+            assert_same(check, 0, hullctl(path, *joints))
+        compared += 1
+
+
 # --- Answers ---
 
 
