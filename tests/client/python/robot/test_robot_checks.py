@@ -169,8 +169,13 @@ def test_a_ur5_is_that_of_hullctl(
 def random_urdf(rng: np.random.Generator) -> str:
     """A tree of 3 to 11 links with up to two shapes each, some of them bare, and joints of any
     kind, some of which mimic."""
-    numbers = lambda count, low, high: " ".join(map(repr, rng.uniform(low, high, count).tolist()))
-    origin = lambda: f'<origin xyz="{numbers(3, -1, 1)}" rpy="{numbers(3, -1, 1)}"/>'
+
+    def numbers(count: int, low: float, high: float) -> str:
+        return " ".join(map(repr, rng.uniform(low, high, count).tolist()))
+
+    def origin() -> str:
+        return f'<origin xyz="{numbers(3, -1, 1)}" rpy="{numbers(3, -1, 1)}"/>'
+
     shapes = (
         lambda: f'<box size="{numbers(3, 0.1, 0.6)}"/>',
         lambda: f'<sphere radius="{numbers(1, 0.1, 0.6)}"/>',
