@@ -10,12 +10,13 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Any, Self, Union
+from typing import Self, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from hulld import arguments
+from hulld.answers.collisions import Batch, Problem, Relation
 from hulld.calls.freshness import Freshness
 from hulld.client import Client
 from hulld.errors import NotFoundError, error_class
@@ -266,50 +267,34 @@ class Robot:
         missing.
         """
         values = self._configurations(q)
-        joints = joint_values(self._description, values)
+        self._warn_of_limits(values)
         around = Placements.of([] if scene is None else scene)
         names = [part.name for part in self.parts] + _names_of(around)
         pairs = self._pairs_to_check(names, around, ignore)
-        self._warn_of_limits(joints, len(values))
-        X_WL = link_poses(self._description, pack_pose(base).tolist(), joints)
-        poses = stacked([compose(X_WL[part.link], part.X_LS) for part in self.parts], len(values))
-        ids, moving = self._registered() + around.ids, len(self.parts)
-        indices = around.indices + np.uint32(moving)
-        per_call = max(1, min(_PAIRS_PER_CALL // len(pairs), _PLACEMENTS_PER_CALL // moving))
+        ids = self._registered() + around.ids
+        X_WB: list[float] = pack_pose(base).tolist()
+        per_call = min(_PAIRS_PER_CALL // len(pairs), _PLACEMENTS_PER_CALL // len(self.parts))
         batches = []
-        for first in range(0, max(1, len(values)), per_call):
-            some = poses[first : first + per_call]
-            lanes = np.arange(len(some), dtype=np.uint32)[:, np.newaxis, np.newaxis]
-            # The scene follows all copies of the robot.
-            shift = np.uint32(moving) * np.where(
-                pairs < moving, lanes, np.uint32(max(0, len(some) - 1))
-            )
-            placed = Placements(
-                ids,
-                np.concatenate([some.reshape(-1, 7), around.poses]),
-                np.concatenate([np.tile(np.arange(moving, dtype=np.uint32), len(some)), indices]),
-            )
+        for first in range(0, max(1, len(values)), max(1, per_call)):
+            poses = self._part_poses(values[first : first + max(1, per_call)], X_WB)
             batch = self.client.check_collisions(
-                placed,
-                (pairs + shift).reshape(-1, 2),
+                *_many_robots(ids, poses, around, pairs),
                 separation=separation,
                 clearance=clearance,
                 tolerance=tolerance,
                 freshness=freshness,
                 timeout=timeout,
             )
-            unanswered = np.flatnonzero(batch.answers.relations == 0)
-            if unanswered.size:
-                row = int(unanswered[0])
-                a, b = pairs[row % len(pairs)]
-                problem = batch.problem(row)
-                where = f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}"
-                if problem is None:
-                    raise error_class("INTERNAL")(f"{where}: the server gave no reason")
-                message = f"{where}: {problem.message}"
-                raise error_class(problem.code)(message, code=problem.code, reason=problem.reason)
+            _require_answers(batch, first, names, pairs)
             batches.append(batch.answers)
         return collect(names, pairs, batches)
+
+    def _part_poses(
+        self, values: npt.NDArray[np.float64], X_WB: Sequence[float]
+    ) -> npt.NDArray[np.float64]:
+        """n x parts x 7."""
+        X_WL = link_poses(self._description, X_WB, joint_values(self._description, values))
+        return stacked([compose(X_WL[part.link], part.X_LS) for part in self.parts], len(values))
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
@@ -352,8 +337,10 @@ class Robot:
             raise ValueError(f"no pair of {self.name} is left to check; {hint}")
         return np.array(pairs, np.uint32)
 
-    def _warn_of_limits(self, values: Sequence[Sequence[Any]], count: int) -> None:
-        for joint, (value, *_) in zip(self._description.joints, values):
+    def _warn_of_limits(self, values: npt.NDArray[np.float64]) -> None:
+        count = len(values)
+        columns = joint_values(self._description, values)
+        for joint, (value, *_) in zip(self._description.joints, columns):
             if joint.limits is None or joint.kind == "fixed":
                 continue
             lower, upper = joint.limits
@@ -440,6 +427,47 @@ class Robot:
         counts = {"variable": self.dof, "part": len(self.parts), "pair": len(self._pairs)}
         texts = [f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts.items()]
         return f"Robot({self.name}: {', '.join(texts)})"
+
+
+def _many_robots(
+    ids: Sequence[str],
+    poses: npt.NDArray[np.float64],
+    scene: Placements,
+    pairs: npt.NDArray[np.uint32],
+) -> tuple[Placements, npt.NDArray[np.uint32]]:
+    """The placements of n robots, then of the scene, and the pairs of each robot. ids: of the
+    parts, then of the scene. poses: n x parts x 7. pairs: of one robot, the scene behind its parts.
+    """
+    count, parts = poses.shape[:2]
+    robots = np.arange(count, dtype=np.uint32)[:, np.newaxis, np.newaxis]
+    # The scene is behind all robots.
+    robot = np.where(pairs < parts, robots, np.uint32(max(0, count - 1)))
+    shifted = pairs + robot * np.uint32(parts)
+    of_parts = np.tile(np.arange(parts, dtype=np.uint32), count)
+    placements = Placements(
+        ids,
+        np.concatenate([poses.reshape(-1, 7), scene.poses]),
+        np.concatenate([of_parts, scene.indices + np.uint32(parts)]),
+    )
+    return placements, shifted.reshape(-1, 2)
+
+
+def _require_answers(
+    batch: Batch, first: int, names: Sequence[str], pairs: npt.NDArray[np.uint32]
+) -> None:
+    """Raises the error of the first pair without an answer. first: the first configuration."""
+    unanswered = np.flatnonzero(batch.answers.relations == Relation.UNSPECIFIED)
+    if not unanswered.size:
+        return
+    row = int(unanswered[0])
+    a, b = pairs[row % len(pairs)]
+    problem = batch.problem(row) or Problem("INTERNAL", "the server gave no reason", None)
+    raise error_class(problem.code)(
+        f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}: "
+        f"{problem.message}",
+        code=problem.code,
+        reason=problem.reason,
+    )
 
 
 def _names_of(scene: Placements) -> list[str]:
