@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import collections
+import copy
 import os
 import re
 import secrets
@@ -270,7 +272,7 @@ class Robot:
         self._warn_of_limits(values)
         around = Placements.of([] if scene is None else scene)
         names = [part.name for part in self.parts] + _names_of(around)
-        pairs = self._pairs_to_check(names, around, ignore)
+        pairs = self._pairs_to_check(names, ignore)
         ids = self._registered() + around.ids
         X_WB: list[float] = pack_pose(base).tolist()
         per_call = min(_PAIRS_PER_CALL // len(pairs), _PLACEMENTS_PER_CALL // len(self.parts))
@@ -302,14 +304,12 @@ class Robot:
         return [(self.parts[a].name, self.parts[b].name) for a, b in self._pairs]
 
     def _pairs_to_check(
-        self, names: Sequence[str], around: Placements, ignore: Iterable[tuple[str, str]]
+        self, names: Sequence[str], ignore: Iterable[tuple[str, str]]
     ) -> npt.NDArray[np.uint32]:
         """Indices into `names`."""
         moving = len(self.parts)
         aliases = [{part.name, self._description.links[part.link].name} for part in self.parts]
-        aliases += [
-            {name, around.ids[index]} for name, index in zip(names[moving:], around.indices)
-        ]
+        aliases += [{name, name.partition("[")[0]} for name in names[moving:]]
         pairs = [*self._pairs]
         pairs += [(a, b) for a in range(moving) for b in range(moving, len(names))]
         for one, other in ignore:
@@ -444,11 +444,10 @@ def _many_robots(
     robot = np.where(pairs < parts, robots, np.uint32(max(0, count - 1)))
     shifted = pairs + robot * np.uint32(parts)
     of_parts = np.tile(np.arange(parts, dtype=np.uint32), count)
-    placements = Placements(
-        ids,
-        np.concatenate([poses.reshape(-1, 7), scene.poses]),
-        np.concatenate([of_parts, scene.indices + np.uint32(parts)]),
-    )
+    placements = copy.copy(scene)
+    placements.ids = [*ids]
+    placements.poses = np.concatenate([poses.reshape(-1, 7), scene.poses])
+    placements.indices = np.concatenate([of_parts, scene.indices + np.uint32(parts)])
     return placements, shifted.reshape(-1, 2)
 
 
@@ -472,5 +471,7 @@ def _require_answers(
 
 def _names_of(scene: Placements) -> list[str]:
     """The ID of each placement, followed by its index if the ID has several."""
-    ids = [scene.ids[index] for index in scene.indices]
-    return [f"{one}[{i}]" if ids.count(one) > 1 else one for i, one in enumerate(ids)]
+    # Points in place of an ID have no name.
+    ids = [scene[index].id or "points" for index in range(len(scene))]
+    counts = collections.Counter(ids)
+    return [f"{one}[{i}]" if counts[one] > 1 else one for i, one in enumerate(ids)]
