@@ -16,8 +16,10 @@ CONFIGURATION = SOURCE / "client/python/pyproject.toml"
 
 
 def check(*arguments: str, cwd: pathlib.Path) -> subprocess.CompletedProcess[str]:
+    # The tests share a cache.
+    cache = str(cwd.parent / "mypy")
     return subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(cwd / "cache"), *arguments],
+        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", cache, *arguments],
         cwd=cwd,
         capture_output=True,
         text=True,
