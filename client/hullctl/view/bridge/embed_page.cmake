@@ -20,7 +20,7 @@ set(page_rows "")
 set(page_inputs "")
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH page_folder)
 cmake_path(APPEND page_folder page)
-file(GLOB page_names CONFIGURE_DEPENDS RELATIVE ${page_folder}
+file(GLOB_RECURSE page_names CONFIGURE_DEPENDS RELATIVE ${page_folder}
      ${page_folder}/*.html ${page_folder}/*.css ${page_folder}/*.js)
 foreach(name ${page_names})
   hulld_embed_page(${name} ${page_folder}/${name})
@@ -32,5 +32,7 @@ endforeach()
 
 set(page_files_source ${CMAKE_CURRENT_BINARY_DIR}/page_files.cc)
 configure_file(${CMAKE_CURRENT_LIST_DIR}/page_files.cc.in ${page_files_source} @ONLY)
-# ccache detects .incbin and recompiles; the build system must know the inputs.
-set_source_files_properties(${page_files_source} PROPERTIES OBJECT_DEPENDS "${page_inputs}" SKIP_PRECOMPILE_HEADERS ON)
+# ccache detects .incbin and recompiles; the build system must know the inputs. Compiled alone, so that a change of the page
+# recompiles nothing else.
+set_source_files_properties(${page_files_source} PROPERTIES OBJECT_DEPENDS "${page_inputs}" SKIP_PRECOMPILE_HEADERS ON
+                            SKIP_UNITY_BUILD_INCLUSION ON)

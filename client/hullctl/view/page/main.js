@@ -1,21 +1,23 @@
 // Connects the page: messages change the model, the model notifies the parts, the parts draw.
-import {AnswerPanel} from 'hulld/answer_panel.js';
+import {AnswerPanel} from 'hulld/panels/answer_panel.js';
 import {connect} from 'hulld/connection.js';
-import {Crowd} from 'hulld/crowd.js';
-import {element, grouped} from 'hulld/dom.js';
-import {Gizmo} from 'hulld/gizmo.js';
-import {bindKeys} from 'hulld/keys.js';
-import {Labels} from 'hulld/labels.js';
-import {Marks} from 'hulld/marks.js';
+import {Crowd} from 'hulld/drawing/crowd.js';
+import {element, grouped} from 'hulld/panels/dom.js';
+import {Gizmo} from 'hulld/drawing/gizmo.js';
+import {Ground} from 'hulld/drawing/ground.js';
+import {bindKeys} from 'hulld/panels/keys.js';
+import {Labels} from 'hulld/drawing/labels.js';
+import {Marks} from 'hulld/drawing/marks.js';
 import {Model} from 'hulld/model.js';
-import {ObjectPanel} from 'hulld/object_panel.js';
-import {ObjectView} from 'hulld/object_view.js';
-import {pick} from 'hulld/picking.js';
-import {keepPicture} from 'hulld/picture.js';
+import {ObjectPanel} from 'hulld/panels/object_panel.js';
+import {ObjectView} from 'hulld/drawing/object_view.js';
+import {pick} from 'hulld/drawing/picking.js';
+import {keepPicture, savePicture} from 'hulld/drawing/picture.js';
+import {Ruler} from 'hulld/drawing/ruler.js';
 import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
-import {ShellView} from 'hulld/shell_view.js';
-import {Stage} from 'hulld/stage.js';
-import {Tree} from 'hulld/tree.js';
+import {ShellView} from 'hulld/drawing/shell_view.js';
+import {Stage} from 'hulld/drawing/stage.js';
+import {Tree} from 'hulld/panels/tree.js';
 
 const $ = (id) => document.getElementById(id);
 // Compares revisions, 64-bit numbers as text; an absent one is the oldest.
@@ -29,6 +31,8 @@ class Viewer {
     this.marks = new Marks(this.model, this.stage);
     this.shell = new ShellView(this.model, this.stage);
     this.labels = new Labels(this.model, this.stage);
+    this.ground = new Ground(this.model, this.stage);
+    this.ruler = new Ruler(this.model, this.stage);
     this.tree = new Tree(this.model);
     this.gizmo = new Gizmo(this.model, this.stage);
     this.views = new Map();
@@ -65,8 +69,9 @@ class Viewer {
   listen() {
     const {model} = this;
     model.on('selection', () => {
+      this.mayChoosePair = false;
       this.shell.clear();
-      if (model.isCrowd) this.rebuildViews();
+      this.rebuildViews();
       this.gizmo.update();
       this.marks.rebuild();
       this.labels.rebuild();
@@ -78,7 +83,9 @@ class Viewer {
     });
     model.on('pose', ({index, rest}) => {
       this.views.get(index)?.place();
+      this.crowd?.write(model.objects[index]);
       this.moved.add(index);
+      if (this.ruler.ends.length) this.ruler.rebuild();
       this.gizmo.update();
       this.shell.place();
       this.objectPanel.updatePose();
@@ -88,6 +95,7 @@ class Viewer {
     });
     model.on('visibility color shown', () => {
       this.rebuildViews();
+      this.rebuildGround();
       this.gizmo.update();
       this.marks.rebuild();
       this.labels.rebuild();
@@ -95,6 +103,7 @@ class Viewer {
     });
     model.on('collisions', (changed) => {
       this.answerPanel.updateCollisions();
+      if (this.mayChoosePair) this.chooseCollidingPair();
       if (!changed.size) return;
       if (model.isCrowd) this.crowd?.recolor();
       for (const index of changed) this.views.get(index)?.rebuild();
@@ -142,12 +151,14 @@ class Viewer {
     this.awaited.clear();
     this.former = new Map();
     this.fitted = false;
+    this.ruler.forget();
     // Answers to earlier questions concern another scene.
     this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
     this.syncShown();
     model.tell('selection');
+    this.mayChoosePair = true;
     this.answerPanel.updateCollisions();
     this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
     this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
@@ -284,6 +295,9 @@ class Viewer {
       const {model} = this;
       if (!this.fitted && this.awaited.size === 0) this.firstFit();
       this.rebuildViews();
+      this.rebuildGround();
+      const bounds = model.bounds();
+      if (this.fitted && bounds) this.stage.keepInView(bounds);
       for (const [index, before] of this.former || []) {
         const shape = model.hullOf(model.objects[index]);
         // Waits until all pieces of a body have arrived.
@@ -296,6 +310,7 @@ class Viewer {
       this.marks.rebuild();
       this.labels.rebuild();
       this.objectPanel.rebuild();
+      this.answerPanel.update();
       this.syncShown();
     });
   }
@@ -309,14 +324,25 @@ class Viewer {
     model.origin = bounds.center.slice();
     this.stage.radius = bounds.radius;
     this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
+    this.stage.isFitted = true;
     const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);
     if (hulls.length === 2)
       model.select(hulls[1].index, hulls[0].index);
     else if (model.objects.length === 1)
       model.select(0);
+    else if (model.collisions.pairs.length)
+      this.chooseCollidingPair();
     else
       this.ask(true);
     document.body.dataset.fitted = document.body.dataset.scene || 'yes';
+  }
+
+  // Selects the first pair that collides, if the user has not selected anything yet.
+  chooseCollidingPair() {
+    const [first] = this.model.collisions.pairs;
+    if (!this.fitted || !first) return;
+    this.mayChoosePair = false;
+    if (this.model.selected === null) this.model.select(first[1], first[0]);
   }
 
   answer(message) {
@@ -390,8 +416,9 @@ class Viewer {
 
   rebuildViews() {
     const {model, stage} = this;
-    const single =
-        model.isCrowd ? model.objects.filter(({index}) => index === model.selected) : model.objects;
+    const isSingle = ({index, opacity, file}) => !model.isCrowd || index === model.selected ||
+        index === model.other || opacity < 1 || (file >= 0 && model.show.mesh);
+    const single = model.objects.filter(isSingle);
     const wanted = new Set(single.map(({index}) => index));
     for (const [index, view] of this.views) {
       if (wanted.has(index)) continue;
@@ -405,16 +432,37 @@ class Viewer {
     }
     if (model.isCrowd) {
       this.crowd ??= new Crowd(model, stage);
-      this.crowd.rebuild(model.selected);
+      this.crowd.rebuild(wanted);
     }
     stage.draw();
   }
 
-  fit() {
+  rebuildGround() {
+    this.ground.rebuild(this.fitted ? this.model.bounds() : null);
+  }
+
+  // `direction`: as in Stage.flyTo.
+  fit(direction = null) {
     const bounds = this.model.bounds();
     if (!bounds) return;
     this.stage.radius = bounds.radius;
-    this.stage.flyTo(bounds);
+    this.stage.flyTo(bounds, {direction});
+    this.stage.isFitted = true;
+    this.rebuildGround();
+  }
+
+  setOrthographic(on) {
+    this.stage.setOrthographic(on);
+    $('orthographic').setAttribute('aria-pressed', String(on));
+  }
+
+  toggleRuler() {
+    this.ruler.toggle();
+    $('measure').setAttribute('aria-pressed', String(this.ruler.on));
+  }
+
+  save() {
+    savePicture(this.stage, 'hulld.png');
   }
 
   // Runs `work` a single time before the next frame, regardless of the number of calls.
@@ -456,6 +504,8 @@ class Viewer {
     this.stage.setTheme(name);
     if (!this.views) return;
     this.rebuildViews();
+    this.rebuildGround();
+    this.ruler.rebuild();
     this.marks.rebuild();
   }
 
@@ -473,6 +523,7 @@ class Viewer {
       $(id).setAttribute('aria-pressed', String(can && this.gizmo.mode === mode));
     }
     $('mode-reset').disabled = !can || object.pose === object.start;
+    $('undo').disabled = !this.model.history.length;
     if (!this.connection.live) document.querySelector('.tools').hidden = true;
     this.gizmo.handles.enabled = this.connection.live;
     if (!this.connection.live) this.gizmo.handles.detach();
@@ -497,6 +548,13 @@ class Viewer {
     $('mode-move').addEventListener('click', () => this.mode('translate'));
     $('mode-turn').addEventListener('click', () => this.mode('rotate'));
     $('mode-reset').addEventListener('click', () => this.reset());
+    $('undo').addEventListener('click', () => model.undo());
+    for (const button of document.querySelectorAll('[data-view]')) {
+      button.addEventListener('click', () => this.fit(button.dataset.view));
+    }
+    $('orthographic').addEventListener('click', () => this.setOrthographic(!stage.isOrthographic));
+    $('measure').addEventListener('click', () => this.toggleRuler());
+    $('save').addEventListener('click', () => this.save());
     for (const tab of document.querySelectorAll('.tabs button')) {
       tab.addEventListener('click', () => this.showPanel(tab.dataset.panel));
     }
@@ -509,9 +567,14 @@ class Viewer {
       step: (by) => this.step(by),
       nextOther: () => this.nextOther(),
       nextCollision: () => this.nextCollision(),
-      deselect: () => model.select(null),
+      deselect: () => (this.ruler.on ? this.toggleRuler() : model.select(null)),
       mode: (mode) => this.mode(mode),
       reset: () => this.reset(),
+      undo: () => model.undo(),
+      view: (name) => this.fit(name),
+      orthographic: () => this.setOrthographic(!stage.isOrthographic),
+      measure: () => this.toggleRuler(),
+      save: () => this.save(),
       show: (key) => $(`show-${key}`).click(),
       toggleVisible: () => this.toggleVisible(),
       search: () => {
@@ -540,11 +603,15 @@ class Viewer {
     canvas.addEventListener('pointerup', ({clientX, clientY, shiftKey, offsetX, offsetY}) => {
       if (!down || this.gizmo.dragged || this.gizmo.handles.dragging) return;
       if (Math.hypot(clientX - down[0], clientY - down[1]) > 4) return;
-      const index = pick(this.model, this.stage, offsetX, offsetY);
-      if (index === null)
-        this.model.select(null);
+      if (this.ruler.on) {
+        this.ruler.take(offsetX, offsetY);
+        return;
+      }
+      const hit = pick(this.model, this.stage, offsetX, offsetY);
+      if (hit)
+        this.tree.choose(this.model.objects[hit.index], shiftKey);
       else
-        this.tree.choose(this.model.objects[index], shiftKey);
+        this.model.select(null);
     });
   }
 

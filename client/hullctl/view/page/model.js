@@ -3,8 +3,14 @@
 import {CROWD_COLOR, OBJECT_COLORS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
-// Maximum number of objects drawn and labeled individually; more are drawn as a crowd.
-export const MOST_SINGLE_OBJECTS = 200;
+// Maximum number of objects drawn individually; more are drawn as a crowd, in few draw calls.
+const MOST_SINGLE_OBJECTS = 24;
+
+// Maximum number of objects with labels and colors of their own.
+const MOST_NAMED_OBJECTS = 200;
+
+// Maximum number of poses that undo() can restore.
+const MOST_UNDONE = 200;
 
 // Bodies with more pairs of pieces than this are queried without a certificate.
 const MOST_PIECE_PAIRS = 1000;
@@ -15,7 +21,7 @@ const MOST_CORNERS = 100;
 export class Model extends EventTarget {
   constructor() {
     super();
-    this.show = {points: false, mesh: false, hull: true, edges: true, labels: true};
+    this.show = {points: false, mesh: false, hull: true, edges: true, labels: true, grid: true};
     this.tolerance = 0;
     this.clear();
   }
@@ -35,6 +41,8 @@ export class Model extends EventTarget {
     this.answer = null;
     this.collisions = {pairs: [], problems: [], totals: {}};
     this.relationOf = new Map();
+    // {index, pose}: poses before each completed motion.
+    this.history = [];
     // In double; drawn coordinates are relative to it.
     this.origin = [0, 0, 0];
   }
@@ -56,13 +64,16 @@ export class Model extends EventTarget {
   }
 
   addObjects(objects) {
-    const many = this.objects.length + objects.length > MOST_SINGLE_OBJECTS;
+    const many = this.objects.length + objects.length > MOST_NAMED_OBJECTS;
     for (const object of objects) {
       const index = this.objects.length;
       this.objects.push({
         ...object,
         index,
         start: object.pose,
+        // The pose after the last completed motion.
+        rested: object.pose,
+        opacity: 1,
         visible: true,
         gone: false,
         color: many ? CROWD_COLOR : OBJECT_COLORS[index % OBJECT_COLORS.length],
@@ -72,6 +83,22 @@ export class Model extends EventTarget {
 
   get isCrowd() {
     return this.objects.length > MOST_SINGLE_OBJECTS;
+  }
+
+  // Returns true if there are too many objects for labels and colors of their own.
+  get isNameless() {
+    return this.objects.length > MOST_NAMED_OBJECTS;
+  }
+
+  // Returns the color in which an object is drawn. The two objects of the pair never share one.
+  colorOf({index, color}) {
+    const {pair} = this;
+    const place = pair ? pair.indexOf(index) : -1;
+    if (place < 0) return color;
+    const [a, b] = pair.map((i) => this.objects[i].color);
+    if (a !== b) return color;
+    const first = a === CROWD_COLOR ? OBJECT_COLORS[0] : a;
+    return place === 0 ? first : OBJECT_COLORS.find((other) => other !== first);
   }
 
   // Returns the hull, or all pieces of a body; undefined while in flight.
@@ -150,11 +177,14 @@ export class Model extends EventTarget {
   // Returns world points that enclose an object: its vertices if few, otherwise the corners of its
   // box.
   cornersOf(object) {
-    const {low, high, xyz, vertexCount} = this.shapeOf(object);
-    if (vertexCount <= MOST_CORNERS) {
-      return Array.from(
-          {length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
-    }
+    const {xyz, vertexCount} = this.shapeOf(object);
+    if (vertexCount > MOST_CORNERS) return this.boxCornersOf(object);
+    return Array.from(
+        {length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
+  }
+
+  boxCornersOf(object) {
+    const {low, high} = this.shapeOf(object);
     const corners = [];
     for (let i = 0; i < 8; ++i) {
       corners.push(toWorld(object.pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));
@@ -240,7 +270,21 @@ export class Model extends EventTarget {
     const object = this.objects[index];
     if (samePose(object.pose, pose) && !rest) return;
     object.pose = pose;
+    if (rest && !samePose(object.rested, pose)) {
+      this.history.push({index, pose: object.rested});
+      if (this.history.length > MOST_UNDONE) this.history.shift();
+      object.rested = pose;
+    }
     this.tell('pose', {index, rest});
+  }
+
+  // Restores the pose before the last completed motion, of any object.
+  undo() {
+    const last = this.history.pop();
+    if (!last) return;
+    if (last.index !== this.selected && last.index !== this.other) this.select(last.index);
+    this.objects[last.index].rested = last.pose;
+    this.setPose(last.index, last.pose, true);
   }
 
   setCollisions(collisions) {

@@ -1,6 +1,9 @@
 // Colors distinguishable with any kind of color vision, and the accompanying words. Source: Okabe
 // and Ito 2008, Color Universal Design.
-export const OBJECT_COLORS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
+export const OBJECT_COLORS = [
+  '#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999', '#6a4c93', '#8bd3c7', '#a65e8b',
+  '#bcbd5a'
+];
 
 // A neutral color: among many objects, only the colliding ones stand out.
 export const CROWD_COLOR = '#8fa9bd';
@@ -36,6 +39,6 @@ export const AXIS_COLORS = {
 };
 
 export const THEMES = {
-  light: {ground: 0xf4f5f6, edge: 0x2a3036, edgeOpacity: 0.5, sky: 0xffffff, earth: 0xb4bac2},
-  dark: {ground: 0x121417, edge: 0xd5dae0, edgeOpacity: 0.35, sky: 0xffffff, earth: 0x5a616a},
+  light: {ground: 0xf4f5f6, edge: 0x2a3036, edgeOpacity: 0.6, grid: 0xc3c9d0, sky: 0xffffff, earth: 0x8c939c},
+  dark: {ground: 0x121417, edge: 0xd5dae0, edgeOpacity: 0.35, grid: 0x3a4149, sky: 0xffffff, earth: 0x6a7078},
 };

@@ -142,10 +142,13 @@ class Browser:
         return self.js("document.querySelector(arguments[0])?.textContent ?? ''", selector)
 
     def fact(self, name):
-        """Returns the value of a name in the answer's table."""
-        return self.js(
-            "[...document.querySelectorAll('#answer-facts dt')]"
-            ".find((dt) => dt.textContent === arguments[0])?.nextElementSibling.textContent", name)
+        """Returns the value of a name in the answer's table; numbers in full, not rounded."""
+        return self.js("""(() => {
+          const term = [...document.querySelectorAll('#answer-facts dt')]
+              .find((dt) => dt.textContent === arguments[0]);
+          const value = term?.nextElementSibling;
+          return value?.querySelector('[title]')?.title ?? value?.textContent;
+        })()""", name)
 
     def problems(self):
         """Returns the errors of the browser's console."""

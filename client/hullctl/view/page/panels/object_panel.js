@@ -1,5 +1,6 @@
-// The selected object: its properties, its pose, and a simpler hull in its place.
-import {element, exact, facts, grouped, short} from 'hulld/dom.js';
+// The selected object: its pose, a simpler hull in its place, and its properties.
+import {copy, element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
+import {poseText} from 'hulld/pose.js';
 
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
 
@@ -25,7 +26,7 @@ export class ObjectPanel {
     if (!object) {
       this.root.replaceChildren(
           element('h2', {}, 'Object'),
-          element('p', {className: 'quiet'}, 'Nothing is selected. Click an object, or press J.'));
+          element('p', {className: 'quiet'}, 'Nothing is selected. Select an object in the picture or the list.'));
       return;
     }
     // A change of the object must not disturb typing.
@@ -37,13 +38,13 @@ export class ObjectPanel {
     this.shownIndex = object.index;
     this.factsBlock =
         element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
-    const blocks = [this.factsBlock];
-    if (object.hullId) blocks.push(this.poseBlock(object));
+    const blocks = [this.controlBlock(object)];
     const isHull = object.hullId && !this.model.bodyOf(object);
     if (isHull && this.live && this.model.hullOf(object)?.dimension === 3) {
       blocks.push(this.simplifyBlock(object));
     }
     if (this.mayEdit && isHull && !object.gone) blocks.push(this.editBlock(object));
+    blocks.push(this.factsBlock);
     this.root.replaceChildren(...blocks);
   }
 
@@ -53,7 +54,7 @@ export class ObjectPanel {
     const body = this.model.bodyOf(object);
     const info = this.model.info.get(object.hullId) || hull?.info || body?.info;
     const isSolid = !body && hull?.dimension === 3;
-    const rows = [element('h2', {}, object.name)];
+    const rows = [element('h2', {}, 'Facts')];
     if (object.gone) rows.push(element('p', {className: 'quiet'}, 'It was deleted.'));
     if (hull?.message) rows.push(element('p', {className: 'quiet'}, hull.message));
     rows.push(facts([
@@ -65,7 +66,7 @@ export class ObjectPanel {
       ['edges', isSolid ? grouped(hull.edgeCount) : null],
       ['facets', hull && grouped(hull.facetCount)],
       ['points', !body && info?.counts ? grouped(info.counts.received) : null],
-      ['volume', isSolid ? exact(hull.measures.volume) : null],
+      ['volume', isSolid ? rounded(hull.measures.volume) : null],
       [
         'box',
         hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') :
@@ -92,7 +93,7 @@ export class ObjectPanel {
     const {volume, area} = mesh.measures;
     if (volume) {
       rows.push(
-          ['mesh volume', exact(volume)],
+          ['mesh volume', rounded(volume)],
           ['hull is', `${short(hull.measures.volume / volume)} times as large as its mesh`]);
     } else {
       rows.push(
@@ -102,37 +103,80 @@ export class ObjectPanel {
     return rows;
   }
 
-  poseBlock(object) {
-    this.inputs =
-        object.pose.map((value, i) => element('input', {
-                          type: 'text',
-                          inputMode: 'decimal',
-                          value: String(value),
-                          autocomplete: 'off',
-                          spellcheck: false,
-                          readOnly: !this.live,
-                          'data-pose': i,
-                          'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
-                          onchange: () => this.typed(object),
-                        }));
+  controlBlock(object) {
+    this.inputs = object.hullId ? object.pose.map((_, i) => this.poseInput(object, i)) : [];
     const fields = (from, to) => element(
         'div', {className: 'pose'},
         ...this.inputs.slice(from, to).flatMap(
             (input, i) => [element('b', {className: 'quiet'}, POSE_NAMES[from + i]), input]));
+    const pose = object.hullId ? [fields(4, 7), this.rotationAndCopies(object, fields)] : [];
     return element(
-        'div', {className: 'block'}, element('h2', {}, 'Translation'), fields(4, 7),
-        element(
-            'details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'),
-            fields(0, 4)));
+        'div', {className: 'block'}, element('h2', {}, object.name), ...pose,
+        this.opacitySlider(object));
   }
 
-  typed(object) {
-    const pose = this.inputs.map(({value}) => (value.trim() === '' ? NaN : Number(value)));
-    this.inputs.forEach((input, i) => {
-      input.setAttribute('aria-invalid', String(!Number.isFinite(pose[i])));
+  rotationAndCopies(object, fields) {
+    const copyButton = (id, label, text) => element(
+        'button', {
+          type: 'button',
+          id,
+          title: 'Copies the placement, every number exact',
+          onclick: async ({target}) => {
+            await copy(text());
+            target.textContent = 'Copied';
+            setTimeout(() => target.textContent = label, 1500);
+          },
+        },
+        label);
+    return element(
+        'div', {},
+        element(
+            'details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'),
+            fields(0, 4)),
+        element(
+            'div', {className: 'buttons'},
+            copyButton(
+                'copy-hullctl', 'Copy for hullctl',
+                () => `${object.hullId} --pose-b ${poseText(object.pose)}`),
+            copyButton(
+                'copy-python', 'Copy for Python',
+                () => `(${JSON.stringify(object.hullId)}, [${object.pose.map(String).join(', ')}])`)));
+  }
+
+  // A field shows a rounded number; while it has the focus, the text of the exact double.
+  poseInput(object, i) {
+    const input = element('input', {
+      type: 'text',
+      inputMode: 'decimal',
+      autocomplete: 'off',
+      spellcheck: false,
+      readOnly: !this.live,
+      'data-pose': i,
+      'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
+      onchange: () => this.typed(object, i),
+      onfocus: () => {
+        input.value = String(object.pose[i]);
+      },
+      onblur: () => {
+        if (input.getAttribute('aria-invalid') !== 'true') this.showNumber(input, object.pose[i]);
+      },
     });
-    const turns = pose.slice(0, 4).some((value) => value !== 0);
-    if (pose.every(Number.isFinite) && turns) this.model.setPose(object.index, pose, true);
+    this.showNumber(input, object.pose[i]);
+    return input;
+  }
+
+  showNumber(input, value) {
+    input.value = short(value);
+    input.title = String(value);
+  }
+
+  typed(object, i) {
+    const {value} = this.inputs[i];
+    const pose = object.pose.slice();
+    pose[i] = value.trim() === '' ? NaN : Number(value);
+    const isValid = Number.isFinite(pose[i]) && pose.slice(0, 4).some((part) => part !== 0);
+    this.inputs[i].setAttribute('aria-invalid', String(!isValid));
+    if (isValid) this.model.setPose(object.index, pose, true);
   }
 
   // Called when the pose changes by other means.
@@ -140,8 +184,23 @@ export class ObjectPanel {
     const {object, inputs} = this;
     if (!object || !inputs || this.shownIndex !== object.index) return;
     inputs.forEach((input, i) => {
-      if (document.activeElement !== input) input.value = String(object.pose[i]);
+      if (document.activeElement !== input) this.showNumber(input, object.pose[i]);
     });
+  }
+
+  opacitySlider(object) {
+    return element('div', {className: 'slider'}, element('label', {}, 'Opacity ', element('input', {
+                     type: 'range',
+                     min: 0.1,
+                     max: 1,
+                     step: 0.05,
+                     value: object.opacity,
+                     id: 'opacity',
+                     oninput: ({target}) => {
+                       object.opacity = Number(target.value);
+                       this.model.tell('color');
+                     },
+                   })));
   }
 
   // A logarithmic range from 0 to half of the size.
@@ -252,7 +311,7 @@ export class ObjectPanel {
     this.result.replaceChildren(facts([
       ['vertices', grouped(hull.vertexCount)],
       ['facets', grouped(hull.facetCount)],
-      ['proven error', exact(hull.error)],
+      ['proven error', rounded(hull.error)],
     ]));
   }
 

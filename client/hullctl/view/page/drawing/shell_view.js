@@ -1,9 +1,9 @@
 // Draws a simpler hull in place of the selected one with the shell of its proven error, or the
 // shell of the tolerance.
-import {DrawnGroup} from 'hulld/drawn_group.js';
+import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {MARK_COLORS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {THREE} from 'hulld/three.js';
+import {THREE} from 'hulld/drawing/three.js';
 
 // Shells of larger hulls have as many facets as the hull.
 const MOST_FACETS = 20000;

@@ -1,6 +1,9 @@
 // Finds the object under the pointer: the first one on a ray, in double.
-import {rotateBack, unitQuaternion} from 'hulld/pose.js';
-import {THREE} from 'hulld/three.js';
+import {THREE} from 'hulld/drawing/three.js';
+import {rotateBack, toWorld, unitQuaternion} from 'hulld/pose.js';
+
+// Distance in CSS pixels within which a picked point snaps to a vertex.
+const SNAP = 10;
 
 // Returns the distance along the ray to the nearest triangle; Infinity if it meets none. Source:
 // Moeller and Trumbore 1997.
@@ -26,8 +29,29 @@ function hitTriangles(shape, o, d) {
   return nearest;
 }
 
-// Returns the index of the object under (x, y), in CSS pixels of the canvas; null if none.
-export function pick(model, stage, x, y) {
+// Returns the vertex of an object that is nearest in the picture to (x, y), if it is within `reach`
+// of the camera and close enough to snap to; null otherwise.
+function nearestVertex(model, stage, object, x, y, reach) {
+  const {xyz} = model.shapeOf(object);
+  let nearest = null;
+  let least = SNAP;
+  for (let i = 0; i < xyz.length; i += 3) {
+    const point = Array.from(xyz.subarray(i, i + 3));
+    const local = new THREE.Vector3(
+        ...toWorld(object.pose, point).map((value, k) => value - model.origin[k]));
+    const seen = stage.toScreen(local);
+    if (!seen) continue;
+    const away = Math.hypot(seen[0] - x, seen[1] - y);
+    if (away < least && local.distanceTo(stage.camera.position) <= reach) {
+      [nearest, least] = [point, away];
+    }
+  }
+  return nearest;
+}
+
+// Returns {index, point}: the object under (x, y), in CSS pixels of the canvas, and the point that
+// was hit, in the frame of the object; null if none. `toVertex`: snap to a vertex nearby.
+export function pick(model, stage, x, y, {toVertex = false} = {}) {
   const ray = new THREE.Raycaster();
   ray.setFromCamera(
       {
@@ -50,9 +74,16 @@ export function pick(model, stage, x, y) {
     if (along - shape.radius > nearest) continue;
     const q = unitQuaternion(object.pose);
     const local = rotateBack(q, toward).map((value, k) => value + shape.center[k]);
-    const distance =
-        shape.triangles.length ? hitTriangles(shape, local, rotateBack(q, direction)) : along;
-    if (distance < nearest) [nearest, picked] = [distance, object.index];
+    const turned = rotateBack(q, direction);
+    const distance = shape.triangles.length ? hitTriangles(shape, local, turned) : along;
+    if (distance >= nearest) continue;
+    nearest = distance;
+    picked = {index: object.index, point: local.map((value, k) => value + distance * turned[k])};
+  }
+  if (picked && toVertex) {
+    const reach = stage.camera.position.distanceTo(ray.ray.origin) + nearest;
+    const object = model.objects[picked.index];
+    picked.point = nearestVertex(model, stage, object, x, y, 1.02 * reach) ?? picked.point;
   }
   return picked;
 }

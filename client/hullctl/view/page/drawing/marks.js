@@ -1,13 +1,40 @@
 // Draws an answer: the separating plane and its axis, the witness points, and the vertex pairs of
 // the certificate.
-import {DrawnGroup} from 'hulld/drawn_group.js';
+import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {MARK_COLORS} from 'hulld/palette.js';
-import {discTexture, THREE} from 'hulld/three.js';
+import {discTexture, gridTexture, THREE} from 'hulld/drawing/three.js';
 
 // With more edges, lines would hide the surface.
 const MOST_PIECE_EDGES = 20000;
 
+// Cells of the plane's grid per radius of the smaller object.
+const PLANE_CELLS = 4;
+
 const number = ({x, y, z}) => [Number(x), Number(y), Number(z)];
+
+// Returns the polygon in which the plane through `middle` with normal n cuts a box, in order around
+// `middle`; fewer than three points if it misses the box.
+function clipToBox(n, middle, [low, high]) {
+  const points = [];
+  const at = (k, i) => (i >> k & 1 ? high : low).getComponent(k);
+  for (let i = 0; i < 8; ++i) {
+    for (let k = 0; k < 3; ++k) {
+      if (i >> k & 1) continue;
+      const from = new THREE.Vector3(at(0, i), at(1, i), at(2, i));
+      const to = from.clone().setComponent(k, high.getComponent(k));
+      const [p, q] = [from, to].map((end) => n.dot(end.clone().sub(middle)));
+      if (p * q < 0) points.push(from.lerp(to, p / (p - q)));
+    }
+  }
+  const turn = new THREE.Quaternion().setFromUnitVectors(n, new THREE.Vector3(0, 0, 1));
+  const center = points.reduce((sum, point) => sum.add(point), new THREE.Vector3())
+                     .divideScalar(points.length || 1);
+  const angle = (point) => {
+    const {x, y} = point.clone().sub(center).applyQuaternion(turn);
+    return Math.atan2(y, x);
+  };
+  return points.sort((a, b) => angle(a) - angle(b));
+}
 
 export class Marks extends DrawnGroup {
   constructor(model, stage) {
@@ -106,29 +133,40 @@ export class Marks extends DrawnGroup {
       });
       this.group.add(arrow);
     }
-    if (this.on.plane) this.addPlane(n, middle);
+    if (this.on.plane) this.addPlane(n, middle, objects);
   }
 
-  addPlane(n, middle) {
-    const half = 0.9 * this.size;
-    const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
-    const corner = (x, y) =>
-        new THREE.Vector3(half * x, half * y, 0).applyQuaternion(turn).add(middle);
-    const plane = new THREE.Mesh(
-        new THREE.PlaneBufferGeometry(2 * half, 2 * half), new THREE.MeshBasicMaterial({
-          color: MARK_COLORS.plane,
-          transparent: true,
-          opacity: 0.16,
-          side: THREE.DoubleSide,
-          depthWrite: false,
-        }));
-    plane.quaternion.copy(turn);
-    plane.position.copy(middle);
+  // Draws the part of the plane through `middle` that lies in the box of the objects, with a grid.
+  addPlane(n, middle, objects) {
+    const corners = clipToBox(n, middle, this.boxOf(objects));
+    if (corners.length < 3) return;
+    const geometry = new THREE.BufferGeometry().setFromPoints(corners);
+    const turn = new THREE.Quaternion().setFromUnitVectors(n, new THREE.Vector3(0, 0, 1));
+    const cells = corners.flatMap((corner) => {
+      const {x, y} = corner.clone().sub(middle).applyQuaternion(turn);
+      return [x, y].map((value) => value * PLANE_CELLS / this.size);
+    });
+    geometry.setAttribute('uv', new THREE.Float32BufferAttribute(cells, 2));
+    geometry.setIndex(corners.slice(2).flatMap((_, i) => [0, i + 1, i + 2]));
+    const plane = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
+                                   color: MARK_COLORS.plane,
+                                   map: gridTexture(),
+                                   transparent: true,
+                                   side: THREE.DoubleSide,
+                                   depthWrite: false,
+                                 }));
     plane.renderOrder = 7;
     this.group.add(plane);
-    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
-    const border = corners.flatMap((p, i) => [p, corners[(i + 1) % 4]]);
+    const border = corners.flatMap((p, i) => [p, corners[(i + 1) % corners.length]]);
     this.line(border, MARK_COLORS.plane, {depthTest: true, opacity: 0.9});
+  }
+
+  // Returns [low, high]: the box of the objects, slightly enlarged.
+  boxOf(objects) {
+    const {corners, radius} = this.model.bounds(objects);
+    const box = new THREE.Box3().setFromPoints(corners.map((corner) => this.local(corner)));
+    box.expandByScalar(0.05 * radius);
+    return [box.min, box.max];
   }
 
   addCertificate({certificate}, objects) {

@@ -1,5 +1,6 @@
-// The list of objects: search, select, show and hide, color. IDs with slashes form groups.
-import {element, grouped} from 'hulld/dom.js';
+// The tree of objects: search, select, show and hide, color. The prefixes of IDs, up to a slash, form
+// groups.
+import {element, grouped} from 'hulld/panels/dom.js';
 import {RELATIONS} from 'hulld/palette.js';
 
 // More rows would slow down the page; the search finds the rest.
@@ -10,7 +11,29 @@ const MOST_ROWS = 400;
 const MOST_OPEN_PIECES = 8;
 const MOST_PIECE_ROWS = 100;
 
-const groupOf = (name) => name.slice(0, name.lastIndexOf('/') + 1);
+const INDENT = 12;
+
+// Returns {prefix, members, groups} of objects whose names start with the prefix: those directly in
+// it, and groups of the others. A group that holds nothing but one group is merged with it.
+function treeOf(objects, prefix = '') {
+  const members = [];
+  const rest = new Map();
+  for (const object of objects) {
+    const end = object.name.indexOf('/', prefix.length) + 1;
+    const key = object.name.slice(0, end);
+    if (end === 0 || end === object.name.length) {
+      members.push(object);
+    } else {
+      if (!rest.has(key)) rest.set(key, []);
+      rest.get(key).push(object);
+    }
+  }
+  if (!members.length && rest.size === 1 && prefix) {
+    const [[key, inside]] = rest;
+    return treeOf(inside, key);
+  }
+  return {prefix, members, objects, groups: [...rest].map(([key, inside]) => treeOf(inside, key))};
+}
 
 export class Tree {
   constructor(model) {
@@ -37,30 +60,11 @@ export class Tree {
   rebuild() {
     const focused = document.activeElement?.dataset?.row;
     const found = this.found();
-    const groups = new Map();
-    for (const object of found) {
-      const group = groupOf(object.name);
-      if (!groups.has(group)) groups.set(group, []);
-      groups.get(group).push(object);
-    }
     const rows = [];
-    for (const [group, members] of groups) {
-      if (rows.length > MOST_ROWS) break;
-      if (group) rows.push(this.groupRow(group, members));
-      if (this.closed.has(group)) continue;
-      const room = Math.max(MOST_ROWS - rows.length, 0);
-      for (const object of members.slice(0, room)) {
-        rows.push(this.row(object, Boolean(group)));
-        if (this.isOpen(object)) rows.push(...this.pieceRows(object, Boolean(group)));
-      }
-    }
-    const shown = rows.filter(({dataset}) => dataset.index !== undefined).length;
-    const closed =
-        [...groups].filter(([g]) => this.closed.has(g)).reduce((n, [, m]) => n + m.length, 0);
-    const rest = found.length - shown - closed;
-    if (rest > 0) {
+    const left = this.addRows(treeOf(found), 0, rows);
+    if (left > 0) {
       rows.push(
-          element('div', {className: 'more'}, `and ${grouped(rest)} more: search to find them`));
+          element('div', {className: 'more'}, `and ${grouped(left)} more: search to find them`));
     }
     if (!found.length) {
       const empty = this.model.objects.length ? 'No name has this in it.' : 'There is nothing yet.';
@@ -70,7 +74,34 @@ export class Tree {
     if (focused) this.root.querySelector(`[data-row="${CSS.escape(focused)}"]`)?.focus();
   }
 
-  groupRow(group, members) {
+  // Adds the rows of a group's content. Returns the number of objects without a row, except those in
+  // collapsed groups.
+  addRows({members, groups, prefix}, depth, rows) {
+    let left = 0;
+    const add = (row) => {
+      row.style.paddingLeft = `${6 + INDENT * depth}px`;
+      rows.push(row);
+    };
+    for (const group of groups) {
+      if (rows.length >= MOST_ROWS) {
+        left += group.objects.length;
+        continue;
+      }
+      add(this.groupRow(group.prefix, group.prefix.slice(prefix.length), group.objects));
+      if (!this.closed.has(group.prefix)) left += this.addRows(group, depth + 1, rows);
+    }
+    for (const object of members) {
+      if (rows.length >= MOST_ROWS) {
+        ++left;
+        continue;
+      }
+      add(this.row(object, prefix));
+      if (this.isOpen(object)) this.pieceRows(object).forEach(add);
+    }
+    return left;
+  }
+
+  groupRow(group, name, members) {
     const closed = this.closed.has(group);
     const visible = members.some((object) => object.visible);
     return element(
@@ -86,7 +117,7 @@ export class Tree {
                 this.rebuild();
               },
             },
-            `${closed ? '\u25b8' : '\u25be'} ${group} `,
+            `${closed ? '\u25b8' : '\u25be'} ${name} `,
             element('span', {className: 'quiet'}, grouped(members.length))),
         this.eye(visible, group, `group-eye ${group}`, () => {
           for (const object of members) object.visible = !visible;
@@ -119,7 +150,7 @@ export class Tree {
   }
 
   // Pieces cannot be selected or moved individually: the body is one object.
-  pieceRows(object, nested) {
+  pieceRows(object) {
     const {model} = this;
     const {pieces} = model.bodies.get(object.hullId);
     const place = model.pair?.indexOf(object.index) ?? -1;
@@ -127,7 +158,7 @@ export class Tree {
     const rows = pieces.slice(0, MOST_PIECE_ROWS).map((piece, i) => {
       const isAbsent = model.absent.has(piece.hullId);
       return element(
-          'div', {className: `row piece ${nested ? 'nested' : ''} ${isAbsent ? 'gone' : ''}`},
+          'div', {className: `row piece ${isAbsent ? 'gone' : ''}`},
           element('span', {className: 'name', title: piece.hullId}, `${i}: ${piece.hullId}`),
           isAbsent && element('span', {className: 'tag quiet'}, 'missing'),
           piece === decider && element('span', {className: 'tag quiet'}, 'decides'));
@@ -139,20 +170,21 @@ export class Tree {
     return rows;
   }
 
-  row(object, nested) {
+  // `prefix`: that of the object's group.
+  row(object, prefix) {
     const {model} = this;
     const isSelected = object.index === model.selected;
     const isOther = object.index === model.other && model.selected !== null;
     const relation = RELATIONS[model.relationOf.get(object.index)];
     const names = [
-      'row', nested && 'nested', isSelected && 'selected', object.gone && 'gone',
+      'row', isSelected && 'selected', object.gone && 'gone',
       !object.visible && 'off'
     ];
     const row = element(
         'div', {className: names.filter(Boolean).join(' '), 'data-index': object.index},
         element('input', {
           type: 'color',
-          value: object.color,
+          value: model.colorOf(object),
           'aria-label': `Color of ${object.name}`,
           oninput: ({target}) => {
             object.color = target.value;
@@ -169,7 +201,7 @@ export class Tree {
               onclick: ({shiftKey}) => this.choose(object, shiftKey),
               ondblclick: () => model.tell('fly', [object]),
             },
-            nested ? object.name.slice(groupOf(object.name).length) : object.name),
+            object.name.slice(prefix.length)),
         relation &&
             element(
                 'span', {className: `tag ${relation.style}`, title: relation.word},

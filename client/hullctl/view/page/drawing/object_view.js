@@ -1,9 +1,9 @@
 // Draws one object with three.js: points, mesh, and hull with its edges. Its group is at the center
 // of the object's box, turned by the pose.
-import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
+import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
 import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {discTexture, THREE} from 'hulld/three.js';
+import {discTexture, THREE} from 'hulld/drawing/three.js';
 
 const FLASH_MS = 1200;
 
@@ -67,14 +67,20 @@ export class ObjectView extends DrawnGroup {
   }
 
   addMesh(mesh) {
-    const material = facetMaterial({color: this.object.color, side: THREE.DoubleSide});
+    const {opacity} = this.object;
+    const material = facetMaterial({
+      color: this.model.colorOf(this.object),
+      side: THREE.DoubleSide,
+      transparent: opacity < 1,
+      opacity,
+    });
     this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
   }
 
   addPoints(shape) {
     const size = shape.vertexCount > 20000 ? 1.5 : 4;
     const material = new THREE.PointsMaterial({
-      color: this.stage.theme.edge,
+      color: this.pointColor(),
       size,
       sizeAttenuation: false,
       map: discTexture(),
@@ -85,18 +91,32 @@ export class ObjectView extends DrawnGroup {
     this.shift(points, shape);
   }
 
-  // Far sides first, then near ones: correct for convex shapes.
+  // Points stand out from the facets of their own color.
+  pointColor() {
+    const color = new THREE.Color(this.model.colorOf(this.object));
+    return color.lerp(new THREE.Color(this.stage.theme.edge), this.model.show.hull ? 0.35 : 0);
+  }
+
+  // A hull is solid. With a mesh or points inside, or with an overlap to be seen, it is glass: far
+  // sides are drawn before near ones, which is correct for convex shapes.
   addHull(hull, isBeside) {
-    const flat = hull.dimension < 3;
-    const sides = flat ? [THREE.DoubleSide] :
-        isHuge(hull)   ? [THREE.FrontSide] :
-                         [THREE.BackSide, THREE.FrontSide];
+    const {model, object} = this;
+    const overlaps = model.relationOf.get(object.index) === 'RELATION_OVERLAPPING';
+    const opacity = object.opacity * (isBeside ? 0.3 : overlaps && !isHuge(hull) ? 0.62 : 1);
+    const isGlass = opacity < 1;
+    const sides = hull.dimension < 3  ? [THREE.DoubleSide] :
+        isGlass && !isHuge(hull)      ? [THREE.BackSide, THREE.FrontSide] :
+                                        [THREE.FrontSide];
     for (const side of sides) {
-      const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
-      const material = facetMaterial(
-          {color: this.object.color, side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+      const glass = {
+        transparent: true,
+        opacity: side === THREE.BackSide ? opacity / 2 : opacity,
+        depthWrite: false,
+      };
+      const material =
+          facetMaterial({color: model.colorOf(object), side, ...(isGlass ? glass : {})});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
-      part.renderOrder = side === THREE.FrontSide ? 4 : 3;
+      part.renderOrder = side === THREE.BackSide ? 3 : 4;
       this.shift(part, hull);
     }
   }
@@ -106,7 +126,7 @@ export class ObjectView extends DrawnGroup {
     const material = new THREE.LineBasicMaterial({
       color: relation ? relation.lit : this.stage.theme.edge,
       transparent: true,
-      opacity: relation ? 0.6 : this.stage.theme.edgeOpacity * edgeWeight(hull.edgeCount),
+      opacity: (relation ? 0.8 : this.stage.theme.edgeOpacity) * edgeWeight(hull.edgeCount),
     });
     const edges = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
     edges.renderOrder = 5;

@@ -13,14 +13,29 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
-// Shows a number that reads back as the same double.
-export const exact = (value) => element('span', {className: 'number'}, String(Number(value)));
-
 // Formats "1234567" as "1 234 567", with thin spaces.
 export const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u2009');
 
 // Rounds to a few digits, for people.
 export const short = (value) => Number(Number(value).toPrecision(4)).toString();
+
+// Shows rounded numbers; the title has texts that read back as the same doubles.
+export const rounded = (...values) => element(
+    'span', {className: 'number', title: values.map((value) => String(Number(value))).join(' ')},
+    values.map(short).join(' '));
+
+// Puts a text on the clipboard. Browsers without permission for it accept an older way.
+export async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+  } catch {
+    const area = element('textarea', {value: text});
+    (document.querySelector('dialog[open]') || document.body).append(area);
+    area.select();
+    document.execCommand('copy');
+    area.remove();
+  }
+}
 
 // Makes a list of facts; omits rows without a value.
 export function facts(rows) {
@@ -31,6 +46,3 @@ export function facts(rows) {
   }
   return list;
 }
-
-export const vector = (...xyz) =>
-    element('span', {className: 'number'}, xyz.map((v) => String(Number(v))).join(' '));

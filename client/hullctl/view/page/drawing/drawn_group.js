@@ -1,5 +1,5 @@
 // Parts drawn for one purpose, in a group of the scene, added and removed together.
-import {THREE} from 'hulld/three.js';
+import {THREE} from 'hulld/drawing/three.js';
 
 export class DrawnGroup {
   constructor(model, stage) {
@@ -24,11 +24,10 @@ export class DrawnGroup {
   }
 }
 
-// Material of flat-shaded facets.
+// Material of flat-shaded facets. Without highlights, each facet has one color.
 export const facetMaterial = (options) => new THREE.MeshPhongMaterial({
   flatShading: true,
-  shininess: 12,
-  specular: 0x222222,
+  specular: 0x000000,
   polygonOffset: true,
   polygonOffsetFactor: 1,
   polygonOffsetUnits: 1,

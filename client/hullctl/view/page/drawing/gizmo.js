@@ -1,7 +1,7 @@
 // Handles at the center of the selected object's box that move and turn it.
 import {AXIS_COLORS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
-import {THREE} from 'hulld/three.js';
+import {THREE} from 'hulld/drawing/three.js';
 
 // three.js paints axes pure red, green, and blue, which color-blind users may confuse.
 function repaint(handles) {
@@ -12,6 +12,24 @@ function repaint(handles) {
   });
 }
 
+// three.js draws the rings of the turn handles as lines of one pixel. Adds a tube along each.
+function thicken(handles) {
+  const {gizmo} = handles.children.find((part) => part.gizmo);
+  for (const ring of gizmo.rotate.children) {
+    if (!ring.isLine || !/^[XYZ]$/.test(ring.name)) continue;
+    const {array} = ring.geometry.attributes.position;
+    const points = Array.from(
+        {length: array.length / 3}, (_, i) => new THREE.Vector3().fromArray(array, 3 * i));
+    const tube = new THREE.TubeBufferGeometry(
+        new THREE.CatmullRomCurve3(points), points.length, 0.018, 6, false);
+    const {color} = ring.material;
+    const material = new THREE.MeshBasicMaterial({color, depthTest: false, transparent: true});
+    const part = new THREE.Mesh(tube, material);
+    part.renderOrder = Infinity;
+    ring.add(part);
+  }
+}
+
 export class Gizmo {
   constructor(model, stage) {
     this.model = model;
@@ -20,6 +38,7 @@ export class Gizmo {
     this.handles = new THREE.TransformControls(stage.camera, stage.canvas);
     this.handles.setSize(0.75);
     repaint(this.handles);
+    thicken(this.handles);
     stage.scene.add(this.proxy, this.handles);
     this.handles.addEventListener('change', () => stage.draw());
     this.handles.addEventListener('objectChange', () => this.follow(false));

@@ -1,10 +1,13 @@
 // The server's answer about the pair, and about all pairs of the scene.
-import {element, exact, facts, grouped, short, vector} from 'hulld/dom.js';
+import {element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
 import {MARK_COLORS, RELATIONS, RUNGS} from 'hulld/palette.js';
 import {poseText} from 'hulld/pose.js';
+import {certificateProblem} from 'hulld/proof/certificate.js';
 
 const MOST_ROWS = 200;
 const MOST_CHOICES = 400;
+// Certificates about more vertices are checked on demand: a million take seconds.
+const MOST_CHECKED_VERTICES = 20000;
 const MARK_NAMES = {
   plane: 'plane',
   axis: 'axis',
@@ -36,7 +39,7 @@ export class AnswerPanel {
     const {pair} = model;
     if (!pair) {
       const hint = model.objects.filter((o) => o.hullId && !o.gone).length > 1 ?
-          'Select an object, then shift-click another one.' :
+          'Select an object in the picture or the list; the nearest one becomes the other of the pair.' :
           'A pair needs two hulls or bodies.';
       this.root.replaceChildren(
           element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
@@ -87,7 +90,52 @@ export class AnswerPanel {
     this.body.setAttribute('aria-busy', String(!answer.rest));
     const open = this.body.querySelector('details')?.open;
     this.body.replaceChildren(
-        this.verdict(answer), this.table(answer), this.toggles(), this.command(answer, open));
+        this.verdict(answer), this.proof(answer), this.table(answer), this.toggles(),
+        this.command(answer, open));
+  }
+
+  // The result of checking the certificate in this page.
+  proof(answer) {
+    const line = element('p', {id: 'proof', className: 'quiet'});
+    if (!answer.rest || !answer.certificate) return line;
+    const sides = this.model.pair.map((index, k) => this.placedSide(answer, index, k));
+    const reason = sides.find((side) => typeof side === 'string');
+    if (reason) {
+      line.textContent = `Certificate not checked: ${reason}`;
+      return line;
+    }
+    const run = () => {
+      const problem = certificateProblem(answer.relation, answer.certificate, ...sides);
+      const isPieces = this.model.decidingPieces().some(Boolean);
+      line.className = problem ? 'refuted' : 'proven';
+      line.textContent = problem ? `\u2717 Certificate refuted here: ${problem}` :
+          isPieces ? '\u2713 Proven for the deciding pieces, by exact arithmetic in this page' :
+                     '\u2713 Proven by exact arithmetic in this page';
+    };
+    const count = sides.reduce((total, {xyz}) => total + xyz.length / 3, 0);
+    if (count <= MOST_CHECKED_VERTICES) {
+      run();
+    } else {
+      line.append(element(
+          'button', {type: 'button', onclick: run},
+          `Check the certificate here (${grouped(count)} vertices)`));
+    }
+    return line;
+  }
+
+  // Returns what the certificate concerns at place k of the pair, or the reason why the page cannot
+  // check it.
+  placedSide(answer, index, k) {
+    const {model} = this;
+    const object = model.objects[index];
+    const version = [answer.hullA, answer.hullB][k];
+    const piece = model.decidingPieces()[k];
+    const hull = model.hulls.get(piece ? piece.hullId : object.hullId);
+    if (!hull) return `the vertices of ${piece ? piece.hullId : object.name} are not here`;
+    if (model.revisionOf(object.hullId) !== version.revision)
+      return `${object.name} has changed since the answer`;
+    const pose = answer.poses.slice(7 * k, 7 * k + 7);
+    return {xyz: hull.xyz, poses: piece ? [pose, piece.pose] : [pose]};
   }
 
   verdict(answer) {
@@ -103,17 +151,17 @@ export class AnswerPanel {
     const {separation, witness, axis, certificate} = answer;
     const value = Number(separation?.value);
     const list = facts([
-      ['separation', separation && exact(separation.value)],
+      ['separation', separation && rounded(separation.value)],
       [
         '',
         value < 0 ? element('span', {className: 'quiet'}, 'minus the depth of the overlap') : null
       ],
-      ['within', separation && exact(separation.bound)],
-      ['axis', axis?.direction && vector(axis.direction.x, axis.direction.y, axis.direction.z)],
-      ['', axis?.direction && element('span', {className: 'quiet'}, AXIS_KINDS[axis.kind] || '')],
-      ['point of A', witness && vector(witness.pointA.x, witness.pointA.y, witness.pointA.z)],
-      ['point of B', witness && vector(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
+      ['within', separation && rounded(separation.bound)],
       ['certificate', certificate && this.certificateText(certificate)],
+      ['axis', axis?.direction && rounded(axis.direction.x, axis.direction.y, axis.direction.z)],
+      ['', axis?.direction && element('span', {className: 'quiet'}, AXIS_KINDS[axis.kind] || '')],
+      ['point of A', witness && rounded(witness.pointA.x, witness.pointA.y, witness.pointA.z)],
+      ['point of B', witness && rounded(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
       ['decided by', RUNGS[answer.rung]],
       ...this.pieceRows(answer),
       ...this.tolerantRows(answer),
@@ -134,7 +182,7 @@ export class AnswerPanel {
     if (!tolerant) return [];
     const {word, sign} = RELATIONS[tolerant.relation];
     return [
-      ['tolerance', exact(tolerant.tolerance)],
+      ['tolerance', rounded(tolerant.tolerance)],
       ['with it', `${sign} ${word}`],
       ['decided then by', RUNGS[tolerant.rung]],
     ];

@@ -1,22 +1,37 @@
-// A picture of the stage, for `hullctl view --png`: the drawing, its labels, and its axes, as a PNG
-// in an attribute of the body, which the browser outputs as text. So it depends neither on the
+// Pictures of the stage: the drawing, its labels, its axes, and its scale. They depend neither on the
 // browser's window nor on the time at which it is shown.
 
-export function keepPicture(stage) {
+// Returns a canvas with the picture of the last frame.
+function pictureOf(stage) {
   const sheet = document.createElement('canvas');
+  [sheet.width, sheet.height] = [stage.canvas.width, stage.canvas.height];
+  const context = sheet.getContext('2d');
+  context.drawImage(stage.canvas, 0, 0);
+  const ratio = stage.canvas.width / stage.canvas.clientWidth;
+  context.scale(ratio, ratio);
+  const origin = stage.canvas.getBoundingClientRect();
+  drawTriad(context, origin);
+  drawScale(context, origin);
+  for (const label of stage.canvas.parentElement.querySelectorAll('.label:not([hidden])')) {
+    drawLabel(context, origin, label);
+  }
+  return sheet;
+}
+
+// Keeps a PNG of each frame in an attribute of the body, which the browser outputs as text; for
+// `hullctl view --png`.
+export function keepPicture(stage) {
   stage.afterFrame(() => {
-    [sheet.width, sheet.height] = [stage.canvas.width, stage.canvas.height];
-    const context = sheet.getContext('2d');
-    context.drawImage(stage.canvas, 0, 0);
-    const ratio = stage.canvas.width / stage.canvas.clientWidth;
-    context.scale(ratio, ratio);
-    const origin = stage.canvas.getBoundingClientRect();
-    drawTriad(context, origin);
-    for (const label of document.querySelectorAll('#labels .label:not([hidden])')) {
-      drawLabel(context, origin, label);
-    }
-    document.body.dataset.png = sheet.toDataURL('image/png');
+    document.body.dataset.png = pictureOf(stage).toDataURL('image/png');
   });
+}
+
+// Lets the browser save a PNG under the name.
+export function savePicture(stage, name) {
+  const link = document.createElement('a');
+  link.download = name;
+  link.href = pictureOf(stage).toDataURL('image/png');
+  link.click();
 }
 
 function boxOf(element, origin) {
@@ -72,4 +87,22 @@ function drawTriad(context, origin) {
     }
   }
   context.restore();
+}
+
+function drawScale(context, origin) {
+  const bar = document.getElementById('scale');
+  if (!bar.textContent) return;
+  const style = getComputedStyle(bar);
+  const {left, top, width, height} = boxOf(bar, origin);
+  context.strokeStyle = context.fillStyle = style.color;
+  context.lineWidth = 1;
+  context.beginPath();
+  context.moveTo(left + 0.5, top + height - 5);
+  context.lineTo(left + 0.5, top + height - 0.5);
+  context.lineTo(left + width - 0.5, top + height - 0.5);
+  context.lineTo(left + width - 0.5, top + height - 5);
+  context.stroke();
+  context.textBaseline = 'bottom';
+  context.textAlign = 'center';
+  drawText(context, bar.textContent, style, left + width / 2, top + height - 4);
 }

@@ -1,5 +1,5 @@
 // Keyboard access to every action of the pointer.
-import {element} from 'hulld/dom.js';
+import {element} from 'hulld/panels/dom.js';
 
 // Keys, their descriptions, and their actions.
 export function bindKeys(actions) {
@@ -16,13 +16,22 @@ export function bindKeys(actions) {
     [['R'], '', 'handles that turn', () => actions.mode('rotate')],
     [['X', 'Y', 'Z'], ' ', 'move the object a step along an axis; with Shift back', null],
     [['Backspace'], '', 'put the object back where it was', actions.reset],
+    [['U'], '', 'undo the last motion; also Ctrl+Z', actions.undo],
     [['\u2190', '\u2191', '\u2193', '\u2192'], ' ', 'orbit; with Shift pan', null],
     [['+', '\u2212'], ' ', 'zoom', null],
+    [['I'], '', 'isometric view', () => actions.view('isometric')],
+    [['A'], '', 'view from the front', () => actions.view('front')],
+    [['T'], '', 'view from the top', () => actions.view('top')],
+    [['S'], '', 'view from the right', () => actions.view('right')],
+    [['O'], '', 'orthographic view', actions.orthographic],
+    [['Q'], '', 'measure between two points', actions.measure],
+    [['W'], '', 'save the picture', actions.save],
     [['P'], '', 'points', () => actions.show('points')],
     [['M'], '', 'mesh', () => actions.show('mesh')],
     [['H'], '', 'hull', () => actions.show('hull')],
     [['E'], '', 'edges', () => actions.show('edges')],
     [['L'], '', 'labels', () => actions.show('labels')],
+    [['#'], '', 'grid of the ground', () => actions.show('grid')],
     [['V'], '', 'hide or show the selected object', actions.toggleVisible],
     [['/'], '', 'search', actions.search],
     [['D'], '', 'light or dark', actions.theme],
@@ -38,7 +47,8 @@ export function bindKeys(actions) {
   plain.set('escape', plain.get('esc'));
 
   addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const isUndo = (event.ctrlKey || event.metaKey) && event.key === 'z';
+    if ((event.ctrlKey || event.metaKey || event.altKey) && !isUndo) return;
     const typing = event.target.matches?.(
         'input:not([type="checkbox"]):not([type="color"]), select, textarea');
     if (typing) {
@@ -46,7 +56,7 @@ export function bindKeys(actions) {
       return;
     }
     if (document.querySelector('dialog[open]')) return;
-    const act = special(event, actions) || plain.get(event.key.toLowerCase());
+    const act = isUndo ? actions.undo : special(event, actions) || plain.get(event.key.toLowerCase());
     if (!act) return;
     event.preventDefault();
     act();

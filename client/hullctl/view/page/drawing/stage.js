@@ -1,7 +1,7 @@
 // The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
 // relative to model.origin.
 import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
-import {THREE} from 'hulld/three.js';
+import {THREE} from 'hulld/drawing/three.js';
 
 const FLIGHT_MS = 350;
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
@@ -14,11 +14,16 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
-    this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.75);
-    this.lamp = new THREE.DirectionalLight(0xffffff, 0.45);
-    this.lamp.position.set(0.4, 0.7, 1);
-    this.camera.add(this.lamp);
+    // The sky tells upper from lower faces; the lamp, above the camera's left, left from right ones.
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.7);
+    this.lamp = new THREE.DirectionalLight(0xffffff, 0.42);
+    this.lamp.position.set(-0.7, 1, 0.5);
+    // The light shines from its position toward its target; both move with the camera.
+    this.camera.add(this.lamp, this.lamp.target);
     this.scene.add(this.sky, this.camera);
+    this.isOrthographic = false;
+    // True until the user moves the camera: then the whole scene stays in view.
+    this.isFitted = false;
     this.radius = 1;
     this.frames = 0;
     this.before = [];
@@ -37,10 +42,31 @@ export class Stage {
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
-    this.controls.addEventListener('change', () => this.draw());
+    let byHand = false;
     this.controls.addEventListener('start', () => {
+      byHand = true;
       this.flight = null;
     });
+    this.controls.addEventListener('end', () => {
+      byHand = false;
+    });
+    this.controls.addEventListener('change', () => {
+      if (byHand) this.isFitted = false;
+      this.draw();
+    });
+    const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    const negative = (axis) => axis.map((value) => -value);
+    const front = {x: z, y: z, z: negative(y)}[up];
+    const right = {x: negative(y), y: x, z: x}[up];
+    // Directions from the target to the camera. The top has a bit of the front, so that the front is
+    // at the bottom of the picture.
+    this.views = {
+      front,
+      right,
+      top: this.camera.up.toArray().map((value, k) => value + 1e-4 * front[k]),
+      isometric: this.camera.up.toArray().map((value, k) => value + front[k] + right[k]),
+    };
+    this.sky.position.copy(this.camera.up);
   }
 
   setTheme(name) {
@@ -56,7 +82,6 @@ export class Stage {
     if (!clientWidth || !clientHeight) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
-    this.camera.updateProjectionMatrix();
     this.draw();
   }
 
@@ -82,7 +107,7 @@ export class Stage {
   frame(now) {
     let more = this.fly(now);
     for (const update of this.before) more = update(now) || more;
-    this.fitDepth();
+    this.project();
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
     this.drawTriad();
@@ -90,13 +115,38 @@ export class Stage {
     if (more) this.draw();
   }
 
-  // Fits the near and far planes to the scene, for full depth precision.
-  fitDepth() {
-    const distance = this.camera.position.distanceTo(this.controls.target);
+  get distance() {
+    return this.camera.position.distanceTo(this.controls.target);
+  }
+
+  // Returns half of the height of the picture at the target, in the caller's length unit.
+  get halfHeight() {
+    return this.distance * Math.tan(this.camera.fov * Math.PI / 360);
+  }
+
+  lengthPerPixel() {
+    return 2 * this.halfHeight / this.canvas.clientHeight;
+  }
+
+  // Fits the near and far planes to the scene, for full depth precision. The orthographic view has
+  // the scale of the perspective one at the target.
+  project() {
+    const {camera, distance} = this;
     const reach = 4 * this.radius + this.controls.target.length();
-    this.camera.near = Math.max((distance - reach) / 2, distance / 500, reach / 1e5);
-    this.camera.far = distance + 2 * reach;
-    this.camera.updateProjectionMatrix();
+    camera.near = Math.max((distance - reach) / 2, distance / 500, reach / 1e5);
+    camera.far = distance + 2 * reach;
+    camera.updateProjectionMatrix();
+    if (!this.isOrthographic) return;
+    const height = this.halfHeight;
+    const width = height * camera.aspect;
+    camera.projectionMatrix.makeOrthographic(
+        -width, width, height, -height, distance - 2 * reach, camera.far);
+    camera.projectionMatrixInverse.getInverse(camera.projectionMatrix);
+  }
+
+  setOrthographic(on) {
+    this.isOrthographic = on;
+    this.draw();
   }
 
   // Returns the direction from the target to the camera that shows three sides.
@@ -105,10 +155,14 @@ export class Stage {
     return new THREE.Vector3(...view).normalize();
   }
 
-  // Shows all of the bounds (model.js); keeps the direction of view unless one is given.
+  // Shows all of the bounds (model.js); keeps the direction of view unless one is given: a key of
+  // `views`, or a vector.
   flyTo({center, radius, corners}, {jump = false, direction = null} = {}) {
     const target = new THREE.Vector3(...center.map((value, k) => value - this.model.origin[k]));
-    const view = direction || this.camera.position.clone().sub(this.controls.target).normalize();
+    const view = this.views[direction] ? new THREE.Vector3(...this.views[direction]) :
+                                         direction?.clone() ||
+            this.camera.position.clone().sub(this.controls.target);
+    view.normalize();
     if (!(view.length() > 0.5)) view.copy(this.defaultView());
     const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();
     const up = new THREE.Vector3().crossVectors(view, right);
@@ -118,9 +172,9 @@ export class Stage {
     let distance = 0.05 * radius;
     for (const corner of corners) {
       const p = new THREE.Vector3(...corner.map((value, k) => value - center[k]));
+      const depth = this.isOrthographic ? 0 : p.dot(view);
       distance = Math.max(
-          distance, p.dot(view) + Math.abs(p.dot(up)) / height,
-          p.dot(view) + Math.abs(p.dot(right)) / width);
+          distance, depth + Math.abs(p.dot(up)) / height, depth + Math.abs(p.dot(right)) / width);
     }
     const position = target.clone().addScaledVector(view, distance);
     if (jump || calm.matches) {
@@ -136,6 +190,24 @@ export class Stage {
       };
     }
     this.draw();
+  }
+
+  // Shows all of the bounds again if they grew out of the picture, unless the user chose the view.
+  // Leaves room for further growth.
+  keepInView(bounds) {
+    if (!this.isFitted || this.flight) return;
+    const isOutside = bounds.corners.some((corner) => {
+      const seen = this.toScreen(
+          new THREE.Vector3(...corner.map((value, k) => value - this.model.origin[k])));
+      return !seen || seen[0] < 0 || seen[0] > this.canvas.clientWidth || seen[1] < 0 ||
+          seen[1] > this.canvas.clientHeight;
+    });
+    if (!isOutside) return;
+    const {center, radius, corners} = bounds;
+    this.radius = radius;
+    const roomy =
+        corners.map((corner) => corner.map((value, k) => center[k] + 1.3 * (value - center[k])));
+    this.flyTo({center, radius, corners: roomy});
   }
 
   fly(now) {
@@ -155,6 +227,7 @@ export class Stage {
 
   // For the keyboard: angles in radians, a factor of the distance, or a shift across the picture.
   orbit(around, over) {
+    this.isFitted = false;
     const offset = this.camera.position.clone().sub(this.controls.target);
     const up = this.camera.up;
     const right = new THREE.Vector3().crossVectors(up, offset).normalize();
@@ -167,6 +240,7 @@ export class Stage {
   }
 
   zoom(factor) {
+    this.isFitted = false;
     const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
@@ -174,9 +248,9 @@ export class Stage {
   }
 
   pan(right, up) {
-    const distance = this.camera.position.distanceTo(this.controls.target);
+    this.isFitted = false;
     const shift = new THREE.Vector3(right, up, 0)
-                      .multiplyScalar(distance * 0.05)
+                      .multiplyScalar(this.distance * 0.05)
                       .applyQuaternion(this.camera.quaternion);
     this.camera.position.add(shift);
     this.controls.target.add(shift);

@@ -1,0 +1,109 @@
+// Names over the objects, as text of the page. Labels do not overlap: those of the pair come first,
+// then those nearer to the camera.
+import {THREE} from 'hulld/drawing/three.js';
+import {RELATIONS} from 'hulld/palette.js';
+
+const GAP = 2;
+
+const overlap = (a, b) => a.left < b.left + b.width + GAP && b.left < a.left + a.width + GAP &&
+    a.top < b.top + b.height + GAP && b.top < a.top + a.height + GAP;
+
+export class Labels {
+  constructor(model, stage) {
+    this.model = model;
+    this.stage = stage;
+    this.root = document.getElementById('labels');
+    this.rows = new Map();
+    stage.afterFrame(() => this.place());
+  }
+
+  rebuild() {
+    const {model} = this;
+    this.root.replaceChildren();
+    this.rows.clear();
+    const wanted = !model.show.labels ? [] :
+        model.isNameless              ? model.objects.filter((o) => this.isOfPair(o)) :
+                                        model.objects;
+    for (const object of wanted) {
+      if (!model.isShown(object) || !model.shapeOf(object)) continue;
+      const element = document.createElement('div');
+      const relation = RELATIONS[model.relationOf.get(object.index)];
+      element.className = 'label';
+      element.textContent = object.name;
+      if (relation) {
+        const tag = document.createElement('span');
+        tag.className = `tag ${relation.style}`;
+        tag.textContent = ` ${relation.sign} ${relation.word}`;
+        element.append(tag);
+      }
+      this.root.append(element);
+      this.rows.set(object, {element});
+    }
+    for (const row of this.rows.values()) {
+      row.width = row.element.offsetWidth;
+      row.height = row.element.offsetHeight;
+    }
+    this.stage.draw();
+  }
+
+  isOfPair({index}) {
+    return index === this.model.selected || index === this.model.other;
+  }
+
+  // Places each label above the box of its object in the picture, or below it. Hides it if it would
+  // overlap a label that matters more or the buttons, or if the object is out of the picture.
+  place() {
+    const rows = [...this.rows];
+    for (const [object, row] of rows) {
+      row.anchor = this.anchorOf(object);
+      row.rank = this.isOfPair(object) ? -1 : row.anchor?.distance;
+    }
+    const taken = this.buttonBoxes();
+    for (const [, row] of rows.sort(([, p], [, q]) => p.rank - q.rank)) {
+      const box = row.anchor && this.freeBox(row, taken);
+      row.element.hidden = !box;
+      if (!box) continue;
+      taken.push(box);
+      row.element.style.transform = `translate(${box.left}px, ${box.top}px)`;
+    }
+  }
+
+  buttonBoxes() {
+    const {left, top} = this.root.getBoundingClientRect();
+    return [...this.stage.canvas.parentElement.querySelectorAll('.views button, .tools')].map(
+        (button) => {
+          const {x, y, width, height} = button.getBoundingClientRect();
+          return {left: x - left, top: y - top, width, height};
+        });
+  }
+
+  // Returns {left, top, width, height}, in pixels of the picture; undefined if there is no room.
+  freeBox({anchor, width, height}, taken) {
+    const {clientWidth, clientHeight} = this.stage.canvas;
+    const left =
+        Math.round(Math.min(Math.max(anchor.x - width / 2, GAP), clientWidth - width - GAP));
+    return [anchor.top - height, anchor.bottom]
+        .map((top) => ({left, top: Math.round(top), width, height}))
+        .find(
+            (box) => box.top >= 0 && box.top + height <= clientHeight &&
+                taken.every((other) => !overlap(box, other)));
+  }
+
+  // Returns {x, top, bottom, distance}: the extent of an object's box in the picture, and its distance
+  // from the camera; null if the middle of the box is outside the picture.
+  anchorOf(object) {
+    const {model, stage} = this;
+    const corners = model.boxCornersOf(object).map(
+        (corner) => stage.toScreen(
+            new THREE.Vector3(...corner.map((value, k) => value - model.origin[k]))));
+    if (!corners.every(Boolean)) return null;
+    const [xs, ys] = [0, 1].map((k) => corners.map((corner) => corner[k]));
+    const [top, bottom] = [Math.min(...ys), Math.max(...ys)];
+    const x = (Math.min(...xs) + Math.max(...xs)) / 2;
+    const {clientWidth, clientHeight} = stage.canvas;
+    if (x < 0 || x > clientWidth || bottom < 0 || top > clientHeight) return null;
+    const center = new THREE.Vector3(
+        ...model.centerOf(object).map((value, k) => value - model.origin[k]));
+    return {x, top, bottom, distance: center.distanceTo(stage.camera.position)};
+  }
+}

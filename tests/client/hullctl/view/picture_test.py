@@ -1,0 +1,323 @@
+"""Tests of the picture and the tools of the viewer's page, in a real browser.
+
+    /usr/bin/python3 picture_test.py BIN_DIRECTORY [TEST...]
+"""
+
+import ast
+import base64
+import json
+import pathlib
+import shlex
+import struct
+import unittest
+
+import viewing
+from viewer_case import AT_REST, ViewerCase
+
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+
+class PictureTest(ViewerCase):
+    # --- The picture ---
+
+    def test_faces_of_a_cube_differ(self):
+        self.view("box")
+        for theme in ("light", "dark"):
+            self.browser.js("(() => { const {model} = hulldViewer; hulldViewer.setTheme(arguments[0]);"
+                            " model.show = {...model.show, edges: false, labels: false, grid: false};"
+                            " model.select(null); model.tell('shown'); })()", theme)
+            self.browser.wait("!hulldViewer.stage.waiting")
+            # The ground and three faces: each has one color, with a brightness of its own.
+            shades = sorted(self.browser.js("""(() => {
+              const {stage} = hulldViewer;
+              const gl = stage.renderer.getContext();
+              const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+              const data = new Uint8Array(4 * w * h);
+              stage.renderer.render(stage.scene, stage.camera);
+              gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
+              const counts = new Map();
+              for (let i = 0; i < data.length; i += 4) {
+                const sum = data[i] + data[i + 1] + data[i + 2];
+                counts.set(sum, (counts.get(sum) || 0) + 1);
+              }
+              return [...counts].filter(([, count]) => count > 0.01 * w * h).map(([sum]) => sum);
+            })()"""))
+            self.assertEqual(len(shades), 4, theme)
+            self.assertGreater(min(b - a for a, b in zip(shades, shades[1:])), 40, (theme, shades))
+
+    def place_boxes(self, name, positions):
+        """Writes a scene of boxes, and returns its file name."""
+        scene = {"placements": [{"hullId": "box", "pose": {"translation": dict(zip("xyz", p))}}
+                                for p in positions]}
+        pathlib.Path(self.hulld.directory, name).write_text(json.dumps(scene))
+        return name
+
+    def test_objects_of_a_pair_never_share_a_color(self):
+        for count in (25, 210):
+            self.view(self.place_boxes("colors.json", [(5 * i, 0, 0) for i in range(count)]))
+            self.assertTrue(self.browser.js("""(() => {
+              const {model} = hulldViewer;
+              for (let a = 0; a < 25; ++a) {
+                for (let b = 0; b < a; ++b) {
+                  model.select(a, b);
+                  const [p, q] = [a, b].map((i) => model.colorOf(model.objects[i]));
+                  if (p === q) return false;
+                }
+              }
+              model.objects[1].color = model.objects[0].color = '#123456';
+              model.select(0, 1);
+              return model.colorOf(model.objects[0]) !== model.colorOf(model.objects[1]);
+            })()"""))
+            # The drawn colors follow.
+            self.assertEqual(self.browser.js("""[0, 1].map((i) => {
+              const {views, model} = hulldViewer;
+              const part = views.get(i).group.children.find((child) => child.isMesh);
+              return '#' + part.material.color.getHexString() === model.colorOf(model.objects[i]);
+            })"""), [True, True])
+
+    def test_first_colliding_pair_is_selected(self):
+        self.view(self.place_boxes("pairs.json", [(x, 0, 0) for x in (0, 10, 20, 22)]))
+        self.browser.wait("hulldViewer.model.pair?.join() === '2,3'")
+        self.assertEqual(self.assert_answers_as_api()["relation"], "RELATION_TOUCHING")
+        # A choice of the user stays.
+        self.keys(Keys.ESCAPE)
+        self.browser.js("hulldViewer.ask(true)")
+        self.browser.wait("hulldViewer.model.collisions.update === hulldViewer.update || "
+                          "hulldViewer.model.collisions.pairs.length === 1")
+        self.assertIsNone(self.browser.js("hulldViewer.model.selected"))
+
+    OUTSIDE = """hulldViewer.model.bounds().corners.filter((corner) => {
+      const {stage, model} = hulldViewer;
+      const at = stage.controls.target.clone().set(...corner.map((v, k) => v - model.origin[k]));
+      const seen = stage.toScreen(at);
+      return !seen || seen[0] < 0 || seen[1] < 0 || seen[0] > stage.canvas.clientWidth ||
+          seen[1] > stage.canvas.clientHeight;
+    }).length"""
+
+    def test_a_growing_hull_stays_in_view_unless_the_user_moved_the_camera(self):
+        self.hulld.add_box("grows")
+        self.view("grows")
+        self.hulld.add("grows", ["30 0 0"])
+        self.browser.wait(f"hulldViewer.model.hulls.get('grows').high[0] === 30 && !({self.OUTSIDE})")
+        self.canvas().click()
+        self.keys("+")
+        self.hulld.add("grows", ["900 0 0"])
+        self.browser.wait("hulldViewer.model.hulls.get('grows').high[0] === 900")
+        self.browser.wait("!hulldViewer.stage.waiting && !hulldViewer.stage.flight")
+        self.assertGreater(self.browser.js(self.OUTSIDE), 0)
+        self.keys("f")
+        self.browser.wait(f"!({self.OUTSIDE})")
+
+    def test_the_plane_is_drawn_within_the_scene(self):
+        self.view("room/left", "room/right")
+        self.browser.wait(AT_REST)
+        self.assertTrue(self.browser.js("""(() => {
+          const {marks, model} = hulldViewer;
+          const plane = marks.group.children.find((part) => part.material?.map && part.isMesh);
+          const [low, high] = marks.boxOf(model.objects);
+          const {array, count} = plane.geometry.attributes.position;
+          const heights = Array.from({length: count}, (_, i) => array[3 * i]);
+          const inside = [...array].every(
+              (v, i) => v >= low.getComponent(i % 3) - 1e-5 && v <= high.getComponent(i % 3) + 1e-5);
+          // Halfway between x = 1 and x = 2, and as high as the boxes.
+          return count === 4 && inside && heights.every((x) => Math.abs(x + model.origin[0] - 1.5) < 1e-6);
+        })()"""))
+
+    def test_camera_presets_and_orthographic_view(self):
+        self.view("box")
+        self.browser.wait("hulldViewer.model.selected === 0")
+        direction = ("(({stage}) => stage.camera.position.clone().sub(stage.controls.target)"
+                     ".normalize().toArray())(hulldViewer)")
+        third = 3 ** -0.5
+        for name, key, expected in (("front", "a", (0, 0, 1)), ("top", "t", (0, 1, 0)),
+                                    ("right", "s", (1, 0, 0)), ("isometric", "i", (third,) * 3)):
+            for act in (lambda: self.browser.driver.find_element(
+                            By.CSS_SELECTOR, f"[data-view='{name}']").click(),
+                        lambda: self.keys(key)):
+                self.browser.js("hulldViewer.stage.orbit(0.3, 0.2)")
+                act()
+                self.browser.wait("!hulldViewer.stage.waiting")
+                for seen, wanted in zip(self.browser.js(direction), expected):
+                    self.assertAlmostEqual(seen, wanted, delta=1e-3)
+        # The near and the far side of the box look equally large only in the orthographic view.
+        sides = """(() => {
+          const {stage, model} = hulldViewer;
+          const at = (x, y, z) => stage.toScreen(stage.controls.target.clone()
+              .set(x - model.origin[0], y - model.origin[1], z - model.origin[2]))[0];
+          return (at(1, 0, 1) - at(-1, 0, 1)) / (at(1, 0, -1) - at(-1, 0, -1));
+        })()"""
+        self.keys("a")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        self.assertGreater(self.browser.js(sides), 1.1)
+        self.keys("o")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        self.assertAlmostEqual(self.browser.js(sides), 1)
+        # Picking and the scale bar agree with the projection.
+        self.canvas().click()
+        self.browser.wait("hulldViewer.model.selected === 0")
+        units, pixels, width = self.browser.js("""(() => {
+          const {stage, model} = hulldViewer;
+          const bar = document.querySelector('#scale');
+          const at = (x) => stage.toScreen(stage.controls.target.clone()
+              .add({x, y: 0, z: 0}))[0];
+          return [parseFloat(bar.textContent), bar.getBoundingClientRect().width, at(1) - at(0)];
+        })()""")
+        self.assertAlmostEqual(pixels / units, width, delta=0.02 * width)
+
+    def test_labels_neither_overlap_nor_name_what_is_out_of_view(self):
+        self.view(self.place_boxes("labels.json", [(3 * (i % 4), 0, 3 * (i // 4)) for i in range(16)]))
+        visible = """[...document.querySelectorAll('#labels .label:not([hidden])')].map((label) => {
+          const {left, right, top, bottom} = label.getBoundingClientRect();
+          return [left, right, top, bottom];
+        })"""
+        for width, height in ((1440, 900), (390, 844)):
+            self.browser.resize(width, height)
+            self.browser.wait("innerWidth === arguments[0] && !hulldViewer.stage.waiting", width)
+            boxes = self.browser.js(visible)
+            self.assertGreater(len(boxes), 1)
+            for i, p in enumerate(boxes):
+                for q in boxes[:i]:
+                    self.assertTrue(p[0] >= q[1] or q[0] >= p[1] or p[2] >= q[3] or q[2] >= p[3],
+                                    (width, p, q))
+        self.browser.js("(hulldViewer.stage.controls.target.x += 1000, hulldViewer.stage.draw())")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        self.assertEqual(self.browser.js(visible), [])
+
+    def test_five_hundred_objects_take_few_draw_calls(self):
+        self.view(self.place_boxes("hundreds.json", [(3 * (i % 25), 3 * (i // 25), 0)
+                                                     for i in range(500)]))
+        self.browser.wait("hulldViewer.crowd?.ranges.size === 500")
+        self.browser.js("hulldViewer.model.select(7)")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        self.assertEqual(self.browser.js("hulldViewer.crowd.ranges.size"), 498)
+        self.assertLess(self.browser.js("""(() => {
+          const {stage, gizmo} = hulldViewer;
+          gizmo.handles.detach();
+          stage.renderer.render(stage.scene, stage.camera);
+          return stage.renderer.info.render.calls;
+        })()"""), 20)
+
+    def test_points_have_the_color_of_their_object(self):
+        self.view("room/left", "room/right")
+        self.browser.js("(() => { const {model} = hulldViewer;"
+                        " model.show = {...model.show, points: true, hull: false}; model.tell('shown'); })()")
+        colors = self.browser.js("""[0, 1].map((i) => '#' + hulldViewer.views.get(i).group.children
+            .find((part) => part.isPoints).material.color.getHexString())""")
+        self.assertEqual(colors, self.browser.js(
+            "hulldViewer.model.objects.map((object) => hulldViewer.model.colorOf(object))"))
+
+    def test_opacity_of_one_object(self):
+        self.view("room/left", "room/right")
+        self.browser.js("(() => { const slider = document.querySelector('#opacity');"
+                        " slider.value = 0.4; slider.dispatchEvent(new Event('input')); })()")
+        self.assertEqual(self.browser.js("""[0, 1].map((i) => Math.min(...hulldViewer.views.get(i)
+            .group.children.filter((part) => part.isMesh).map(({material}) => material.opacity)))"""),
+                         [1, 0.2])
+
+    def test_saved_picture_is_that_of_the_stage(self):
+        self.view("room/left", "room/right")
+        self.browser.js("(HTMLAnchorElement.prototype.click = function() {"
+                        " globalThis.saved = [this.download, this.href]; })")
+        self.browser.driver.find_element(By.ID, "save").click()
+        name, data = self.browser.wait("globalThis.saved")
+        self.assertEqual(name, "hulld.png")
+        png = base64.b64decode(data.removeprefix("data:image/png;base64,"))
+        self.assertEqual(list(struct.unpack(">II", png[16:24])), self.browser.js(
+            "[hulldViewer.stage.canvas.width, hulldViewer.stage.canvas.height]"))
+
+    # --- Undo, measuring, copying ---
+
+    def test_undo_restores_poses_bit_for_bit(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        poses = "hulldViewer.model.objects.map(({pose}) => pose)"
+        start = self.browser.js(poses)
+        self.drag_handle(-60, 20)
+        self.browser.wait("hulldViewer.model.history.length === 1")
+        dragged = self.browser.js(poses)
+        self.browser.js("hulldViewer.model.select(0, 1)")
+        self.keys("x")
+        self.browser.wait("hulldViewer.model.history.length === 2")
+        self.keys("u")
+        self.browser.wait("hulldViewer.model.history.length === 1")
+        self.assertEqual(self.browser.js(poses), dragged)
+        self.browser.driver.find_element(By.ID, "undo").click()
+        self.browser.wait("hulldViewer.model.history.length === 0")
+        self.assertEqual(self.browser.js(poses), start)
+        self.assertTrue(self.browser.js("document.querySelector('#undo').disabled"))
+        self.assert_answers_as_api()
+
+    def test_measures_between_two_corners(self):
+        self.view("box")
+        self.browser.wait("hulldViewer.model.selected === 0")
+        self.browser.js("hulldViewer.model.select(null)")
+        self.keys("q")
+        width, height = self.browser.js(
+            "[hulldViewer.stage.canvas.clientWidth, hulldViewer.stage.canvas.clientHeight]")
+        for corner in ((-1, 1, 1), (1, 1, -1)):
+            x, y = self.browser.js("""(() => {
+              const {stage, model} = hulldViewer;
+              const [x, y, z] = arguments[0].map((value, k) => value - model.origin[k]);
+              // Slightly toward the center of the upper face, for a hit.
+              return stage.toScreen(stage.controls.target.clone().set(0.97 * x, y, 0.97 * z));
+            })()""", corner)
+            ActionChains(self.browser.driver).move_to_element_with_offset(
+                self.canvas(), round(x - width / 2), round(y - height / 2)).click().perform()
+        self.browser.wait("hulldViewer.ruler.ends.length === 2")
+        self.assertEqual(float(self.browser.js("document.querySelector('#measured').title")), 8 ** 0.5)
+        self.assertEqual(self.browser.text("#measured"), "2.828")
+        self.keys(Keys.ESCAPE)
+        self.assertTrue(self.browser.js("document.querySelector('#measured').hidden"))
+
+    def test_copies_a_pose_that_hullctl_accepts(self):
+        self.view("room/left", "room/right")
+        self.browser.js("(navigator.clipboard.writeText = async (text) => { globalThis.copied = text; })")
+        self.browser.js("hulldViewer.model.setPose(1, [1, 0, 0, 0, 0.1, 1e-17, -0.3], true)")
+        answer = self.assert_answers_as_api()
+        self.browser.driver.find_element(By.ID, "copy-hullctl").click()
+        copied = self.browser.wait("globalThis.copied")
+        again = self.hulld.json("check", "room/left", *shlex.split(copied), "--separation")
+        self.assertEqual(again["separation"], answer["separation"])
+        self.browser.driver.find_element(By.ID, "copy-python").click()
+        copied = self.browser.wait("globalThis.copied.startsWith('(') && globalThis.copied")
+        self.assertEqual(ast.literal_eval(copied), ("room/right", [1, 0, 0, 0, 0.1, 1e-17, -0.3]))
+
+    def test_numbers_are_short_and_exact_while_edited(self):
+        self.view("room/left", "room/right")
+        self.browser.js("hulldViewer.model.setPose(1, [1, 0, 0, 0, 0.1 + 0.2, 0, 0], true)")
+        field = self.browser.driver.find_element(By.CSS_SELECTOR, "[data-pose='4']")
+        self.assertEqual(field.get_attribute("value"), "0.3")
+        self.assertEqual(field.get_attribute("title"), "0.30000000000000004")
+        field.click()
+        self.assertEqual(field.get_attribute("value"), "0.30000000000000004")
+        field.send_keys(Keys.TAB)
+        self.assertEqual(field.get_attribute("value"), "0.3")
+        self.assertEqual(self.browser.js("hulldViewer.model.objects[1].pose[4]"), 0.1 + 0.2)
+
+    def test_controls_are_above_the_fold(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        for selector in ("[data-pose='6']", "#opacity", "#copy-python", "#simplify"):
+            self.assertLess(self.browser.js(
+                "document.querySelector(arguments[0]).getBoundingClientRect().bottom", selector), 900)
+
+    def test_tree_has_a_group_for_each_prefix(self):
+        for name in ("cell/arm/link-1", "cell/arm/link-2", "cell/table"):
+            self.hulld.add_box(name)
+        self.view("cell/")
+        rows = ("[...document.querySelectorAll('#tree .row .name')]"
+                ".map((row) => row.textContent.replace(/[^a-z0-9/-]/g, ' ').trim().split(/ +/)[0])")
+        self.browser.wait(f"{rows}.length === 5")
+        self.assertEqual(self.browser.js(rows), ["cell/", "arm/", "link-1", "link-2", "table"])
+        self.browser.driver.find_element(By.CSS_SELECTOR, "[data-row='group cell/arm/']").click()
+        self.assertEqual(self.browser.js(rows), ["cell/", "arm/", "table"])
+        self.browser.driver.find_element(By.CSS_SELECTOR, "[data-row='group-eye cell/arm/']").click()
+        self.assertEqual(self.browser.js("hulldViewer.model.objects.map(({visible}) => visible)"),
+                         [False, False, True])
+
+
+if __name__ == "__main__":
+    viewing.PROGRAMS = viewing.bin_directory()
+    unittest.main(verbosity=2)
