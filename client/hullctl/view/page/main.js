@@ -354,6 +354,7 @@ class Viewer {
     this.model.answer = message;
     this.marks.rebuild();
     this.answerPanel.update();
+    this.objectPanel.compare();
     if (this.model.decidingPieces().some((piece, k) => piece !== before[k])) this.tree.rebuild();
   }
 

@@ -61,13 +61,13 @@ class PictureTest(ViewerCase):
               const {model} = hulldViewer;
               for (let a = 0; a < 25; ++a) {
                 for (let b = 0; b < a; ++b) {
-                  model.select(a, b);
+                  [model.selected, model.other] = [a, b];
                   const [p, q] = [a, b].map((i) => model.colorOf(model.objects[i]));
                   if (p === q) return false;
                 }
               }
               model.objects[1].color = model.objects[0].color = '#123456';
-              model.select(0, 1);
+              model.select(1, 0);
               return model.colorOf(model.objects[0]) !== model.colorOf(model.objects[1]);
             })()"""))
             # The drawn colors follow.
@@ -110,20 +110,29 @@ class PictureTest(ViewerCase):
         self.keys("f")
         self.browser.wait(f"!({self.OUTSIDE})")
 
-    def test_the_plane_is_drawn_within_the_scene(self):
+    def test_the_plane_separates_and_ends_at_the_scene(self):
         self.view("room/left", "room/right")
         self.browser.wait(AT_REST)
-        self.assertTrue(self.browser.js("""(() => {
+        inside, spread, below, above = self.browser.js("""(() => {
           const {marks, model} = hulldViewer;
           const plane = marks.group.children.find((part) => part.material?.map && part.isMesh);
           const [low, high] = marks.boxOf(model.objects);
-          const {array, count} = plane.geometry.attributes.position;
-          const heights = Array.from({length: count}, (_, i) => array[3 * i]);
+          const {array} = plane.geometry.attributes.position;
+          const {x, y, z} = model.answer.axis.direction;
+          const heightOf = (p) => Number(x) * p[0] + Number(y) * p[1] + Number(z) * p[2];
+          const heights = Array.from(
+              {length: array.length / 3},
+              (_, i) => heightOf([0, 1, 2].map((k) => array[3 * i + k] + model.origin[k])));
           const inside = [...array].every(
               (v, i) => v >= low.getComponent(i % 3) - 1e-5 && v <= high.getComponent(i % 3) + 1e-5);
-          // Halfway between x = 1 and x = 2, and as high as the boxes.
-          return count === 4 && inside && heights.every((x) => Math.abs(x + model.origin[0] - 1.5) < 1e-6);
-        })()"""))
+          const [a, b] = model.objects.map((object) => model.cornersOf(object).map(heightOf));
+          return [inside, Math.max(...heights) - Math.min(...heights),
+                  heights[0] - Math.max(...a), Math.min(...b) - heights[0]];
+        })()""")
+        self.assertTrue(inside)
+        self.assertLess(spread, 1e-5)
+        self.assertGreater(below, 0)
+        self.assertGreater(above, 0)
 
     def test_camera_presets_and_orthographic_view(self):
         self.view("box")
@@ -181,7 +190,11 @@ class PictureTest(ViewerCase):
                 for q in boxes[:i]:
                     self.assertTrue(p[0] >= q[1] or q[0] >= p[1] or p[2] >= q[3] or q[2] >= p[3],
                                     (width, p, q))
-        self.browser.js("(hulldViewer.stage.controls.target.x += 1000, hulldViewer.stage.draw())")
+        self.browser.js("""(({camera, controls}) => {
+          camera.position.x += 1000;
+          controls.target.x += 1000;
+          controls.update();
+        })(hulldViewer.stage)""")
         self.browser.wait("!hulldViewer.stage.waiting")
         self.assertEqual(self.browser.js(visible), [])
 

@@ -291,19 +291,4 @@ export class Stage {
       text.setAttribute('y', -31 * axis.y);
     });
   }
-
-  // Returns frames per second while the camera orbits, each frame awaited; for measurements.
-  async measure(frames = 60) {
-    const pixel = new Uint8Array(4);
-    const gl = this.renderer.getContext();
-    const start = performance.now();
-    for (let i = 0; i < frames; ++i) {
-      this.orbit(2 * Math.PI / frames, 0);
-      this.frame(performance.now());
-      // Reading a pixel waits for the drawing.
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
-      await new Promise((resume) => setTimeout(resume));
-    }
-    return 1000 * frames / (performance.now() - start);
-  }
 }

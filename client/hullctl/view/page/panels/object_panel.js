@@ -206,6 +206,7 @@ export class ObjectPanel {
   // A logarithmic range from 0 to half of the size.
   simplifyBlock(object) {
     this.steps = 0;
+    this.simpler = null;
     this.output = element('output', {}, 'off');
     this.result = element('div', {'aria-live': 'polite'});
     const ask = () => {
@@ -213,6 +214,7 @@ export class ObjectPanel {
       const maxError =
           this.steps === 0 ? 0 : Number((size * 10 ** ((this.steps - 40) / 13) / 2).toPrecision(3));
       this.output.textContent = this.steps === 0 ? 'off' : `error up to ${short(maxError)}`;
+      this.simpler = null;
       if (this.steps === 0) this.result.replaceChildren();
       this.simplify(object, this.side, maxError);
     };
@@ -308,11 +310,44 @@ export class ObjectPanel {
 
   simplified(hull) {
     if (!this.result || this.steps === 0) return;
+    this.simpler = hull;
+    this.compare();
+  }
+
+  // Shows the simpler hull and its answer beside the exact ones. Called when either changes.
+  compare() {
+    const {simpler} = this;
+    const exact = this.object && this.model.hullOf(this.object);
+    if (!simpler || !exact || this.steps === 0) return;
+    const of = (count, all) => `${grouped(count)} of ${grouped(all)}`;
     this.result.replaceChildren(facts([
-      ['vertices', grouped(hull.vertexCount)],
-      ['facets', grouped(hull.facetCount)],
-      ['proven error', rounded(hull.error)],
+      ['vertices', of(simpler.vertexCount, exact.vertexCount)],
+      ['facets', of(simpler.facetCount, exact.facetCount)],
+      ['proven error', rounded(simpler.error)],
+      ...this.simplerAnswer(simpler.error),
     ]));
+  }
+
+  // The separations of the exact hull and of the simpler one. If convex shapes differ by at most e,
+  // so do their separations from any other; a shape inside another is not closer.
+  simplerAnswer(error) {
+    const {answer} = this.model;
+    if (!answer?.separation) return [];
+    const [value, bound] = [answer.separation.value, answer.separation.bound].map(Number);
+    const isInside = this.side === 'inside';
+    const low = value - bound - (isInside ? 0 : error);
+    const high = value + bound + (isInside ? error : 0);
+    const relations = [
+      low < 0 && 'overlapping',
+      low <= 0 && high >= 0 && 'touching',
+      high > 0 && 'separated',
+    ];
+    return [
+      ['exact separation', rounded(value)],
+      ['simpler, from', rounded(low)],
+      ['to', rounded(high)],
+      ['so it is', relations.filter(Boolean).join(' or ')],
+    ];
   }
 
   simplifyFailed(message) {
