@@ -93,9 +93,9 @@ class Viewer {
       this.stage.draw();
       this.ask(rest);
     });
+    model.on('visibility shown', () => this.rebuildGround());
     model.on('visibility color shown', () => {
       this.rebuildViews();
-      this.rebuildGround();
       this.gizmo.update();
       this.marks.rebuild();
       this.labels.rebuild();

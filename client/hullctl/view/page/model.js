@@ -15,8 +15,8 @@ const MOST_UNDONE = 200;
 // Bodies with more pairs of pieces than this are queried without a certificate.
 const MOST_PIECE_PAIRS = 1000;
 
-// Shapes with more vertices than this are represented by their box.
-const MOST_CORNERS = 100;
+// Shapes with more vertices than this, and those of a crowd, are represented by their box.
+const MOST_CORNERS = 300;
 
 export class Model extends EventTarget {
   constructor() {
@@ -178,7 +178,7 @@ export class Model extends EventTarget {
   // box.
   cornersOf(object) {
     const {xyz, vertexCount} = this.shapeOf(object);
-    if (vertexCount > MOST_CORNERS) return this.boxCornersOf(object);
+    if (vertexCount > MOST_CORNERS || this.isCrowd) return this.boxCornersOf(object);
     return Array.from(
         {length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
   }

@@ -12,14 +12,15 @@ import struct
 import unittest
 
 import viewing
-from viewer_case import AT_REST, ViewerCase
+import viewer_test
+from viewer_test import AT_REST
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 
-class PictureTest(ViewerCase):
+class PictureTest(viewer_test.ViewerCase):
     # --- The picture ---
 
     def test_faces_of_a_cube_differ(self):
@@ -332,5 +333,5 @@ class PictureTest(ViewerCase):
 
 
 if __name__ == "__main__":
-    viewing.PROGRAMS = viewing.bin_directory()
+    viewer_test.PROGRAMS = viewing.bin_directory()
     unittest.main(verbosity=2)

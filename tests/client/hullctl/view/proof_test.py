@@ -10,10 +10,11 @@ import unittest
 from random import Random
 
 import viewing
-from viewer_case import AT_REST, ViewerCase
+import viewer_test
+from viewer_test import AT_REST
 
 
-class ProofTest(ViewerCase):
+class ProofTest(viewer_test.ViewerCase):
     def page_verdict(self, response, request):
         """Returns the problem that the page finds in a recorded answer; empty if it is proven."""
         poses = []
@@ -124,5 +125,5 @@ class ProofTest(ViewerCase):
 
 
 if __name__ == "__main__":
-    viewing.PROGRAMS = viewing.bin_directory()
+    viewer_test.PROGRAMS = viewing.bin_directory()
     unittest.main(verbosity=2)

@@ -50,7 +50,7 @@ export class Labels {
     return index === this.model.selected || index === this.model.other;
   }
 
-  // Places each label above the box of its object in the picture, or below it. Hides it if it would
+  // Places each label above its object in the picture, or below it. Hides it if it would
   // overlap a label that matters more or the buttons, or if the object is out of the picture.
   place() {
     const rows = [...this.rows];
@@ -89,11 +89,11 @@ export class Labels {
                 taken.every((other) => !overlap(box, other)));
   }
 
-  // Returns {x, top, bottom, distance}: the extent of an object's box in the picture, and its distance
-  // from the camera; null if the middle of the box is outside the picture.
+  // Returns {x, top, bottom, distance}: the extent of an object in the picture, and its distance from
+  // the camera; null if its middle is outside the picture.
   anchorOf(object) {
     const {model, stage} = this;
-    const corners = model.boxCornersOf(object).map(
+    const corners = model.cornersOf(object).map(
         (corner) => stage.toScreen(
             new THREE.Vector3(...corner.map((value, k) => value - model.origin[k]))));
     if (!corners.every(Boolean)) return null;

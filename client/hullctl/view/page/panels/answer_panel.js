@@ -132,7 +132,8 @@ export class AnswerPanel {
     const piece = model.decidingPieces()[k];
     const hull = model.hulls.get(piece ? piece.hullId : object.hullId);
     if (!hull) return `the vertices of ${piece ? piece.hullId : object.name} are not here`;
-    if (model.revisionOf(object.hullId) !== version.revision)
+    // An inline shape has no version, and never changes.
+    if (version.hullId && model.revisionOf(object.hullId) !== version.revision)
       return `${object.name} has changed since the answer`;
     const pose = answer.poses.slice(7 * k, 7 * k + 7);
     return {xyz: hull.xyz, poses: piece ? [pose, piece.pose] : [pose]};

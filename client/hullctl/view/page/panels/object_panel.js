@@ -154,8 +154,9 @@ export class ObjectPanel {
       'data-pose': i,
       'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
       onchange: () => this.typed(object, i),
+      // A text that is no number stays until it is corrected.
       onfocus: () => {
-        input.value = String(object.pose[i]);
+        if (input.getAttribute('aria-invalid') !== 'true') input.value = String(object.pose[i]);
       },
       onblur: () => {
         if (input.getAttribute('aria-invalid') !== 'true') this.showNumber(input, object.pose[i]);
