@@ -1,6 +1,7 @@
 // Draws many objects as a single surface and a single set of lines, placed in double and converted
 // to float: two draw calls instead of two per object.
 import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
+import {FINE_LAYER} from 'hulld/drawing/stage.js';
 import {THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
@@ -58,8 +59,10 @@ export class Crowd extends DrawnGroup {
     if (this.model.show.hull)
       parts.push(new THREE.Mesh(geometryWith(this.fills, triangles), facetMaterial(colored)));
     if (edges.length) {
-      parts.push(new THREE.LineSegments(
-          geometryWith(this.strokes, edges), new THREE.LineBasicMaterial(colored)));
+      const lines = new THREE.LineSegments(
+          geometryWith(this.strokes, edges), new THREE.LineBasicMaterial(colored));
+      lines.layers.set(FINE_LAYER);
+      parts.push(lines);
     }
     if (this.model.show.points) {
       parts.push(new THREE.Points(

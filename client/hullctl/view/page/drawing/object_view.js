@@ -3,6 +3,7 @@
 import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
 import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
+import {FINE_LAYER} from 'hulld/drawing/stage.js';
 import {discTexture, THREE} from 'hulld/drawing/three.js';
 
 const FLASH_MS = 1200;
@@ -129,6 +130,7 @@ export class ObjectView extends DrawnGroup {
       opacity: (relation ? 0.8 : this.stage.theme.edgeOpacity) * edgeWeight(hull.edgeCount),
     });
     const edges = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
+    edges.layers.set(FINE_LAYER);
     edges.renderOrder = 5;
     this.shift(edges, hull);
   }

@@ -4,16 +4,37 @@ import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 import {THREE} from 'hulld/drawing/three.js';
 
 const FLIGHT_MS = 350;
+
+// Parts on this layer are left out of coarse frames.
+export const FINE_LAYER = 1;
+// Frames that follow each other more slowly than this are drawn coarsely, until a pause.
+const SLOW_MS = 50;
+const PAUSE_MS = 200;
+
+// Returns true if WebGL draws on the processor.
+function isSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl');
+  const info = gl?.getExtension('WEBGL_debug_renderer_info');
+  return Boolean(info) &&
+      /swiftshader|llvmpipe|software/i.test(gl.getParameter(info.UNMASKED_RENDERER_WEBGL));
+}
+
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
 
 export class Stage {
   constructor(canvas, model) {
     this.model = model;
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    // In software, antialiasing makes each frame of a motion more than twice as slow; pictures at
+    // rest are drawn at a higher resolution instead.
+    const antialias = !isSoftware() || document.body.classList.contains('picture');
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias, preserveDrawingBuffer: true});
+    this.pixelRatio = antialias ? Math.min(devicePixelRatio, 2) : 2;
+    this.renderer.setPixelRatio(this.pixelRatio);
+    this.isCoarse = false;
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
+    this.camera.layers.enable(FINE_LAYER);
     // The sky tells upper from lower faces; the lamp, above the camera's left, left from right ones.
     this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.7);
     this.lamp = new THREE.DirectionalLight(0xffffff, 0.42);
@@ -90,8 +111,36 @@ export class Stage {
     if (this.waiting) return;
     this.waiting = requestAnimationFrame((now) => {
       this.waiting = 0;
+      this.adaptTo(this.isMoving ? now - this.drawn : 0);
       this.frame(now);
+      this.drawn = now;
     });
+  }
+
+  // Draws coarsely after two frames in succession that took too long, until a pause.
+  adaptTo(duration) {
+    this.isMoving = true;
+    this.slowFrames = duration > SLOW_MS ? (this.slowFrames || 0) + 1 : 0;
+    if (this.slowFrames > 1) this.setCoarse(true);
+    clearTimeout(this.pause);
+    // The browser delays the callback until it has shown the frame.
+    requestAnimationFrame(() => {
+      clearTimeout(this.pause);
+      this.pause = setTimeout(() => {
+        this.isMoving = false;
+        if (!this.isCoarse) return;
+        this.setCoarse(false);
+        this.draw();
+      }, PAUSE_MS);
+    });
+  }
+
+  // Coarse frames have half of the resolution, and no fine parts.
+  setCoarse(on) {
+    if (on === this.isCoarse) return;
+    this.isCoarse = on;
+    this.camera.layers[on ? 'disable' : 'enable'](FINE_LAYER);
+    this.renderer.setPixelRatio(on ? 0.5 : this.pixelRatio);
   }
 
   // Calls `update(now)` before each frame; frames continue while one returns true.
