@@ -90,7 +90,7 @@ class Viewer {
       this.shell.place();
       this.objectPanel.updatePose();
       this.updateTools();
-      this.stage.draw();
+      this.stage.draw(!rest);
       this.ask(rest);
     });
     model.on('visibility shown', () => this.rebuildGround());

@@ -213,6 +213,23 @@ class PictureTest(viewer_test.ViewerCase):
           return stage.renderer.info.render.calls;
         })()"""), 20)
 
+    def test_slow_motions_are_drawn_coarsely_and_rest_in_full(self):
+        self.view("box")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        size = "[hulldViewer.stage.canvas.width, hulldViewer.stage.canvas.height]"
+        full = self.browser.js(size)
+        coarse, lines = self.browser.js("""(() => {
+          const {stage} = hulldViewer;
+          // The third frame of a motion whose frames take a second each.
+          for (let i = 0; i < 3; ++i) stage.adaptTo(1000);
+          stage.renderer.render(stage.scene, stage.camera);
+          return [[stage.canvas.width, stage.canvas.height], stage.camera.layers.mask];
+        })()""")
+        self.assertLess(coarse[0], full[0])
+        self.assertEqual(lines, 1)
+        self.browser.wait("!hulldViewer.stage.isCoarse && !hulldViewer.stage.waiting")
+        self.assertEqual(self.browser.js(size), full)
+
     def test_points_have_the_color_of_their_object(self):
         self.view("room/left", "room/right")
         self.browser.js("(() => { const {model} = hulldViewer;"

@@ -32,6 +32,7 @@ export class Stage {
     this.pixelRatio = antialias ? Math.min(devicePixelRatio, 2) : 2;
     this.renderer.setPixelRatio(this.pixelRatio);
     this.isCoarse = false;
+    this.slowFrames = 0;
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
     this.camera.layers.enable(FINE_LAYER);
@@ -73,7 +74,7 @@ export class Stage {
     });
     this.controls.addEventListener('change', () => {
       if (byHand) this.isFitted = false;
-      this.draw();
+      this.draw(byHand);
     });
     const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     const negative = (axis) => axis.map((value) => -value);
@@ -106,21 +107,23 @@ export class Stage {
     this.draw();
   }
 
-  // Requests a frame.
-  draw() {
+  // Requests a frame. `isMotion`: it belongs to a motion of the camera or of an object.
+  draw(isMotion = false) {
+    this.isMotion ||= isMotion;
     if (this.waiting) return;
     this.waiting = requestAnimationFrame((now) => {
       this.waiting = 0;
-      this.adaptTo(this.isMoving ? now - this.drawn : 0);
+      if (this.isMotion) this.adaptTo(this.isMoving ? now - this.drawn : 0);
+      this.isMotion = false;
       this.frame(now);
       this.drawn = now;
     });
   }
 
-  // Draws coarsely after two frames in succession that took too long, until a pause.
+  // Draws a motion coarsely after two frames in succession that took too long, until a pause.
   adaptTo(duration) {
     this.isMoving = true;
-    this.slowFrames = duration > SLOW_MS ? (this.slowFrames || 0) + 1 : 0;
+    this.slowFrames = duration > SLOW_MS ? this.slowFrames + 1 : 0;
     if (this.slowFrames > 1) this.setCoarse(true);
     clearTimeout(this.pause);
     // The browser delays the callback until it has shown the frame.
@@ -161,7 +164,7 @@ export class Stage {
     ++this.frames;
     this.drawTriad();
     for (const update of this.after) update();
-    if (more) this.draw();
+    if (more) this.draw(Boolean(this.flight));
   }
 
   get distance() {
@@ -285,7 +288,7 @@ export class Stage {
     offset.applyAxisAngle(up, around);
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
-    this.draw();
+    this.draw(true);
   }
 
   zoom(factor) {
@@ -293,7 +296,7 @@ export class Stage {
     const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
-    this.draw();
+    this.draw(true);
   }
 
   pan(right, up) {
@@ -304,7 +307,7 @@ export class Stage {
     this.camera.position.add(shift);
     this.controls.target.add(shift);
     this.controls.update();
-    this.draw();
+    this.draw(true);
   }
 
   // Returns the position of a scene point in the picture, in CSS pixels; null behind the camera.
