@@ -1,23 +1,23 @@
 // Connects the page: messages change the model, the model notifies the parts, the parts draw.
-import {AnswerPanel} from 'hulld/panels/answer_panel.js';
 import {connect} from 'hulld/connection.js';
 import {Crowd} from 'hulld/drawing/crowd.js';
-import {element, grouped} from 'hulld/panels/dom.js';
 import {Gizmo} from 'hulld/drawing/gizmo.js';
 import {Ground} from 'hulld/drawing/ground.js';
-import {bindKeys} from 'hulld/panels/keys.js';
 import {Labels} from 'hulld/drawing/labels.js';
 import {Marks} from 'hulld/drawing/marks.js';
-import {Model} from 'hulld/model.js';
-import {ObjectPanel} from 'hulld/panels/object_panel.js';
 import {ObjectView} from 'hulld/drawing/object_view.js';
 import {pick} from 'hulld/drawing/picking.js';
 import {keepPicture, savePicture} from 'hulld/drawing/picture.js';
 import {Ruler} from 'hulld/drawing/ruler.js';
-import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 import {ShellView} from 'hulld/drawing/shell_view.js';
 import {Stage} from 'hulld/drawing/stage.js';
+import {Model} from 'hulld/model.js';
+import {AnswerPanel} from 'hulld/panels/answer_panel.js';
+import {element, grouped} from 'hulld/panels/dom.js';
+import {bindKeys} from 'hulld/panels/keys.js';
+import {ObjectPanel} from 'hulld/panels/object_panel.js';
 import {Tree} from 'hulld/panels/tree.js';
+import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 
 const $ = (id) => document.getElementById(id);
 // Compares revisions, 64-bit numbers as text; an absent one is the oldest.

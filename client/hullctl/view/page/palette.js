@@ -39,6 +39,20 @@ export const AXIS_COLORS = {
 };
 
 export const THEMES = {
-  light: {ground: 0xf4f5f6, edge: 0x2a3036, edgeOpacity: 0.6, grid: 0xc3c9d0, sky: 0xffffff, earth: 0x8c939c},
-  dark: {ground: 0x121417, edge: 0xd5dae0, edgeOpacity: 0.35, grid: 0x3a4149, sky: 0xffffff, earth: 0x6a7078},
+  light: {
+    ground: 0xf4f5f6,
+    edge: 0x2a3036,
+    edgeOpacity: 0.6,
+    grid: 0xc3c9d0,
+    sky: 0xffffff,
+    earth: 0x8c939c
+  },
+  dark: {
+    ground: 0x121417,
+    edge: 0xd5dae0,
+    edgeOpacity: 0.35,
+    grid: 0x3a4149,
+    sky: 0xffffff,
+    earth: 0x6a7078
+  },
 };

@@ -550,6 +550,7 @@ class ViewerTest(ViewerCase):
         self.assertGreater(self.pixels()["drawn"], 0.03)
         self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
         self.assertAlmostEqual(float(self.browser.fact("separation")), 1)
+        self.assertIn("\u2713 Proven", self.browser.text("#proof"))
         # It is not permitted to fetch anything, and requests nothing.
         self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
                                          ".filter(({name}) => !name.startsWith('data:')).length"), 0)

@@ -1,7 +1,7 @@
 // Handles at the center of the selected object's box that move and turn it.
+import {THREE} from 'hulld/drawing/three.js';
 import {AXIS_COLORS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
-import {THREE} from 'hulld/drawing/three.js';
 
 // three.js paints axes pure red, green, and blue, which color-blind users may confuse.
 function repaint(handles) {

@@ -89,8 +89,8 @@ export class Labels {
                 taken.every((other) => !overlap(box, other)));
   }
 
-  // Returns {x, top, bottom, distance}: the extent of an object in the picture, and its distance from
-  // the camera; null if its middle is outside the picture.
+  // Returns {x, top, bottom, distance}: the extent of an object in the picture, and its distance
+  // from the camera; null if its middle is outside the picture.
   anchorOf(object) {
     const {model, stage} = this;
     const corners = model.cornersOf(object).map(
@@ -102,8 +102,8 @@ export class Labels {
     const x = (Math.min(...xs) + Math.max(...xs)) / 2;
     const {clientWidth, clientHeight} = stage.canvas;
     if (x < 0 || x > clientWidth || bottom < 0 || top > clientHeight) return null;
-    const center = new THREE.Vector3(
-        ...model.centerOf(object).map((value, k) => value - model.origin[k]));
+    const center =
+        new THREE.Vector3(...model.centerOf(object).map((value, k) => value - model.origin[k]));
     return {x, top, bottom, distance: center.distanceTo(stage.camera.position)};
   }
 }

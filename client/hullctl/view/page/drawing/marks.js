@@ -1,8 +1,8 @@
 // Draws an answer: the separating plane and its axis, the witness points, and the vertex pairs of
 // the certificate.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
-import {MARK_COLORS} from 'hulld/palette.js';
 import {discTexture, gridTexture, THREE} from 'hulld/drawing/three.js';
+import {MARK_COLORS} from 'hulld/palette.js';
 
 // With more edges, lines would hide the surface.
 const MOST_PIECE_EDGES = 20000;
@@ -149,12 +149,12 @@ export class Marks extends DrawnGroup {
     geometry.setAttribute('uv', new THREE.Float32BufferAttribute(cells, 2));
     geometry.setIndex(corners.slice(2).flatMap((_, i) => [0, i + 1, i + 2]));
     const plane = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
-                                   color: MARK_COLORS.plane,
-                                   map: gridTexture(),
-                                   transparent: true,
-                                   side: THREE.DoubleSide,
-                                   depthWrite: false,
-                                 }));
+      color: MARK_COLORS.plane,
+      map: gridTexture(),
+      transparent: true,
+      side: THREE.DoubleSide,
+      depthWrite: false,
+    }));
     plane.renderOrder = 7;
     this.group.add(plane);
     const border = corners.flatMap((p, i) => [p, corners[(i + 1) % corners.length]]);

@@ -1,10 +1,10 @@
 // Draws one object with three.js: points, mesh, and hull with its edges. Its group is at the center
 // of the object's box, turned by the pose.
 import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
-import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
-import {unitQuaternion} from 'hulld/pose.js';
 import {FINE_LAYER} from 'hulld/drawing/stage.js';
 import {discTexture, THREE} from 'hulld/drawing/three.js';
+import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
+import {unitQuaternion} from 'hulld/pose.js';
 
 const FLASH_MS = 1200;
 
@@ -98,16 +98,19 @@ export class ObjectView extends DrawnGroup {
     return color.lerp(new THREE.Color(this.stage.theme.edge), this.model.show.hull ? 0.35 : 0);
   }
 
-  // A hull is solid. With a mesh or points inside, or with an overlap to be seen, it is glass: far
+  // A hull is solid. With something inside, or with an overlap to be seen, it is glass: far
   // sides are drawn before near ones, which is correct for convex shapes.
   addHull(hull, isBeside) {
     const {model, object} = this;
     const overlaps = model.relationOf.get(object.index) === 'RELATION_OVERLAPPING';
-    const opacity = object.opacity * (isBeside ? 0.3 : overlaps && !isHuge(hull) ? 0.62 : 1);
+    const opacity = object.opacity *
+        (isBeside || object.isGlass    ? 0.3 :
+             overlaps && !isHuge(hull) ? 0.62 :
+                                         1);
     const isGlass = opacity < 1;
-    const sides = hull.dimension < 3  ? [THREE.DoubleSide] :
-        isGlass && !isHuge(hull)      ? [THREE.BackSide, THREE.FrontSide] :
-                                        [THREE.FrontSide];
+    const sides = hull.dimension < 3 ? [THREE.DoubleSide] :
+        isGlass && !isHuge(hull)     ? [THREE.BackSide, THREE.FrontSide] :
+                                       [THREE.FrontSide];
     for (const side of sides) {
       const glass = {
         transparent: true,

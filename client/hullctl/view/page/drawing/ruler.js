@@ -76,8 +76,9 @@ export class Ruler extends DrawnGroup {
   placeLabel() {
     if (!this.on) return;
     const [p, q] = this.points;
-    const middle = q && this.stage.toScreen(new THREE.Vector3(
-        ...p.map((value, k) => (value + q[k]) / 2 - this.model.origin[k])));
+    const middle = q &&
+        this.stage.toScreen(
+            new THREE.Vector3(...p.map((value, k) => (value + q[k]) / 2 - this.model.origin[k])));
     const [x, y] = middle || [this.stage.canvas.clientWidth / 2, 60];
     this.label.style.transform =
         `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -140%)`;

@@ -1,16 +1,19 @@
 // Draws a simpler hull in place of the selected one with the shell of its proven error, or the
 // shell of the tolerance.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
+import {THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {THREE} from 'hulld/drawing/three.js';
 
 // Shells of larger hulls have as many facets as the hull.
 const MOST_FACETS = 20000;
 
 export class ShellView extends DrawnGroup {
+  // Object whose hull is simplified.
+  expected = null;
+
   clear() {
-    this.expected = null;
+    this.expect(null);
     this.empty();
   }
 
@@ -19,8 +22,13 @@ export class ShellView extends DrawnGroup {
     this.stage.draw();
   }
 
+  // The hull of the object is drawn as glass, so that the simpler one shows through.
   expect(object) {
+    if (this.expected === object) return;
+    if (this.expected) this.expected.isGlass = false;
+    if (object) object.isGlass = true;
     this.expected = object;
+    this.model.tell('color');
   }
 
   // Inside: the hull lies within the error of the simpler one, so the shell surrounds the simpler

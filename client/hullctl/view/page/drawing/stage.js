@@ -1,7 +1,7 @@
 // The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
 // relative to model.origin.
-import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 import {THREE} from 'hulld/drawing/three.js';
+import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 
 const FLIGHT_MS = 350;
 
@@ -36,7 +36,8 @@ export class Stage {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
     this.camera.layers.enable(FINE_LAYER);
-    // The sky tells upper from lower faces; the lamp, above the camera's left, left from right ones.
+    // The sky tells upper from lower faces; the lamp, above the camera's left, left from right
+    // ones.
     this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.7);
     this.lamp = new THREE.DirectionalLight(0xffffff, 0.42);
     this.lamp.position.set(-0.7, 1, 0.5);
@@ -80,8 +81,8 @@ export class Stage {
     const negative = (axis) => axis.map((value) => -value);
     const front = {x: z, y: z, z: negative(y)}[up];
     const right = {x: negative(y), y: x, z: x}[up];
-    // Directions from the target to the camera. The top has a bit of the front, so that the front is
-    // at the bottom of the picture.
+    // Directions from the target to the camera. The top has a bit of the front, so that the front
+    // is at the bottom of the picture.
     this.views = {
       front,
       right,
@@ -211,9 +212,9 @@ export class Stage {
   // `views`, or a vector.
   flyTo({center, radius, corners}, {jump = false, direction = null} = {}) {
     const target = new THREE.Vector3(...center.map((value, k) => value - this.model.origin[k]));
-    const view = this.views[direction] ? new THREE.Vector3(...this.views[direction]) :
-                                         direction?.clone() ||
-            this.camera.position.clone().sub(this.controls.target);
+    const view = this.views[direction] ?
+        new THREE.Vector3(...this.views[direction]) :
+        direction?.clone() || this.camera.position.clone().sub(this.controls.target);
     view.normalize();
     if (!(view.length() > 0.5)) view.copy(this.defaultView());
     const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();

@@ -88,10 +88,10 @@ export class AnswerPanel {
     }
     // Announced by screen readers only at rest.
     this.body.setAttribute('aria-busy', String(!answer.rest));
-    const open = this.body.querySelector('details')?.open;
+    const [more, command] = [...this.body.querySelectorAll('details')].map(({open}) => open);
     this.body.replaceChildren(
-        this.verdict(answer), this.proof(answer), this.table(answer), this.toggles(),
-        this.command(answer, open));
+        this.verdict(answer), this.proof(answer), this.tables(answer, more), this.toggles(),
+        this.command(answer, command));
   }
 
   // The result of checking the certificate in this page.
@@ -148,7 +148,7 @@ export class AnswerPanel {
         element('span', {className: 'moving'}, answer.rest ? '' : 'while moving'));
   }
 
-  table(answer) {
+  tables(answer, open) {
     const {separation, witness, axis, certificate} = answer;
     const value = Number(separation?.value);
     const list = facts([
@@ -161,15 +161,20 @@ export class AnswerPanel {
       ['certificate', certificate && this.certificateText(certificate)],
       ['axis', axis?.direction && rounded(axis.direction.x, axis.direction.y, axis.direction.z)],
       ['', axis?.direction && element('span', {className: 'quiet'}, AXIS_KINDS[axis.kind] || '')],
+      ...this.pieceRows(answer),
+      ...this.tolerantRows(answer),
+    ]);
+    const more = facts([
       ['point of A', witness && rounded(witness.pointA.x, witness.pointA.y, witness.pointA.z)],
       ['point of B', witness && rounded(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
       ['decided by', RUNGS[answer.rung]],
-      ...this.pieceRows(answer),
-      ...this.tolerantRows(answer),
       ['revisions', `${answer.hullA.revision} and ${answer.hullB.revision}`],
     ]);
-    list.id = 'answer-facts';
-    return list;
+    return element(
+        'div', {id: 'answer-facts'}, list,
+        element(
+            'details', {className: 'command', open: Boolean(open)},
+            element('summary', {}, 'Witness points, revisions'), more));
   }
 
   // Rows for the deciding pieces of bodies.

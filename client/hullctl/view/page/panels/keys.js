@@ -56,7 +56,8 @@ export function bindKeys(actions) {
       return;
     }
     if (document.querySelector('dialog[open]')) return;
-    const act = isUndo ? actions.undo : special(event, actions) || plain.get(event.key.toLowerCase());
+    const act =
+        isUndo ? actions.undo : special(event, actions) || plain.get(event.key.toLowerCase());
     if (!act) return;
     event.preventDefault();
     act();

@@ -26,7 +26,9 @@ export class ObjectPanel {
     if (!object) {
       this.root.replaceChildren(
           element('h2', {}, 'Object'),
-          element('p', {className: 'quiet'}, 'Nothing is selected. Select an object in the picture or the list.'));
+          element(
+              'p', {className: 'quiet'},
+              'Nothing is selected. Select an object in the picture or the list.'));
       return;
     }
     // A change of the object must not disturb typing.
@@ -140,7 +142,8 @@ export class ObjectPanel {
                 () => `${object.hullId} --pose-b ${poseText(object.pose)}`),
             copyButton(
                 'copy-python', 'Copy for Python',
-                () => `(${JSON.stringify(object.hullId)}, [${object.pose.map(String).join(', ')}])`)));
+                () => `(${JSON.stringify(object.hullId)}, [${
+                    object.pose.map(String).join(', ')}])`)));
   }
 
   // A field shows a rounded number; while it has the focus, the text of the exact double.
@@ -191,17 +194,17 @@ export class ObjectPanel {
 
   opacitySlider(object) {
     return element('div', {className: 'slider'}, element('label', {}, 'Opacity ', element('input', {
-                     type: 'range',
-                     min: 0.1,
-                     max: 1,
-                     step: 0.05,
-                     value: object.opacity,
-                     id: 'opacity',
-                     oninput: ({target}) => {
-                       object.opacity = Number(target.value);
-                       this.model.tell('color');
-                     },
-                   })));
+                                                           type: 'range',
+                                                           min: 0.1,
+                                                           max: 1,
+                                                           step: 0.05,
+                                                           value: object.opacity,
+                                                           id: 'opacity',
+                                                           oninput: ({target}) => {
+                                                             object.opacity = Number(target.value);
+                                                             this.model.tell('color');
+                                                           },
+                                                         })));
   }
 
   // A logarithmic range from 0 to half of the size.
@@ -209,7 +212,7 @@ export class ObjectPanel {
     this.steps = 0;
     this.simpler = null;
     this.output = element('output', {}, 'off');
-    this.result = element('div', {'aria-live': 'polite'});
+    this.result = element('div', {className: 'result', 'aria-live': 'polite'});
     const ask = () => {
       const size = this.model.radiusOf(object);
       const maxError =

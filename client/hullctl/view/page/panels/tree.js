@@ -1,7 +1,7 @@
-// The tree of objects: search, select, show and hide, color. The prefixes of IDs, up to a slash, form
-// groups.
-import {element, grouped} from 'hulld/panels/dom.js';
+// The tree of objects: search, select, show and hide, color. The prefixes of IDs, up to a slash,
+// form groups.
 import {RELATIONS} from 'hulld/palette.js';
+import {element, grouped} from 'hulld/panels/dom.js';
 
 // More rows would slow down the page; the search finds the rest.
 const MOST_ROWS = 400;
@@ -74,8 +74,8 @@ export class Tree {
     if (focused) this.root.querySelector(`[data-row="${CSS.escape(focused)}"]`)?.focus();
   }
 
-  // Adds the rows of a group's content. Returns the number of objects without a row, except those in
-  // collapsed groups.
+  // Adds the rows of a group's content. Returns the number of objects without a row, except those
+  // in collapsed groups.
   addRows({members, groups, prefix}, depth, rows) {
     let left = 0;
     const add = (row) => {
@@ -176,10 +176,8 @@ export class Tree {
     const isSelected = object.index === model.selected;
     const isOther = object.index === model.other && model.selected !== null;
     const relation = RELATIONS[model.relationOf.get(object.index)];
-    const names = [
-      'row', isSelected && 'selected', object.gone && 'gone',
-      !object.visible && 'off'
-    ];
+    const names =
+        ['row', isSelected && 'selected', object.gone && 'gone', !object.visible && 'off'];
     const row = element(
         'div', {className: names.filter(Boolean).join(' '), 'data-index': object.index},
         element('input', {

@@ -23,7 +23,8 @@ const isRotated = (pose) => pose.slice(0, 4).some((value) => value !== 0);
 // An exact hull in the world: p_W = (rows p + shift) / scale in integers, all lengths at one power
 // of two.
 class ExactHull {
-  // placed: {xyz, poses}: the pose of the hull and, for a piece of a body, of the piece in the body.
+  // placed: {xyz, poses}: the pose of the hull and, for a piece of a body, of the piece in the
+  // body.
   constructor({xyz, poses}, exponent) {
     this.xyz = xyz;
     this.exponent = exponent;
@@ -162,15 +163,13 @@ function check(relation, certificate, placedA, placedB) {
       ['RELATION_SEPARATED', 'RELATION_TOUCHING', 'RELATION_OVERLAPPING'].includes(relation),
       `${relation} has no certificate`);
   if (!placedA.xyz.length || !placedB.xyz.length) {
-    require(
-        relation === 'RELATION_SEPARATED',
-        'a hull is empty, and so separated from everything');
+    require(relation === 'RELATION_SEPARATED', 'a hull is empty, and so separated from everything');
     return;
   }
   checkPlacement(placedA);
   checkPlacement(placedB);
-  const lengths = [placedA, placedB].flatMap(
-      ({xyz, poses}) => [xyz, ...poses.map((pose) => pose.slice(4))]);
+  const lengths =
+      [placedA, placedB].flatMap(({xyz, poses}) => [xyz, ...poses.map((pose) => pose.slice(4))]);
   const exponent = commonExponent(...lengths);
   const a = new ExactHull(placedA, exponent);
   const b = new ExactHull(placedB, exponent);

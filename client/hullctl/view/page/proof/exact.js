@@ -39,8 +39,8 @@ export const scaled = (s, a) => [s * a[0], s * a[1], s * a[2]];
 export const sum = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 export const difference = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross = (a, b) =>
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const cross =
+    (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const isZero = (a) => a.every((value) => value === 0n);
 
 // Returns {rows, scale} of a quaternion of any length: R(q) and |q|^2, up to a common factor.
