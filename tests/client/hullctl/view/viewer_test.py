@@ -414,6 +414,38 @@ class ViewerTest(ViewerCase):
               reach(hull.xyz, 0, [0, 0, 0]) - 1e-4;
         })()"""))
 
+    def test_answer_of_a_simpler_hull_stands_beside_the_exact_one(self):
+        self.hulld.hullctl("generate", "sphere", "200", "--seed", "3", "-o", "ball.xyz")
+        self.hulld.hullctl("append", "ball", "ball.xyz", "--create")
+        self.view("room/right", "ball")
+        self.browser.js("hulldViewer.model.setPose(1, [1, 0, 0, 0, 0.2, 0.5, 0.5], true)")
+        separation = self.assert_answers_as_api()["separation"]["value"]
+        rows = """Object.fromEntries([...document.querySelectorAll('.result dt')].map((dt) => [
+          dt.textContent, [...dt.nextElementSibling.querySelectorAll('[title]')].map((e) => +e.title)]))"""
+        for side in ("inside", "outside"):
+            self.browser.js("""(() => {
+              const select = document.querySelector('select[aria-label="Side"]');
+              select.value = arguments[0];
+              select.dispatchEvent(new Event('change'));
+              const slider = document.querySelector('#simplify');
+              slider.value = 30;
+              slider.dispatchEvent(new Event('input'));
+            })()""", side)
+            self.browser.wait("hulldViewer.objectPanel.simpler && hulldViewer.model.answer?.rest && "
+                              "document.querySelector('.result dt')")
+            shown = self.browser.js(rows)
+            self.assertEqual(shown["exact separation"], [separation])
+            # The server's answer for a hull of the simpler hull's vertices lies between the bounds.
+            xyz = self.browser.js("[...hulldViewer.objectPanel.simpler.xyz]")
+            self.hulld.add(f"simple-{side}", [" ".join(map(repr, xyz[i:i + 3]))
+                                              for i in range(0, len(xyz), 3)])
+            simple = self.hulld.json("check", "room/right", f"simple-{side}", "--separation",
+                                     "--pose-b", "1,0,0,0,0.2,0.5,0.5")["separation"]
+            low, high = shown["of the simpler"]
+            self.assertLess(len(xyz), 3 * 200)
+            self.assertLessEqual(low, simple["value"] + simple["bound"])
+            self.assertGreaterEqual(high, simple["value"] - simple["bound"])
+
     def test_the_shell_about_many_facets_is_as_far_out_as_it_says(self):
         self.hulld.hullctl("generate", "sphere", "12000", "-o", "many.xyz")
         self.hulld.hullctl("append", "many", "many.xyz", "--create")

@@ -348,9 +348,8 @@ export class ObjectPanel {
     ];
     return [
       ['exact separation', rounded(value)],
-      ['simpler, from', rounded(low)],
-      ['to', rounded(high)],
-      ['so it is', relations.filter(Boolean).join(' or ')],
+      ['of the simpler', rounded(low), ' to ', rounded(high)],
+      ['which is', relations.filter(Boolean).join(' or ')],
     ];
   }
 
