@@ -237,7 +237,7 @@ class Viewer {
 
   hullCame(hull, id) {
     const {model} = this;
-    if (model.hulls.has(id) && !model.isCrowd) this.keepForFlash(id);
+    if (model.hulls.has(id) && !model.isNameless) this.keepForFlash(id);
     const wasAbsent = model.absent.has(id);
     model.setHull(id, hull);
     this.awaited.delete(id);

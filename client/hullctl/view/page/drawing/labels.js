@@ -53,28 +53,31 @@ export class Labels {
   // Places each label above its object in the picture, or below it. Hides it if it would
   // overlap a label that matters more or the buttons, or if the object is out of the picture.
   place() {
-    const rows = [...this.rows];
-    for (const [object, row] of rows) {
+    const shown = [];
+    for (const [object, row] of this.rows) {
       row.anchor = this.anchorOf(object);
-      row.rank = this.isOfPair(object) ? -1 : row.anchor?.distance;
+      row.element.hidden = true;
+      if (!row.anchor) continue;
+      row.rank = this.isOfPair(object) ? -1 : row.anchor.distance;
+      shown.push(row);
     }
     const taken = this.buttonBoxes();
-    for (const [, row] of rows.sort(([, p], [, q]) => p.rank - q.rank)) {
-      const box = row.anchor && this.freeBox(row, taken);
-      row.element.hidden = !box;
+    for (const row of shown.sort((a, b) => a.rank - b.rank)) {
+      const box = this.freeBox(row, taken);
       if (!box) continue;
       taken.push(box);
+      row.element.hidden = false;
       row.element.style.transform = `translate(${box.left}px, ${box.top}px)`;
     }
   }
 
   buttonBoxes() {
     const {left, top} = this.root.getBoundingClientRect();
-    return [...this.stage.canvas.parentElement.querySelectorAll('.views button, .tools')].map(
-        (button) => {
-          const {x, y, width, height} = button.getBoundingClientRect();
-          return {left: x - left, top: y - top, width, height};
-        });
+    const buttons = this.stage.canvas.parentElement.querySelectorAll('.views button, .tools');
+    return [...buttons]
+        .map((button) => button.getBoundingClientRect())
+        .filter(({width}) => width > 0)
+        .map(({x, y, width, height}) => ({left: x - left, top: y - top, width, height}));
   }
 
   // Returns {left, top, width, height}, in pixels of the picture; undefined if there is no room.

@@ -23,7 +23,7 @@ function clipToBox(n, middle, [low, high]) {
       const from = new THREE.Vector3(at(0, i), at(1, i), at(2, i));
       const to = from.clone().setComponent(k, high.getComponent(k));
       const [p, q] = [from, to].map((end) => n.dot(end.clone().sub(middle)));
-      if (p * q < 0) points.push(from.lerp(to, p / (p - q)));
+      if ((p <= 0) !== (q <= 0)) points.push(from.lerp(to, p / (p - q)));
     }
   }
   const turn = new THREE.Quaternion().setFromUnitVectors(n, new THREE.Vector3(0, 0, 1));

@@ -79,7 +79,7 @@ export class Ruler extends DrawnGroup {
     const middle = q &&
         this.stage.toScreen(
             new THREE.Vector3(...p.map((value, k) => (value + q[k]) / 2 - this.model.origin[k])));
-    const [x, y] = middle || [this.stage.canvas.clientWidth / 2, 60];
+    const [x, y] = middle || [this.stage.canvas.clientWidth / 2, 110];
     this.label.style.transform =
         `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -140%)`;
   }

@@ -104,6 +104,11 @@ export class AnswerPanel {
       line.textContent = `Certificate not checked: ${reason}`;
       return line;
     }
+    // Changes of other hulls show the same answer again.
+    const {known} = this;
+    if (known?.answer === answer && sides.every(({xyz}, k) => xyz === known.sides[k].xyz))
+      return known.line;
+    this.known = {answer, sides, line};
     const run = () => {
       const problem = certificateProblem(answer.relation, answer.certificate, ...sides);
       const isPieces = this.model.decidingPieces().some(Boolean);
@@ -135,7 +140,9 @@ export class AnswerPanel {
     // An inline shape has no version, and never changes.
     if (version.hullId && model.revisionOf(object.hullId) !== version.revision)
       return `${object.name} has changed since the answer`;
-    const pose = answer.poses.slice(7 * k, 7 * k + 7);
+    const {pose} = object;
+    if (!pose.every((value, i) => value === answer.poses[7 * k + i]))
+      return `${object.name} has moved since the answer`;
     return {xyz: hull.xyz, poses: piece ? [pose, piece.pose] : [pose]};
   }
 
