@@ -85,8 +85,7 @@ class PictureTest(viewer_test.ViewerCase):
         # A choice of the user stays.
         self.keys(Keys.ESCAPE)
         self.browser.js("hulldViewer.ask(true)")
-        self.browser.wait("hulldViewer.model.collisions.update === hulldViewer.update || "
-                          "hulldViewer.model.collisions.pairs.length === 1")
+        self.browser.wait("hulldViewer.model.collisions.update === hulldViewer.update")
         self.assertIsNone(self.browser.js("hulldViewer.model.selected"))
 
     OUTSIDE = """hulldViewer.model.bounds().corners.filter((corner) => {
