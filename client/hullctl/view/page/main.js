@@ -117,7 +117,9 @@ class Viewer {
     });
     model.on('fly', (objects) => {
       const bounds = model.bounds(objects);
-      if (bounds) this.stage.flyTo(bounds);
+      if (!bounds) return;
+      this.stage.flyTo(bounds);
+      this.stage.isFitted = false;
     });
   }
 
