@@ -230,7 +230,7 @@ void Server::AddDescriptorsToMetrics() {
 void Server::BeginDrain() {
   health_service_.EndServing();
   admission_.BeginDrain();
-  registry_.EndWatches();
+  registry_.feed().EndAll();
 }
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
@@ -257,7 +257,7 @@ Server::~Server() {
   if (grpc_server_ == nullptr) return;
   acceptor_->Stop();
   admission_.BeginDrain();
-  registry_.EndWatches();
+  registry_.feed().EndAll();
   // Cancels the running calls; core polls for cancellation, so they end soon.
   grpc_server_->Shutdown(std::chrono::system_clock::now());
   admission_.WaitIdle(std::chrono::steady_clock::time_point::max());

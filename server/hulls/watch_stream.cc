@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace {
 
-// Returns true if the box must be read from the store. A body has neither a box nor vertices.
+// Returns true if the box must be read from the store. Bodies have no box.
 bool WantsBox(const HullChange& change) {
   return change.record.vertex_count > 0 && !change.has_box && !change.damaged;
 }
@@ -64,25 +64,25 @@ WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission
 void WatchStream::Open() {
   const absl::StatusOr<WatchTarget> target = ReadTarget();
   if (!target.ok()) return FinishCall(target.status());
-  const absl::StatusOr<WatchStart> start = ReadStart();
-  if (!start.ok()) return FinishCall(start.status());
-  RunOn(readers_, [this, target = *target, start = *start] { Begin(target, start); });
+  const absl::StatusOr<WatchPosition> position = ReadPosition();
+  if (!position.ok()) return FinishCall(position.status());
+  RunOn(readers_, [this, target = *target, position = *position] { Begin(target, position); });
 }
 
-// The watch includes every change acknowledged so far by this server or by a peer.
-void WatchStream::Begin(const WatchTarget& target, const WatchStart& start) {
+// The watch includes everything that this server or a peer server acknowledged before the call.
+void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position) {
   const auto should_stop = [this] { return call().ShouldStop(); };
   const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
-  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch =
-      registry_.OpenWatch(target, start, [this, self = shared_from_this()] { TellNext(); });
+  absl::StatusOr<std::shared_ptr<Watch>> watch =
+      registry_.feed().Open(target, position, [this, self = shared_from_this()] { SendNext(); });
   if (!watch.ok()) return FinishCall(watch.status());
   {
     const std::lock_guard lock(watch_mutex_);
     watch_ = *std::move(watch);
   }
-  TellNext();
+  SendNext();
 }
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
@@ -99,40 +99,41 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   return WatchTarget{"", {request().hull_id()}, request().bodies()};
 }
 
-absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
+absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
   if (request().after_revision() > 0 && request().store_id().empty()) {
     return absl::InvalidArgumentError(
         "after_revision requires store_id; use the one from the same header");
   }
-  return WatchStart{true, request().after_revision(), request().store_id()};
+  return WatchPosition{request().after_revision(), request().store_id()};
 }
 
-// Sends the next changes, or arms the watch to call this again. At most one call runs or is due.
-void WatchStream::TellNext() {
+// Sends the next batch, or waits for on_ready, which calls this again. At most one call runs or is
+// due.
+void WatchStream::SendNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
-    if (!piece.ok()) return FinishCall(piece.status());
-    // A concurrent call may already be running.
-    if (piece->waits) return;
-    is_synced_ = piece->synced || (is_synced_ && !piece->anew);
-    const bool is_mark = piece->revision > sent_revision_;
-    if (piece->changes.empty() && !piece->synced && !piece->anew && !is_mark) continue;
-    if (!std::ranges::any_of(piece->changes, WantsBox)) return Tell(*piece);
-    return RunOn(readers_, [this, loaded = *std::move(piece)]() mutable {
+    absl::StatusOr<WatchBatch> batch = registry_.feed().Next(watch_);
+    if (!batch.ok()) return FinishCall(batch.status());
+    // on_ready may already run on another thread.
+    if (batch->waits) return;
+    is_synced_ = batch->synced || (is_synced_ && !batch->restarted);
+    const bool is_mark = batch->revision > sent_revision_;
+    if (batch->changes.empty() && !batch->synced && !batch->restarted && !is_mark) continue;
+    if (!std::ranges::any_of(batch->changes, WantsBox)) return SendBatch(*batch);
+    return RunOn(readers_, [this, loaded = *std::move(batch)]() mutable {
       const absl::Status status = LoadBoxes(&loaded);
       if (!status.ok()) return FinishCall(OrStopped(status));
-      Tell(loaded);
+      SendBatch(loaded);
     });
   }
 }
 
-// Reads the missing boxes at the current revisions of their hulls, hull by hull to bound memory.
-// Drops hulls that were deleted; a later piece reports the deletion.
-absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
+// Reads the missing boxes at the current revisions of their hulls, one hull at a time to bound
+// memory. Drops hulls that were deleted; a later batch reports the deletion.
+absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
   std::vector<HullChange> loaded;
-  loaded.reserve(piece->changes.size());
-  for (HullChange& change : piece->changes) {
+  loaded.reserve(batch->changes.size());
+  for (HullChange& change : batch->changes) {
     if (WantsBox(change)) {
       const auto resolved = registry_.Resolve(
           change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::AnyStaleness());
@@ -150,23 +151,23 @@ absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
     }
     loaded.push_back(std::move(change));
   }
-  piece->changes = std::move(loaded);
+  batch->changes = std::move(loaded);
   return absl::OkStatus();
 }
 
-void WatchStream::Tell(const WatchPiece& piece) {
-  sent_revision_ = piece.revision;
-  EncodeHeader(registry_.store(), piece.revision, reply().mutable_header());
-  reply().set_synced(piece.synced);
-  reply().set_anew(piece.anew);
-  for (const HullChange& change : piece.changes) EncodeEvent(change, reply().add_events());
+void WatchStream::SendBatch(const WatchBatch& batch) {
+  sent_revision_ = batch.revision;
+  EncodeHeader(registry_.store(), batch.revision, reply().mutable_header());
+  reply().set_synced(batch.synced);
+  reply().set_anew(batch.restarted);
+  for (const HullChange& change : batch.changes) EncodeEvent(change, reply().add_events());
   Send();
 }
 
 void WatchStream::OnSent() {
   reply().Clear();
-  if (is_synced_) return TellNext();
-  RunOn(readers_, [this] { TellNext(); });
+  if (is_synced_) return SendNext();
+  RunOn(readers_, [this] { SendNext(); });
 }
 
 void WatchStream::OnCancel() {
@@ -175,23 +176,23 @@ void WatchStream::OnCancel() {
 }
 
 void WatchStream::Nudge() {
-  std::shared_ptr<ChangeWatch> watch;
+  std::shared_ptr<Watch> watch;
   {
     const std::lock_guard lock(watch_mutex_);
     watch = watch_;
   }
-  if (watch != nullptr) registry_.NudgeWatch(watch);
+  if (watch != nullptr) registry_.feed().Nudge(watch);
 }
 
 void WatchStream::OnDone() {
   const auto self = shared_from_this();
   PulledStream::OnDone();
-  std::shared_ptr<ChangeWatch> watch;
+  std::shared_ptr<Watch> watch;
   {
     const std::lock_guard lock(watch_mutex_);
     watch = std::exchange(watch_, nullptr);
   }
-  if (watch != nullptr) registry_.CloseWatch(watch);
+  if (watch != nullptr) registry_.feed().Close(watch);
 }
 
 }  // namespace hulld::server

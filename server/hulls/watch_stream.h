@@ -13,11 +13,12 @@
 #include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
+#include "server/registry/watch/change_watch.h"
 
 namespace hulld::server {
 
-// One WatchHulls call. Takes the next changes from the registry, sends them, and takes more after
-// they are written. If none are pending, the registry calls back; no thread waits.
+// One WatchHulls call. Sends one batch of changes after another; while none is pending, the feed
+// calls back later, so no thread blocks.
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
@@ -38,24 +39,23 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
-  void Begin(const WatchTarget& target, const WatchStart& start);
+  void Begin(const WatchTarget& target, const WatchPosition& position);
   absl::StatusOr<WatchTarget> ReadTarget() const;
-  absl::StatusOr<WatchStart> ReadStart() const;
-  void TellNext();
-  absl::Status LoadBoxes(WatchPiece* piece);
-  void Tell(const WatchPiece& piece);
+  absl::StatusOr<WatchPosition> ReadPosition() const;
+  void SendNext();
+  absl::Status LoadBoxes(WatchBatch* batch);
+  void SendBatch(const WatchBatch& batch);
   // Makes the stream check if it should stop.
   void Nudge();
 
   Registry& registry_;
   WorkerPool& readers_;
-  // Guards the creation and release of watch_ against threads that cancel; it does not change in
-  // between.
+  // Guards the assignment and reset of watch_ against threads that cancel.
   std::mutex watch_mutex_;
-  std::shared_ptr<ChangeWatch> watch_;
-  // The initial state has been sent.
+  std::shared_ptr<Watch> watch_;
+  // True after the existing hulls were sent.
   bool is_synced_ = false;
-  // Revision of the last sent header.
+  // The revision of the last header.
   uint64_t sent_revision_ = 0;
 };
 

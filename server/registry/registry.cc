@@ -24,8 +24,7 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       records_(state_, committer_, *barrier_, *loaders_),
       reader_(state_, *barrier_, records_, *loaders_),
       bodies_(state_, committer_, *barrier_, records_),
-      changes_(state_, committer_, *barrier_, records_, writers),
-      watches_(store, state_.mutex, state_.catalog, state_.memory, state_.feed, records_) {}
+      changes_(state_, committer_, *barrier_, records_, writers) {}
 
 Registry::~Registry() {
   barrier_->End();
@@ -48,7 +47,7 @@ absl::Status Registry::Load() {
   Locked locked(state_.mutex);
   Catalog& catalog = state_.catalog;
   catalog.Begin(state_.store.revision());
-  state_.feed.Begin(catalog.revision());
+  state_.feed.Begin(catalog.revision(), records_);
   absl::Status status;
   if (catalog.is_cache()) {
     catalog.SetTotals(state_.store.totals());

@@ -17,7 +17,6 @@
 #include "server/process/worker_pool.h"
 #include "server/registry/bodies/body_registry.h"
 #include "server/registry/catalog/known_hulls.h"
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/changes/hull_changes.h"
 #include "server/registry/commit/committer.h"
@@ -27,7 +26,8 @@
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/read/hull_reader.h"
 #include "server/registry/records/record_reader.h"
-#include "server/registry/watch/watches.h"
+#include "server/registry/state/registry_state.h"
+#include "server/registry/watch/change_feed.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -45,7 +45,7 @@ namespace hulld::server {
 //   HullChanges    creates, deletes, replaces, and grows hulls
 //   BodyRegistry   puts, deletes, finds and lists bodies
 //   HullReader     serves hulls of a single snapshot
-//   Watches        sends the initial state and then every change, as noted by ChangeFeed
+//   ChangeFeed     sends the initial state and then every change to watches
 //
 // A change has two steps. It is validated or built, then submitted to the committer. After the
 // store has committed it, RegistryState applies it: it becomes visible atomically and in the order
@@ -143,28 +143,8 @@ class Registry {
                                                     const std::function<bool()>& should_stop,
                                                     const Freshness& freshness = {});
 
-  // Starts a watch (ChangeFeed). `on_ready` is called on the feed's thread, once after each piece
-  // that waits. RESOURCE_EXHAUSTED: --memory-limit.
-  absl::StatusOr<std::shared_ptr<ChangeWatch>> OpenWatch(const WatchTarget& target,
-                                                         const WatchStart& start,
-                                                         std::function<void()> on_ready) {
-    return watches_.Open(target, start, std::move(on_ready));
-  }
-  // Returns the next piece of changes, possibly empty. UNAVAILABLE after EndWatches. Requires: the
-  // watch does not wait. Cost: O(kMostPerPiece).
-  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch) { return watches_.Take(watch); }
-  // Adds `added` to the watched IDs and removes `dropped`, which must have been added before.
-  // Applies to later changes. Requires a target that varies. Cost: one hash per ID.
-  void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
-                 std::span<const std::string> dropped) {
-    watches_.Extend(watch, added, dropped);
-  }
-  // Schedules the watch's on_ready although nothing changed.
-  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Nudge(watch); }
-  // Closes a watch. An on_ready that is already due is still called.
-  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Close(watch); }
-  // Nudges every watch so that it ends.
-  void EndWatches() { watches_.EndAll(); }
+  // Watches of hulls and bodies.
+  ChangeFeed& feed() { return state_.feed; }
 
  private:
   RegistryState state_;
@@ -177,7 +157,6 @@ class Registry {
   HullReader reader_;
   BodyRegistry bodies_;
   HullChanges changes_;
-  Watches watches_;
 };
 
 }  // namespace hulld::server

@@ -218,27 +218,20 @@ absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
   absl::StatusOr<Resolved> resolved =
       RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
-  Take(registry.store(), *std::move(resolved), options);
+  SetHulls(registry.store(), *std::move(resolved), options);
   return absl::OkStatus();
 }
 
-absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions& options,
-                                         std::span<const size_t> hulls) {
-  HULLD_CHECK(by_hull_begin_.size() == ids_.size() + 1);
-  std::vector<std::string> ids;
-  ids.reserve(hulls.size());
-  for (const size_t k : hulls) ids.push_back(ids_[k]);
-  absl::StatusOr<Resolved> resolved =
-      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::AnyStaleness()}),
-                    options.should_stop);
-  if (!resolved.ok()) return resolved.status();
+void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolved,
+                                  const QueryOptions& options) {
+  HULLD_CHECK(by_hull_begin_.size() == ids_.size() + 1 && resolved.hulls.size() == hulls.size());
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
   is_all_answerable_ = false;
   for (size_t n = 0; n < hulls.size(); ++n) {
     const size_t k = hulls[n];
     // The former hull lives until no placement uses it.
-    const absl::StatusOr<HullView> before = std::exchange(hulls_[k], std::move(resolved->hulls[n]));
+    const absl::StatusOr<HullView> before = std::exchange(hulls_[k], std::move(resolved.hulls[n]));
     const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
     changed_[k] = !IsSame(before, hulls_[k]);
     query_hull_changed_[k] = std::exchange(query_hulls_[k], &query_hull) != &query_hull;
@@ -246,21 +239,20 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
     for (const uint32_t i : placements_of(k)) PlaceAgain(i);
   }
   if (!has_bodies()) TakeBodies();
-  as_of_ = resolved->as_of();
+  as_of_ = resolved.as_of();
   NoteProblems();
-  return absl::OkStatus();
 }
 
 bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
                                 const ReadPlan& plan) {
   std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
   if (!resolved.has_value()) return false;
-  Take(registry.store(), *std::move(resolved), options);
+  SetHulls(registry.store(), *std::move(resolved), options);
   return true;
 }
 
 // If the options need canonical snapshots, every resolved hull has one, and queries use it.
-void PlacementTable::Take(const Store& store, Resolved resolved, const QueryOptions& options) {
+void PlacementTable::SetHulls(const Store& store, Resolved resolved, const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(ids_.size());
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {

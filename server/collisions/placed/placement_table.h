@@ -100,10 +100,13 @@ class PlacementTable {
   // to points of the former one.
   bool query_hull_changed(size_t i) const;
 
-  // As Resolve for a few of hull_ids(), by index, each once: hulls that the registry reported as
-  // changed. Takes their current state; the other hulls stay as they are. Requires SortByHull.
-  absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
-                           std::span<const size_t> hulls);
+  // Returns the lookup of hull_ids() for queries with these options.
+  PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
+  // Sets all hulls. `resolved` is parallel to hull_ids().
+  void SetHulls(const Store& store, Resolved resolved, const QueryOptions& options);
+  // Sets a few of hull_ids(), given by index, each once; the other hulls stay as they are.
+  // `resolved` is parallel to `hulls`. Requires SortByHull.
+  void SetSomeHulls(std::span<const size_t> hulls, Resolved resolved, const QueryOptions& options);
 
   // Requires a valid pose (ValidatePose).
   void Move(size_t i, const Pose& X_WH);
@@ -118,7 +121,7 @@ class PlacementTable {
     HULLD_DCHECK(k < hulls_.size());
     return hulls_[k];
   }
-  // Indexes the placements by their hull, for placements_of and ResolveSome. Cost: O(n).
+  // Indexes the placements by their hull, for placements_of and SetSomeHulls. Cost: O(n).
   void SortByHull();
   // Placements of hull k. Requires SortByHull.
   std::span<const uint32_t> placements_of(size_t k) const {
@@ -169,8 +172,6 @@ class PlacementTable {
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
-  PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
-  void Take(const Store& store, Resolved resolved, const QueryOptions& options);
   void TakeBodies();
   void TakeBody(size_t k);
   void TakeHullsOfPieces();

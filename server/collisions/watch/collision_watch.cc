@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/contract/status_map.h"
-#include "server/registry/body_resolution.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 
@@ -61,19 +59,17 @@ BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admissi
 void CollisionWatch::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
-  if (watch_ == nullptr) return;
-  registry_.CloseWatch(watch_);
-  watch_.reset();
+  hulls_.Close();
 }
 
 void CollisionWatch::StartWork() {
-  if (!reading() && !has_message_ && !has_said_all_) Read();
+  if (!reading() && !has_message_ && !has_half_closed_) Read();
   if (is_working_ || unsent_bytes() > 0) return;
   const auto work = [this](auto& pool, void (CollisionWatch::*step)()) {
     is_working_ = true;
     RunOn(pool, [this, step] { (this->*step)(); });
   };
-  if (is_telling_) return work(lane_, &CollisionWatch::Tell);
+  if (is_sending_) return work(lane_, &CollisionWatch::SendRound);
   if (has_message_) {
     // The first message resolves all hulls.
     if (!is_open_) return work(long_readers_, &CollisionWatch::TakeMessage);
@@ -81,8 +77,8 @@ void CollisionWatch::StartWork() {
     if (is_short) return work(pool_, &CollisionWatch::TakeMessage);
     return work(lane_, &CollisionWatch::TakeMessage);
   }
-  if (has_said_all_) return End(absl::OkStatus());
-  if (!std::exchange(are_hulls_due_, false)) return;
+  if (has_half_closed_) return End(absl::OkStatus());
+  if (!std::exchange(has_changes_, false)) return;
   work(readers_, &CollisionWatch::TakeChanges);
 }
 
@@ -93,7 +89,7 @@ void CollisionWatch::OnMessage() {
 
 void CollisionWatch::OnNoMessage(const absl::Status& why) {
   if (!why.ok()) return End(OrStopped(why));
-  has_said_all_ = true;
+  has_half_closed_ = true;
 }
 
 void CollisionWatch::EndWork(const absl::Status& error) {
@@ -108,7 +104,7 @@ void CollisionWatch::TakeMessage() {
   if (!status.ok()) return EndWork(status);
   request().Clear();
   answers_message_ = true;
-  Tell();
+  SendRound();
 }
 
 absl::Status CollisionWatch::HandleMessage() {
@@ -162,90 +158,30 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   table_.SortByHull();
   pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
-  if (absl::Status s = WatchHulls(); !s.ok()) return s;
-  std::vector<size_t> all_hulls(table_.hull_ids().size());
-  std::iota(all_hulls.begin(), all_hulls.end(), size_t{0});
-  if (absl::Status s = FollowPieces(all_hulls); !s.ok()) return s;
 
   // Preparation pays off, because each hull is queried repeatedly.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
-  const absl::Status resolved =
-      table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
-  if (!resolved.ok()) return resolved;
-  revision_ = table_.revision();
-  for (const size_t k : all_hulls) {
-    if (table_.hull(k).ok()) TellOf(k);
+  const auto on_ready = [this, self = shared_from_this()] {
+    Locked([this] { has_changes_ = true; });
+  };
+  absl::StatusOr<WatchedHulls::Round> round = hulls_.Open(
+      table_.hull_ids(), on_ready, table_.LookupFor(options_, {kExpectedRounds * per_hull, true}),
+      [this] { return call().ShouldStop(); });
+  if (!round.ok()) return round.status();
+  Locked([this] { has_changes_ = true; });
+  table_.SetHulls(registry_.store(), std::move(round->resolved), options_);
+  revision_ = round->revision;
+  new_piece_hulls_ = std::move(round->piece_hulls);
+  for (const size_t k : round->places) {
+    if (table_.hull(k).ok()) new_hulls_.push_back(k);
   }
   std::vector<uint32_t> all(table_.size());
   std::iota(all.begin(), all.end(), 0);
   for (const uint32_t i : all) {
-    if (!table_.is_answerable(i)) problems_to_tell_.push_back(i);
+    if (!table_.is_answerable(i)) new_problems_.push_back(i);
   }
   is_open_ = true;
-  return AskAbout(all);
-}
-
-// Starts watching the hulls. A change before the hulls are resolved is reported twice, and none is
-// missed.
-absl::Status CollisionWatch::WatchHulls() {
-  WatchTarget target;
-  target.bodies = target.varies = true;
-  for (size_t k = 0; k < table_.hull_ids().size(); ++k) {
-    const std::string& id = table_.hull_ids()[k];
-    if (!hulls_of_.contains(id)) target.ids.push_back(id);
-    hulls_of_.emplace(id, k);
-  }
-  // No hull has this ID; the watch ends when the server drains, like any other.
-  if (target.ids.empty()) target.ids.emplace_back();
-  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
-      target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
-  if (!watch.ok()) return watch.status();
-  watch_ = *std::move(watch);
-  Locked([this] { are_hulls_due_ = true; });
-  return absl::OkStatus();
-}
-
-// Starts watching the hulls of the pieces of those table entries that are bodies. A body that
-// changes later is reported itself, then followed and resolved again. Errors as
-// Registry::FindBodies if a body cannot be read.
-absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
-  if (!registry_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
-  std::vector<std::string> ids;
-  ids.reserve(hulls.size());
-  for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
-  const FoundBodies found = registry_.bodies().Find(ids, [this] { return call().ShouldStop(); });
-  if (!found.status.ok()) return found.status;
-  FollowedPieces::Difference difference;
-  for (size_t n = 0; n < hulls.size(); ++n) {
-    const std::shared_ptr<const Body>& body = found.bodies[n];
-    const bool is_asked = body != nullptr && CheckPiecePrefix(*body, call().caller().prefix).ok();
-    pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
-  }
-  difference.Settle();
-  // Hulls that are placed themselves are always watched.
-  const auto is_placed = [this](const std::string& id) { return hulls_of_.contains(id); };
-  std::erase_if(difference.added, is_placed);
-  std::erase_if(difference.dropped, is_placed);
-  if (!difference.added.empty() || !difference.dropped.empty()) {
-    registry_.WatchAlso(*watch_, difference.added, difference.dropped);
-  }
-  return absl::OkStatus();
-}
-
-// Queues a hull, or a body and the hulls of its pieces, to be sent.
-void CollisionWatch::TellOf(size_t hull) {
-  hulls_to_tell_.push_back(hull);
-  TellOfPieces(hull);
-}
-
-// Queues the hulls of a body's pieces that the client lacks: a body may have been resolved before
-// its pieces were followed.
-void CollisionWatch::TellOfPieces(size_t hull) {
-  const HullView& view = *table_.hull(hull);
-  if (view.body == nullptr) return;
-  for (const HullView& of_piece : view.body->hulls) {
-    if (pieces_.IsNews(of_piece.record)) piece_hulls_to_tell_.push_back(of_piece.record);
-  }
+  return BeginRound(all);
 }
 
 absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update) {
@@ -259,138 +195,122 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
     table_.Move(placement, ReadPose(update.poses(), i));
     // The placement may also lack a hull.
     const absl::Status& now = table_.problem(placement);
-    if (!now.ok() && now != before) problems_to_tell_.push_back(placement);
+    if (!now.ok() && now != before) new_problems_.push_back(placement);
   }
-  return AskAbout(changed);
+  return BeginRound(changed);
 }
 
 void CollisionWatch::TakeChanges() {
-  const absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
-  if (!piece.ok()) return EndWork(piece.status());
-  if (piece->waits) return EndWork(absl::OkStatus());
-  // More changes may be pending.
-  Locked([this] { are_hulls_due_ = true; });
-  const absl::Status status = HandleChanges(*piece);
+  absl::StatusOr<WatchedHulls::Round> round =
+      hulls_.TakeChanges([this] { return call().ShouldStop(); });
+  if (!round.ok()) return EndWork(round.status());
+  if (round->waits) return EndWork(absl::OkStatus());
+  // There may be more.
+  Locked([this] { has_changes_ = true; });
+  const absl::Status status = HandleChanges(*std::move(round));
   if (!status.ok()) return EndWork(status);
-  if (!is_telling_) return EndWork(absl::OkStatus());
+  if (!is_sending_) return EndWork(absl::OkStatus());
   answers_message_ = false;
-  Tell();
+  SendRound();
 }
 
-// Returns the distinct hulls and bodies of the table that the piece affects.
-std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
-  if (piece.anew) {
-    // The changes are unknown.
-    std::vector<size_t> all(table_.hull_ids().size());
-    std::iota(all.begin(), all.end(), size_t{0});
-    return all;
+absl::Status CollisionWatch::HandleChanges(WatchedHulls::Round round) {
+  if (round.places.empty() && !round.has_advanced) return absl::OkStatus();
+  revision_ = round.revision;
+  new_piece_hulls_ = std::move(round.piece_hulls);
+  if (!round.places.empty()) {
+    table_.SetSomeHulls(round.places, std::move(round.resolved), options_);
   }
-  std::set<size_t> hulls;
-  for (const HullChange& change : piece.changes) {
-    const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
-    for (auto hull = begin; hull != end; ++hull) hulls.insert(hull->second);
-    hulls.merge(pieces_.BodiesOf(change.record.hull_id));
-  }
-  return {hulls.begin(), hulls.end()};
-}
-
-absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
-  const std::vector<size_t> hulls = ConcernedBy(piece);
-  const bool has_moved_on = piece.revision > revision_;
-  revision_ = std::max(revision_, piece.revision);
-  if (hulls.empty() && !has_moved_on) return absl::OkStatus();
-  if (absl::Status s = FollowPieces(hulls); !s.ok()) return s;
-  if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
   std::vector<uint32_t> changed;
-  for (const size_t k : hulls) {
+  for (const size_t k : round.places) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
     if (placements.empty()) continue;
     if (table_.query_hull_changed(placements.front())) {
       for (const uint32_t i : placements) pairs_.ForgetPoints(i);
     }
-    const bool is_there = table_.hull(k).ok();
-    if (is_there) TellOfPieces(k);
     if (!table_.hull_changed(placements.front())) continue;
-    if (is_there) hulls_to_tell_.push_back(k);
+    const bool is_there = table_.hull(k).ok();
+    if (is_there) new_hulls_.push_back(k);
     for (const uint32_t i : placements) {
       changed.push_back(i);
-      if (!is_there) problems_to_tell_.push_back(i);
+      if (!is_there) new_problems_.push_back(i);
     }
   }
-  // Without a changed hull, only the revision is sent.
-  return AskAbout(changed);
+  // Without a changed placement, the round only sends the new revision.
+  return BeginRound(changed);
 }
 
-absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
-  if (absl::Status s = pairs_.AskAbout(changed, table_); !s.ok()) return s;
-  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + pieces_.MemoryBytes());
+absl::Status CollisionWatch::BeginRound(const std::vector<uint32_t>& changed) {
+  if (absl::Status s = pairs_.Select(changed, table_); !s.ok()) return s;
+  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + hulls_.MemoryBytes());
   if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
-  call().AddPairs(pairs_.asked().size());
+  call().AddPairs(pairs_.selected().size());
   next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
-  is_telling_ = true;
+  is_sending_ = true;
   return absl::OkStatus();
 }
 
-// Answers pairs and fills replies until the round is sent, a message is full, or the slice ends.
-void CollisionWatch::Tell() {
+// Answers pairs and adds events until the round is complete, the message is full, or the time slice
+// ends.
+void CollisionWatch::SendRound() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-  bool is_full = !TellHulls();
-  const std::span<const uint32_t> asked = pairs_.asked();
-  while (!is_full && next_pair_ < asked.size()) {
-    const absl::Status status = TellPair(pairs_.pair(asked[next_pair_++]));
+  bool is_full = !AddHulls();
+  const std::span<const uint32_t> selected = pairs_.selected();
+  while (!is_full && next_pair_ < selected.size()) {
+    const absl::Status status = AnswerPair(pairs_.pair(selected[next_pair_++]));
     if (!status.ok()) return EndWork(status);
     is_full = reply_bytes_ >= Config::kReplyMessageBytes;
     if (!table_.has_bodies() && next_pair_ % kPairsPerPoll != 0) continue;
     if (call().ShouldStop()) return EndWork(call().StopStatus());
-    if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { Tell(); });
+    if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { SendRound(); });
   }
   call().metrics().CountPairs(std::exchange(rungs_, {}));
-  const bool is_told = !is_full;
-  if (is_told) {
-    pairs_.EndAsking();
-    hulls_to_tell_.clear();
-    piece_hulls_to_tell_.clear();
-    problems_to_tell_.clear();
+  const bool is_complete = !is_full;
+  if (is_complete) {
+    pairs_.EndRound();
+    new_hulls_.clear();
+    new_piece_hulls_.clear();
+    new_problems_.clear();
     if (answers_message_) call().EndMessage();
   }
   EncodeHeader(registry_.store(), revision_, reply_.mutable_header());
   reply_.set_update(messages_);
-  reply_.set_synced(is_told);
+  reply_.set_synced(is_complete);
   Locked([&] {
     is_working_ = false;
-    is_telling_ = !is_told;
-    if (is_told && answers_message_) has_message_ = false;
+    is_sending_ = !is_complete;
+    if (is_complete && answers_message_) has_message_ = false;
     const size_t bytes = std::exchange(reply_bytes_, 0) + 1;
     Queue(std::exchange(reply_, {}), bytes);
   });
 }
 
-// Returns false if the message is full before everything is added.
-bool CollisionWatch::TellHulls() {
-  while (next_hull_ < hulls_to_tell_.size() || next_piece_hull_ < piece_hulls_to_tell_.size() ||
-         next_problem_ < problems_to_tell_.size()) {
+// Adds new hulls and problems to the reply. Returns false if the message is full before the last.
+bool CollisionWatch::AddHulls() {
+  while (next_hull_ < new_hulls_.size() || next_piece_hull_ < new_piece_hulls_.size() ||
+         next_problem_ < new_problems_.size()) {
     if (reply_bytes_ >= Config::kReplyMessageBytes) return false;
-    if (next_hull_ < hulls_to_tell_.size()) {
+    if (next_hull_ < new_hulls_.size()) {
       v1::HullVersion* const version = reply_.add_hulls();
-      table_.EncodeHull(hulls_to_tell_[next_hull_++], version);
+      table_.EncodeHull(new_hulls_[next_hull_++], version);
       reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
-    } else if (next_piece_hull_ < piece_hulls_to_tell_.size()) {
+    } else if (next_piece_hull_ < new_piece_hulls_.size()) {
       v1::HullVersion* const version = reply_.add_piece_hulls();
-      const HullRecord& hull = piece_hulls_to_tell_[next_piece_hull_++];
+      const HullRecord& hull = new_piece_hulls_[next_piece_hull_++];
       EncodeVersion(registry_.store(), hull, version);
       reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
-      table_.EncodeProblem(problems_to_tell_[next_problem_++], problem);
+      table_.EncodeProblem(new_problems_[next_problem_++], problem);
       reply_bytes_ += kEntryHeaderBytes + problem->ByteSizeLong();
     }
   }
   return true;
 }
 
-absl::Status CollisionWatch::TellPair(WatchedPair& pair) {
+absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
   if (!table_.is_answerable(pair.a) || !table_.is_answerable(pair.b)) {
-    if (pair.is_told()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair, std::nullopt);
+    if (pair.is_reported()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair, std::nullopt);
     pair.relation = v1::RELATION_SEPARATED;
     pair.is_within_clearance = false;
     return absl::OkStatus();

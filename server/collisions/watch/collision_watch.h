@@ -8,16 +8,13 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
-#include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/collisions/placed/placement_table.h"
-#include "server/collisions/watch/followed_pieces.h"
+#include "server/collisions/watch/watched_hulls.h"
 #include "server/collisions/watch/watched_pairs.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
@@ -26,10 +23,10 @@
 namespace hulld::server {
 
 // One WatchCollisions call. Works in rounds: a round takes one message of the client, or the
-// pending changes of hulls and bodies, answers the affected pairs again, and sends the differences.
-// A round starts after the replies of the previous one are written. Until then, messages wait in
-// gRPC's window and changes in the registry, which keeps the last state of each hull; a slow client
-// therefore costs the memory of one message.
+// pending changes of hulls and bodies, answers the affected pairs again, and sends an event for
+// each pair that differs. A round starts after the replies of the previous one are written. Until
+// then, messages wait in gRPC's window and changes coalesce in the feed, so a slow client costs the
+// memory of one message.
 //
 // The mutex guards which task is running. The data of a round belongs to that task alone.
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
@@ -48,6 +45,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
+        hulls_(registry),
         charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override {
@@ -61,25 +59,20 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   void OnMessage() override;
   void OnNoMessage(const absl::Status& why) override;
 
-  // The functions below run in the round's task.
+  // The following run as the only task.
   void TakeMessage();
   absl::Status HandleMessage();
   absl::Status HandleOpen(v1::CollisionWatchOpen& open);
-  absl::Status WatchHulls();
-  absl::Status FollowPieces(std::span<const size_t> hulls);
-  std::vector<size_t> ConcernedBy(const WatchPiece& piece) const;
-  void TellOf(size_t hull);
-  void TellOfPieces(size_t hull);
   absl::Status HandleUpdate(const v1::CollisionWatchUpdate& update);
   void TakeChanges();
-  absl::Status HandleChanges(const WatchPiece& piece);
-  absl::Status AskAbout(const std::vector<uint32_t>& changed);
-  void Tell();
-  bool TellHulls();
-  absl::Status TellPair(WatchedPair& pair);
+  absl::Status HandleChanges(WatchedHulls::Round round);
+  absl::Status BeginRound(const std::vector<uint32_t>& changed);
+  void SendRound();
+  bool AddHulls();
+  absl::Status AnswerPair(WatchedPair& pair);
   void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
                 const std::optional<PiecePair>& pieces);
-  // Ends the task; an error ends the call.
+  // Ends the task, and the call if `error` is not OK.
   void EndWork(const absl::Status& error);
 
   Registry& registry_;
@@ -90,33 +83,30 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
 
   // Guarded by the mutex.
   bool is_working_ = false;
-  // A message has been read and is not yet handled.
+  // A message was read and waits for its round.
   bool has_message_ = false;
-  bool has_said_all_ = false;
-  // The registry has changes, or was not queried yet.
-  bool are_hulls_due_ = false;
+  bool has_half_closed_ = false;
+  // The feed may have changes.
+  bool has_changes_ = false;
 
-  // Owned by the task. Written before hulls can be due, and not changed afterwards.
-  std::shared_ptr<ChangeWatch> watch_;
+  // The following belong to the task.
+  WatchedHulls hulls_;
   // Covers placements and pairs.
   MemoryCharge charge_;
   bool is_open_ = false;
   QueryOptions options_;
   PlacementTable table_;
   WatchedPairs pairs_;
-  // Indices into the table's hulls, by ID.
-  std::unordered_multimap<std::string, size_t> hulls_of_;
-  FollowedPieces pieces_;
   uint64_t messages_ = 0;
   // Every change of a hull up to this revision is included.
   uint64_t revision_ = 0;
 
-  // Progress of sending the round: the next hull, problem, and pair.
-  bool is_telling_ = false;
+  // The current round, and the next of its hulls, problems and pairs to send.
+  bool is_sending_ = false;
   bool answers_message_ = false;
-  std::vector<size_t> hulls_to_tell_;
-  std::vector<HullRecord> piece_hulls_to_tell_;
-  std::vector<uint32_t> problems_to_tell_;
+  std::vector<size_t> new_hulls_;
+  std::vector<HullRecord> new_piece_hulls_;
+  std::vector<uint32_t> new_problems_;
   size_t next_hull_ = 0;
   size_t next_piece_hull_ = 0;
   size_t next_problem_ = 0;

@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Up to this many placements are compared with all others; for more, a tree costs less.
+// Up to this many placements are compared with all others; beyond it, a tree costs less.
 constexpr size_t kMostCompared = 16;
 
 uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
@@ -63,27 +63,26 @@ bool WatchedPairs::MayCollide(uint32_t a, uint32_t b) const {
   return !ignored_.contains(std::minmax(groups_[a], groups_[b]));
 }
 
-void WatchedPairs::Ask(uint32_t number) {
-  if (std::exchange(pairs_[number].is_asked, true)) return;
-  asked_.push_back(number);
+void WatchedPairs::SelectOne(uint32_t number) {
+  if (std::exchange(pairs_[number].is_selected, true)) return;
+  selected_.push_back(number);
 }
 
-absl::Status WatchedPairs::AskAbout(std::span<const uint32_t> changed,
-                                    const PlacementTable& table) {
+absl::Status WatchedPairs::Select(std::span<const uint32_t> changed, const PlacementTable& table) {
   for (const uint32_t placement : changed) {
-    for (const uint32_t number : pairs_of_[placement]) Ask(number);
+    for (const uint32_t number : pairs_of_[placement]) SelectOne(number);
     if (is_scene_) boxes_[placement] = table.BoxOf(placement);
   }
-  return is_scene_ ? AskAboutNeighbors(changed) : absl::OkStatus();
+  return is_scene_ ? SelectNeighbors(changed) : absl::OkStatus();
 }
 
-absl::Status WatchedPairs::AskAboutNeighbors(std::span<const uint32_t> changed) {
+absl::Status WatchedPairs::SelectNeighbors(std::span<const uint32_t> changed) {
   if (changed.size() <= kMostCompared) {
     for (const uint32_t a : changed) {
       const Box box = GrownBy(boxes_[a], clearance_);
       for (uint32_t b = 0; b < boxes_.size(); ++b) {
         if (!box.Meets(boxes_[b])) continue;
-        if (absl::Status s = AskAboutPair(a, b); !s.ok()) return s;
+        if (absl::Status s = SelectPair(a, b); !s.ok()) return s;
       }
     }
     return absl::OkStatus();
@@ -94,13 +93,13 @@ absl::Status WatchedPairs::AskAboutNeighbors(std::span<const uint32_t> changed) 
     met.clear();
     tree.AppendMeeting(GrownBy(boxes_[a], clearance_), 0, met);
     for (const uint32_t b : met) {
-      if (absl::Status s = AskAboutPair(a, b); !s.ok()) return s;
+      if (absl::Status s = SelectPair(a, b); !s.ok()) return s;
     }
   }
   return absl::OkStatus();
 }
 
-absl::Status WatchedPairs::AskAboutPair(uint32_t a, uint32_t b) {
+absl::Status WatchedPairs::SelectPair(uint32_t a, uint32_t b) {
   if (!MayCollide(a, b)) return absl::OkStatus();
   const auto [low, high] = std::minmax(a, b);
   const auto [place, is_new] = numbers_.emplace(KeyOf(low, high), 0);
@@ -111,7 +110,7 @@ absl::Status WatchedPairs::AskAboutPair(uint32_t a, uint32_t b) {
     }
     place->second = Add(low, high);
   }
-  Ask(place->second);
+  SelectOne(place->second);
   return absl::OkStatus();
 }
 
@@ -119,18 +118,18 @@ void WatchedPairs::ForgetPoints(uint32_t placement) {
   for (const uint32_t number : pairs_of_[placement]) pairs_[number].cache.pair_count = 0;
 }
 
-void WatchedPairs::EndAsking() {
-  for (const uint32_t number : asked_) {
+void WatchedPairs::EndRound() {
+  for (const uint32_t number : selected_) {
     WatchedPair& pair = pairs_[number];
-    pair.is_asked = false;
-    if (!is_scene_ || pair.is_told()) continue;
+    pair.is_selected = false;
+    if (!is_scene_ || pair.is_reported()) continue;
     if (!GrownBy(boxes_[pair.a], clearance_).Meets(boxes_[pair.b])) Drop(number);
   }
-  asked_.clear();
+  selected_.clear();
 }
 
 size_t WatchedPairs::MemoryBytes() const {
-  // Bytes of a pair, with its numbers in two placements, in the selection, and by its key.
+  // Entries in the lists of two placements, in the selection, and in the map by key.
   constexpr size_t kPerPair = sizeof(WatchedPair) + 3 * sizeof(uint32_t) + 48;
   return pairs_.size() * kPerPair +
          pairs_of_.size() * (sizeof(std::vector<uint32_t>) + sizeof(uint32_t)) +

@@ -18,42 +18,42 @@
 
 namespace hulld::server {
 
-// The state of a pair between answers.
+// State of a pair between answers.
 struct WatchedPair {
   uint32_t a = 0;
   uint32_t b = 0;
   PairCache cache;
-  // The last reported relation; SEPARATED for pairs that were not reported.
+  // As reported last; SEPARATED if never reported.
   v1::Relation relation = v1::RELATION_SEPARATED;
   bool is_within_clearance = false;
-  bool is_asked = false;
+  bool is_selected = false;
 
-  // True if the client has an event that says the pair is close.
-  bool is_told() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
+  // Returns true if the pair was last reported as touching, overlapping or within the clearance.
+  bool is_reported() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
-// The pairs of a watch by placement, and the pairs that a change affects. A list names its pairs. A
-// scene keeps the pairs that were reported and the pairs with bounding boxes that meet; all other
-// pairs are farther apart than the clearance. Not thread-safe.
+// The pairs of a watch, indexed by placement, and those selected for the current round. Holds all
+// named pairs; of a scene, only reported pairs and pairs whose bounding boxes, grown by the
+// clearance, meet: all other pairs are farther apart than the clearance. Not thread-safe.
 class WatchedPairs {
  public:
   WatchedPairs() = default;
-  // open: its pairs, groups, and movers are valid for this number of placements. max_pairs: maximum
-  // number of pairs kept for a scene (--max-pairs-per-batch).
+  // Requires valid pairs, groups and movers for this many placements. max_pairs: maximum number of
+  // held pairs of a scene (--max-pairs-per-batch).
   WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
-  // Selects the pairs of the changed or moved placements, which are distinct, to be answered again,
-  // including new pairs. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n
-  // log n) for all of them, plus the number of pairs found.
-  absl::Status AskAbout(std::span<const uint32_t> changed, const PlacementTable& table);
-  // Clears the points in the caches of this placement's pairs, which no longer exist.
+  // Selects all pairs of the moved or changed placements, including new ones; each placement once.
+  // RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n) in total,
+  // plus the number of selected pairs.
+  absl::Status Select(std::span<const uint32_t> changed, const PlacementTable& table);
+  // Clears the cached points of the placement's pairs, which refer to a former hull.
   void ForgetPoints(uint32_t placement);
 
-  // Numbers of the selected pairs, until EndAsking.
-  std::span<const uint32_t> asked() const { return asked_; }
+  // Numbers of the selected pairs.
+  std::span<const uint32_t> selected() const { return selected_; }
   WatchedPair& pair(uint32_t number) { return pairs_[number]; }
-  // Drops the selected pairs that need not be kept.
-  void EndAsking();
+  // Clears the selection and drops pairs that need not be held.
+  void EndRound();
 
   size_t MemoryBytes() const;
 
@@ -61,14 +61,14 @@ class WatchedPairs {
   bool MayCollide(uint32_t a, uint32_t b) const;
   uint32_t Add(uint32_t a, uint32_t b);
   void Drop(uint32_t number);
-  void Ask(uint32_t number);
-  absl::Status AskAboutNeighbors(std::span<const uint32_t> changed);
-  absl::Status AskAboutPair(uint32_t a, uint32_t b);
+  void SelectOne(uint32_t number);
+  absl::Status SelectNeighbors(std::span<const uint32_t> changed);
+  absl::Status SelectPair(uint32_t a, uint32_t b);
 
   std::vector<WatchedPair> pairs_;
   // Pair numbers by placement.
   std::vector<std::vector<uint32_t>> pairs_of_;
-  std::vector<uint32_t> asked_;
+  std::vector<uint32_t> selected_;
 
   bool is_scene_ = false;
   uint64_t max_pairs_ = 0;
@@ -77,7 +77,7 @@ class WatchedPairs {
   uint32_t movers_ = 0;
   double clearance_ = 0;
   std::vector<Box> boxes_;
-  // Pair numbers by both placements; the lower placement is in the upper half of the key.
+  // Pair numbers by key: both placements, the lower one in the upper half.
   std::unordered_map<uint64_t, uint32_t> numbers_;
   // Unused entries of pairs_.
   std::vector<uint32_t> free_;

@@ -13,12 +13,12 @@
 #include <string>
 
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
+#include "server/registry/state/registry_state.h"
 
 namespace hulld::server {
 

@@ -212,19 +212,6 @@ struct OpenResult {
   uint64_t last_sequence = 0;
 };
 
-// Target of a watch: hulls by prefix of their IDs, or hulls by ID.
-struct WatchTarget {
-  // Ignored unless `ids` is empty.
-  std::string prefix;
-  std::vector<std::string> ids;
-  // Includes bodies.
-  bool bodies = false;
-  // IDs are added and removed later (Registry::WatchAlso), so no other watch can share the state.
-  bool varies = false;
-
-  bool operator==(const WatchTarget&) const = default;
-};
-
 // Kind of change of a hull, as v1::HullEventKind.
 enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
 
@@ -243,27 +230,6 @@ struct HullChange {
   bool has_box = false;
   Vector low;
   Vector high;
-};
-
-// Next part of a watch.
-struct WatchPiece {
-  // No change is pending; the watch's on_ready will be called once when one is.
-  bool waits = false;
-  // Every change up to this revision was sent before, is in `changes`, or was superseded.
-  uint64_t revision = 0;
-  std::vector<HullChange> changes;
-  // Fields of v1::WatchHullsResponse.
-  bool synced = false;
-  bool anew = false;
-};
-
-// Start of a watch.
-struct WatchStart {
-  // True: sends the present state first. False: sends only later changes.
-  bool tell_present = false;
-  // Resumes a watch that received everything up to this revision of that store; 0: does not resume.
-  uint64_t after_revision = 0;
-  std::string store_id = {};
 };
 
 // Called exactly once with the result.

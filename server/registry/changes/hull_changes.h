@@ -15,12 +15,12 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
+#include "server/registry/state/registry_state.h"
 
 namespace hulld::server {
 

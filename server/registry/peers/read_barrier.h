@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
+#include "server/registry/state/registry_state.h"
 
 namespace hulld::server {
 

@@ -14,11 +14,11 @@
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/catalog/known_hulls.h"
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
+#include "server/registry/state/registry_state.h"
 
 namespace hulld::server {
 

@@ -328,69 +328,73 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-// Starts the store query for the watch's next piece.
-void RecordReader::ReadPresent(Locked& locked, ChangeWatch& watch) {
-  HULLD_CHECK(locked.Holds(state_.mutex));
-  // Changes before the first step are part of the list.
-  if (watch.last_id.empty() && watch.after_revision == 0) state_.feed.SkipChanges(watch);
-  const WatchTarget& target = ChangeFeed::TargetOf(watch);
-  watch.is_reading = true;
-  loaders_.Submit(
-      [this, kept = watch.shared_from_this(), reading = ++watch.readings,
-       asked_at = state_.catalog.revision(), after = watch.last_id, prefix = target.prefix,
-       ids = target.ids, bodies = target.bodies] {
-        absl::StatusOr<FoundRecords> found =
-            ids.empty() ? state_.store.ListRecords(prefix, after, ChangeFeed::kMostPerPiece,
-                                                   {.hulls = true, .bodies = bodies})
-                        : state_.store.FindRecords(std::span(ids).first(1));
-        if (found.ok() && !bodies) found->bodies.clear();
-        Locked later(state_.mutex);
-        WhenReached(
-            later, asked_at, std::move(found),
-            [this, kept, reading](Locked& now, const absl::StatusOr<FoundRecords>& reached) {
-              if (!kept->is_reading || kept->readings != reading) return;
-              kept->is_reading = false;
-              kept->found = reached;
-              state_.feed.Wake(now, kept);
-            });
-      },
-      kWatchReader);
+RecordPage RecordReader::Describe(const FoundRecords& found) const {
+  RecordPage page;
+  page.more = found.more;
+  for (const auto& [id, stored] : found.hulls) page.changes.push_back(Describe(id, stored));
+  for (const auto& [id, stored] : found.bodies) {
+    const StoredBody nothing = {{id, 0, 0}, {}, {}};
+    page.changes.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
+  }
+  std::ranges::sort(page.changes, {}, [](const HullChange& change) -> const std::string& {
+    return change.record.hull_id;
+  });
+  return page;
 }
 
-absl::Status RecordReader::TakePresent(Locked& locked, ChangeWatch& watch, WatchPiece* piece) {
-  if (!watch.found.has_value()) {
-    if (!watch.is_reading) ReadPresent(locked, watch);
-    piece->waits = true;
-    state_.feed.Arm(watch);
-    return absl::OkStatus();
-  }
-  if (!watch.found->ok()) return std::exchange(watch.found, std::nullopt)->status();
-  const FoundRecords found = **std::exchange(watch.found, std::nullopt);
-  // A damaged record has no readable revision.
-  const auto tell = [&](HullChange change) {
-    const bool is_new = watch.after_revision == 0 || change.record.revision > watch.after_revision;
-    if (is_new) piece->changes.push_back(std::move(change));
+RecordPage RecordReader::CataloguedPage(const PageRequest& request) const {
+  const std::string& first = request.ids.empty() ? request.prefix : request.ids.front();
+  const auto has_next = [&](const auto& entries, const auto& next) {
+    if (next == entries.end()) return false;
+    return request.ids.empty() ? next->first.starts_with(first) : next->first == first;
   };
-  auto hull = found.hulls.begin();
-  auto body = found.bodies.begin();
-  while (hull != found.hulls.end() || body != found.bodies.end()) {
-    const bool is_hull =
-        body == found.bodies.end() || (hull != found.hulls.end() && hull->first < body->first);
-    watch.last_id = is_hull ? hull->first : body->first;
-    if (is_hull) {
-      tell(Describe(hull->first, hull->second));
+  const auto begin_of = [&](const auto& entries) {
+    return request.after.empty() ? entries.lower_bound(first) : entries.upper_bound(request.after);
+  };
+  const auto& hulls = state_.catalog.hulls().entries();
+  const auto& bodies = state_.catalog.bodies().entries();
+  auto hull = begin_of(hulls);
+  auto body = request.bodies ? begin_of(bodies) : bodies.end();
+  RecordPage page;
+  while (page.changes.size() < request.page_size) {
+    const bool has_hull = has_next(hulls, hull);
+    const bool has_body = has_next(bodies, body);
+    if (!has_hull && !has_body) return page;
+    if (!has_body || (has_hull && hull->first < body->first)) {
+      if (hull->second.visible()) page.changes.push_back(hull->second.Describe(hull->first));
       ++hull;
     } else {
-      const absl::StatusOr<StoredBody>& stored = body->second;
-      const StoredBody nothing = {{body->first, 0, 0}, {}, {}};
-      tell(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
+      const std::shared_ptr<const Body>& committed = body->second.committed();
+      if (committed != nullptr) page.changes.push_back(committed->Describe());
       ++body;
     }
   }
-  if (found.more) return absl::OkStatus();
-  watch.stage = ChangeWatch::Stage::kChanges;
-  watch.synced_at = state_.catalog.revision();
-  return absl::OkStatus();
+  page.more = has_next(hulls, hull) || has_next(bodies, body);
+  return page;
+}
+
+void RecordReader::ReadPage(Locked& locked, PageRequest request,
+                            std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) {
+  HULLD_CHECK(locked.Holds(state_.mutex));
+  if (!state_.catalog.is_cache()) return done(locked, CataloguedPage(request));
+  loaders_.Submit(
+      [this, request = std::move(request), done = std::move(done),
+       asked_at = state_.catalog.revision()]() mutable {
+        absl::StatusOr<FoundRecords> found =
+            request.ids.empty()
+                ? state_.store.ListRecords(request.prefix, request.after, request.page_size,
+                                           {.hulls = true, .bodies = request.bodies})
+                : state_.store.FindRecords(request.ids);
+        if (found.ok() && !request.bodies) found->bodies.clear();
+        Locked later(state_.mutex);
+        WhenReached(later, asked_at, std::move(found),
+                    [this, done = std::move(done)](Locked& now,
+                                                   const absl::StatusOr<FoundRecords>& reached) {
+                      if (!reached.ok()) return done(now, reached.status());
+                      done(now, Describe(*reached));
+                    });
+      },
+      kWatchReader);
 }
 
 }  // namespace hulld::server

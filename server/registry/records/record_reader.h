@@ -16,10 +16,11 @@
 #include "server/process/fair_queue.h"
 #include "server/process/synchronization.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/catalog/registry_state.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
+#include "server/registry/state/registry_state.h"
+#include "server/registry/watch/page_source.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -45,7 +46,7 @@ inline constexpr ClientId kWatchReader = {2};
 //     be answered from the earlier one next.
 //
 // Guarded by the registry's mutex, which is released during store queries.
-class RecordReader : public PeerChangeListener {
+class RecordReader : public PeerChangeListener, public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
   RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier,
@@ -87,10 +88,8 @@ class RecordReader : public PeerChangeListener {
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
                                       size_t page_size, const std::function<bool()>& should_stop);
 
-  // Takes the next piece of a watch in stage kPresent and advances the watch. If the piece is not
-  // read yet, starts the read, and the watch waits for it. UNAVAILABLE: the read failed; the next
-  // call retries.
-  absl::Status TakePresent(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
+  void ReadPage(Locked& locked, PageRequest request,
+                std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) override;
 
  private:
   struct Reading {
@@ -128,7 +127,8 @@ class RecordReader : public PeerChangeListener {
                                     size_t page_size, RecordKinds kinds,
                                     const std::function<bool()>& should_stop);
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  void ReadPresent(Locked& locked, ChangeWatch& watch);
+  RecordPage Describe(const FoundRecords& found) const;
+  RecordPage CataloguedPage(const PageRequest& request) const;
 
   RegistryState& state_;
   Committer& committer_;

@@ -51,8 +51,10 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   header_ = response.header();
   std::string last_id;
   uint64_t last_revision = 0;
+  std::set<std::string> ids;
   for (const v1::HullEvent& event : response.events()) {
     const v1::HullInfo& hull = event.hull();
+    if (!ids.insert(hull.hull_id()).second) return "a hull has two events in one message";
     // Deleted hulls come first, then existing ones.
     const bool is_there = !is_synced_ && event.kind() != v1::HULL_EVENT_KIND_DELETED;
     if (is_there && hull.hull_id() <= last_id) return "events are not in the order of IDs";
@@ -131,8 +133,11 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
   if (response.header().revision() < revision_) return "the revision of a watch falls";
   revision_ = response.header().revision();
   told_update_ = response.update();
-  for (const v1::HullVersion& hull : response.hulls()) {
-    if (hull.revision() == 0) return "a hull has no revision";
+  for (const auto* const hulls : {&response.hulls(), &response.piece_hulls()}) {
+    for (const v1::HullVersion& hull : *hulls) {
+      if (hull.revision() == 0) return "a hull has no revision";
+      versions_[hull.hull_id()] = {hull.create_revision(), hull.revision()};
+    }
   }
   for (const v1::PlacementProblem& problem : response.placement_problems()) {
     if (problem.placement() >= static_cast<uint32_t>(open_.placements_size())) {
@@ -149,6 +154,25 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
   return {};
 }
 
+// An event is exact at versions that it or an earlier message states.
+std::string CollisionWatchCheck::CheckSent(uint32_t placement, uint64_t revision, bool has_piece,
+                                           const v1::DecidingPiece& piece) const {
+  const std::string& id = open_.placements(static_cast<int>(placement)).hull_id();
+  const auto sent = versions_.find(id);
+  if (sent == versions_.end() || sent->second.second != revision) {
+    return absl::StrCat("revision ", revision, " of ", id, " was not sent");
+  }
+  if (!has_piece) return {};
+  const v1::HullVersion& hull = piece.hull();
+  const auto of_piece = versions_.find(hull.hull_id());
+  if (of_piece != versions_.end() &&
+      of_piece->second == Version(hull.create_revision(), hull.revision())) {
+    return {};
+  }
+  return absl::StrCat("revision ", hull.revision(), " of the piece's hull ", hull.hull_id(),
+                      " was not sent");
+}
+
 std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   const Pair pair = {event.placement_a(), event.placement_b()};
   if (!IsWatched(pair)) return "it is not watched";
@@ -158,6 +182,14 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   }
   if (event.has_within_clearance() != (open_.has_clearance() && !is_lost)) {
     return "the clearance is told where nobody asked, or the other way round";
+  }
+  if (!is_lost) {
+    std::string finding =
+        CheckSent(pair.first, event.revision_a(), event.has_piece_a(), event.piece_a());
+    if (finding.empty()) {
+      finding = CheckSent(pair.second, event.revision_b(), event.has_piece_b(), event.piece_b());
+    }
+    if (!finding.empty()) return finding;
   }
   State& state = told_[pair];
   const State before = state;

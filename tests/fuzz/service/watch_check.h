@@ -67,13 +67,20 @@ class CollisionWatchCheck {
     bool is_near = false;
   };
 
+  // create_revision and revision of a hull or body.
+  using Version = std::pair<uint64_t, uint64_t>;
+
   bool IsWatched(const Pair& pair) const;
+  std::string CheckSent(uint32_t placement, uint64_t revision, bool has_piece,
+                        const v1::DecidingPiece& piece) const;
   std::string TakeEvent(const v1::CollisionEvent& event);
 
   v1::CollisionWatchOpen open_;
   // For explicitly named pairs: their multiplicity.
   std::map<Pair, int> named_;
   std::map<Pair, State> told_;
+  // Last version sent, by ID.
+  std::map<std::string, Version> versions_;
   // Since the last `synced`.
   std::set<Pair> told_now_;
   uint64_t sent_ = 0;

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <random>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -93,6 +95,14 @@ class WatchHulls : public ServerTest {
  protected:
   grpc::Status Refused(const v1::WatchHullsRequest& request) {
     return Watch(*hulls_, request).Finish();
+  }
+  // gRPC reads ahead for its clients without a fixed limit; here 64 KiB.
+  std::unique_ptr<v1::HullService::Stub> SlowReader() const {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+    arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
+    return v1::HullService::NewStub(grpc::CreateCustomChannel(
+        server_->address(), grpc::InsecureChannelCredentials(), arguments));
   }
 };
 
@@ -199,12 +209,7 @@ TEST_F(WatchHulls, EndsAtItsDeadline) {
 // A client does not read while many hulls change. The changes are acknowledged nevertheless, and
 // the client gets each hull once when it resumes reading.
 TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
-  // gRPC reads ahead for its clients without a fixed limit; here 64 KiB, a tenth of the changes.
-  grpc::ChannelArguments arguments;
-  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
-  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
-  const auto slow = v1::HullService::NewStub(
-      grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), arguments));
+  const auto slow = SlowReader();
   Watch watch(*slow, {});
   watch.ReadUntilSynced();
   constexpr uint64_t kHulls = 50;
@@ -228,6 +233,47 @@ TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
     if (all && received.size() == kHulls) break;
   }
   EXPECT_LT(events, kHulls * kRounds);
+}
+
+// The client does not read while more hulls are created than one message holds.
+TEST_F(WatchHulls, AReaderFarBehindReceivesPresentAfterSynced) {
+  const auto slow = SlowReader();
+  Watch watch(*slow, {});
+  watch.ReadUntilSynced();
+  constexpr int kHulls = 2000;
+  for (int h = 0; h < kHulls; ++h) Create(absl::StrCat(std::string(240, 'h'), h));
+  std::set<std::string> received;
+  std::set<v1::HullEventKind> kinds;
+  while (received.size() < kHulls) {
+    const v1::WatchHullsResponse message = watch.Next();
+    ASSERT_GT(message.events_size(), 0);
+    EXPECT_FALSE(message.synced() || message.anew());
+    for (const v1::HullEvent& event : message.events()) {
+      EXPECT_TRUE(received.insert(event.hull().hull_id()).second);
+      kinds.insert(event.kind());
+    }
+  }
+  EXPECT_THAT(kinds, ElementsAre(v1::HULL_EVENT_KIND_PRESENT, v1::HULL_EVENT_KIND_CREATED));
+  Create("last");
+  EXPECT_THAT(watch.Next().events(0).kind(), v1::HULL_EVENT_KIND_CREATED);
+}
+
+TEST_F(WatchHulls, AResumedWatchReceivesEachDeletedIdOnce) {
+  Create("a");
+  Create("b");
+  Watch first(*hulls_, {});
+  first.ReadUntilSynced();
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(Delete("a").ok());
+    if (i < 2) Create("a");
+  }
+  ASSERT_TRUE(Delete("b").ok());
+  Create("b");
+  v1::WatchHullsRequest resumed;
+  resumed.set_after_revision(first.last().revision());
+  resumed.set_store_id(first.last().store_id());
+  Watch second(*hulls_, resumed);
+  EXPECT_THAT(second.ReadUntilSynced(), ElementsAre("DELETED a", "PRESENT b"));
 }
 
 // The state of the store according to the events of a watch.

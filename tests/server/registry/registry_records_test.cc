@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <semaphore>
 #include <string>
 #include <vector>
 
@@ -266,6 +267,23 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   EXPECT_EQ(after, "b59");
   EXPECT_EQ(store_.questions, 10);
   EXPECT_FALSE(registry_.bodies().TryFind(Ids(10, 1, "b")).has_value());
+}
+
+// The batch that says so does not wait, although the existing hulls are not read yet.
+TEST_F(RegistryRecords, AWatchThatCannotResumeReportsThatItRestarted) {
+  Start(10);
+  ChangeFeed& feed = registry_.feed();
+  std::counting_semaphore<> ready(0);
+  const auto watch = *feed.Open({"", {"h7"}}, {1, "another store"}, [&ready] { ready.release(); });
+  WatchBatch batch = *feed.Next(watch);
+  while (batch.waits) {
+    ready.acquire();
+    batch = *feed.Next(watch);
+  }
+  EXPECT_TRUE(batch.restarted);
+  ASSERT_EQ(batch.changes.size(), 1);
+  EXPECT_EQ(batch.changes[0].record.hull_id, "h7");
+  feed.Close(watch);
 }
 
 }  // namespace registry_records_test

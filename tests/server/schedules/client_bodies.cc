@@ -49,6 +49,9 @@ void Client::PutBody() {
   StoredBody body;
   body.record.body_id = HullName(call.hull);
   body.hull_ids = {"piece"};
+  if (simulation_.plan.has_collision_watch && !random().OneIn(4)) {
+    body.hull_ids = {HullName(1 - call.hull)};
+  }
   body.pieces.resize(1);
   Scheduler::Current().Note("puts body", call.hull, call.if_revision.value_or(0));
   const auto check = [&](const absl::StatusOr<PutBodyResult>& result) {

@@ -1,4 +1,5 @@
-// The registry with its committer, budget, and feed, under schedules chosen by a seed.
+// The registry with its committer, budget and feed, and a watch of collisions, under schedules
+// chosen by a seed.
 //
 // HULLD_SCHEDULES: number of schedules, for manual runs. HULLD_TEST_SEED: the first seed.
 #include <gtest/gtest.h>
@@ -29,7 +30,7 @@ void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.damaged, 20);
   EXPECT_GT(reached.reads, 1000);
   EXPECT_GT(reached.snapshots, 100);
-  EXPECT_GT(reached.told, 100);
+  EXPECT_GT(reached.reported, 100);
   EXPECT_GT(reached.loads, 100);
   EXPECT_GT(reached.sequences, 100);
   EXPECT_GT(reached.lookups, 1000);
@@ -37,6 +38,8 @@ void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.bodies_deleted, 50);
   EXPECT_GT(reached.bodies_found, 50);
   EXPECT_GT(reached.kinds_refused, 100);
+  EXPECT_GT(reached.resolved, 1000);
+  EXPECT_GT(reached.pieces_sent, 100);
   EXPECT_GT(reached.evictions, 100);
   EXPECT_GT(reached.recovered, 100);
   EXPECT_GT(reached.kills, 100);

@@ -228,6 +228,10 @@ bool Scheduler::Wait(const void* object, int64_t deadline, const Condition& cond
   return threads_[self].was_notified;
 }
 
+void Scheduler::WaitUntil(const void* object, const Condition& condition, const Location& where) {
+  while (!condition.holds(condition.context)) Wait(object, kNoDeadline, condition, where);
+}
+
 void Scheduler::Notify(const void* object, bool all, const Location& where) {
   Yield(all ? "notifies all" : "notifies one", object, where);
   ready_.clear();

@@ -100,7 +100,10 @@ class Scheduler {
   // Waits for a notification or the deadline. Returns true if notified.
   bool Wait(const void* object, int64_t deadline, const Condition& condition,
             const Location& where);
-  void Notify(const void* object, bool all, const Location& where);
+  // Waits for notifications until the condition holds.
+  void WaitUntil(const void* object, const Condition& condition,
+                 const Location& where = Location::current());
+  void Notify(const void* object, bool all = true, const Location& where = Location::current());
 
  private:
   enum class Status : uint8_t { kReady, kBlocked, kWaiting, kDone };

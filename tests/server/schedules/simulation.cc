@@ -8,6 +8,7 @@
 #include "server/process/synchronization.h"
 #include "server/process/worker_pool.h"
 #include "tests/server/schedules/client.h"
+#include "tests/server/schedules/collision_watcher.h"
 #include "tests/server/schedules/store/shared_store.h"
 #include "tests/server/schedules/watcher.h"
 
@@ -66,7 +67,7 @@ void RunClients(Simulation& simulation) {
   std::shared_ptr<Watcher> watcher;
   std::vector<std::unique_ptr<Client>> clients;
   std::vector<Thread> threads;
-  threads.reserve(simulation.plan.clients + 1);
+  threads.reserve(simulation.plan.clients + 2);
   for (size_t i = 0; i < simulation.plan.clients; ++i) {
     clients.push_back(std::make_unique<Client>(simulation));
     threads.emplace_back([client = clients.back().get()] { client->Run(); }, "client");
@@ -75,10 +76,15 @@ void RunClients(Simulation& simulation) {
     watcher = std::make_shared<Watcher>(simulation);
     threads.emplace_back([watcher] { watcher->Run(); }, "watcher");
   }
+  std::shared_ptr<CollisionWatcher> collisions;
+  if (simulation.plan.has_collision_watch) {
+    collisions = std::make_shared<CollisionWatcher>(simulation);
+    threads.emplace_back([collisions] { collisions->Run(); }, "collision watcher");
+  }
   for (size_t i = 0; i < clients.size(); ++i) threads[i].join();
-  if (watcher == nullptr) return;
-  watcher->End();
-  threads.back().join();
+  if (watcher != nullptr) watcher->End();
+  if (collisions != nullptr) collisions->End();
+  for (size_t i = clients.size(); i < threads.size(); ++i) threads[i].join();
 }
 
 void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
@@ -129,14 +135,12 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
 
 void Event::Set() {
   is_set_ = true;
-  Scheduler::Current().Notify(this, true, std::source_location::current());
+  Scheduler::Current().Notify(this);
 }
 
 void Event::Wait(const std::source_location& where) {
   const auto holds = [](const void* set) { return *static_cast<const bool*>(set); };
-  while (!is_set_) {
-    Scheduler::Current().Wait(this, Scheduler::kNoDeadline, {holds, &is_set_}, where);
-  }
+  Scheduler::Current().WaitUntil(this, {holds, &is_set_}, where);
 }
 
 Plan::Plan(Random& random) {
@@ -182,10 +186,11 @@ Plan::Plan(Random& random) {
     pressure = 3;
     cancellations = 2;
   }
+  has_collision_watch = bodies > 0 && hulls > 1 && random.OneIn(2);
   if (!random.OneIn(3)) return;
   servers = 2;
   // A watch may report several changes as one.
-  has_watch = false;
+  has_watch = has_collision_watch = false;
   faults.damage = 0;
   faults.killed_at_batch = 0;
   if (!finds_records) bodies = 0;

@@ -25,7 +25,8 @@ struct Reached {
   uint64_t damaged = 0;
   uint64_t reads = 0;
   uint64_t snapshots = 0;
-  uint64_t told = 0;
+  // Changes reported to a watch.
+  uint64_t reported = 0;
   uint64_t loads = 0;
   uint64_t sequences = 0;
   uint64_t lookups = 0;
@@ -33,6 +34,9 @@ struct Reached {
   uint64_t bodies_deleted = 0;
   uint64_t bodies_found = 0;
   uint64_t kinds_refused = 0;
+  // By a collision watch: resolved hulls and bodies, and sent hulls of pieces.
+  uint64_t resolved = 0;
+  uint64_t pieces_sent = 0;
   uint64_t evictions = 0;
   uint64_t recovered = 0;
   uint64_t kills = 0;
@@ -71,6 +75,7 @@ struct Plan {
   size_t hulls = 0;
   size_t writers = 0;
   bool has_watch = false;
+  bool has_collision_watch = false;
   // Relative frequency of each kind of call.
   uint32_t creations = 0;
   uint32_t deletions = 0;

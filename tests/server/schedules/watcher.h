@@ -9,33 +9,32 @@
 
 namespace hulld::server {
 
-// A watch of all hulls. Fails the schedule if it receives an event of a state that never existed.
+// Watches all hulls. Fails the schedule if the watch reports a state that never existed.
 class Watcher : public std::enable_shared_from_this<Watcher> {
  public:
   explicit Watcher(Simulation& simulation) : simulation_(simulation) {}
 
-  // Receives events until End.
+  // Runs until End.
   void Run();
-  // Waits until the watch has received the stored state of every hull, then ends it. A change that
-  // is never reported thus appears as a thread that waits forever. Requires: no client is left.
+  // Blocks until the watch has the final state of the store, then ends it. A lost change therefore
+  // appears as a thread that waits forever. Requires that all clients have ended.
   void End();
 
  private:
-  void WaitUntilReady();
-  void Take(const HullChange& change);
+  void Receive(const HullChange& change);
   bool MayBeOfKind(size_t hull, const HullChange& change, size_t state) const;
-  bool KnowsAll() const;
+  bool IsCurrent() const;
 
   Simulation& simulation_;
-  std::shared_ptr<ChangeWatch> watch_;
+  std::shared_ptr<Watch> watch_;
   bool has_begun_ = false;
   bool is_refused_ = false;
   bool is_ready_ = false;
   bool is_ending_ = false;
-  // Everything up to this revision was received; 0 before the first header.
+  // Revision of the last batch; 0 before the listing ends.
   uint64_t revision_ = 0;
-  // Number of the last received state of each hull.
-  std::array<size_t, kHulls> told_{};
+  // The last reported state of each hull, as an index into the ledger.
+  std::array<size_t, kHulls> reported_{};
 };
 
 }  // namespace hulld::server

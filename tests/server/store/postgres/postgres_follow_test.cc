@@ -266,23 +266,23 @@ TEST_F(PostgresFollow, AServerThatLagsTooFarBehindStops) {
 class Watcher {
  public:
   explicit Watcher(Registry& registry) : registry_(registry) {
-    watch_ = *registry.OpenWatch(WatchTarget(), {}, [this] {
+    watch_ = *registry.feed().Open({.lists_existing = false}, {}, [this] {
       const std::lock_guard lock(mutex_);
       is_ready_ = true;
       ready_.notify_all();
     });
   }
-  ~Watcher() { registry_.CloseWatch(watch_); }
+  ~Watcher() { registry_.feed().Close(watch_); }
 
   // Returns true when an event for this hull arrives; false after kLong.
-  bool SeesEvent(const std::string& id) {
+  bool Reports(const std::string& id) {
     while (true) {
-      const auto piece = registry_.TakeChanges(*watch_);
-      if (!piece.ok()) return false;
-      for (const HullChange& change : piece->changes) {
+      const auto batch = registry_.feed().Next(watch_);
+      if (!batch.ok()) return false;
+      for (const HullChange& change : batch->changes) {
         if (change.record.hull_id == id) return true;
       }
-      if (!piece->waits) continue;
+      if (!batch->waits) continue;
       std::unique_lock lock(mutex_);
       if (!ready_.wait_for(lock, kLong, [this] { return is_ready_; })) return false;
       is_ready_ = false;
@@ -291,7 +291,7 @@ class Watcher {
 
  private:
   Registry& registry_;
-  std::shared_ptr<ChangeWatch> watch_;
+  std::shared_ptr<Watch> watch_;
   std::mutex mutex_;
   std::condition_variable ready_;
   bool is_ready_ = false;
@@ -317,8 +317,8 @@ TEST_F(PostgresFollow, ANoticeOfABatchTriggersAReadImmediately) {
   for (int i = 0; i < 20; ++i) {
     const std::string id = absl::StrCat("h", i);
     ASSERT_TRUE((i % 2 == 0 ? other : hulls_)->Create(id).ok());
-    ASSERT_TRUE(here.SeesEvent(id)) << i;
-    ASSERT_TRUE(there.SeesEvent(id)) << i;
+    ASSERT_TRUE(here.Reports(id)) << i;
+    ASSERT_TRUE(there.Reports(id)) << i;
   }
   EXPECT_EQ(proxy_->Asked(kLook), 1);
 }
@@ -330,7 +330,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersPoll) {
   const Server other = StartPeer();
   Watcher watcher(hulls_->registry());
   ASSERT_TRUE(other->Create("h").ok());
-  EXPECT_TRUE(watcher.SeesEvent("h"));
+  EXPECT_TRUE(watcher.Reports("h"));
 }
 
 // The listening session reconnects by itself.
@@ -347,7 +347,7 @@ TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
       proxy_->CutListeners();
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
-      EXPECT_TRUE(watcher.SeesEvent(id));
+      EXPECT_TRUE(watcher.Reports(id));
       ASSERT_TRUE(Comes([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
     }
   }
@@ -369,16 +369,16 @@ TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
   const auto looks = [&] { return proxy_->Asked(kLook); };
   const auto beats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
   ASSERT_TRUE(other_->Create("heard").ok());
-  ASSERT_TRUE(watcher->SeesEvent("heard"));
+  ASSERT_TRUE(watcher->Reports("heard"));
   proxy_->SetDeaf(true);
   ASSERT_TRUE(other_->Create("unheard").ok());
-  EXPECT_TRUE(watcher->SeesEvent("unheard"));
+  EXPECT_TRUE(watcher->Reports("unheard"));
   const int beats_then = beats();
   EXPECT_TRUE(Comes([&] { return beats() > beats_then + 3; }));
   EXPECT_GT(looks(), 3 * beats());
   proxy_->SetDeaf(false);
   ASSERT_TRUE(other_->Create("heard again").ok());
-  EXPECT_TRUE(watcher->SeesEvent("heard again"));
+  EXPECT_TRUE(watcher->Reports("heard again"));
   // Two heartbeats cause two polls, and one poll may already have been running.
   EXPECT_TRUE(Comes([&] {
     const int looks_before = looks();
@@ -402,7 +402,7 @@ TEST_F(PostgresFollow, ServersPollIfTheDatabaseRefusesToListen) {
     for (int i = 0; i < 3; ++i) {
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
-      EXPECT_TRUE(watcher.SeesEvent(id));
+      EXPECT_TRUE(watcher.Reports(id));
     }
   }
   EndAll();

@@ -285,9 +285,8 @@ TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
   const std::unique_ptr<PostgresRegistry> other = MakeRegistry();
   Registry& registry = other->registry();
   const auto open = [&](bool bodies) {
-    WatchTarget target;
-    target.bodies = bodies;
-    const auto watch = registry.OpenWatch(target, {}, [] {});
+    const WatchTarget target{.bodies = bodies, .lists_existing = false};
+    const auto watch = registry.feed().Open(target, {}, [] {});
     EXPECT_TRUE(watch.ok()) << watch.status();
     return *watch;
   };
@@ -307,14 +306,14 @@ TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
     bool is_body;
     bool operator==(const Told&) const = default;
   };
-  const auto told = [&](const std::shared_ptr<ChangeWatch>& watch) {
+  const auto told = [&](const std::shared_ptr<Watch>& watch) {
     std::vector<Told> all;
-    const absl::StatusOr<WatchPiece> piece = registry.TakeChanges(*watch);
-    EXPECT_TRUE(piece.ok()) << piece.status();
-    for (const HullChange& change : piece->changes) {
+    const absl::StatusOr<WatchBatch> batch = registry.feed().Next(watch);
+    EXPECT_TRUE(batch.ok()) << batch.status();
+    for (const HullChange& change : batch->changes) {
       all.push_back({change.record.hull_id, change.kind, change.is_body});
     }
-    registry.CloseWatch(watch);
+    registry.feed().Close(watch);
     return all;
   };
   const std::vector<Told> expected = {{"changes", ChangeKind::kChanged, true},
@@ -430,24 +429,22 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   EXPECT_FALSE(registry.bodies().TryFind(std::vector<std::string>{"b"}).has_value());
   const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
-    WatchTarget target;
-    target.bodies = bodies;
+    const WatchTarget target{.bodies = bodies};
     const auto ready = std::make_shared<std::counting_semaphore<>>(0);
-    const auto watch = registry.OpenWatch(
-        target, {.tell_present = true, .after_revision = after, .store_id = hulls_->store().id()},
-        [ready] { ready->release(); });
+    const auto watch =
+        registry.feed().Open(target, {after, hulls_->store().id()}, [ready] { ready->release(); });
     EXPECT_TRUE(watch.ok()) << watch.status();
     for (bool is_synced = !watch.ok(); !is_synced;) {
-      const absl::StatusOr<WatchPiece> piece = registry.TakeChanges(**watch);
-      EXPECT_TRUE(piece.ok()) << piece.status();
-      if (!piece.ok()) break;
-      for (const HullChange& change : piece->changes) {
+      const absl::StatusOr<WatchBatch> batch = registry.feed().Next(*watch);
+      EXPECT_TRUE(batch.ok()) << batch.status();
+      if (!batch.ok()) break;
+      for (const HullChange& change : batch->changes) {
         events.emplace_back(change.record.hull_id, change.kind != ChangeKind::kDeleted);
       }
-      is_synced = piece->synced;
-      if (piece->waits) ready->acquire();
+      is_synced = batch->synced;
+      if (batch->waits) ready->acquire();
     }
-    if (watch.ok()) registry.CloseWatch(*watch);
+    if (watch.ok()) registry.feed().Close(*watch);
     return events;
   };
   using Events = std::vector<std::pair<std::string, bool>>;

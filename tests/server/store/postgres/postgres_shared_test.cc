@@ -288,7 +288,7 @@ TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
   Start();
   const Server other = StartPeer();
   std::atomic<int> ready = 0;
-  const auto watch = hulls_->registry().OpenWatch(WatchTarget(), {}, [&] {
+  const auto watch = hulls_->registry().feed().Open({.lists_existing = false}, {}, [&] {
     ++ready;
     ready.notify_all();
   });
@@ -297,12 +297,12 @@ TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
   int waited = 0;
   const auto take_until = [&](size_t count) {
     while (told.size() < count) {
-      const auto piece = hulls_->registry().TakeChanges(**watch);
-      ASSERT_TRUE(piece.ok()) << piece.status();
-      for (const HullChange& change : piece->changes) {
+      const auto batch = hulls_->registry().feed().Next(*watch);
+      ASSERT_TRUE(batch.ok()) << batch.status();
+      for (const HullChange& change : batch->changes) {
         told.emplace_back(change.record.hull_id, change.kind);
       }
-      if (piece->waits) ready.wait(waited++);
+      if (batch->waits) ready.wait(waited++);
     }
   };
   ASSERT_TRUE(other->Create("h").ok());
@@ -311,7 +311,7 @@ TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
   take_until(2);
   ASSERT_TRUE(other->Delete("h").ok());
   take_until(3);
-  hulls_->registry().CloseWatch(*watch);
+  hulls_->registry().feed().Close(*watch);
   using Told = std::pair<std::string, ChangeKind>;
   EXPECT_THAT(
       told, ::testing::ElementsAre(Told("h", ChangeKind::kCreated), Told("h", ChangeKind::kChanged),
@@ -351,10 +351,9 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   Registry& registry = hulls_->registry();
   ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
-  WatchTarget both;
-  both.bodies = true;
-  const auto watch_hulls = registry.OpenWatch(WatchTarget(), {}, [] {});
-  const auto watch_both = registry.OpenWatch(both, {}, [] {});
+  ChangeFeed& feed = registry.feed();
+  const auto watch_hulls = feed.Open({.lists_existing = false}, {}, [] {});
+  const auto watch_both = feed.Open({.bodies = true, .lists_existing = false}, {}, [] {});
   ASSERT_TRUE(watch_hulls.ok() && watch_both.ok());
   const auto delete_body = [&](const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
@@ -371,17 +370,17 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
 
   using Told = std::tuple<std::string, ChangeKind, bool>;
-  const auto told_to = [&](const std::shared_ptr<ChangeWatch>& watch) {
+  const auto told_to = [&](const std::shared_ptr<Watch>& watch) {
     std::vector<Told> told;
     for (bool waits = false; !waits;) {
-      const auto piece = registry.TakeChanges(*watch);
-      if (!piece.ok()) break;
-      for (const HullChange& change : piece->changes) {
+      const auto batch = feed.Next(watch);
+      if (!batch.ok()) break;
+      for (const HullChange& change : batch->changes) {
         told.emplace_back(change.record.hull_id, change.kind, change.is_body);
       }
-      waits = piece->waits;
+      waits = batch->waits;
     }
-    registry.CloseWatch(watch);
+    feed.Close(watch);
     return told;
   };
   EXPECT_THAT(told_to(*watch_hulls),

@@ -1,5 +1,5 @@
 // Tests of the events that a registry sends to its watches.
-#include "server/registry/catalog/change_feed.h"
+#include "server/registry/watch/change_feed.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -26,29 +26,29 @@ std::string Text(const HullChange& change) {
 // A watch that collects events on request.
 class Watcher {
  public:
-  Watcher(Registry& registry, const WatchTarget& target, const WatchStart& start)
-      : registry_(registry) {
-    watch_ = *registry_.OpenWatch(target, start, [this] {
+  Watcher(Registry& registry, const WatchTarget& target, const WatchPosition& position = {})
+      : feed_(registry.feed()) {
+    watch_ = *feed_.Open(target, position, [this] {
       const std::lock_guard lock(mutex_);
       waits_ = false;
       changed_.notify_all();
     });
   }
   ~Watcher() {
-    registry_.NudgeWatch(watch_);
+    feed_.Nudge(watch_);
     AwaitTurn();
-    registry_.CloseWatch(watch_);
+    feed_.Close(watch_);
   }
 
-  // Waits for the next non-empty piece and returns it.
-  WatchPiece Next() {
+  // Waits for the next non-empty batch and returns it.
+  WatchBatch Next() {
     while (true) {
       AwaitTurn();
-      WatchPiece piece = Take();
-      if (!piece.changes.empty() || piece.synced || piece.anew) return piece;
+      WatchBatch batch = Take();
+      if (!batch.changes.empty() || batch.synced || batch.restarted) return batch;
     }
   }
-  // Returns all pending events, piece by piece.
+  // Returns all pending events, batch by batch.
   std::vector<std::string> All() {
     std::vector<std::string> texts;
     bool waits = false;
@@ -57,14 +57,14 @@ class Watcher {
       waits = waits_;
     }
     // Earlier changes made it due; on_ready may still be in flight.
-    if (waits) registry_.NudgeWatch(watch_);
+    if (waits) feed_.Nudge(watch_);
     AwaitTurn();
     while (true) {
-      const WatchPiece piece = Take();
-      if (piece.waits) return texts;
-      if (piece.anew) texts.push_back("anew");
-      for (const HullChange& change : piece.changes) texts.push_back(Text(change));
-      if (piece.synced) texts.push_back("synced");
+      const WatchBatch batch = Take();
+      if (batch.waits) return texts;
+      if (batch.restarted) texts.push_back("restarted");
+      for (const HullChange& change : batch.changes) texts.push_back(Text(change));
+      if (batch.synced) texts.push_back("synced");
     }
   }
   // Waits until an event is pending or the watch is called for another reason.
@@ -74,11 +74,11 @@ class Watcher {
   }
   absl::Status AwaitEnd() {
     AwaitTurn();
-    return registry_.TakeChanges(*watch_).status();
+    return feed_.Next(watch_).status();
   }
   uint64_t revision() const { return revision_; }
-  void Also(std::span<const std::string> added, std::span<const std::string> dropped) {
-    registry_.WatchAlso(*watch_, added, dropped);
+  void ChangeIds(std::span<const std::string> added, std::span<const std::string> removed) {
+    feed_.ChangeIds(*watch_, added, removed);
   }
 
  private:
@@ -86,30 +86,28 @@ class Watcher {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return !waits_; });
   }
-  WatchPiece Take() {
+  WatchBatch Take() {
     {
-      // on_ready may run before TakeChanges returns.
+      // on_ready may run before Next returns.
       const std::lock_guard lock(mutex_);
       waits_ = true;
     }
-    WatchPiece piece = *registry_.TakeChanges(*watch_);
-    if (!piece.waits) {
+    WatchBatch batch = *feed_.Next(watch_);
+    if (!batch.waits) {
       const std::lock_guard lock(mutex_);
       waits_ = false;
-      revision_ = piece.revision;
+      revision_ = batch.revision;
     }
-    return piece;
+    return batch;
   }
 
-  Registry& registry_;
-  std::shared_ptr<ChangeWatch> watch_;
+  ChangeFeed& feed_;
+  std::shared_ptr<Watch> watch_;
   std::mutex mutex_;
   std::condition_variable changed_;
   bool waits_ = false;
   uint64_t revision_ = 0;
 };
-
-const WatchStart kFromTheStart{true};
 
 WatchTarget Prefix(const std::string& prefix) { return {prefix, {}}; }
 WatchTarget Hull(const std::string& id) { return {"", {id}}; }
@@ -120,7 +118,7 @@ class ChangeFeedTest : public ::testing::Test {
  protected:
   Registry& registry() { return hulls_->registry(); }
   // Resumes a watch that is at the store's current revision.
-  WatchStart Resume() { return {true, registry().Sizes().store_revision, registry().store().id()}; }
+  WatchPosition Resume() { return {registry().Sizes().store_revision, registry().store().id()}; }
   void Replace(const std::string& id) {
     Replacement replacement;
     replacement.hull_id = id;
@@ -146,10 +144,10 @@ class ChangeFeedTest : public ::testing::Test {
       std::make_unique<MemoryRegistry>(std::make_unique<MemoryStore>());
 };
 
-TEST_F(ChangeFeedTest, TellsWhatIsThereThenWhatChanges) {
+TEST_F(ChangeFeedTest, ReportsExistingHullsThenChanges) {
   ASSERT_TRUE(hulls_->Create("b").ok());
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
-  Watcher watcher(registry(), Prefix(""), kFromTheStart);
+  Watcher watcher(registry(), Prefix(""));
   EXPECT_THAT(watcher.All(), ElementsAre("present a", "present b", "synced"));
   EXPECT_EQ(watcher.revision(), registry().Sizes().store_revision);
   EXPECT_THAT(watcher.All(), IsEmpty());
@@ -164,28 +162,28 @@ TEST_F(ChangeFeedTest, TellsWhatIsThereThenWhatChanges) {
   EXPECT_EQ(watcher.revision(), registry().Sizes().store_revision);
 }
 
-TEST_F(ChangeFeedTest, AnEmptyStoreIsSyncedAtOnce) {
-  Watcher watcher(registry(), Prefix(""), kFromTheStart);
+TEST_F(ChangeFeedTest, AnEmptyStoreIsSyncedImmediately) {
+  Watcher watcher(registry(), Prefix(""));
   EXPECT_THAT(watcher.All(), ElementsAre("synced"));
 }
 
-TEST_F(ChangeFeedTest, EachChangeWakesAWatchThatWaits) {
-  Watcher watcher(registry(), Prefix(""), kFromTheStart);
+TEST_F(ChangeFeedTest, EachChangeWakesAWaitingWatch) {
+  Watcher watcher(registry(), Prefix(""));
   EXPECT_THAT(watcher.All(), ElementsAre("synced"));
   for (int i = 0; i < 100; ++i) {
     ASSERT_TRUE(hulls_->Create("h" + std::to_string(i)).ok());
-    const WatchPiece piece = watcher.Next();
-    ASSERT_EQ(piece.changes.size(), 1);
-    EXPECT_EQ(Text(piece.changes[0]), "created h" + std::to_string(i));
+    const WatchBatch batch = watcher.Next();
+    ASSERT_EQ(batch.changes.size(), 1);
+    EXPECT_EQ(Text(batch.changes[0]), "created h" + std::to_string(i));
   }
 }
 
 // All changes of a hull since its last event coalesce into one event.
-TEST_F(ChangeFeedTest, CoalescesWhatHappenedToAHull) {
+TEST_F(ChangeFeedTest, CoalescesTheChangesOfAHull) {
   for (const char* id : {"kept", "gone", "reborn", "replaced"}) {
     ASSERT_TRUE(hulls_->Create(id).ok());
   }
-  Watcher watcher(registry(), Prefix(""), kFromTheStart);
+  Watcher watcher(registry(), Prefix(""));
   watcher.All();
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(hulls_->Put("kept", CubeCorners(0, i + 1)).ok());
   ASSERT_TRUE(hulls_->Put("gone", CubeCorners()).ok());
@@ -204,26 +202,26 @@ TEST_F(ChangeFeedTest, CoalescesWhatHappenedToAHull) {
   EXPECT_THAT(watcher.All(), IsEmpty());
 }
 
-TEST_F(ChangeFeedTest, TellsPointsThatChangeNoVertexWithTheNextChange) {
+TEST_F(ChangeFeedTest, ReportsInteriorPointsWithTheNextChange) {
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  Watcher watcher(registry(), Hull("h"), kFromTheStart);
+  Watcher watcher(registry(), Hull("h"));
   watcher.All();
   ASSERT_TRUE(hulls_->Put("h", {{0.5, 0.5, 0.5}}).ok());
   EXPECT_THAT(watcher.All(), IsEmpty());
   ASSERT_TRUE(hulls_->Put("h", {{2, 2, 2}}).ok());
-  const WatchPiece piece = watcher.Next();
-  ASSERT_EQ(piece.changes.size(), 1);
-  EXPECT_EQ(piece.changes[0].record.counts.received, 10);
-  EXPECT_TRUE(piece.changes[0].has_box);
-  EXPECT_EQ(piece.changes[0].high, Vector(2, 2, 2));
+  const WatchBatch batch = watcher.Next();
+  ASSERT_EQ(batch.changes.size(), 1);
+  EXPECT_EQ(batch.changes[0].record.counts.received, 10);
+  EXPECT_TRUE(batch.changes[0].has_box);
+  EXPECT_EQ(batch.changes[0].high, Vector(2, 2, 2));
 }
 
-TEST_F(ChangeFeedTest, TellsOnlyWhatIsWatched) {
-  Watcher all(registry(), Prefix(""), kFromTheStart);
-  Watcher under(registry(), Prefix("a/"), kFromTheStart);
-  Watcher other(registry(), Prefix("ab"), kFromTheStart);
-  Watcher one(registry(), Hull("a/b"), kFromTheStart);
-  Watcher two(registry(), {"", {"a/b", "ab"}}, WatchStart{});
+TEST_F(ChangeFeedTest, ReportsOnlyItsTarget) {
+  Watcher all(registry(), Prefix(""));
+  Watcher under(registry(), Prefix("a/"));
+  Watcher other(registry(), Prefix("ab"));
+  Watcher one(registry(), Hull("a/b"));
+  Watcher two(registry(), {"", {"a/b", "ab"}, false, false});
   for (Watcher* watcher : {&all, &under, &other, &one}) {
     EXPECT_THAT(watcher->All(), ElementsAre("synced"));
   }
@@ -234,23 +232,23 @@ TEST_F(ChangeFeedTest, TellsOnlyWhatIsWatched) {
   EXPECT_THAT(other.All(), ElementsAre("created ab"));
   EXPECT_THAT(one.All(), ElementsAre("created a/b"));
   EXPECT_THAT(two.All(), ElementsAre("created a/b", "created ab"));
-  Watcher late(registry(), Hull("a/b"), kFromTheStart);
+  Watcher late(registry(), Hull("a/b"));
   EXPECT_THAT(late.All(), ElementsAre("present a/b", "synced"));
 }
 
-TEST_F(ChangeFeedTest, TellsOfBodiesWhereTheyAreAskedFor) {
+TEST_F(ChangeFeedTest, ReportsBodiesIfRequested) {
   ASSERT_TRUE(hulls_->Create("b").ok());
   PutBody("a");
   PutBody("c");
   ASSERT_TRUE(hulls_->Create("d").ok());
-  Watcher hulls(registry(), Prefix(""), kFromTheStart);
-  Watcher both(registry(), {"", {}, true}, kFromTheStart);
-  Watcher one(registry(), {"", {"c"}, true}, kFromTheStart);
+  Watcher hulls(registry(), Prefix(""));
+  Watcher both(registry(), {"", {}, true});
+  Watcher one(registry(), {"", {"c"}, true});
   EXPECT_THAT(hulls.All(), ElementsAre("present b", "present d", "synced"));
   EXPECT_THAT(both.All(),
               ElementsAre("present body a", "present b", "present body c", "present d", "synced"));
   EXPECT_THAT(one.All(), ElementsAre("present body c", "synced"));
-  const WatchStart resume = Resume();
+  const WatchPosition resume = Resume();
   PutBody("c");
   DeleteBody("a");
   EXPECT_THAT(hulls.All(), IsEmpty());
@@ -277,29 +275,40 @@ TEST_F(ChangeFeedTest, TellsOfBodiesWhereTheyAreAskedFor) {
                                               "present body d", "synced"));
 }
 
-TEST_F(ChangeFeedTest, WhatIsWatchedAlsoComesAndGoes) {
+TEST_F(ChangeFeedTest, IdsAreAddedAndRemoved) {
   for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Create(id).ok());
   WatchTarget target = Hull("a");
-  target.varies = true;
-  Watcher watch(registry(), target, {});
+  target.lists_existing = false;
+  Watcher watch(registry(), target);
   // It does not share state with other watches of the same ID.
-  Watcher other(registry(), Hull("a"), {});
+  Watcher other(registry(), {"", {"a"}, false, false});
   const std::vector<std::string> b = {"b"};
-  watch.Also(b, {});
+  watch.ChangeIds(b, {});
   for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners(0, 1)).ok());
   EXPECT_THAT(watch.All(), ElementsAre("changed a", "changed b"));
   EXPECT_THAT(other.All(), ElementsAre("changed a"));
   const std::vector<std::string> c = {"c"};
-  watch.Also(c, b);
+  watch.ChangeIds(c, b);
   for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners(0, 2)).ok());
   EXPECT_THAT(watch.All(), ElementsAre("changed a", "changed c"));
 }
 
-TEST_F(ChangeFeedTest, ResumesWithWhatChangedAndWhatWent) {
+// The reader may have read the hull between its creation and its deletion.
+TEST_F(ChangeFeedTest, ReportsEveryDeletionToAReaderThatReadsExistingHullsItself) {
+  Watcher lists(registry(), Hull("a"));
+  lists.All();
+  Watcher reads(registry(), {"", {"a"}, false, false});
+  ASSERT_TRUE(hulls_->Create("a").ok());
+  ASSERT_TRUE(hulls_->Delete("a").ok());
+  EXPECT_THAT(lists.All(), IsEmpty());
+  EXPECT_THAT(reads.All(), ElementsAre("deleted a"));
+}
+
+TEST_F(ChangeFeedTest, ResumesWithDeletionsAndChanges) {
   for (const char* id : {"same", "grown", "gone", "reborn", "x"}) {
     ASSERT_TRUE(hulls_->Create(id).ok());
   }
-  const WatchStart resume = Resume();
+  const WatchPosition resume = Resume();
   ASSERT_TRUE(hulls_->Put("grown", CubeCorners()).ok());
   ASSERT_TRUE(hulls_->Delete("gone").ok());
   ASSERT_TRUE(hulls_->Delete("reborn").ok());
@@ -314,60 +323,88 @@ TEST_F(ChangeFeedTest, ResumesWithWhatChangedAndWhatWent) {
   EXPECT_THAT(under.All(), ElementsAre("deleted gone", "present grown", "synced"));
 }
 
-TEST_F(ChangeFeedTest, StartsAnewWhereItCannotKnow) {
-  ASSERT_TRUE(hulls_->Create("a").ok());
-  ASSERT_TRUE(hulls_->Create("b").ok());
-  const WatchStart resume = Resume();
+TEST_F(ChangeFeedTest, ResumesWithOneDeletionOfEachId) {
+  for (const char* id : {"a", "b"}) ASSERT_TRUE(hulls_->Create(id).ok());
+  const WatchPosition resume = Resume();
+  ASSERT_TRUE(hulls_->Delete("a").ok());
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(hulls_->Create("a").ok());
+    ASSERT_TRUE(hulls_->Delete("a").ok());
+  }
+  // A hull, then bodies.
   ASSERT_TRUE(hulls_->Delete("b").ok());
-  WatchStart elsewhere = resume;
-  elsewhere.store_id = "another";
-  Watcher other_store(registry(), Prefix(""), elsewhere);
-  EXPECT_THAT(other_store.All(), ElementsAre("anew", "present a", "synced"));
-  WatchStart future = resume;
-  future.after_revision += 100;
-  Watcher from_future(registry(), Prefix(""), future);
-  EXPECT_THAT(from_future.All(), ElementsAre("anew", "present a", "synced"));
+  const uint64_t hull_deletion = registry().Sizes().store_revision;
+  for (int i = 0; i < 2; ++i) {
+    PutBody("b");
+    DeleteBody("b");
+  }
+  Watcher hulls(registry(), Prefix(""), resume);
+  const WatchBatch batch = hulls.Next();
+  ASSERT_EQ(batch.changes.size(), 2);
+  EXPECT_EQ(batch.changes[0].record.hull_id, "a");
+  EXPECT_EQ(batch.changes[1].record.hull_id, "b");
+  EXPECT_EQ(batch.changes[1].record.revision, hull_deletion);
+  EXPECT_THAT(hulls.All(), ElementsAre("synced"));
+  Watcher both(registry(), {"", {}, true}, resume);
+  EXPECT_THAT(both.All(), ElementsAre("deleted a", "deleted body b", "synced"));
+  Watcher one(registry(), Hull("a"), resume);
+  EXPECT_THAT(one.All(), ElementsAre("deleted a", "synced"));
 }
 
-TEST_F(DurableChangeFeedTest, StartsAnewAfterARestartUnlessNothingHadChanged) {
+TEST_F(ChangeFeedTest, RestartsWithAnUnknownPosition) {
+  ASSERT_TRUE(hulls_->Create("a").ok());
+  ASSERT_TRUE(hulls_->Create("b").ok());
+  const WatchPosition resume = Resume();
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  WatchPosition elsewhere = resume;
+  elsewhere.store_id = "another";
+  Watcher other_store(registry(), Prefix(""), elsewhere);
+  EXPECT_THAT(other_store.All(), ElementsAre("restarted", "present a", "synced"));
+  WatchPosition future = resume;
+  future.after_revision += 100;
+  Watcher from_future(registry(), Prefix(""), future);
+  EXPECT_THAT(from_future.All(), ElementsAre("restarted", "present a", "synced"));
+}
+
+TEST_F(DurableChangeFeedTest, RestartsAfterAServerRestartUnlessNothingChanged) {
   DurableRegistry* hulls = &Start();
   const auto now = [&] {
-    return WatchStart{true, hulls->registry().Sizes().store_revision, hulls->store().id()};
+    return WatchPosition{hulls->registry().Sizes().store_revision, hulls->store().id()};
   };
   ASSERT_TRUE(hulls->Put("a", CubeCorners()).ok());
-  const WatchStart before = now();
+  const WatchPosition before = now();
   ASSERT_TRUE(hulls->Create("b").ok());
-  const WatchStart last = now();
+  const WatchPosition last = now();
   hulls = &Start();
   Watcher late(hulls->registry(), Prefix(""), before);
-  EXPECT_THAT(late.All(), ElementsAre("anew", "present a", "present b", "synced"));
+  EXPECT_THAT(late.All(), ElementsAre("restarted", "present a", "present b", "synced"));
   Watcher watcher(hulls->registry(), Prefix(""), last);
   EXPECT_THAT(watcher.All(), ElementsAre("synced"));
 }
 
-// More hulls change at the same time than fit a piece: new hulls are not distinguished until the
+// More hulls change at the same time than fit a batch: new hulls are not distinguished until the
 // watch has caught up.
-TEST_F(ChangeFeedTest, TellsManyChangesInPieces) {
-  Watcher watcher(registry(), Prefix(""), kFromTheStart);
+TEST_F(ChangeFeedTest, ReportsManyChangesInBatches) {
+  Watcher watcher(registry(), Prefix(""));
   watcher.All();
-  constexpr size_t kHulls = ChangeFeed::kMostPerPiece + 10;
+  constexpr size_t kHulls = ChangeFeed::kMaxPerBatch + 10;
   std::vector<std::string> expected;
   for (size_t i = 0; i < kHulls; ++i) {
     const std::string id = "h" + std::to_string(i);
     ASSERT_TRUE(hulls_->Create(id, false).ok());
-    expected.push_back((i < ChangeFeed::kMostPerPiece ? "created " : "present ") + id);
+    expected.push_back((i < ChangeFeed::kMaxPerBatch ? "created " : "present ") + id);
   }
   EXPECT_EQ(watcher.All(), expected);
-  Watcher late(registry(), Prefix(""), kFromTheStart);
+  Watcher late(registry(), Prefix(""));
   EXPECT_EQ(late.All().size(), kHulls + 1);
   ASSERT_TRUE(hulls_->Delete("h3").ok());
   EXPECT_THAT(watcher.All(), ElementsAre("deleted h3"));
   EXPECT_THAT(late.All(), ElementsAre("deleted h3"));
 }
 
-TEST_F(ChangeFeedTest, KeepsNothingOfWhatAllWereTold) {
-  Watcher quick(registry(), Prefix(""), kFromTheStart);
-  Watcher slow(registry(), Prefix(""), kFromTheStart);
+TEST_F(ChangeFeedTest, DropsChangesThatAllWatchesReported) {
+  Watcher quick(registry(), Prefix(""));
+  Watcher slow(registry(), Prefix(""));
   quick.All();
   slow.All();
   const uint64_t before = registry().Cache().bytes;
@@ -387,23 +424,23 @@ TEST_F(ChangeFeedTest, KeepsNothingOfWhatAllWereTold) {
   EXPECT_LT(registry().Cache().bytes, before + 1000);
 }
 
-TEST_F(ChangeFeedTest, FarBehindStartsAnewRatherThanKeepAllThatWent) {
+TEST_F(ChangeFeedTest, RestartsWhenFarBehindInsteadOfKeepingAllDeletions) {
   ASSERT_TRUE(hulls_->Create("stays").ok());
-  Watcher slow(registry(), Prefix(""), kFromTheStart);
+  Watcher slow(registry(), Prefix(""));
   slow.All();
-  const WatchStart resume = Resume();
-  for (size_t i = 0; i <= ChangeFeed::kMostDeletions; ++i) {
+  const WatchPosition resume = Resume();
+  for (size_t i = 0; i <= DeletionLog::kCapacity; ++i) {
     const std::string id = "h" + std::to_string(i);
     ASSERT_TRUE(hulls_->Create(id).ok());
     ASSERT_TRUE(hulls_->Delete(id).ok());
   }
-  EXPECT_THAT(slow.All(), ElementsAre("anew", "present stays", "synced"));
+  EXPECT_THAT(slow.All(), ElementsAre("restarted", "present stays", "synced"));
   Watcher resumed(registry(), Prefix(""), resume);
-  EXPECT_THAT(resumed.All(), ElementsAre("anew", "present stays", "synced"));
+  EXPECT_THAT(resumed.All(), ElementsAre("restarted", "present stays", "synced"));
 }
 
-TEST_F(ChangeFeedTest, MarksTellThatTheRevisionMovedOn) {
-  Watcher watcher(registry(), Prefix("a/"), kFromTheStart);
+TEST_F(ChangeFeedTest, MarksReportTheCurrentRevision) {
+  Watcher watcher(registry(), Prefix("a/"));
   EXPECT_THAT(watcher.All(), ElementsAre("synced"));
   ASSERT_TRUE(hulls_->Create("b").ok());
   const uint64_t revision = registry().Sizes().store_revision;
@@ -411,11 +448,11 @@ TEST_F(ChangeFeedTest, MarksTellThatTheRevisionMovedOn) {
 }
 
 TEST_F(ChangeFeedTest, EndsWhenTheServerDrains) {
-  Watcher waits(registry(), Prefix(""), kFromTheStart);
+  Watcher waits(registry(), Prefix(""));
   waits.All();
-  registry().EndWatches();
+  registry().feed().EndAll();
   EXPECT_TRUE(absl::IsUnavailable(waits.AwaitEnd()));
-  Watcher late(registry(), Prefix(""), kFromTheStart);
+  Watcher late(registry(), Prefix(""));
   EXPECT_TRUE(absl::IsUnavailable(late.AwaitEnd()));
 }
 

@@ -1,4 +1,4 @@
-#include "server/registry/catalog/registry_state.h"
+#include "server/registry/state/registry_state.h"
 
 #include <utility>
 
@@ -27,7 +27,7 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
       limits(WithMemoryLimit(limits_in)),
       memory(limits.memory_limit, ReadersShare(limits.memory_limit, store), mutex),
       catalog(store, limits, memory),
-      feed(mutex, memory, Config::kWatchMarkInterval),
+      feed(store, mutex, memory, Config::kWatchMarkInterval),
       preparer(mutex, catalog, memory, preparers) {}
 
 void RegistryState::ApplyCreation(Locked& locked, const HullPointer& hull,

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_STATE_H_
-#define HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_STATE_H_
+#ifndef HULLD_SERVER_REGISTRY_STATE_REGISTRY_STATE_H_
+#define HULLD_SERVER_REGISTRY_STATE_REGISTRY_STATE_H_
 
 #include <cstdint>
 #include <memory>
@@ -9,10 +9,10 @@
 #include "core/query/placed/live_hull.h"
 #include "server/process/metrics.h"
 #include "server/registry/catalog/catalog.h"
-#include "server/registry/catalog/change_feed.h"
 #include "server/registry/catalog/preparer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
+#include "server/registry/watch/change_feed.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -90,4 +90,4 @@ struct RegistryState {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_STATE_H_
+#endif  // HULLD_SERVER_REGISTRY_STATE_REGISTRY_STATE_H_

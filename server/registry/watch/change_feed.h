@@ -1,0 +1,186 @@
+#ifndef HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
+#define HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "server/process/synchronization.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/memory/locked.h"
+#include "server/registry/memory/memory_budget.h"
+#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/deletion_log.h"
+#include "server/registry/watch/page_source.h"
+#include "server/store/store.h"
+
+namespace hulld::server {
+
+// Sends the initial state and then every change of hulls and bodies to watches. A watch first
+// catches up: it reports deletions, if it resumes, and lists the existing hulls. Then it reports
+// the changes noted since, and is synced whenever none is left.
+//
+// Invariant: a change during the listing is reported after it, so no change is missed.
+//
+// Watches of the same target share a group, which keeps the last change of each hull in the order
+// of revisions; a watch is a cursor in it. A change thus costs O(log n) per group, however many
+// watches it has, and a slow watch costs the number of changed hulls, not of changes. A group drops
+// its changes when all of its watches have passed them. A watch starts over if its group, or the
+// deletion log, has dropped a deletion that it needs.
+//
+// A watch without pending changes waits. The first change afterwards makes its group due, in O(1);
+// the feed's thread then calls on_ready of all waiting watches of the group.
+//
+// Thread-safe: guarded by the registry's mutex, which the Note functions require.
+class ChangeFeed {
+ public:
+  // Maximum number of hulls visited or reported per hold of the mutex: some 50 us.
+  static constexpr size_t kMaxPerBatch = 512;
+
+  // All must outlive this. Pending changes are charged to the budget. mark_interval: the interval
+  // at which a watch without changes learns the current revision.
+  ChangeFeed(const Store& store, FairMutex& mutex, MemoryBudget& memory,
+             std::chrono::milliseconds mark_interval);
+  ChangeFeed(const ChangeFeed&) = delete;
+  ChangeFeed& operator=(const ChangeFeed&) = delete;
+  // Requires that all watches are closed.
+  ~ChangeFeed();
+
+  // Begins at the revision of the loaded store. Existing hulls are read from `pages`. Call before
+  // all other functions.
+  void Begin(uint64_t revision, PageSource& pages);
+
+  // Note a committed change at the revision of its record, or at `revision`. Cost: O(log n) per
+  // group that includes the ID, and one hash per length of a watched prefix.
+  void NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
+  // former: the body that this one replaces, or null.
+  void NoteBodyPut(Locked& locked, const BodyRecord* former,
+                   const std::shared_ptr<const Body>& body);
+  void NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision);
+  // Peer servers turned a hull into a body, or a body into a hull, by several changes; reported as
+  // one.
+  void NoteBecameBody(Locked& locked, const HullRecord& former,
+                      const std::shared_ptr<const Body>& body);
+  void NoteBecameHull(Locked& locked, const BodyRecord& former,
+                      const std::shared_ptr<RegisteredHull>& hull);
+  // Notes a revision whose change cannot be described; only the revision is reported.
+  void NoteOther(const Locked& locked, uint64_t revision);
+
+  // Starts a watch. Calls `on_ready` on the feed's thread, once after each batch that waits. A
+  // watch that cannot resume starts over. RESOURCE_EXHAUSTED: --memory-limit.
+  absl::StatusOr<std::shared_ptr<Watch>> Open(const WatchTarget& target,
+                                              const WatchPosition& position,
+                                              std::function<void()> on_ready);
+  // Returns the next changes, possibly none. Requires that the watch does not wait. UNAVAILABLE:
+  // the watch was ended, or the store cannot be read; the next call reads again. Cost:
+  // O(kMaxPerBatch).
+  absl::StatusOr<WatchBatch> Next(const std::shared_ptr<Watch>& watch);
+  // Adds and removes watched IDs; later changes count. Requires a target with lists_existing =
+  // false; `added` must be new to it, and `removed` included. Cost: one hash per ID.
+  void ChangeIds(Watch& watch, std::span<const std::string> added,
+                 std::span<const std::string> removed);
+  // Calls on_ready of a waiting watch although nothing changed.
+  void Nudge(const std::shared_ptr<Watch>& watch);
+  // Closes a watch. An on_ready that is already due is still called.
+  void Close(const std::shared_ptr<Watch>& watch);
+  // Ends and nudges all watches.
+  void EndAll();
+
+ private:
+  struct Hash {
+    using is_transparent = void;
+    size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
+  };
+  using Groups = std::vector<std::shared_ptr<WatchGroup>>;
+  using GroupsByName = std::unordered_map<std::string, Groups, Hash, std::equal_to<>>;
+
+  // A change of the hull or body with an ID.
+  struct Change {
+    ChangeKind kind = ChangeKind::kDeleted;
+    bool is_body = false;
+    uint64_t revision = 0;
+    // Start of the current incarnation, or of the deleted one.
+    uint64_t create_revision = 0;
+    // Both null for a deletion.
+    std::shared_ptr<RegisteredHull> hull = nullptr;
+    std::shared_ptr<const Body> body = nullptr;
+    // If the change replaced a hull by a body or a body by a hull: create_revision of the former.
+    // Otherwise 0.
+    uint64_t other_kind_began = 0;
+  };
+  friend struct WatchGroup;
+
+  static Change ChangeOf(ChangeKind kind, const std::shared_ptr<RegisteredHull>& hull);
+  static Change ChangeOf(ChangeKind kind, const std::shared_ptr<const Body>& body);
+  static std::optional<Change> AsReportedTo(const WatchTarget& target, const Change& change);
+  void Note(Locked& locked, const std::string& id, const Change& change);
+  void NoteDeletion(Locked& locked, const std::string& id, const Change& change);
+  void NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& group, const std::string& id,
+               const Change& change);
+
+  std::shared_ptr<WatchGroup> GroupOf(const WatchTarget& target);
+  void RemoveGroup(const std::shared_ptr<WatchGroup>& group);
+  void AddId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
+  void RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
+  void DropChanges(WatchGroup& group);
+  void Charge(uint64_t before, uint64_t now);
+
+  bool IsLost(const Watch& watch) const;
+  void Restart(Watch& watch);
+  void BeginCatchUp(Watch& watch, uint64_t after_revision);
+  void AddDeletions(Watch& watch, WatchBatch* batch);
+  absl::Status AddExisting(Locked& locked, const std::shared_ptr<Watch>& watch, WatchBatch* batch);
+  void AddChanges(Watch& watch, WatchBatch* batch);
+  void MoveCursor(Watch& watch, uint64_t revision);
+
+  void Wait(Watch& watch, WatchBatch* batch);
+  void Wake(Locked& locked, const std::shared_ptr<Watch>& watch);
+  void MakeReady(const std::shared_ptr<Watch>& watch);
+  // The feed's thread.
+  void Run();
+  void NudgeForMarks();
+
+  const Store& store_;
+  FairMutex& mutex_;
+  MemoryBudget& memory_;
+  const std::chrono::milliseconds mark_interval_;
+
+  // The members below are guarded by mutex_.
+  PageSource* pages_ = nullptr;
+  uint64_t revision_ = 0;
+  DeletionLog deletions_;
+  GroupsByName by_prefix_;
+  // Number of groups by length of their prefix.
+  std::map<size_t, size_t> prefix_lengths_;
+  GroupsByName by_id_;
+  Watch::Set watches_;
+  // Bytes of all pending changes.
+  uint64_t bytes_ = 0;
+  MemoryCharge charge_;
+
+  // Input of the thread.
+  ConditionVariable wake_;
+  Groups due_;
+  std::vector<std::shared_ptr<Watch>> ready_;
+  bool has_ended_ = false;
+  bool is_stopping_ = false;
+  Thread thread_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_

@@ -1,0 +1,120 @@
+#ifndef HULLD_SERVER_REGISTRY_WATCH_CHANGE_WATCH_H_
+#define HULLD_SERVER_REGISTRY_WATCH_CHANGE_WATCH_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "server/registry/catalog/registry_types.h"
+#include "server/registry/watch/page_source.h"
+
+namespace hulld::server {
+
+// The hulls that a watch reports: those with a prefix, or a set of IDs.
+struct WatchTarget {
+  bool Includes(const std::string& id) const {
+    return ids.empty() ? id.starts_with(prefix) : ids.contains(id);
+  }
+  bool operator==(const WatchTarget&) const = default;
+
+  // Ignored unless `ids` is empty.
+  std::string prefix = {};
+  std::set<std::string> ids = {};
+  // Includes bodies.
+  bool bodies = false;
+  // True: the watch first lists the existing hulls, by prefix or for a single ID. False: it reports
+  // only later changes, because its reader reads existing hulls itself; it then reports every
+  // deletion, and IDs can be added and removed (ChangeFeed::ChangeIds).
+  bool lists_existing = true;
+};
+
+// A watch resumes after this revision of this store. 0: it does not resume.
+struct WatchPosition {
+  uint64_t after_revision = 0;
+  std::string store_id = {};
+};
+
+// The next changes that a watch reports.
+struct WatchBatch {
+  // No change is pending; the watch's on_ready will be called once when one is.
+  bool waits = false;
+  // Every change up to this revision was sent before, is in `changes`, or was superseded.
+  uint64_t revision = 0;
+  std::vector<HullChange> changes = {};
+  // `synced` and `anew` of v1::WatchHullsResponse.
+  bool synced = false;
+  bool restarted = false;
+};
+
+struct WatchGroup;
+
+// A cursor in the changes of its target. Only the ChangeFeed, whose mutex guards it, looks inside.
+class Watch {
+ public:
+  // The order of opening, which does not depend on addresses.
+  struct Order {
+    bool operator()(const std::shared_ptr<Watch>& a, const std::shared_ptr<Watch>& b) const {
+      return a->number_ < b->number_;
+    }
+  };
+  using Set = std::set<std::shared_ptr<Watch>, Order>;
+
+ private:
+  friend class ChangeFeed;
+
+  enum class State {
+    // Reports deletions since it was last synced, if it resumes, then the existing hulls by ID.
+    kCatchingUp,
+    // The pending changes fill several batches. The state at the cursor is not that of any
+    // revision, so hulls are PRESENT or DELETED.
+    kBehind,
+    // Has reported exactly the state at the cursor.
+    kSynced,
+  };
+  static constexpr uint64_t kNoDeletions = std::numeric_limits<uint64_t>::max();
+  // Null: not requested. Without a value: in flight.
+  using PendingPage = std::shared_ptr<std::optional<absl::StatusOr<RecordPage>>>;
+
+  // Progress of kCatchingUp.
+  struct CatchUp {
+    // Existing hulls are listed if they changed after this revision.
+    uint64_t after_revision = 0;
+    // Deletions are reported after this revision; kNoDeletions: no more.
+    uint64_t deletions_after = kNoDeletions;
+    // The last listed ID.
+    std::string last_id;
+    // The next existing hulls, if they are read from the store.
+    PendingPage page;
+  };
+
+  // Greater than that of every watch that is open when this one opens.
+  uint64_t number_ = 0;
+  std::shared_ptr<WatchGroup> group_;
+  // Called on the feed's thread without locks.
+  std::function<void()> on_ready_;
+  State state_ = State::kSynced;
+  CatchUp catch_up_;
+  // Every change up to this revision was reported, or precedes the listing.
+  uint64_t cursor_ = 0;
+  // The cursor of the last batch that did not wait.
+  uint64_t reported_ = 0;
+  // The listing ended at this revision, and `synced` is due there.
+  std::optional<uint64_t> synced_at_;
+  // The next batch says that the watch started over.
+  bool restarted_ = false;
+  // on_ready is due at the next change.
+  bool is_waiting_ = false;
+  // The next batch does not wait.
+  bool is_nudged_ = false;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_WATCH_CHANGE_WATCH_H_
