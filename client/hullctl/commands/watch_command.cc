@@ -199,8 +199,8 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body,\n"
       "its number of pieces. The initial state comes first (PRESENT) and ends with a line\n"
-      "'# synced'. Then come CREATED, CHANGED, REPLACED, and DELETED; of many changes at once,\n"
-      "only the last state of each hull is printed.\n"
+      "'# synced'. Then come CREATED, CHANGED, REPLACED, and DELETED. Of many changes at once,\n"
+      "only the last state of each hull is printed, as PRESENT if they take several messages.\n"
       "With --scene: kind (ENTER, TOUCH, EXIT; with a clearance, NEAR and FAR; LOST if a hull is\n"
       "deleted), the two placements, the revisions of their hulls or bodies, and, for bodies, the\n"
       "deciding pieces. Poses are fixed; pairs change as hulls grow and bodies are replaced.\n"

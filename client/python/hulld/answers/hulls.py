@@ -244,7 +244,8 @@ class HullEventKind(IntEnum):
     """The change of a hull since the previous header."""
 
     UNSPECIFIED = 0
-    #: There is this hull. The only kind besides DELETED until `synced`.
+    #: The hull exists. The only kind besides DELETED until `synced`. Later, it replaces the next
+    #: three while the reader is far behind.
     PRESENT = 1
     CREATED = 2
     #: Its vertices changed, or a body was put again; it is the same incarnation.
