@@ -39,6 +39,10 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
   std::unordered_map<std::string, uint32_t> index_of;
   for (int i = 0; i < request.pieces_size(); ++i) {
     const v1::Placement& piece = request.pieces(i);
+    if (piece.has_points()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "pieces[", i, "].points is set; a piece is a registered hull, so give its ID"));
+    }
     const auto [known, is_new] =
         index_of.try_emplace(piece.hull_id(), static_cast<uint32_t>(body.hull_ids.size()));
     if (is_new) {

@@ -20,19 +20,6 @@ namespace {
 // Steps between two reads of the clock.
 constexpr uint64_t kStepsPerAdvance = 64;
 
-absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
-                                   const v1::Placement& placement, const std::string& field) {
-  if (!present) {
-    return absl::InvalidArgumentError(absl::StrCat(field, " is missing; give a hull ID"));
-  }
-  if (absl::Status s = CheckHullId(caller, placement.hull_id(), field + ".hull_id"); !s.ok()) {
-    return s;
-  }
-  absl::StatusOr<Pose> pose = DecodePose(placement.pose());
-  if (!pose.ok()) return Prefixed(absl::StrCat(field, ".pose."), pose.status());
-  return pose;
-}
-
 // Returns the first error in `resolved`, or OK.
 absl::Status FirstProblem(const absl::StatusOr<Resolved>& resolved) {
   if (!resolved.ok()) return resolved.status();
@@ -73,10 +60,12 @@ void EncodePiece(const Store& store, const PairSide& side, uint32_t piece,
   EncodeVersion(store, side.view().body->hull_of(piece).record, message->mutable_hull());
 }
 
-// Encodes the hulls of all pieces, without duplicates; for a hull, itself.
+// Encodes the hulls of all pieces, without duplicates; for a hull, itself; none for an inline
+// shape.
 void EncodeHulls(const Store& store, const PairSide& side, std::set<std::string_view>* known,
                  v1::CheckCollisionResponse* response) {
   const auto encode = [&](const HullView& view) {
+    if (view.record.hull_id.empty()) return;
     if (!known->insert(view.record.hull_id).second) return;
     EncodeVersion(store, view.record, response->add_piece_hulls());
   };
@@ -137,22 +126,33 @@ absl::Status PairQuestion::ReadRequest() {
       request.method(), request.wanted(), request.tolerance(), registry_.limits(), call.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
-  const absl::StatusOr<Pose> X_WA = ReadPlacement(call.caller(), request.has_a(), request.a(), "a");
-  if (!X_WA.ok()) return X_WA.status();
-  const absl::StatusOr<Pose> X_WB = ReadPlacement(call.caller(), request.has_b(), request.b(), "b");
-  if (!X_WB.ok()) return X_WB.status();
-  X_W_ = {*X_WA, *X_WB};
+  if (absl::Status s = ReadPlacement(0, request.has_a(), request.a()); !s.ok()) {
+    return Prefixed("a", s);
+  }
+  if (absl::Status s = ReadPlacement(1, request.has_b(), request.b()); !s.ok()) {
+    return Prefixed("b", s);
+  }
   const absl::StatusOr<Freshness> freshness =
       DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
   if (!freshness.ok()) return freshness.status();
   lookup_.plan.freshness = *freshness;
   lookup_.canonical = options_.WantsCanonical();
   lookup_.prefix = call.caller().prefix;
+  lookup_.shapes = &shapes_;
   return absl::OkStatus();
 }
 
-std::array<std::string, 2> PairQuestion::ids() const {
-  return {call_->request().a().hull_id(), call_->request().b().hull_id()};
+absl::Status PairQuestion::ReadPlacement(size_t side, bool present,
+                                         const v1::Placement& placement) {
+  if (!present) return absl::InvalidArgumentError(" is missing; give a hull ID or points");
+  subjects_[side] = placement.has_points() ? shapes_.size() : ids_.size();
+  const absl::Status named = CheckSubject(call_->call().caller(), placement, &shapes_);
+  if (!named.ok()) return Prefixed(".", named);
+  if (!placement.has_points()) ids_.push_back(placement.hull_id());
+  const absl::StatusOr<Pose> pose = DecodePose(placement.pose());
+  if (!pose.ok()) return Prefixed(".pose.", pose.status());
+  X_W_[side] = *pose;
+  return absl::OkStatus();
 }
 
 void PairQuestion::Answer(absl::StatusOr<Resolved> resolved, TaskPool& pool) {
@@ -166,8 +166,9 @@ void PairQuestion::Answer(absl::StatusOr<Resolved> resolved, TaskPool& pool) {
 }
 
 absl::Status PairQuestion::Place(Resolved resolved) {
-  HullView& a = *resolved.hulls[0];
-  HullView& b = *resolved.hulls[1];
+  const v1::CheckCollisionRequest& request = call_->request();
+  HullView& a = *resolved.hulls[subjects_[0] + (request.a().has_points() ? ids_.size() : 0)];
+  HullView& b = *resolved.hulls[subjects_[1] + (request.b().has_points() ? ids_.size() : 0)];
   has_body_ = a.body != nullptr || b.body != nullptr;
   if (has_body_) {
     if (absl::Status s = ValidateForBodies(options_); !s.ok()) return s;

@@ -9,7 +9,9 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "core/query/body/body_search.h"
 #include "core/query/body/placed_body.h"
@@ -19,6 +21,7 @@
 #include "server/call/unary_call.h"
 #include "server/process/task_pool.h"
 #include "server/registry/body_resolution.h"
+#include "server/registry/inline_shapes.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -58,7 +61,7 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   // Reads everything except the hulls. `call` must not end before the question is answered.
   static absl::StatusOr<std::shared_ptr<PairQuestion>> Read(Registry& registry, CheckCall* call);
 
-  std::array<std::string, 2> ids() const;
+  std::span<const std::string> ids() const { return ids_; }
   const PlacedLookup& lookup() const { return lookup_; }
   const std::function<bool()>& should_stop() const { return options_.should_stop; }
 
@@ -72,6 +75,7 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
       : registry_(registry), call_(call), charge_(registry.memory(), MemoryUse::kReading) {}
 
   absl::Status ReadRequest();
+  absl::Status ReadPlacement(size_t side, bool present, const v1::Placement& placement);
   absl::Status Place(Resolved resolved);
   bool is_textbook() const { return options_.method == Method::kTextbookSat; }
   bool IsQuick() const;
@@ -85,7 +89,11 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 
   Registry& registry_;
   CheckCall* const call_;
+  // Of A and B: the pose, and the position among the IDs or among the inline shapes.
   std::array<Pose, 2> X_W_;
+  std::array<size_t, 2> subjects_;
+  std::vector<std::string> ids_;
+  InlineShapes shapes_;
   QueryOptions options_;
   PlacedLookup lookup_;
   std::optional<PairSide> a_;

@@ -170,6 +170,12 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
+  if (lookup.shapes != nullptr && known.shapes_.empty()) {
+    absl::StatusOr<std::vector<HullView>> built =
+        BuildInlineShapes(registry, *lookup.shapes, should_stop);
+    if (!built.ok()) return built.status();
+    known.shapes_ = *std::move(built);
+  }
   absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop);
   absl::StatusOr<Resolved> hulls;
   do {
@@ -185,7 +191,13 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   if (lookup.canonical) {
     if (absl::Status s = MakeCanonical(registry, should_stop, hulls->hulls); !s.ok()) return s;
   }
-  if (!known.has_bodies()) return hulls;
+  const auto add_shapes = [&known](std::vector<absl::StatusOr<HullView>>& to) {
+    to.insert(to.end(), known.shapes_.begin(), known.shapes_.end());
+  };
+  if (!known.has_bodies()) {
+    add_shapes(hulls->hulls);
+    return hulls;
+  }
   const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
     return hulls->hulls[known.index_of_.at(id)];
   };
@@ -198,11 +210,13 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
                                  ? find_hull(ids[i])
                                  : ServeBody(registry, known.bodies_[i], lookup, find_hull));
   }
+  add_shapes(resolved.hulls);
   return resolved;
 }
 
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
+  if (lookup.shapes != nullptr && !lookup.shapes->empty()) return std::nullopt;
   if (registry.has_bodies()) {
     const std::optional<FoundBodies> found = registry.bodies().TryFind(ids);
     if (!found.has_value()) return std::nullopt;

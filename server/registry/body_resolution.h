@@ -15,6 +15,7 @@
 #include "server/registry/bodies/served_body.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/known_hulls.h"
+#include "server/registry/inline_shapes.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -27,6 +28,8 @@ struct PlacedLookup {
   std::string prefix;
   // Canonical snapshots need no preparation.
   ReadPlan plan;
+  // Inline shapes; owned by the caller; null: none. Their hulls follow the hulls of the IDs.
+  const InlineShapes* shapes = nullptr;
 };
 
 // State that a reader keeps between repeated lookups of the same IDs. Not thread-safe.
@@ -55,9 +58,12 @@ class KnownPlaced {
   std::vector<std::string> hull_ids_;
   std::unordered_map<std::string, size_t> index_of_;
   KnownHulls hulls_;
+  // Hulls of the inline shapes, built by the first lookup.
+  std::vector<HullView> shapes_;
 };
 
-// Resolves hulls and bodies by ID, all at one revision of the store. A body without a hull for some
+// Resolves hulls and bodies by ID, all at one revision of the store, and builds the hulls of inline
+// shapes. A body without a hull for some
 // piece has an error: NOT_FOUND (PIECE_NOT_FOUND), PERMISSION_DENIED or DATA_LOSS names body and
 // piece; RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies, equivalent
 // to Registry::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread. CANCELLED:
@@ -67,7 +73,8 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
                                        const std::function<bool()>& should_stop);
 
 // As ResolvePlaced, for a reader that repeatedly resolves the same IDs: `known` persists between
-// calls, and only hulls changed since are looked up.
+// calls, and only hulls changed since are looked up. The points of inline shapes are not needed
+// after the first call.
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);

@@ -147,6 +147,8 @@ struct Config {
   static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;
+  // Maximum points of an inline shape, whose hull is built within a call: some milliseconds.
+  static constexpr size_t kMaxShapePoints = 4096;
 };
 
 // A parsed command line: run with `config`, or print `print` and exit if it is not empty (--help,

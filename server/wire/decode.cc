@@ -5,13 +5,16 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
+#include "server/settings/config.h"
 
 namespace hulld::server {
 namespace {
@@ -80,6 +83,36 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, ui
     return DecodePoints(block.xyz_float(), "points.xyz_float", max_points);
   }
   return DecodePoints(block.xyz(), "points.xyz", max_points);
+}
+
+absl::Status CheckShape(std::span<const Vector> points) {
+  if (points.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("points is empty; give 1 to ", Config::kMaxShapePoints));
+  }
+  if (points.size() > Config::kMaxShapePoints) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "points holds ", points.size(), " points; the limit of an inline shape is ",
+        Config::kMaxShapePoints, "; give only the vertices of the hull, or register it"));
+  }
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (points[i].allFinite()) continue;
+    const auto is_finite = [](double x) { return std::isfinite(x); };
+    const auto k = std::ranges::find_if_not(points[i], is_finite) - points[i].begin();
+    return absl::InvalidArgumentError(absl::StrCat("points[", i, "].", std::string(1, "xyz"[k]),
+                                                   " is ",
+                                                   std::isnan(points[i][k]) ? "NaN" : "infinite"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes) {
+  const absl::StatusOr<std::vector<Vector>> points =
+      DecodePoints(block, std::numeric_limits<uint64_t>::max());
+  if (!points.ok()) return points.status();
+  if (absl::Status s = CheckShape(*points); !s.ok()) return s;
+  shapes->Add(*points);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points) {

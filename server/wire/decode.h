@@ -16,6 +16,7 @@
 #include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
+#include "server/registry/inline_shapes.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -24,6 +25,12 @@ namespace hulld::server {
 // INVALID_ARGUMENT: both point fields are set, or the number of coordinates is not a multiple of
 // three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points);
+
+// Adds the inline shape of these points. INVALID_ARGUMENT, as in "points[17].y is NaN": both point
+// fields are set, or the number of coordinates is not a multiple of three; CheckShape.
+absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes);
+// INVALID_ARGUMENT: no point, more than Config::kMaxShapePoints, or one that is not finite.
+absl::Status CheckShape(std::span<const Vector> points);
 
 // Decodes a chunk. Its points may be NaN or infinite, which the builder checks. INVALID_ARGUMENT:
 // sequence 0, both point fields are set, or the number of coordinates is not a multiple of three.

@@ -85,6 +85,7 @@ void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
 }
 
 void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion* message) {
+  if (record.hull_id.empty()) return;
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);
   message->set_revision(record.revision);

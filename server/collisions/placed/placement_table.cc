@@ -3,6 +3,8 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <limits>
+#include <numeric>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
@@ -76,15 +78,31 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
         absl::StrCat("packed_placements.poses holds ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
   }
-  const auto hulls = static_cast<uint32_t>(packed.hull_ids_size());
+  const auto shapes = static_cast<uint32_t>(packed.shape_sizes_size());
+  const uint32_t hulls = static_cast<uint32_t>(packed.hull_ids_size()) + shapes;
   for (int i = 0; i < packed.hulls_size(); ++i) {
     if (packed.hulls(i) >= hulls) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("packed_placements.hulls[", i, "] is ", packed.hulls(i),
-                       ", but packed_placements.hull_ids holds ", hulls, "; indices start at 0"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "packed_placements.hulls[", i, "] is ", packed.hulls(i),
+          ", but packed_placements.hull_ids holds ", packed.hull_ids_size(),
+          shapes == 0 ? "" : absl::StrCat(" and shape_sizes ", shapes), "; indices start at 0"));
     }
   }
   return absl::OkStatus();
+}
+
+// Decodes the points of all inline shapes. INVALID_ARGUMENT: their number is not the sum of the
+// sizes.
+absl::StatusOr<std::vector<Vector>> DecodeShapePoints(const v1::PackedPlacements& packed) {
+  absl::StatusOr<std::vector<Vector>> points =
+      DecodePoints(packed.shape_points(), std::numeric_limits<uint64_t>::max());
+  if (!points.ok()) return Prefixed("packed_placements.shape_", points.status());
+  const uint64_t sum =
+      std::accumulate(packed.shape_sizes().begin(), packed.shape_sizes().end(), uint64_t{0});
+  if (sum == points->size()) return points;
+  return absl::InvalidArgumentError(absl::StrCat("packed_placements.shape_sizes add up to ", sum,
+                                                 " points, but shape_points holds ",
+                                                 points->size()));
 }
 
 }  // namespace
@@ -92,7 +110,9 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
 absl::StatusOr<PlacementTable> PlacementTable::Make(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
     v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements, const char* what) {
-  const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
+  const bool is_packed = packed.hull_ids_size() + packed.shape_sizes_size() + packed.hulls_size() +
+                             packed.poses_size() >
+                         0;
   if (is_packed && !placements.empty()) {
     return absl::InvalidArgumentError(
         "placements and packed_placements are both set; set one of them");
@@ -101,18 +121,25 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
                                       " placements", max_placements, what);
   if (!few.ok()) return few;
   if (!is_packed) return PlacementTable(placements, caller);
-  const absl::Status few_hulls =
-      CheckCount(packed.hull_ids_size(), " hull_ids", max_placements, what);
-  if (!few_hulls.ok()) return few_hulls;
+  for (const auto& [count, of] : {std::pair<int, const char*>{packed.hull_ids_size(), " hull_ids"},
+                                  {packed.shape_sizes_size(), " shape_sizes"}}) {
+    if (absl::Status s = CheckCount(count, of, max_placements, what); !s.ok()) return s;
+  }
   if (absl::Status s = CheckPacked(packed); !s.ok()) return s;
-  return PlacementTable(packed, caller);
+  const absl::StatusOr<std::vector<Vector>> shape_points = DecodeShapePoints(packed);
+  if (!shape_points.ok()) return shape_points.status();
+  return PlacementTable(packed, *shape_points, caller);
 }
 
-PlacementTable::PlacementTable(v1::PackedPlacements& packed, const Caller& caller)
+PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vector> shape_points,
+                               const Caller& caller)
     : is_packed_(true), prefix_(caller.prefix) {
-  std::vector<absl::Status> malformed(packed.hull_ids_size());
-  named_.resize(malformed.size(), kNoHull);
-  for (size_t k = 0; k < named_.size(); ++k) {
+  const size_t id_count = packed.hull_ids_size();
+  const size_t shape_count = packed.shape_sizes_size();
+  // Errors of the IDs, then of the inline shapes.
+  std::vector<absl::Status> malformed(id_count + shape_count);
+  named_.resize(id_count, kNoHull);
+  for (size_t k = 0; k < id_count; ++k) {
     const std::string& id = packed.hull_ids(static_cast<int>(k));
     malformed[k] =
         Prefixed("packed_placements.", CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
@@ -120,12 +147,25 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, const Caller& calle
     named_[k] = static_cast<uint32_t>(ids_.size());
     ids_.push_back(id);
   }
+  std::vector<uint32_t> hulls = named_;
+  hulls.resize(id_count + shape_count, kNoHull);
+  for (size_t k = 0; k < shape_count; ++k) {
+    const size_t size = packed.shape_sizes(static_cast<int>(k));
+    const std::span<const Vector> points = shape_points.first(size);
+    shape_points = shape_points.subspan(size);
+    absl::Status& status = malformed[id_count + k];
+    status = Prefixed(absl::StrCat("packed_placements: shape ", k, ": "), CheckShape(points));
+    if (!status.ok()) continue;
+    hulls[id_count + k] = static_cast<uint32_t>(ids_.size() + shapes_.size());
+    shapes_.Add(points);
+  }
+  shape_count_ = shapes_.size();
   const size_t count = packed.hulls_size();
   hull_of_.reserve(count);
   poses_.Swap(packed.mutable_poses());
   for (size_t i = 0; i < count; ++i) {
     const uint32_t named = packed.hulls(static_cast<int>(i));
-    hull_of_.push_back(named_[named]);
+    hull_of_.push_back(hulls[named]);
     if (HasHull(i)) {
       CheckPose(i, "packed_placements.poses[", "].");
     } else {
@@ -138,25 +178,36 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
                                const Caller& caller)
     : prefix_(caller.prefix) {
   std::unordered_map<std::string_view, uint32_t> index_of;
+  // Placements with inline shapes, which follow all IDs in hulls_.
+  std::vector<size_t> shaped;
   const size_t count = placements.size();
   hull_of_.resize(count, kNoHull);
   poses_.Resize(static_cast<int>(count) * kPoseNumbers, 0);
   for (size_t i = 0; i < count; ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
-    auto known = index_of.find(placement.hull_id());
-    if (known == index_of.end()) {
-      const absl::Status status = CheckHullId(caller, placement.hull_id(), "hull_id");
-      if (!status.ok()) {
-        malformed_.emplace(i, Prefixed(absl::StrCat("placements[", i, "]."), status));
-        continue;
-      }
-      const auto next = static_cast<uint32_t>(ids_.size());
-      known = index_of.emplace(placement.hull_id(), next).first;
+    const auto known = index_of.find(placement.hull_id());
+    const bool is_known = known != index_of.end() && !placement.has_points();
+    const absl::Status status =
+        is_known ? absl::OkStatus() : CheckSubject(caller, placement, &shapes_);
+    if (!status.ok()) {
+      malformed_.emplace(i, Prefixed(absl::StrCat("placements[", i, "]."), status));
+      continue;
+    }
+    if (placement.has_points()) {
+      shaped.push_back(i);
+    } else if (is_known) {
+      hull_of_[i] = known->second;
+    } else {
+      hull_of_[i] = static_cast<uint32_t>(ids_.size());
+      index_of.emplace(placement.hull_id(), hull_of_[i]);
       ids_.push_back(placement.hull_id());
     }
-    hull_of_[i] = known->second;
     WritePose(ReadPose(placement.pose()), i, &poses_);
     CheckPose(i, "placements[", "].pose.");
+  }
+  shape_count_ = shaped.size();
+  for (size_t k = 0; k < shape_count_; ++k) {
+    hull_of_[shaped[k]] = static_cast<uint32_t>(ids_.size() + k);
   }
 }
 
@@ -182,10 +233,10 @@ size_t PlacementTable::MemoryBytes() const {
   const size_t each = 2 * sizeof(uint32_t) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
   const size_t of_poses = static_cast<size_t>(poses_.Capacity()) * sizeof(double);
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
-         ids_.size() *
-             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
-              sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
-         of_ids + of_errors + BodyBytes();
+         ids_.size() * (sizeof(std::string) + KnownHulls::kBytesEach) +
+         hull_count() * (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) +
+                         sizeof(size_t) + 2 * sizeof(char)) +
+         shapes_.MemoryBytes() + of_ids + of_errors + BodyBytes();
 }
 
 // Valid after resolution.
@@ -215,16 +266,19 @@ absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& opt
 
 absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
                                          const QueryOptions& options, const ReadPlan& plan) {
+  PlacedLookup lookup = LookupFor(options, plan);
+  lookup.shapes = &shapes_;
   absl::StatusOr<Resolved> resolved =
-      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
+      RefreshPlaced(registry, ids_, known, lookup, options.should_stop);
   if (!resolved.ok()) return resolved.status();
+  shapes_ = {};
   SetHulls(registry.store(), *std::move(resolved), options);
   return absl::OkStatus();
 }
 
 void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolved,
                                   const QueryOptions& options) {
-  HULLD_CHECK(by_hull_begin_.size() == ids_.size() + 1 && resolved.hulls.size() == hulls.size());
+  HULLD_CHECK(by_hull_begin_.size() == hull_count() + 1 && resolved.hulls.size() == hulls.size());
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
   is_all_answerable_ = false;
@@ -245,7 +299,9 @@ void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolv
 
 bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
                                 const ReadPlan& plan) {
-  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
+  PlacedLookup lookup = LookupFor(options, plan);
+  lookup.shapes = &shapes_;
+  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, lookup);
   if (!resolved.has_value()) return false;
   SetHulls(registry.store(), *std::move(resolved), options);
   return true;
@@ -254,12 +310,12 @@ bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
 // If the options need canonical snapshots, every resolved hull has one, and queries use it.
 void PlacementTable::SetHulls(const Store& store, Resolved resolved, const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
-  query_hulls.reserve(ids_.size());
+  query_hulls.reserve(hull_count());
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
     query_hulls.push_back(&QueryHullOf(hull, options.WantsCanonical()));
   }
-  changed_.assign(ids_.size(), true);
-  query_hull_changed_.assign(ids_.size(), true);
+  changed_.assign(hull_count(), true);
+  query_hull_changed_.assign(hull_count(), true);
   for (size_t i = 0; i < hulls_.size(); ++i) {
     changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
     query_hull_changed_[i] = query_hulls_[i] != query_hulls[i];
@@ -295,9 +351,9 @@ void PlacementTable::TakeBodies() {
   const bool has_any = std::ranges::any_of(
       hulls_, [](const auto& hull) { return hull.ok() && hull->body != nullptr; });
   if (!has_any) return;
-  bodies_of_hulls_.resize(ids_.size());
-  query_bodies_.resize(ids_.size());
-  for (size_t k = 0; k < ids_.size(); ++k) TakeBody(k);
+  bodies_of_hulls_.resize(hull_count());
+  query_bodies_.resize(hull_count());
+  for (size_t k = 0; k < hull_count(); ++k) TakeBody(k);
   bodies_.reserve(size());
   for (size_t i = 0; i < size(); ++i) bodies_.push_back(PlaceBody(i));
 }
@@ -330,7 +386,7 @@ PlacedBody PlacementTable::PlaceBody(size_t i) const {
 }
 
 void PlacementTable::SortByHull() {
-  by_hull_begin_.assign(ids_.size() + 1, 0);
+  by_hull_begin_.assign(hull_count() + 1, 0);
   for (const uint32_t k : hull_of_) {
     if (k != kNoHull) ++by_hull_begin_[k];
   }
@@ -433,6 +489,13 @@ void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) cons
   message->set_code(ToGrpc(status.code()));
   message->set_message(std::string(status.message()));
   message->set_reason(ReasonOf(status));
+}
+
+absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
+                          InlineShapes* shapes) {
+  if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
+  if (placement.hull_id().empty()) return DecodeShape(placement.points(), shapes);
+  return absl::InvalidArgumentError("hull_id and points are both set; set one of them");
 }
 
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,

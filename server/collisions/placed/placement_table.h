@@ -24,6 +24,7 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
 #include "server/registry/body_resolution.h"
+#include "server/registry/inline_shapes.h"
 #include "server/registry/registry.h"
 #include "server/wire/decode.h"
 
@@ -36,9 +37,9 @@ class PlacementTable {
   PlacementTable() = default;
   // Reads a request in one of the two forms, and moves the poses of packed placements out of it.
   // Records malformed placements and IDs outside the caller's prefix; no hull is known before
-  // Resolve. INVALID_ARGUMENT: both forms, or packed lists that do not match. RESOURCE_EXHAUSTED:
-  // more than max_placements (--max-placements). `what`: container of the placements, as in "the
-  // batch".
+  // Resolve, which also builds the hulls of inline shapes. INVALID_ARGUMENT: both forms, or packed
+  // lists that do not match. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
+  // `what`: container of the placements, as in "the batch".
   static absl::StatusOr<PlacementTable> Make(
       const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
       v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
@@ -59,8 +60,8 @@ class PlacementTable {
   bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return hull_of_.size(); }
-  // Number of distinct hulls.
-  size_t hull_count() const { return ids_.size(); }
+  // Number of distinct hulls: of hull_ids(), then of the inline shapes.
+  size_t hull_count() const { return ids_.size() + shape_count_; }
   // Approximate bytes held after resolution, excluding hulls.
   size_t MemoryBytes() const;
   // The placed hulls; an empty hull for a body. Requires that they are not placed on demand.
@@ -114,7 +115,8 @@ class PlacementTable {
   void SetPose(size_t i, const Pose& X_WH);
   void PlaceAgain(size_t i);
 
-  // IDs of the hulls, without duplicates unless packed placements name it several times.
+  // IDs of the hulls, without duplicates unless packed placements name it several times; none for
+  // inline shapes.
   std::span<const std::string> hull_ids() const { return ids_; }
   // Hull k, or its error. Requires that it was resolved.
   const absl::StatusOr<HullView>& hull(size_t k) const {
@@ -129,7 +131,8 @@ class PlacementTable {
     return std::span(by_hull_).subspan(by_hull_begin_[k],
                                        by_hull_begin_[k + 1] - by_hull_begin_[k]);
   }
-  // Hull of a placement; nullopt if the ID is malformed or outside the caller's prefix.
+  // Hull of a placement; nullopt if the ID or the inline shape is malformed, or the ID is outside
+  // the caller's prefix.
   std::optional<size_t> hull_of(size_t i) const {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
@@ -164,7 +167,8 @@ class PlacementTable {
 
   PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                  const Caller& caller);
-  PlacementTable(v1::PackedPlacements& packed, const Caller& caller);
+  PlacementTable(v1::PackedPlacements& packed, std::span<const Vector> shape_points,
+                 const Caller& caller);
 
   bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
@@ -182,17 +186,20 @@ class PlacementTable {
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;
 
-  // For each placement: its hull as an index into hulls_, or kNoHull if the ID is malformed or
-  // outside the caller's prefix; and its pose, packed.
+  // For each placement: its hull as an index into hulls_, or kNoHull if hull_of() is nullopt; and
+  // its pose, packed.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
-  // Errors of malformed IDs and poses, by placement.
+  // Errors of malformed IDs, inline shapes, and poses, by placement.
   std::unordered_map<size_t, absl::Status> malformed_;
   bool is_packed_ = false;
   // Index into hulls_ of each hull named by packed placements.
   std::vector<uint32_t> named_;
   std::vector<std::string> ids_;
-  // Parallel to ids_.
+  // Points of the inline shapes, until their hulls are built.
+  InlineShapes shapes_;
+  size_t shape_count_ = 0;
+  // Hulls of ids_, then of the inline shapes.
   std::vector<absl::StatusOr<HullView>> hulls_;
   // For Refresh.
   KnownPlaced known_;
@@ -218,14 +225,19 @@ class PlacementTable {
 
   // Prefix of the IDs visible to the caller.
   std::string prefix_;
-  // If any of hulls_ is a body: the query structure of each, parallel to ids_. Structures of hulls
-  // are owned here.
+  // If any of hulls_ is a body: the query structure of each, parallel to hulls_. Structures of
+  // hulls are owned here.
   std::vector<const QueryBody*> query_bodies_;
   std::vector<std::unique_ptr<const QueryBody>> bodies_of_hulls_;
   std::vector<PlacedBody> bodies_;
   // If certificates are wanted: the hulls of all pieces, without duplicates; owned by hulls_.
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
+
+// Checks the ID of a placement, or adds its inline shape. INVALID_ARGUMENT: it names a
+// hull and carries points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
+absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
+                          InlineShapes* shapes);
 
 // Validates an update of a stream with `count` placements: the new pose of each of `placements`, as
 // read by ReadPose. INVALID_ARGUMENT: the lists do not match, an index is out of range or repeated,

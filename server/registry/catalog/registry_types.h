@@ -28,7 +28,7 @@ struct ServedBody;
 
 // A hull as seen by one reader; `served` belongs to the record's revision. In lookups that allow
 // bodies (ResolvePlaced), possibly a body: then `record` holds only its ID and revisions, and
-// `served` is null.
+// `served` is null. The record of an inline shape is empty.
 struct HullView {
   HullRecord record;
   std::shared_ptr<const ServedHull> served;

@@ -213,6 +213,7 @@ class MemoryCharge {
 
   // Sets the memory held. Cost: O(1).
   void Set(uint64_t bytes);
+  uint64_t bytes() const { return bytes_; }
 
  private:
   MemoryBudget* budget_;
