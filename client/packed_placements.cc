@@ -3,9 +3,24 @@
 #include <absl/container/flat_hash_map.h>
 
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace hulld {
+namespace {
+
+// Widens single-precision coordinates, as all shapes share one block.
+void AddShape(const v1::PointBlock& points, v1::PackedPlacements* packed) {
+  google::protobuf::RepeatedField<double>* const xyz =
+      packed->mutable_shape_points()->mutable_xyz();
+  xyz->MergeFrom(points.xyz());
+  xyz->Add(points.xyz_float().begin(), points.xyz_float().end());
+  packed->add_shape_sizes(static_cast<uint32_t>(points.xyz_size() + points.xyz_float_size()) / 3);
+}
+
+}  // namespace
 
 v1::PackedPlacements PackPlacements(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {
@@ -13,16 +28,30 @@ v1::PackedPlacements PackPlacements(
   packed.mutable_hulls()->Reserve(placements.size());
   packed.mutable_poses()->Reserve(7 * placements.size());
   absl::flat_hash_map<std::string_view, uint32_t> index_of;
+  // Serialized points.
+  absl::flat_hash_map<std::string, uint32_t> shape_of;
+  // Placements with an inline shape, and its index.
+  std::vector<std::pair<int, uint32_t>> shaped;
   for (const v1::Placement& placement : placements) {
-    const auto [known, is_new] =
-        index_of.emplace(placement.hull_id(), static_cast<uint32_t>(packed.hull_ids_size()));
-    if (is_new) packed.add_hull_ids(placement.hull_id());
-    packed.add_hulls(known->second);
+    if (placement.has_points()) {
+      const auto [known, is_new] = shape_of.emplace(
+          placement.points().SerializeAsString(), static_cast<uint32_t>(packed.shape_sizes_size()));
+      if (is_new) AddShape(placement.points(), &packed);
+      shaped.emplace_back(packed.hulls_size(), known->second);
+      packed.add_hulls(0);
+    } else {
+      const auto [known, is_new] =
+          index_of.emplace(placement.hull_id(), static_cast<uint32_t>(packed.hull_ids_size()));
+      if (is_new) packed.add_hull_ids(placement.hull_id());
+      packed.add_hulls(known->second);
+    }
     const v1::Quaternion& q = placement.pose().rotation();
     const v1::Vector3& t = placement.pose().translation();
     packed.add_poses(placement.pose().has_rotation() ? q.w() : 1);
     for (const double number : {q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) packed.add_poses(number);
   }
+  const auto id_count = static_cast<uint32_t>(packed.hull_ids_size());
+  for (const auto& [i, shape] : shaped) packed.set_hulls(i, id_count + shape);
   return packed;
 }
 

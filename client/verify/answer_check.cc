@@ -87,6 +87,22 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& vers
   return &known->second;
 }
 
+absl::StatusOr<std::optional<PlacedVertices>> AnswerChecker::FetchHull(
+    const v1::Placement& placement, const v1::HullVersion& version, Verification* problem) {
+  if (placement.has_points()) {
+    const v1::PointBlock& points = placement.points();
+    std::span<const double> xyz(points.xyz().data(), static_cast<size_t>(points.xyz_size()));
+    if (!points.xyz_float().empty()) {
+      xyz = widened_.emplace_back(points.xyz_float().begin(), points.xyz_float().end());
+    }
+    return PlacedVertices{xyz, placement.pose(), nullptr, true};
+  }
+  const auto mesh = Fetch(version, problem);
+  if (!mesh.ok()) return mesh.status();
+  if (*mesh == nullptr) return std::nullopt;
+  return PlacedVertices{(*mesh)->xyz, placement.pose()};
+}
+
 absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::HullVersion& version,
                                                                     Verification* problem) {
   const std::string& id = version.hull_id();
@@ -112,21 +128,25 @@ absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::Hu
 absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
     const v1::Placement& placement, const v1::HullVersion& version, bool named,
     const HullVersions& hulls, Verification* problem) {
-  const auto body = FetchBody(version, problem);
-  if (!body.ok()) return body.status();
   std::vector<PlacedVertices> pieces;
-  if (!problem->reason.empty()) return pieces;
-  if (*body == nullptr) {
+  const v1::GetBodyResponse* body = nullptr;
+  if (!placement.has_points()) {
+    const auto fetched = FetchBody(version, problem);
+    if (!fetched.ok()) return fetched.status();
+    if (!problem->reason.empty()) return pieces;
+    body = *fetched;
+  }
+  if (body == nullptr) {
     if (named) {
       *problem = {Verdict::kMoved, absl::StrCat("body ", version.hull_id(), " was deleted")};
       return pieces;
     }
-    const auto mesh = Fetch(version, problem);
-    if (!mesh.ok()) return mesh.status();
-    if (*mesh != nullptr) pieces.push_back({(*mesh)->xyz, placement.pose()});
+    const auto hull = FetchHull(placement, version, problem);
+    if (!hull.ok()) return hull.status();
+    if (hull->has_value()) pieces.push_back(**hull);
     return pieces;
   }
-  for (const v1::Placement& piece : (*body)->pieces()) {
+  for (const v1::Placement& piece : body->pieces()) {
     const auto hull = hulls.find(piece.hull_id());
     if (hull == hulls.end()) {
       *problem = {Verdict::kInvalid,
@@ -148,16 +168,13 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
     return *precluded;
   }
   Verification verification;
-  const auto a = Fetch(answer.hull_a, &verification);
+  const auto a = FetchHull(answer.a, answer.hull_a, &verification);
   if (!a.ok()) return a.status();
-  if (*a == nullptr) return verification;
-  const auto b = Fetch(answer.hull_b, &verification);
+  if (!a->has_value()) return verification;
+  const auto b = FetchHull(answer.b, answer.hull_b, &verification);
   if (!b.ok()) return b.status();
-  if (*b == nullptr) return verification;
-  const absl::Status checked =
-      CheckCertificate(answer.relation, answer.certificate, {(*a)->xyz, answer.a.pose()},
-                       {(*b)->xyz, answer.b.pose()});
-  return FromStatus(checked);
+  if (!b->has_value()) return verification;
+  return FromStatus(CheckCertificate(answer.relation, answer.certificate, **a, **b));
 }
 
 absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionRequest& request,

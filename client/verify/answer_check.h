@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <list>
 #include <map>
 #include <optional>
 #include <string>
@@ -61,7 +62,8 @@ struct CheckedBodies {
   std::optional<uint32_t> piece_b;
 };
 
-// Checks answers against the hulls and bodies that GetHullMesh and GetBody return.
+// Checks answers against the points of inline shapes, and the hulls and bodies that GetHullMesh and
+// GetBody return.
 class AnswerChecker {
  public:
   // `client` must outlive this object.
@@ -77,7 +79,12 @@ class AnswerChecker {
  private:
   // Returns null, with the reason, if the server no longer has the mesh at that version.
   absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
-  // Same as above, for a body; null without a reason if no body has this ID.
+  // Returns the vertices of a placed hull, or the points of its inline shape; nullopt as above. The
+  // result refers to data of the placement and of this object.
+  absl::StatusOr<std::optional<PlacedVertices>> FetchHull(const v1::Placement& placement,
+                                                          const v1::HullVersion& version,
+                                                          Verification* problem);
+  // Same as Fetch, for a body; null without a reason if no body has this ID.
   absl::StatusOr<const v1::GetBodyResponse*> FetchBody(const v1::HullVersion& version,
                                                        Verification* problem);
   // Returns the pieces of a placed body, or the hull itself; none, with the reason, if the server
@@ -91,6 +98,8 @@ class AnswerChecker {
   const Client& client_;
   std::map<std::string, HullMesh> meshes_;
   std::map<std::string, v1::GetBodyResponse> bodies_;
+  // Points of inline shapes in single precision.
+  std::list<std::vector<double>> widened_;
 };
 
 // Queries and checks the answer; retries a few times while a hull changes in between. Returns the

@@ -65,7 +65,11 @@ int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
 }
 
 absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& vertex,
-                         std::span<const double> xyz, const std::string& name) {
+                         const ExactHull& hull, const std::string& name) {
+  const std::span<const double> xyz = hull.xyz;
+  if (index >= xyz.size() / 3 && hull.in_any_order) {
+    return ProofFails(absl::StrCat(name, " is none of the points of its inline shape"));
+  }
   if (index >= xyz.size() / 3) {
     return ProofFails(
         absl::StrCat(name, " is vertex ", index, ", but the hull has ", xyz.size() / 3));
@@ -78,6 +82,28 @@ absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& ver
   return absl::OkStatus();
 }
 
+// Sets the index of a vertex to that of the point with its coordinates. Leaves an index out of
+// range if there is none.
+void Locate(const v1::Vector3& vertex, std::span<const double> xyz, uint32_t* index) {
+  for (*index = 0; *index < xyz.size() / 3; ++*index) {
+    const double* const p = xyz.data() + 3 * size_t{*index};
+    if (vertex.x() == p[0] && vertex.y() == p[1] && vertex.z() == p[2]) return;
+  }
+}
+
+// Returns the certificate with indices into the points of hulls in any order.
+v1::Certificate Located(v1::Certificate certificate, const ExactHull& a, const ExactHull& b) {
+  for (v1::VertexPair& pair : *certificate.mutable_pairs()) {
+    uint32_t index_a = pair.index_a();
+    uint32_t index_b = pair.index_b();
+    if (a.in_any_order) Locate(pair.vertex_a(), a.xyz, &index_a);
+    if (b.in_any_order) Locate(pair.vertex_b(), b.xyz, &index_b);
+    pair.set_index_a(index_a);
+    pair.set_index_b(index_b);
+  }
+  return certificate;
+}
+
 absl::Status CheckPairs(const v1::Certificate& certificate, int most, const ExactHull& a,
                         const ExactHull& b) {
   if (certificate.pairs_size() > most) {
@@ -88,9 +114,9 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int most, const Exac
     const v1::VertexPair& pair = certificate.pairs(i);
     const std::string name = absl::StrCat("pairs[", i, "].");
     absl::Status s =
-        CheckVertex(pair.index_a(), pair.has_vertex_a(), pair.vertex_a(), a.xyz, name + "a");
+        CheckVertex(pair.index_a(), pair.has_vertex_a(), pair.vertex_a(), a, name + "a");
     if (s.ok()) {
-      s = CheckVertex(pair.index_b(), pair.has_vertex_b(), pair.vertex_b(), b.xyz, name + "b");
+      s = CheckVertex(pair.index_b(), pair.has_vertex_b(), pair.vertex_b(), b, name + "b");
     }
     if (!s.ok()) return s;
   }
@@ -131,9 +157,10 @@ absl::Status CheckRelation(v1::Relation relation) {
   return ProofFails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
 }
 
-absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
-                          const ExactHull& a, const ExactHull& b) {
+absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& given, const ExactHull& a,
+                          const ExactHull& b) {
   if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  const v1::Certificate certificate = Located(given, a, b);
   if (relation != v1::RELATION_SEPARATED) {
     const int most =
         relation == v1::RELATION_OVERLAPPING ? kMostOverlappingPairs : kMostTouchingPairs;

@@ -95,7 +95,7 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
 
 // p_W = R(q) p / |q|^2 + t, and for a piece R(q_B) (R(q_P) p / |q_P|^2 + t_P) / |q_B|^2 + t_B.
 ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths)
-    : xyz(hull.xyz), vertices(std::move(given)) {
+    : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   const BigRotation outer = ToIntegers(Rotation(hull.pose));
   const BigVector t = ToIntegers(Translation(hull.pose), lengths);

@@ -21,6 +21,9 @@ struct PlacedVertices {
   // For a piece of a body: its pose in the body's frame; `pose` is then the pose of the body.
   // Otherwise null.
   const v1::Pose* in_body = nullptr;
+  // True: points with this hull, in any order, as of an inline shape. A certificate then names its
+  // vertices by their coordinates.
+  bool in_any_order = false;
 };
 
 bool AreFinite(std::span<const double> numbers);
@@ -50,6 +53,7 @@ struct ExactHull {
 
   // The original coordinates.
   std::span<const double> xyz;
+  bool in_any_order;
   BigVertices vertices;
   BigVector rows[3];
   // > 0

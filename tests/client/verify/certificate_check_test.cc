@@ -241,6 +241,26 @@ TEST(CertificateCheck, PairsMustBeVerticesOfTheHulls) {
   ExpectInvalid(kTouching, named, a, b, "pairs[0].a has other coordinates");
 }
 
+TEST(CertificateCheck, PointsInAnyOrderAreFoundByTheirCoordinates) {
+  const Hull a = At({0.5, 0.5, 0.5, 1, 1, 1, 0, 0, 0, 0, 0, 0});
+  const Hull b = At({0, 0, 0}, 1, 1, 1);
+  v1::Certificate certificate = Direction(1, 0, 0, {{7, 0}});
+  v1::VertexPair& pair = *certificate.mutable_pairs(0);
+  pair.mutable_vertex_a()->set_x(1);
+  pair.mutable_vertex_a()->set_y(1);
+  pair.mutable_vertex_a()->set_z(1);
+  pair.mutable_vertex_b()->set_x(-0.0);
+  const auto check = [&](bool in_any_order) {
+    return CheckCertificate(kTouching, certificate, {a.xyz, a.pose, nullptr, in_any_order},
+                            {b.xyz, b.pose, nullptr, true});
+  };
+  EXPECT_TRUE(check(true).ok()) << check(true);
+  EXPECT_THAT(std::string(check(false).message()), HasSubstr("pairs[0].a is vertex 7"));
+  pair.mutable_vertex_a()->set_x(2);
+  EXPECT_THAT(std::string(check(true).message()),
+              HasSubstr("pairs[0].a is none of the points of its inline shape"));
+}
+
 TEST(CertificateCheck, EmptyHullsAreSeparatedWithoutProof) {
   ExpectValid(kSeparated, v1::Certificate(), At({}), At(Cube()));
   ExpectValid(kSeparated, v1::Certificate(), At(Cube()), At({}));
