@@ -1,10 +1,13 @@
 #include "client/hullctl/hullctl.h"
 
+#include <absl/strings/str_cat.h>
 #include <unistd.h>
 
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "client/hullctl/body/body_command.h"
 #include "client/hullctl/command_line/arguments.h"
@@ -16,6 +19,7 @@
 #include "client/hullctl/completion/completion.h"
 #include "client/hullctl/completion/completion_script.h"
 #include "client/hullctl/completion/completion_values.h"
+#include "client/hullctl/local/local_server.h"
 #include "client/hullctl/parts/cover_command.h"
 #include "client/hullctl/robot/robot_commands.h"
 
@@ -148,8 +152,26 @@ int CompleteWords(const std::vector<std::string>& words, CommandLine* command_li
   return static_cast<int>(ExitCode::kDone);
 }
 
+// Starts the server of --local.
+absl::StatusOr<std::unique_ptr<LocalServer>> StartLocal(Invocation* invocation) {
+  const ConnectionSettings& flags = invocation->flags;
+  if (!flags.empty() || !invocation->context.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--local starts a server of its own; remove --",
+                     flags.empty() ? "context" : flags.begin()->first));
+  }
+  auto server = LocalServer::Start();
+  if (server.ok()) invocation->server = (*server)->address();
+  return server;
+}
+
 ExitCode RunAction(Invocation* invocation) {
-  if (invocation->needs_server) {
+  std::unique_ptr<LocalServer> local;
+  if (invocation->needs_server && invocation->local) {
+    auto started = StartLocal(invocation);
+    if (!started.ok()) return invocation->FailUsage(started.status());
+    local = *std::move(started);
+  } else if (invocation->needs_server) {
     const absl::Status resolved = ResolveConnection(invocation);
     if (!resolved.ok()) return invocation->FailUsage(resolved);
   }

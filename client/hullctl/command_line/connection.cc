@@ -66,6 +66,8 @@ void AddConnectionOptions(Command command, Invocation* invocation) {
       .ValueName("NAME")
       .Completes(ValueKind::kContext)
       .Variable(kContextVariable);
+  command.AddFlag("--local", &invocation->local,
+                  "Start a server for this command, in memory, and end it afterwards");
   for (const ConnectionSetting& setting : kConnectionSettings) {
     const std::string name = setting.name;
     const std::string option = name == "server" ? "-s,--server" : "--" + name;

@@ -196,10 +196,15 @@ class BatchRun {
                                         versions_, index(piece_a), index(piece_b)});
   }
 
-  // Returns the hull of a placement of the request; null if the answer lacks it.
+  // Returns the hull of a placement of the request, empty for an inline shape; null if the answer
+  // lacks it.
   const v1::HullVersion* VersionOf(uint32_t placement) const {
     const v1::PackedPlacements& packed = request_->packed_placements();
-    if (packed.hulls_size() > 0) placement = packed.hulls(static_cast<int>(placement));
+    if (packed.hulls_size() > 0) {
+      placement = packed.hulls(static_cast<int>(placement));
+      const bool is_shape = placement >= static_cast<uint32_t>(packed.hull_ids_size());
+      if (is_shape) return &v1::HullVersion::default_instance();
+    }
     const auto hulls = static_cast<uint32_t>(head_.hulls_size());
     return placement < hulls ? &head_.hulls(static_cast<int>(placement)) : nullptr;
   }

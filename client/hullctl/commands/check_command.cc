@@ -1,4 +1,6 @@
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
@@ -6,6 +8,7 @@
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -15,6 +18,10 @@ namespace hulld {
 namespace {
 
 struct PairArguments {
+  // IDs, or files with points.
+  std::string a;
+  std::string b;
+  // Without IDs.
   v1::CheckCollisionRequest request;
   QueryDetails details;
   std::string record;
@@ -22,6 +29,14 @@ struct PairArguments {
 
 std::string VersionText(const v1::HullVersion& hull) {
   return hull.hull_id() + "  (revision " + std::to_string(hull.revision()) + ")";
+}
+
+// Names the hull or body of a side, or its file.
+std::string SideText(const v1::Placement& placement, const v1::HullVersion& hull,
+                     const std::string& argument) {
+  if (!placement.has_points()) return VersionText(hull);
+  return argument + "  (" +
+         Counted(static_cast<uint64_t>(placement.points().xyz_size()) / 3, "point") + ")";
 }
 
 std::string PieceText(const v1::DecidingPiece& piece) {
@@ -94,13 +109,14 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
   }
 }
 
-void PrintAnswerTable(const Invocation& run, const v1::CheckCollisionRequest& request,
+void PrintAnswerTable(const Invocation& run, const PairArguments& arguments,
+                      const v1::CheckCollisionRequest& request,
                       const v1::CheckCollisionResponse& response,
                       const Verification* verification) {
   Table table;
   table.Row({"relation", PaintedRelation(response.relation(), run.paint)})
-      .Row({"A", VersionText(response.hull_a())})
-      .Row({"B", VersionText(response.hull_b())})
+      .Row({"A", SideText(request.a(), response.hull_a(), arguments.a)})
+      .Row({"B", SideText(request.b(), response.hull_b(), arguments.b)})
       .Row({"decided by", RungText(response.rung())});
   AddPieces(response, &table);
   AddMeasures(request, response, &table);
@@ -133,19 +149,27 @@ std::string RecordJson(const v1::CheckCollisionRequest& request,
       .Close();
 }
 
-void PrintAnswer(const Invocation& run, const v1::CheckCollisionRequest& request,
+void PrintAnswer(const Invocation& run, const PairArguments& arguments,
+                 const v1::CheckCollisionRequest& request,
                  const v1::CheckCollisionResponse& response, const Verification* verification) {
   if (run.json()) {
     run.out << MessageJson(response) << "\n";
   } else if (run.names()) {
     run.out << RelationText(response.relation()) << "\n";
   } else {
-    PrintAnswerTable(run, request, response, verification);
+    PrintAnswerTable(run, arguments, request, response, verification);
   }
 }
 
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
+  for (const auto& [argument, placement] : {std::pair(&arguments.a, request.mutable_a()),
+                                            std::pair(&arguments.b, request.mutable_b())}) {
+    placement->set_hull_id(*argument);
+    if (!IsShapeFile(*argument)) continue;
+    const absl::Status set = SetShape(run, *argument, placement);
+    if (!set.ok()) return run.FailUsage(set);
+  }
   double tolerance = 0;
   arguments.details.Apply(request.mutable_wanted(), &tolerance);
   request.set_tolerance(tolerance);
@@ -164,7 +188,7 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
     answer.response = *std::move(response);
   }
   // A record on standard output replaces the answer.
-  if (arguments.record != "-") PrintAnswer(run, request, answer.response, verification);
+  if (arguments.record != "-") PrintAnswer(run, arguments, request, answer.response, verification);
   if (!arguments.record.empty()) {
     const absl::Status written = WriteOutput(arguments.record, run.out, [&](std::ostream& out) {
       out << RecordJson(request, answer.response) << "\n";
@@ -192,13 +216,10 @@ void AddPoseOption(Command command, const std::string& name, v1::Placement* plac
 void AddCheckCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<PairArguments>();
   v1::CheckCollisionRequest* const request = &arguments->request;
-  Command command = program.AddCommand("check", "Check two hulls or bodies for collision");
-  command.AddText("A", request->mutable_a()->mutable_hull_id(), "ID of a hull or body")
-      .Required()
-      .Completes(ValueKind::kPlaced);
-  command.AddText("B", request->mutable_b()->mutable_hull_id(), "ID of a hull or body")
-      .Required()
-      .Completes(ValueKind::kPlaced);
+  Command command = program.AddCommand("check", "Check two hulls, bodies, or files for collision");
+  constexpr char kSideHelp[] = "ID of a hull or body, or a file with points";
+  command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kPlaced);
+  command.AddText("B", &arguments->b, kSideHelp).Required().Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
   AddQueryOptions(command, &arguments->details);
@@ -216,14 +237,17 @@ void AddCheckCommand(Command program, Invocation* invocation) {
           "output, instead of the answer")
       .ValueName("FILE");
   command.SetDetails(
-      "Lengths are in the unit of the points. For a body ('hullctl body --help'), the answer\n"
-      "names the deciding pieces, and its certificate has one part for each pair of pieces that\n"
-      "boxes do not decide; --output json shows them. --textbook takes hulls only.");
+      "The hull of a file is sent with the query and never stored; formats are those of 'hullctl\n"
+      "append'. A file without an extension needs a path, such as ./part. Lengths are in the unit\n"
+      "of the points. For a body ('hullctl body --help'), the answer names the deciding pieces,\n"
+      "and its certificate has one part for each pair of pieces that boxes do not decide;\n"
+      "--output json shows them. --textbook takes no bodies.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
+       {"Two files, without a server", "hullctl check a.stl b.stl --local"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});

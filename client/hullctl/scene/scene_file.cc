@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <numeric>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -103,12 +104,20 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
         absl::StrCat("packedPlacements.poses holds ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven"));
   }
+  const int count = packed.hull_ids_size() + packed.shape_sizes_size();
   for (const uint32_t hull : packed.hulls()) {
-    if (hull < static_cast<uint32_t>(packed.hull_ids_size())) continue;
+    if (hull < static_cast<uint32_t>(count)) continue;
     return absl::InvalidArgumentError(absl::StrCat("packedPlacements.hulls names hull ", hull,
-                                                   "; hullIds holds ", packed.hull_ids_size()));
+                                                   "; hullIds and shapeSizes hold ", count));
   }
-  return absl::OkStatus();
+  const uint64_t points =
+      std::accumulate(packed.shape_sizes().begin(), packed.shape_sizes().end(), uint64_t{0});
+  if (3 * points == static_cast<uint64_t>(packed.shape_points().xyz_size())) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(absl::StrCat(
+      "packedPlacements.shapeSizes add up to ", points, " points, but shapePoints.xyz holds ",
+      packed.shape_points().xyz_size(), " numbers; each point needs three"));
 }
 
 // Parses the object as the message that contains its members.
@@ -245,16 +254,26 @@ const std::string* Scene::HullOf(uint32_t placement) const {
   const v1::PackedPlacements& packed = request.packed_placements();
   if (placement >= static_cast<uint32_t>(packed.hulls_size())) return nullptr;
   const uint32_t hull = packed.hulls(static_cast<int>(placement));
-  if (hull >= static_cast<uint32_t>(packed.hull_ids_size())) return nullptr;
+  static const std::string kShape;
+  if (hull >= static_cast<uint32_t>(packed.hull_ids_size())) return &kShape;
   return &packed.hull_ids(static_cast<int>(hull));
 }
 
 v1::Placement Scene::PlacementOf(uint32_t placement) const {
   if (request.placements_size() > 0) return request.placements(static_cast<int>(placement));
+  const v1::PackedPlacements& packed = request.packed_placements();
+  const int shape =
+      static_cast<int>(packed.hulls(static_cast<int>(placement))) - packed.hull_ids_size();
   v1::Placement result;
-  result.set_hull_id(*HullOf(placement));
-  const double* const pose =
-      request.packed_placements().poses().data() + ptrdiff_t{kPoseNumbers} * placement;
+  if (shape < 0) {
+    result.set_hull_id(*HullOf(placement));
+  } else {
+    const auto sizes = packed.shape_sizes().begin();
+    const double* const points =
+        packed.shape_points().xyz().data() + 3 * std::accumulate(sizes, sizes + shape, uint64_t{0});
+    result.mutable_points()->mutable_xyz()->Add(points, points + 3 * size_t{sizes[shape]});
+  }
+  const double* const pose = packed.poses().data() + ptrdiff_t{kPoseNumbers} * placement;
   v1::Quaternion& rotation = *result.mutable_pose()->mutable_rotation();
   rotation.set_w(pose[0]);
   rotation.set_x(pose[1]);
@@ -270,7 +289,9 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
 std::string Scene::NameOf(uint32_t placement) const {
   if (placement < names.size()) return names[placement];
   const std::string* const hull = HullOf(placement);
-  return absl::StrCat(placement, ":", hull == nullptr ? "" : *hull);
+  const bool is_shape =
+      hull != nullptr && hull->empty() && PlacementOf(placement).has_points();
+  return absl::StrCat(placement, ":", hull == nullptr ? "" : is_shape ? "points" : *hull);
 }
 
 std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,

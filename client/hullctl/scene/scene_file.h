@@ -42,12 +42,13 @@ struct Scene {
   std::vector<std::vector<std::string>> piece_names;
 
   uint32_t size() const;
-  // Returns the hull of a placement; null if the placement does not exist or names no hull.
+  // Returns the hull of a placement, empty for an inline shape; null if the placement does not
+  // exist.
   const std::string* HullOf(uint32_t placement) const;
   // Returns a placement, in either form. Requires HullOf(placement) != nullptr; unchecked, as
   // ReadScene and PairsOf ensure it.
   v1::Placement PlacementOf(uint32_t placement) const;
-  // Returns the placement's name, or its index and hull, as in "0:spider".
+  // Returns the placement's name, or its index and hull, as in "0:spider" or "1:points".
   std::string NameOf(uint32_t placement) const;
   // Returns the file's names for the deciding pieces of two placements, given by their indices;
   // empty if it has none.

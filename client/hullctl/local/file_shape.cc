@@ -1,0 +1,123 @@
+#include "client/hullctl/local/file_shape.h"
+
+#include <absl/container/flat_hash_set.h>
+#include <absl/status/statusor.h>
+#include <absl/strings/str_cat.h>
+
+#include <array>
+#include <filesystem>
+
+#include "client/formats/point_file.h"
+#include "client/hullctl/body/hull_segment.h"
+#include "client/hullctl/command_line/point_input.h"
+#include "client/hullctl/local/local_server.h"
+
+namespace hulld {
+namespace {
+
+// Ends the reading of a file with more distinct points than an inline shape takes.
+absl::Status TooManyPoints() { return absl::OutOfRangeError("too many points"); }
+
+// Reads the distinct points of a file.
+absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* points) {
+  absl::flat_hash_set<std::array<double, 3>> known;
+  const auto add = [&](const auto& xyz) {
+    for (size_t i = 0; i < xyz.size(); i += 3) {
+      if (!known.insert({xyz[i], xyz[i + 1], xyz[i + 2]}).second) continue;
+      points->mutable_xyz()->Add(xyz.begin() + i, xyz.begin() + i + 3);
+    }
+    return known.size() <= kMaxShapePoints ? absl::OkStatus() : TooManyPoints();
+  };
+  const auto receive = [&](const PointBlock& block) {
+    const absl::Status added = add(block.xyz);
+    return added.ok() ? add(block.xyz_float) : added;
+  };
+  const absl::Status read = ReadPoints(request, receive).status();
+  if (!read.ok() || !points->xyz().empty()) return read;
+  return absl::InvalidArgumentError(absl::StrCat(request.path, ": the file holds no point"));
+}
+
+// Registers the hull of a file; returns its ID.
+absl::StatusOr<std::string> Register(const Client& client, const ReadRequest& request) {
+  v1::ReplaceOpen open;
+  // The whole path, so that files of different folders differ.
+  open.set_hull_id(HullSegment(request.path));
+  open.set_create_if_absent(true);
+  const auto replaced = client.ReplaceHull(open, [&request](const Client::PointSink& sink) {
+    return ReadPoints(request, [&sink](const PointBlock& block) { return sink(ToProto(block)); })
+        .status();
+  });
+  if (!replaced.ok()) return replaced.status();
+  return open.hull_id();
+}
+
+// Returns the hull of a file, built by a local server.
+absl::StatusOr<HullMesh> Build(const ReadRequest& request) {
+  const auto server = LocalServer::Start();
+  if (!server.ok()) return server.status();
+  ClientOptions options;
+  options.server = (*server)->address();
+  options.own_connection = true;
+  const Client client(options);
+  const auto id = Register(client, request);
+  if (!id.ok()) return id.status();
+  return client.GetHullMesh(*id);
+}
+
+// Sets `points` to the vertices of the hull of a file.
+absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
+  const auto mesh = Build(request);
+  if (!mesh.ok()) {
+    return absl::Status(mesh.status().code(),
+                        absl::StrCat(request.path, " holds more than ", kMaxShapePoints,
+                                     " points, so a local server has to find the vertices: ",
+                                     mesh.status().message()));
+  }
+  if (mesh->vertex_count() > kMaxShapePoints) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(request.path, ": its hull has ", mesh->vertex_count(),
+                     " vertices, and a query carries up to ", kMaxShapePoints,
+                     "; use --local, or register the hull with 'hullctl append'"));
+  }
+  points->mutable_xyz()->Assign(mesh->xyz.begin(), mesh->xyz.end());
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+bool IsShapeFile(const std::string& argument) {
+  if (argument.starts_with('.') || argument.starts_with('/')) return true;
+  std::error_code ignored;
+  return PointFormatOfPath(argument).ok() && std::filesystem::exists(argument, ignored);
+}
+
+absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placement* placement) {
+  const auto format = PointFormatOfPath(path);
+  if (!format.ok()) return format.status();
+  const ReadRequest request{path, *format, {}, {}};
+  v1::PointBlock points;
+  absl::Status read = ReadDistinctPoints(request, &points);
+  placement->clear_hull_id();
+  if (absl::IsOutOfRange(read)) {
+    points.Clear();
+    if (run.local) {
+      const auto id = Register(run.MakeClient(), request);
+      if (!id.ok()) return id.status();
+      placement->set_hull_id(*id);
+      return absl::OkStatus();
+    }
+    read = ReadVertices(request, &points);
+  }
+  if (read.ok()) placement->mutable_points()->Swap(&points);
+  return read;
+}
+
+absl::StatusOr<HullMesh> HullOfFile(const std::string& path) {
+  const auto format = PointFormatOfPath(path);
+  if (!format.ok()) return format.status();
+  ReadRequest request{path, *format, {}, {}};
+  request.options.skip_nonfinite = true;
+  return Build(request);
+}
+
+}  // namespace hulld

@@ -1,0 +1,35 @@
+#ifndef HULLD_CLIENT_HULLCTL_LOCAL_FILE_SHAPE_H_
+#define HULLD_CLIENT_HULLCTL_LOCAL_FILE_SHAPE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <string>
+
+#include "client/client.h"
+#include "client/hullctl/command_line/invocation.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// Returns true if an argument is a file rather than the ID of a hull or body: an existing file with
+// the extension of a format of points, or a path that no ID can be ("./part", "/tmp/part.stl").
+bool IsShapeFile(const std::string& argument);
+
+// Makes the hull of all points of a file the shape of the placement. Up to kMaxShapePoints distinct
+// points are sent as they are. A file with more is read by a server of hullctl's own, and the
+// vertices of its hull are sent; with --local, the hull is registered on that server instead.
+// INVALID_ARGUMENT: the file cannot be read; its hull has more than kMaxShapePoints vertices.
+// Errors of the local server.
+absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placement* placement);
+
+// Returns the hull of all finite points of a file, built by a server of hullctl's own. Errors as
+// above, whatever the number of vertices.
+absl::StatusOr<HullMesh> HullOfFile(const std::string& path);
+
+// Limit of the server (Placement.points).
+inline constexpr size_t kMaxShapePoints = 4096;
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_LOCAL_FILE_SHAPE_H_

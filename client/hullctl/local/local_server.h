@@ -1,0 +1,45 @@
+#ifndef HULLD_CLIENT_HULLCTL_LOCAL_LOCAL_SERVER_H_
+#define HULLD_CLIENT_HULLCTL_LOCAL_LOCAL_SERVER_H_
+
+#include <absl/status/statusor.h>
+#include <sys/types.h>
+
+#include <memory>
+#include <string>
+#include <thread>
+
+namespace hulld {
+
+// A hulld process that keeps hulls in memory and listens on a unix socket in a folder that no other
+// user can enter. Both exist as long as this object, and end with this process however it ends,
+// SIGKILL included.
+class LocalServer {
+ public:
+  // Returns when the server listens. The program is $HULLD_BINARY, or hulld beside hullctl or on
+  // the PATH. NOT_FOUND: there is none. INTERNAL: it did not start, with its last message.
+  static absl::StatusOr<std::unique_ptr<LocalServer>> Start();
+  // Ends the server, and returns when it has ended.
+  ~LocalServer();
+  LocalServer(const LocalServer&) = delete;
+  LocalServer& operator=(const LocalServer&) = delete;
+
+  // For ClientOptions::server.
+  const std::string& address() const { return address_; }
+
+ private:
+  LocalServer() = default;
+
+  // Starts the keeper in a new folder. Returns the end of the pipe that has the server's log.
+  absl::StatusOr<int> Spawn(const std::string& program);
+
+  std::string address_;
+  // A shell that runs the server, and ends it and removes the folder at the end of its input.
+  pid_t keeper_ = 0;
+  int keeper_input_ = -1;
+  // Reads the log to its end, so that the server never waits for a reader.
+  std::thread log_reader_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_LOCAL_LOCAL_SERVER_H_

@@ -1,0 +1,171 @@
+// Queries about files, and servers of hullctl's own.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/types.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "client/hullctl/local/local_server.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace files_test {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class Files : public HullctlOnServer {
+ protected:
+  void SetUp() override {
+    HullctlOnServer::SetUp();
+    std::string pattern = (fs::temp_directory_path() / "hullctl-files-XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override {
+    fs::remove_all(folder_);
+    HullctlOnServer::TearDown();
+  }
+
+  // Writes points as a file; returns its path.
+  std::string Write(const std::string& name, const server::Coordinates& xyz) const {
+    const fs::path path = folder_ / name;
+    std::ofstream out(path);
+    out.precision(17);
+    for (size_t i = 0; i < xyz.size(); i += 3) {
+      out << xyz[i] << " " << xyz[i + 1] << " " << xyz[i + 2] << "\n";
+    }
+    return path.string();
+  }
+
+  bool StoresNothing() const {
+    const auto hulls = Client({}, channel_).ListAllHulls("");
+    return hulls.ok() && hulls->hulls().empty();
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Files, AreCheckedWithoutBeingStored) {
+  const std::string cube = Write("cube.xyz", server::Cube());
+  const Ran ran = Ask({"check", cube, cube, "--pose-b", "1,0,0"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
+  EXPECT_THAT(ran.out, HasSubstr(cube + "  (8 points)"));
+  EXPECT_TRUE(StoresNothing());
+}
+
+TEST_F(Files, MeetHullsAndAreVerified) {
+  Put("ball", server::Sphere(300));
+  const std::string cube = Write("cube.xyz", server::Cube());
+  for (const char* const pose : {"0,0,0", "1,0,0", "3,0,0"}) {
+    const Ran ran = Ask({"check", "ball", cube, "--pose-b", pose, "--verify"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("valid"));
+  }
+  ASSERT_EQ(Ask({"body", "put", "pair", "ball", "ball@5,0,0"}).code, 0);
+  const Ran body = Ask({"check", "pair", cube, "--pose-b", "1,0,0", "--verify"});
+  EXPECT_EQ(body.code, 0) << body.err;
+  const std::string record = (folder_ / "answer.json").string();
+  ASSERT_EQ(Ask({"check", cube, "ball", "--record", record}).code, 0);
+  EXPECT_EQ(Ask({"verify", record}).code, 0);
+  EXPECT_EQ(Ask({"check", cube, "ball", "--textbook", "--axis"}).code, 0);
+}
+
+TEST_F(Files, OfManyPointsSendTheirVertices) {
+  server::Coordinates cloud = server::Cube(-2, 4);
+  const server::Coordinates inside = server::Sphere(5000);
+  cloud.insert(cloud.end(), inside.begin(), inside.end());
+  const std::string file = Write("cloud.xyz", cloud);
+  const Ran ran = Ask({"check", file, file, "--pose-b", "4,0,0"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
+  EXPECT_THAT(ran.out, HasSubstr("(8 points)"));
+  EXPECT_TRUE(StoresNothing());
+}
+
+TEST_F(Files, OfManyVerticesNeedALocalServer) {
+  const std::string file = Write("ball.xyz", server::Sphere(5000));
+  const Ran refused = Ask({"check", file, file});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("ball.xyz: its hull has 5000 vertices"));
+  EXPECT_THAT(refused.err, HasSubstr("use --local"));
+  const Ran local = RunTool({"check", file, file, "--local", "--output", "name"});
+  EXPECT_EQ(local.code, 0) << local.err;
+  EXPECT_EQ(local.out, "OVERLAPPING\n");
+}
+
+TEST_F(Files, AreNamedInErrors) {
+  EXPECT_THAT(Ask({"check", "./part", "./part"}).err, HasSubstr("./part"));
+  EXPECT_THAT(Ask({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
+  const std::string empty = Write("empty.xyz", {});
+  EXPECT_THAT(Ask({"check", empty, empty}).err, HasSubstr("empty.xyz: the file holds no point"));
+  // A name that no file has is an ID.
+  EXPECT_THAT(Ask({"check", "part.stl", "part.stl"}).err, HasSubstr("part.stl"));
+}
+
+TEST(Local, NeedsNoServer) {
+  const Ran ran = RunTool({"--local", "status"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("unix:"));
+  const Ran both = RunTool({"--local", "status", "--server", "127.0.0.1:1"});
+  EXPECT_EQ(both.code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--local starts a server of its own; remove --server"));
+}
+
+TEST(Local, NamesAMissingProgram) {
+  setenv("HULLD_BINARY", "/nonexistent/hulld", 1);
+  const Ran ran = RunTool({"--local", "status"});
+  unsetenv("HULLD_BINARY");
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("HULLD_BINARY is /nonexistent/hulld"));
+}
+
+TEST(Local, RemovesItsFolder) {
+  auto server = LocalServer::Start();
+  ASSERT_TRUE(server.ok()) << server.status();
+  const std::string address = (*server)->address();
+  ASSERT_THAT(address, StartsWith("unix:/"));
+  const fs::path folder = fs::path(address.substr(5)).parent_path();
+  EXPECT_EQ(fs::status(folder).permissions(), fs::perms::owner_all);
+  server->reset();
+  EXPECT_FALSE(fs::exists(folder));
+}
+
+// A process that is killed cannot clean up.
+TEST(Local, EndsWithItsProcess) {
+  std::array<int, 2> pipe_ends;
+  ASSERT_EQ(pipe(pipe_ends.data()), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const auto server = LocalServer::Start();
+    const std::string address = server.ok() ? (*server)->address() : "";
+    const auto written = write(pipe_ends[1], address.data(), address.size());
+    _exit(written > 0 && raise(SIGKILL) == 0 ? 0 : 1);
+  }
+  close(pipe_ends[1]);
+  std::string address(4096, '\0');
+  const ssize_t size = read(pipe_ends[0], address.data(), address.size());
+  close(pipe_ends[0]);
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  ASSERT_GT(size, 5);
+  const fs::path folder = fs::path(address.substr(5, static_cast<size_t>(size) - 5)).parent_path();
+  // Bounded by the test's time limit only.
+  while (fs::exists(folder)) {
+  }
+}
+
+}  // namespace files_test
+}  // namespace hulld
