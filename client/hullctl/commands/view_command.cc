@@ -8,9 +8,12 @@
 #include <filesystem>
 #include <memory>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/local/file_shape.h"
+#include "client/hullctl/local/local_server.h"
 #include "client/hullctl/printing/table.h"
 #include "client/hullctl/view/bridge/bridge.h"
 #include "client/hullctl/view/bridge/page_html.h"
@@ -152,18 +155,44 @@ class Viewing {
     return ExitCode::kDone;
   }
 
-  // Takes the shape from the file and its hull from the server.
+  // Takes the shape from the file. Its hull is registered on the server of --local; any other
+  // server receives its vertices with each query.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
     auto shape = ReadShape(path);
     if (!shape.ok()) return shape.status();
-    const auto hull_id = temporary_.AddFile(path);
-    if (!hull_id.ok()) {
+    ViewObject object{shape->name, "", static_cast<int>(scene->files.size()), kIdentityPose};
+    const absl::Status hull = run_.local ? RegisterHull(path, &object) : BuildHull(path, &*shape);
+    if (!hull.ok()) {
       run_.err << "hullctl: warning: " << path << " is shown without its hull\n";
-      static_cast<void>(run_.Fail(hull_id.status()));
+      static_cast<void>(run_.FailUsage(hull));
     }
-    scene->objects.push_back({shape->name, hull_id.ok() ? *hull_id : "",
-                              static_cast<int>(scene->files.size()), kIdentityPose});
+    if (shape->hull != nullptr) {
+      object.hull_id = shape->hull_name;
+      object.hull = shape->hull;
+    }
+    scene->objects.push_back(std::move(object));
     scene->files.push_back(std::make_shared<FileShape>(*std::move(shape)));
+    return absl::OkStatus();
+  }
+
+  absl::Status RegisterHull(const std::string& path, ViewObject* object) {
+    const auto id = temporary_.AddFile(path);
+    if (id.ok()) object->hull_id = *id;
+    return id.status();
+  }
+
+  static absl::Status BuildHull(const std::string& path, FileShape* shape) {
+    auto hull = HullOfFile(path);
+    if (!hull.ok()) return hull.status();
+    if (hull->vertex_count() > kMaxShapePoints) {
+      return absl::InvalidArgumentError(absl::StrCat("its hull has ", hull->vertex_count(),
+                                                     " vertices, and a query carries up to ",
+                                                     kMaxShapePoints, "; use --local"));
+    }
+    shape->hull = std::make_shared<const HullMesh>(*std::move(hull));
+    // As `hullctl check` takes it.
+    const bool is_path = path.starts_with('.') || path.starts_with('/');
+    shape->hull_name = Printable(absl::StrCat(is_path ? "" : "./", path));
     return absl::OkStatus();
   }
 
@@ -244,7 +273,20 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
     return run.FailUsage(
         absl::InvalidArgumentError("--edit cannot be combined with --html or --png"));
   }
-  return Viewing(run, arguments).Run();
+  const bool is_temporary =
+      arguments.demo || (!arguments.things.empty() &&
+                         std::ranges::all_of(arguments.things, [](const std::string& thing) {
+                           return IsFile(thing) && !IsSceneName(thing);
+                         }));
+  if (!is_temporary || run.local) return Viewing(run, arguments).Run();
+  // All hulls are temporary: a server of its own keeps them.
+  const auto server = LocalServer::Start();
+  if (!server.ok()) return run.FailUsage(server.status());
+  Invocation local = run;
+  local.local = true;
+  local.server = (*server)->address();
+  local.security = {};
+  return Viewing(local, arguments).Run();
 }
 
 }  // namespace
@@ -287,10 +329,10 @@ void AddViewCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "A body is dragged as a whole; the hulls of its pieces are shown on their own only if\n"
       "named. The page queries hulld through hullctl: it never sees your token, and without\n"
-      "--edit it changes nothing on the server. The hull of a FILE is created on the server,\n"
-      "under view/, and deleted at the end; with a read-only token, the file is shown without its\n"
-      "hull. Press ? on the page for its keys. --png runs chromium or another browser of its\n"
-      "family.");
+      "--edit it changes nothing on the server. Files alone, and --demo, need no server: hullctl\n"
+      "starts one of its own, which ends with the viewer. Beside hulls of another server, the\n"
+      "hull of a FILE is not stored: its vertices, at most 4096, are sent with each query. Press\n"
+      "? on the page for its keys. --png runs chromium or another browser of its family.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},

@@ -3,11 +3,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <unordered_map>
 #include <utility>
 
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
+#include "client/packed_placements.h"
 
 namespace hulld {
 namespace {
@@ -141,31 +141,36 @@ class SceneAnswer {
   v1::SceneTotals totals_;
 };
 
+// Places the hull or body of an object, or the vertices of its file's hull.
+v1::Placement PlacementOf(const ViewObject& object) {
+  v1::Placement placement;
+  if (object.hull == nullptr) {
+    placement.set_hull_id(object.hull_id);
+  } else {
+    placement.mutable_points()->mutable_xyz()->Add(object.hull->xyz.begin(),
+                                                   object.hull->xyz.end());
+  }
+  *placement.mutable_pose() = ToPose(object.pose);
+  return placement;
+}
+
 // Packs the objects that have a hull; `objects` receives their indices.
 v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint32_t>* objects) {
-  v1::PackedPlacements packed;
-  std::unordered_map<std::string, uint32_t> index_of;
+  google::protobuf::RepeatedPtrField<v1::Placement> placements;
   for (uint32_t i = 0; i < from.size(); ++i) {
-    const ViewObject& object = from[i];
-    if (object.hull_id.empty()) continue;
-    const auto [place, is_new] =
-        index_of.emplace(object.hull_id, static_cast<uint32_t>(index_of.size()));
-    if (is_new) packed.add_hull_ids(object.hull_id);
-    packed.add_hulls(place->second);
-    packed.mutable_poses()->Add(object.pose.begin(), object.pose.end());
+    if (from[i].hull_id.empty()) continue;
+    *placements.Add() = PlacementOf(from[i]);
     objects->push_back(i);
   }
-  return packed;
+  return PackPlacements(placements);
 }
 
 }  // namespace
 
 v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate) {
   v1::CheckCollisionRequest request;
-  request.mutable_a()->set_hull_id(a.hull_id);
-  *request.mutable_a()->mutable_pose() = ToPose(a.pose);
-  request.mutable_b()->set_hull_id(b.hull_id);
-  *request.mutable_b()->mutable_pose() = ToPose(b.pose);
+  *request.mutable_a() = PlacementOf(a);
+  *request.mutable_b() = PlacementOf(b);
   *request.mutable_wanted() = WantedOfPair(certificate);
   return request;
 }

@@ -26,6 +26,9 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeR
                      : MissingFrame(shape, MessageOf(mesh.status()));
   }
   const std::string hull_id = shape.hull_id.value_or("");
+  for (const auto& file : files) {
+    if (file->hull != nullptr && file->hull_name == hull_id) return HullFrame(hull_id, *file->hull);
+  }
   const auto mesh = client.GetHullMesh(hull_id);
   if (mesh.ok()) return HullFrame(hull_id, *mesh);
   const auto body =

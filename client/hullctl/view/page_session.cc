@@ -22,7 +22,7 @@ v1::WatchHullsRequest WatchFor(const ViewScene& scene) {
   std::vector<std::string> names = scene.prefixes;
   names.insert(names.end(), scene.pieces.begin(), scene.pieces.end());
   for (const ViewObject& object : scene.objects) {
-    if (!object.hull_id.empty()) names.push_back(object.hull_id);
+    if (!object.hull_id.empty() && object.hull == nullptr) names.push_back(object.hull_id);
   }
   if (names.empty()) return request;
   std::string prefix = names[0];

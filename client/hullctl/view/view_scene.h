@@ -26,17 +26,22 @@ struct FileShape {
   // Three indices each.
   std::vector<uint32_t> triangles;
   uint64_t point_count = 0;
+  // The hull of the file, if no server has it, and its name, which is a path and no ID.
+  std::shared_ptr<const HullMesh> hull;
+  std::string hull_name;
 };
 inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
 // A displayed object: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
   std::string name;
-  // ID of a hull or a body. Empty: none.
+  // ID of a hull or a body, or FileShape::hull_name. Empty: none.
   std::string hull_id;
   // Index into ViewScene::files, -1: none.
   int file = -1;
   Pose7 pose = kIdentityPose;
+  // FileShape::hull of its file; null for an ID.
+  std::shared_ptr<const HullMesh> hull = nullptr;
 };
 
 struct ViewScene {

@@ -89,7 +89,7 @@ class ViewerCase(unittest.TestCase):
         self.browser.wait(AT_REST)
         command = shlex.split(self.browser.text("#command"))
         self.assertEqual(command[:2], ["hullctl", "check"])
-        answer = self.hulld.json(*command[1:])
+        answer = self.hulld.json(*command[1:], server=self.browser.js("hulldViewer.server"))
         words = {"RELATION_SEPARATED": "separated", "RELATION_TOUCHING": "touching",
                  "RELATION_OVERLAPPING": "overlapping"}
         self.assertIn(words[answer["relation"]], self.browser.text("#relation"))
@@ -381,11 +381,25 @@ class ViewerTest(ViewerCase):
                 self.browser.wait("document.querySelector('#collision-count').textContent"
                                   " === '1 pair collides'", seconds=90)
 
-    def test_temporary_hulls_are_deleted_at_the_end(self):
+    def test_files_are_not_stored_beside_hulls(self):
+        before = self.hulld.hullctl("list", "--output", "name")
+        self.view("room/left", "/usr/share/assimp/models/OBJ/spider.obj")
+        self.browser.wait("document.querySelector('#collision-count').textContent !== ''")
+        self.browser.js("hulldViewer.model.select(0); hulldViewer.model.select(1, true)")
+        self.assertEqual(self.hulld.hullctl("list", "--output", "name"), before)
+
+    def test_a_killed_viewer_leaves_nothing(self):
         viewer = self.hulld.view("/usr/share/assimp/models/OBJ/spider.obj")
-        self.assertIn("view/", self.hulld.hullctl("list", "view/"))
-        self.assertEqual(viewer.stop(), 0)
-        self.assertNotIn("view/", self.hulld.hullctl("list", "view/"))
+        self.browser.open(viewer.address)
+        folder = pathlib.Path(self.browser.js("hulldViewer.server").removeprefix("unix:")).parent
+        self.assertTrue(folder.is_dir())
+        self.browser.driver.get("about:blank")
+        viewer.child.kill()
+        viewer.child.communicate()
+        # Bounded by the test's time limit only.
+        while folder.exists():
+            pass
+        self.assertEqual(self.hulld.hullctl("list", "view/", "--output", "name"), "")
 
     # --- The page ---
 

@@ -81,8 +81,12 @@ class Hulld:
                               cwd=self.directory, check=True, stdout=subprocess.PIPE, text=True,
                               **options).stdout
 
-    def json(self, *arguments):
-        return json.loads(self.hullctl(*arguments, "--output", "json"))
+    def json(self, *arguments, server=None):
+        """Returns the answer of a command; server: another one than this."""
+        command = [self.programs / "hullctl", *arguments, "--server", server or self.address,
+                   "--output", "json"]
+        return json.loads(subprocess.run(command, cwd=self.directory, check=True,
+                                         stdout=subprocess.PIPE, text=True).stdout)
 
     def add(self, hull_id, points):
         """Appends points, each a text "x y z"."""
