@@ -380,8 +380,9 @@ class Client(ClientBase):
     ) -> Collision:
         """The relation of a pair: exact, for the doubles given.
 
-        a, b: an ID, (ID, pose), or hulld.Placement; a pose is 4 x 4, a quaternion and a
-        translation, or a translation. Nothing beyond the relation is computed unless asked for:
+        a, b: an ID, the points of an inline shape (n x 3), either of them at a pose as in (ID,
+        pose), or hulld.Placement; a pose is 4 x 4, a quaternion and a translation, or a
+        translation. Nothing beyond the relation is computed unless asked for:
         axis (the separating or touching axis and the features on it), separation (the distance, or
         minus the penetration depth, with a proven bound, at most max_error), witness (a point of
         each hull that attain it), clearance (true if the separation is at most this; exact),

@@ -183,11 +183,17 @@ def scene_json(placements: Placements, pairs: Sequence[tuple[int, int]]) -> str:
             "translation": dict(zip("xyz", numbers[4:])),
         }
 
+    def subject(index: int) -> dict[str, Any]:
+        one = placements.subject(index)
+        if isinstance(one, str):
+            return {"hullId": one}
+        return {"points": {"xyz": one.astype(float).reshape(-1).tolist()}}
+
     return json.dumps(
         {
             "placements": [
-                {"hullId": placements.ids[index], "pose": pose(numbers)}
-                for index, numbers in zip(placements.indices.tolist(), placements.poses.tolist())
+                {**subject(index), "pose": pose(numbers)}
+                for index, numbers in enumerate(placements.poses.tolist())
             ],
             "pairs": [index for pair in pairs for index in pair],
         }

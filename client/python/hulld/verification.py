@@ -98,9 +98,15 @@ class _Motion:
 class _Piece:
     """A hull where it stands; its vertices are moved when they are needed first."""
 
-    def __init__(self, vertices: npt.NDArray[np.float64], motions: Sequence[_Motion]) -> None:
+    def __init__(
+        self,
+        vertices: npt.NDArray[np.float64],
+        motions: Sequence[_Motion],
+        in_any_order: bool = False,
+    ) -> None:
         self._vertices = vertices
         self._motions = motions
+        self._in_any_order = in_any_order
         self._points: list[_Point] | None = None
         self._box: list[tuple[Fraction, Fraction]] | None = None
 
@@ -112,6 +118,18 @@ class _Piece:
                 moved = [motion(point) for point in moved]
             self._points = moved
         return self._points
+
+    def moved(self, index: int, vertex: npt.NDArray[np.float64]) -> _Point:
+        """The vertex of a certificate, by its index or, among the points of an inline shape, by its
+        coordinates."""
+        if self._in_any_order:
+            places = np.flatnonzero((self._vertices == vertex).all(axis=1))
+            if not places.size:
+                raise VerificationError("a vertex pair names a point that its shape does not have")
+            index = int(places[0])
+        if index >= len(self.points):
+            raise VerificationError("a vertex pair names a vertex that does not exist")
+        return self.points[index]
 
     def box(self) -> list[tuple[Fraction, Fraction]]:
         """The least box along the axes of the world. Requires points."""
@@ -171,9 +189,9 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
     """Checks that the certificate proves the relation of two hulls."""
     differences = []
     for pair in certificate.pairs:
-        if pair.index_a >= len(a.points) or pair.index_b >= len(b.points):
-            raise VerificationError("a vertex pair names a vertex that does not exist")
-        differences.append(_minus(a.points[pair.index_a], b.points[pair.index_b]))
+        differences.append(
+            _minus(a.moved(pair.index_a, pair.vertex_a), b.moved(pair.index_b, pair.vertex_b))
+        )
     if relation == Relation.OVERLAPPING:
         if not _surrounds_origin(differences):
             raise VerificationError("the differences of the vertex pairs do not surround 0")
@@ -198,6 +216,8 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
         raise VerificationError("the vertex pairs show no common point")
 
 
+# The version of an inline shape.
+_NO_VERSION = HullVersion("", 0, 0, "")
 _STRENGTH = {Relation.SEPARATED: 0, Relation.TOUCHING: 1, Relation.OVERLAPPING: 2}
 
 
@@ -285,7 +305,10 @@ class Verifier:
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         a, b = (packed[int(index)] for index in found.pairs[row])
         answers = found.answers
-        if a.id not in found.hulls or b.id not in found.hulls:
+        versions = [
+            found.hulls.get(one.id) if one.id is not None else _NO_VERSION for one in (a, b)
+        ]
+        if versions[0] is None or versions[1] is None:
             if int(answers.relations[row]) == 0:
                 raise VerificationError("the row has no answer")
             raise VerificationError(
@@ -296,7 +319,7 @@ class Verifier:
             b,
             Relation(int(answers.relations[row])),
             answers.certificates[row] if answers.certificates else None,
-            (found.hulls[a.id], found.hulls[b.id]),
+            (versions[0], versions[1]),
             answers.piece_proofs.get(row),
             found.piece_hulls,
         )
@@ -313,7 +336,7 @@ class Verifier:
     ) -> None:
         if relation not in _STRENGTH:
             raise VerificationError(f"{relation.name} has no certificate")
-        if (a.id, b.id) != (versions[0].hull_id, versions[1].hull_id):
+        if (a.id or "", b.id or "") != (versions[0].hull_id, versions[1].hull_id):
             raise VerificationError("the answer is about different hulls")
         if proof is None:
             if certificate is None:
@@ -328,12 +351,15 @@ class Verifier:
         )
 
     def _hull(self, placement: Placement, version: HullVersion) -> _Piece:
-        return _Piece(self._vertices(version), [_Motion(placement.pose)])
+        motions = [_Motion(placement.pose)]
+        if placement.shape is None:
+            return _Piece(self._vertices(version), motions)
+        return _Piece(placement.shape.astype(np.float64), motions, in_any_order=True)
 
     def _pieces(
         self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
     ) -> list[_Piece]:
-        body = self._body(version)
+        body = self._body(version) if placement.shape is None else None
         if body is None:
             return [self._hull(placement, version)]
         pieces = []

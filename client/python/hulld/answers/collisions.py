@@ -66,7 +66,7 @@ class AxisKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullVersion:
-    """The hull that an answer was computed from."""
+    """The hull that an answer was computed from. Empty for an inline shape."""
 
     hull_id: str
     create_revision: int
@@ -74,7 +74,7 @@ class HullVersion:
     store_id: str
 
     def __repr__(self) -> str:
-        return f"{self.hull_id}@{self.revision}"
+        return f"{self.hull_id}@{self.revision}" if self.hull_id else "points"
 
 
 @dataclass(frozen=True)
@@ -250,8 +250,8 @@ class Collision:
         rows = [
             ("relation", self.relation.name),
             ("decided by", self.rung.name),
-            ("A", f"{self.hull_a.hull_id} (revision {self.hull_a.revision})"),
-            ("B", f"{self.hull_b.hull_id} (revision {self.hull_b.revision})"),
+            ("A", _versioned(self.hull_a)),
+            ("B", _versioned(self.hull_b)),
             ("piece of A", _named(self.piece_a)),
             ("piece of B", _named(self.piece_b)),
             ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
@@ -286,7 +286,11 @@ def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:
 def _named(piece: DecidingPiece | None) -> str | None:
     if piece is None:
         return None
-    return f"{piece.index}: {piece.hull.hull_id} (revision {piece.hull.revision})"
+    return f"{piece.index}: {_versioned(piece.hull)}"
+
+
+def _versioned(hull: HullVersion) -> str:
+    return f"{hull.hull_id} (revision {hull.revision})" if hull.hull_id else "points"
 
 
 @dataclass(frozen=True)

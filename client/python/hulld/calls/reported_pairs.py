@@ -33,7 +33,9 @@ class WatchedPlacements:
         clearance: float | None,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
-        self.placements = Placements(placements.ids, placements.poses.copy(), placements.indices)
+        self.placements = Placements(
+            placements.ids, placements.poses.copy(), placements.indices, shapes=placements.shapes
+        )
         self.clearance = clearance
         self.orthogonality_tolerance = orthogonality_tolerance
         self.updates = 0
@@ -50,7 +52,9 @@ class WatchedPlacements:
         return open_watch(self.placements, self._pairs, self._scene, self.clearance)
 
     def hull_of(self, placement: int) -> str:
-        return self.placements.ids[int(self.placements.indices[placement])]
+        """Empty for an inline shape."""
+        subject = self.placements.subject(placement)
+        return subject if isinstance(subject, str) else ""
 
 
 class ReportedPairs:

@@ -19,6 +19,7 @@ from hulld.answers.status import ServerStatus
 from hulld.calls.freshness import FIELD, Freshness
 from hulld.calls.wanted import Wanted
 from hulld.geometry.placements import Placements, as_integers
+from hulld.geometry.points import point_block
 from hulld.notebook import Viewer
 from hulld.v1 import body_pb2, collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
 from hulld.wire import MessageWriter
@@ -169,9 +170,14 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
     )
 
 
-def _put_placement(target: Any, hull_id: str, pose: npt.NDArray[np.float64]) -> None:
+def _put_placement(target: Any, placements: Placements, index: int) -> None:
     """Fills a Placement of the contract."""
-    target.hull_id = hull_id
+    subject = placements.subject(index)
+    if isinstance(subject, str):
+        target.hull_id = subject
+    else:
+        target.points.MergeFromString(point_block(subject).finish())
+    pose = placements.poses[index]
     w, x, y, z, tx, ty, tz = pose.tolist()
     target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
     target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
@@ -183,8 +189,10 @@ def put_body(body_id: str, pieces: Placements, if_revision: int | None) -> Call[
     )
     if not len(pieces):
         raise ValueError("pieces is empty; a body has at least one")
-    for index, pose in zip(pieces.indices, pieces.poses):
-        _put_placement(request.pieces.add(), pieces.ids[index], pose)
+    if pieces.shapes:
+        raise ValueError("pieces has points; a piece is a registered hull, so pass its ID")
+    for index in range(len(pieces)):
+        _put_placement(request.pieces.add(), pieces, index)
     # Putting the same pieces twice is idempotent, unless it depends on the revision.
     return Call(
         method_path("BodyService", "PutBody"),
@@ -262,8 +270,8 @@ def check_collision(
         tolerance=arguments.length(tolerance, "tolerance"),
         wanted=wanted.message(),
     )
-    for index, pose, target in zip(pair.indices, pair.poses, (request.a, request.b)):
-        _put_placement(target, pair.ids[index], pose)
+    for index, target in enumerate((request.a, request.b)):
+        _put_placement(target, pair, index)
     return Call(
         method_path("CollisionService", "CheckCollision"),
         request.SerializeToString(),

@@ -1,4 +1,4 @@
-"""Placements: hulls and bodies at poses, packed for the wire."""
+"""Placements: hulls, bodies, and inline shapes at poses, packed for the wire."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hulld import arguments
+from hulld.geometry.points import Points, PointsLike, as_points, point_block
 from hulld.geometry.poses import (
     ORTHOGONALITY_TOLERANCE,
     PackedPoses,
@@ -22,49 +23,86 @@ from hulld.geometry.poses import (
 )
 from hulld.wire import MessageWriter
 
-_HULL_IDS, _HULLS, _POSES = 1, 2, 3  # fields of PackedPlacements
+_HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS = 1, 2, 3, 4, 5  # of PackedPlacements
+#: The most points of an inline shape.
+_MOST_SHAPE_POINTS = 4096
 
 
 @dataclass(frozen=True)
 class Placement:
-    """The hull or body with this ID, at a pose; None: the identity."""
+    """The hull or body with this ID, or the inline shape of `points`, at a pose; None: the
+    identity.
 
-    id: str
+    points: 1 to 4096, n x 3. They mean the same as a registered hull of these points, and are not
+    stored. ValueError: a malformed ID or shape, or not exactly one of both.
+    """
+
+    id: str | None = None
     pose: PoseLike = None
+    points: PointsLike | None = None
 
     def __post_init__(self) -> None:
-        arguments.hull_id(self.id, "the ID of a placement")
+        if self.points is None:
+            arguments.hull_id(self.id, "the ID of a placement")
+        elif self.id is not None:
+            raise ValueError("a placement has an ID or points, not both")
+        else:
+            object.__setattr__(self, "points", as_shape(self.points))
+
+    @property
+    def shape(self) -> Points | None:
+        """The points of an inline shape; None for a hull or body."""
+        return self.points  # type: ignore[return-value]
 
 
-#: A hull or body at a pose: its ID, a Placement, or (ID, pose).
-PlacementLike = Union[str, Placement, tuple[str, PoseLike]]
+#: A hull or body by its ID, or the points of an inline shape, n x 3.
+Subject = Union[str, npt.NDArray[Any], list[Any]]
+#: One of these at a pose: alone, a Placement, or (ID or points, pose).
+PlacementLike = Union[Subject, Placement, tuple[Subject, PoseLike]]
+
+
+def as_shape(points: PointsLike, name: str = "points") -> Points:
+    """The points of an inline shape. ValueError: as in as_points, or none, or more than 4096."""
+    array = as_points(points, name)
+    if not 1 <= len(array) <= _MOST_SHAPE_POINTS:
+        raise ValueError(
+            f"{name} holds {len(array)} points; a shape takes 1 to {_MOST_SHAPE_POINTS}, so "
+            "register a hull of more"
+        )
+    return array
 
 
 def as_placement(placement: PlacementLike) -> Placement:
-    """TypeError: not a placement. ValueError: a malformed ID."""
+    """TypeError: not a placement. ValueError: a malformed ID or shape."""
     if isinstance(placement, Placement):
         return placement
-    if isinstance(placement, str):
-        return Placement(placement)
-    if isinstance(placement, tuple) and len(placement) == 2 and isinstance(placement[0], str):
-        return Placement(*placement)
+    subject, pose = (
+        placement if isinstance(placement, tuple) and len(placement) == 2 else (placement, None)
+    )
+    if isinstance(subject, str):
+        return Placement(subject, pose)
+    if isinstance(subject, (np.ndarray, list)):
+        return Placement(pose=pose, points=subject)
     raise TypeError(
-        f"{placement!r} is not a placement; pass an ID, (ID, pose), or hulld.Placement(ID, pose)"
+        f"{placement!r} is not a placement; pass an ID or points, (ID or points, pose), or "
+        "hulld.Placement"
     )
 
 
 class Placements:
-    """Many placements of few hulls or bodies: each ID once, the poses as one array.
+    """Many placements of few hulls, bodies, or inline shapes: each once, the poses as one array.
 
     ids: the distinct IDs. poses: for each placement, as in pack_poses; None: the identity.
-    indices: for each placement, the index of its ID; None: each ID is placed once, or a single ID
-    as often as there are poses. orthogonality_tolerance, quaternion_order: as in pack_poses.
+    indices: for each placement, the index of its ID or, from the number of IDs on, of its shape;
+    None: each is placed once, or a single one as often as there are poses. shapes: inline shapes,
+    the points of each as in Placement. orthogonality_tolerance, quaternion_order: as in pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses
         Placements(["arm", "box"], poses, [0, 1, 1, 1])  # four placements of two hulls
+        Placements([], poses, shapes=[points])           # one inline shape at n poses
 
-    ValueError: the lists do not fit each other, or hold a malformed ID.
+    ValueError: the lists do not fit each other, or hold a malformed ID or shape.
     """
 
     def __init__(
@@ -73,12 +111,17 @@ class Placements:
         poses: PosesLike | None = None,
         indices: npt.ArrayLike | None = None,
         *,
+        shapes: Sequence[PointsLike] = (),
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         quaternion_order: QuaternionOrder = "wxyz",
     ) -> None:
         self.ids: list[str] = [ids] if isinstance(ids, str) else list(ids)
         for index, one in enumerate(self.ids):
             arguments.hull_id(one, f"ids[{index}]")
+        self.shapes: list[Points] = [
+            as_shape(points, f"shapes[{index}]") for index, points in enumerate(shapes)
+        ]
+        count = len(self.ids) + len(self.shapes)
         packed: PackedPoses | None = None
         if poses is not None:
             packed = pack_poses(
@@ -87,14 +130,14 @@ class Placements:
                 quaternion_order=quaternion_order,
             )
         if indices is None:
-            many = len(self.ids) == 1 and packed is not None
+            many = count == 1 and packed is not None
             chosen = (
                 np.zeros(len(packed), np.uint32)
                 if many and packed is not None
-                else np.arange(len(self.ids), dtype=np.uint32)
+                else np.arange(count, dtype=np.uint32)
             )
         else:
-            chosen = as_indices(indices, len(self.ids), "indices")
+            chosen = as_indices(indices, count, "indices")
         if packed is None:
             packed = np.tile(pack_pose(None), (len(chosen), 1))
         if len(packed) != len(chosen):
@@ -116,12 +159,26 @@ class Placements:
             )
         single = [as_placement(placement) for placement in placements]  # type: ignore[union-attr]
         places: dict[str, int] = {}
-        indices = [places.setdefault(placement.id, len(places)) for placement in single]
+        for placement in single:
+            if placement.id is not None:
+                places.setdefault(placement.id, len(places))
+        # An array that is given several times is one shape.
+        shapes: dict[int, Points] = {}
+        shape_places: dict[int, int] = {}
+        indices = []
+        for placement in single:
+            if placement.shape is None:
+                indices.append(places[placement.id or ""])
+                continue
+            key = id(placement.shape)
+            shapes[key] = placement.shape
+            indices.append(len(places) + shape_places.setdefault(key, len(shape_places)))
         rows = [placement.pose for placement in single]
         return cls(
             list(places),
             rows,
             np.array(indices, np.uint32),
+            shapes=list(shapes.values()),
             orthogonality_tolerance=orthogonality_tolerance,
         )
 
@@ -129,19 +186,31 @@ class Placements:
         return len(self.indices)
 
     def __getitem__(self, index: int) -> Placement:
-        return Placement(self.ids[self.indices[index]], Pose.from_packed(self.poses[index]))
+        pose = Pose.from_packed(self.poses[index])
+        one = self.subject(index)
+        return Placement(one, pose) if isinstance(one, str) else Placement(pose=pose, points=one)
 
     def __repr__(self) -> str:
-        return f"Placements({len(self)} of {len(self.ids)} IDs)"
+        shapes = f" and {len(self.shapes)} shapes" if self.shapes else ""
+        return f"Placements({len(self)} of {len(self.ids)} IDs{shapes})"
+
+    def subject(self, index: int) -> str | Points:
+        """The ID of a placement, or the points of its inline shape."""
+        one = int(self.indices[index])
+        return self.ids[one] if one < len(self.ids) else self.shapes[one - len(self.ids)]
 
     def packed(self) -> MessageWriter:
         """The message PackedPlacements."""
-        return (
+        message = (
             MessageWriter()
             .strings(_HULL_IDS, self.ids)
             .uint32s(_HULLS, self.indices)
             .doubles(_POSES, self.poses)
         )
+        if self.shapes:
+            message.uint32s(_SHAPE_SIZES, np.array([len(shape) for shape in self.shapes], np.uint32))
+            message.message(_SHAPE_POINTS, point_block(np.concatenate(self.shapes)))
+        return message
 
 
 PlacementsLike = Union[Placements, Iterable[PlacementLike]]
