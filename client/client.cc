@@ -241,8 +241,12 @@ absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, 
   v1::GetHullRequest request;
   request.set_hull_id(hull_id);
   request.set_audit(audit);
-  if (options_.freshness.has_value()) *request.mutable_freshness() = *options_.freshness;
-  return Call(hulls_.get(), &v1::HullService::Stub::GetHull, request, true);
+  return GetHull(request);
+}
+
+absl::StatusOr<v1::GetHullResponse> Client::GetHull(const v1::GetHullRequest& request) const {
+  v1::GetHullRequest copy;
+  return Call(hulls_.get(), &v1::HullService::Stub::GetHull, WithFreshness(request, &copy), true);
 }
 
 absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {

@@ -93,6 +93,8 @@ class Client {
                           std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
+  // Same as above, with every option of the request, such as properties.
+  absl::StatusOr<v1::GetHullResponse> GetHull(const v1::GetHullRequest& request) const;
 
   // INTERNAL: the stream is inconsistent.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;

@@ -1,5 +1,7 @@
 #include "core/numeric/rational.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -13,6 +15,9 @@ namespace {
 
 // Bits of the quotients before they are rounded; 64 after a square root.
 constexpr int kQuotientBits = 128;
+
+// The exponent of the least double.
+constexpr int kLeastExponent = -1074;
 
 int BitsOf(const Integer& value) {
   return value.is_zero() ? 0 : static_cast<int>(msb(Integer(abs(value)))) + 1;
@@ -53,6 +58,32 @@ Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exp
   const ScaledDouble scaled = ToScaledDouble(quotient);
   return Round(Sign(numerator) < 0 ? -scaled.mantissa : scaled.mantissa,
                scaled.exponent - shift + exponent);
+}
+
+Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int exponent) {
+  HULLD_CHECK(Sign(denominator) > 0);
+  if (numerator.is_zero()) return {0, 0};
+  // The quotient has 62 or 63 bits: at least two more than a double, and its unit is at most a
+  // quarter of the least double.
+  constexpr int kLeastUnit = kLeastExponent - 2;
+  const int unit = std::max(BitsOf(numerator) - BitsOf(denominator) + exponent - 62, kLeastUnit);
+  const int shift = exponent - unit;
+  Integer quotient;
+  Integer remainder;
+  divide_qr(Integer(abs(numerator) << std::max(shift, 0)),
+            Integer(denominator << std::max(-shift, 0)), quotient, remainder);
+  // A lowest bit of 1 stands for what follows it.
+  const uint64_t bits = static_cast<uint64_t>(quotient) | (remainder.is_zero() ? 0 : 1);
+  const int dropped = std::max(static_cast<int>(std::bit_width(bits)) - 53, kLeastExponent - unit);
+  const uint64_t half = uint64_t{1} << (dropped - 1);
+  const uint64_t rest = bits & (2 * half - 1);
+  uint64_t kept = bits >> dropped;
+  if (rest > half || (rest == half && kept % 2 == 1)) ++kept;
+  const double sign = Sign(numerator) < 0 ? -1 : 1;
+  const double value = std::ldexp(static_cast<double>(kept), unit + dropped);
+  if (std::isinf(value)) return {sign * kLargestDouble, kInfinity};
+  const double bound = std::max(std::ldexp(1.0, unit + dropped - 1), kLeastDouble);
+  return {value == 0 ? 0 : sign * value, rest == 0 ? 0 : bound};
 }
 
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent) {

@@ -24,6 +24,11 @@ struct Rounded {
 // Returns numerator / denominator * 2^exponent. Requires: denominator > 0.
 Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exponent);
 
+// Returns the double nearest to numerator / denominator * 2^exponent, ties to even, and half its
+// distance from the next double as the bound, or 0 if it is exact. Zero and tiny numbers differ
+// from Rounded: a number nearer to 0 than to the least double is 0. Requires: denominator > 0.
+Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int exponent);
+
 // Returns sqrt(numerator / denominator) * 2^exponent. Requires: numerator >= 0, denominator > 0.
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent);
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/hull/audit.h"
+#include "core/hull/properties.h"
 #include "server/call/unary_call.h"
 #include "server/hulls/append_stream.h"
 #include "server/hulls/mesh_stream.h"
@@ -50,8 +51,9 @@ grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* cont
                                                grpc::ByteBuffer* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
-        // The duration of an audit depends on the size of the hull.
-        WorkerPool& readers = call->request().audit() ? long_readers_ : readers_;
+        // The duration of an audit or of sums over the surface depends on the size of the hull.
+        const bool is_long = call->request().audit() || call->request().properties();
+        WorkerPool& readers = is_long ? long_readers_ : readers_;
         call->EndOn(readers,
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
@@ -124,13 +126,19 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   EncodeHeader(registry_.store(), as_of, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
-  if (request.without_facets() && !request.audit()) return absl::OkStatus();
+  const bool wants_properties = request.properties() && !view.served->empty();
+  if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
   const auto should_stop = [&call] { return call.ShouldStop(); };
   const absl::StatusOr<const Hull*> hull = registry_.reader().Canonical(view, should_stop);
   if (!hull.ok()) return hull.status();
   if (!request.without_facets()) {
     response->set_edge_count((*hull)->edges().size());
     response->set_facet_count((*hull)->facet_count());
+  }
+  if (wants_properties) {
+    const absl::StatusOr<HullProperties> properties = ComputeProperties(**hull, should_stop);
+    if (!properties.ok()) return properties.status();
+    EncodeProperties(*properties, response->mutable_properties());
   }
   if (!request.audit()) return absl::OkStatus();
   const absl::Status finding = AuditHull(**hull, should_stop);

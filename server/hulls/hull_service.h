@@ -27,9 +27,9 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
                                 v1::HullService::Service>>>>>>>>;
 
 // hulld.v1.HullService: implements the contract in hull.proto on the registry. Calls that only read
-// records are answered on arrival. Calls that need a snapshot run on `readers`; meshes and audits,
-// which may take long, on `long_readers`. Replacements are built on `writers`, as are chunks.
-// Watches read records on notification, and boxes from the store on `readers`.
+// records are answered on arrival. Calls that need a snapshot run on `readers`; meshes, audits, and
+// properties, which may take long, on `long_readers`. Replacements are built on `writers`, as are
+// chunks. Watches read records on notification, and boxes from the store on `readers`.
 class HullService : public HullServiceOfBytes {
  public:
   HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,

@@ -84,6 +84,26 @@ void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   EncodeCounts(record.counts, message->mutable_counts());
 }
 
+void EncodeProperties(const HullProperties& properties, v1::HullProperties* message) {
+  message->mutable_volume()->set_value(properties.volume.value);
+  message->mutable_volume()->set_bound(properties.volume.bound);
+  message->mutable_area()->set_value(properties.area.value);
+  message->mutable_area()->set_bound(properties.area.bound);
+  const auto& c = properties.centroid;
+  EncodeVector({c[0].value, c[1].value, c[2].value}, message->mutable_centroid());
+  EncodeVector({c[0].bound, c[1].bound, c[2].bound}, message->mutable_centroid_bounds());
+  const auto encode = [&](double Rounded::*member, v1::SymmetricTensor* tensor) {
+    tensor->set_xx(properties.inertia[0].*member);
+    tensor->set_yy(properties.inertia[1].*member);
+    tensor->set_zz(properties.inertia[2].*member);
+    tensor->set_xy(properties.inertia[3].*member);
+    tensor->set_xz(properties.inertia[4].*member);
+    tensor->set_yz(properties.inertia[5].*member);
+  };
+  encode(&Rounded::value, message->mutable_inertia());
+  encode(&Rounded::bound, message->mutable_inertia_bounds());
+}
+
 void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion* message) {
   if (record.hull_id.empty()) return;
   message->set_hull_id(record.hull_id);

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "core/hull/hull.h"
+#include "core/hull/properties.h"
 #include "core/query/body/piece_certification.h"
 #include "core/query/collision.h"
 #include "google/protobuf/duration.pb.h"
@@ -22,6 +23,7 @@ void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* mes
 // Adds the revision and staleness of a read.
 void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message);
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message);
+void EncodeProperties(const HullProperties& properties, v1::HullProperties* message);
 void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion* message);
 void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message);
 

@@ -109,6 +109,17 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     FillInfo(request->hull_id(), found->second, response->mutable_hull());
     response->mutable_box_min()->set_x(-1);
     response->mutable_box_max()->set_x(0.1);
+    if (request->properties()) {
+      v1::HullProperties* const properties = response->mutable_properties();
+      properties->mutable_volume()->set_value(8);
+      properties->mutable_area()->set_value(24);
+      properties->mutable_area()->set_bound(4e-15);
+      properties->mutable_centroid()->set_y(0.5);
+      properties->mutable_centroid_bounds()->set_y(1e-17);
+      properties->mutable_inertia()->set_zz(3);
+      properties->mutable_inertia()->set_xy(-0.25);
+      properties->mutable_inertia_bounds()->set_xx(2e-16);
+    }
     if (request->audit()) {
       response->mutable_audit()->set_ok(fake_.audit_finding.empty());
       response->mutable_audit()->set_finding(fake_.audit_finding);

@@ -1,5 +1,8 @@
 // `create` and `get`.
+#include <algorithm>
+#include <initializer_list>
 #include <memory>
+#include <string>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/freshness_options.h"
@@ -31,6 +34,28 @@ ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absen
   return ExitCode::kDone;
 }
 
+// "8 within 0", with the largest of the bounds.
+std::string WithinText(const std::string& value, std::initializer_list<double> bounds) {
+  return value + " within " + ShortestText(std::max(bounds));
+}
+
+void AddProperties(const v1::HullProperties& properties, Table* table) {
+  const auto number = [](const v1::BoundedValue& measure) {
+    return WithinText(ShortestText(measure.value()), {measure.bound()});
+  };
+  const v1::Vector3& bounds = properties.centroid_bounds();
+  const v1::SymmetricTensor& inertia = properties.inertia();
+  const v1::SymmetricTensor& within = properties.inertia_bounds();
+  table->Row({"volume", number(properties.volume())})
+      .Row({"area", number(properties.area())})
+      .Row({"centroid",
+            WithinText(VectorText(properties.centroid()), {bounds.x(), bounds.y(), bounds.z()})})
+      .Row({"inertia xx yy zz", WithinText(VectorText(inertia.xx(), inertia.yy(), inertia.zz()),
+                                           {within.xx(), within.yy(), within.zz()})})
+      .Row({"inertia xy xz yz", WithinText(VectorText(inertia.xy(), inertia.xz(), inertia.yz()),
+                                           {within.xy(), within.xz(), within.yz()})});
+}
+
 void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
   const v1::HullInfo& hull = response.hull();
   Table table;
@@ -50,6 +75,7 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
     table.Row({"store", response.header().store_id()})
         .Row({"store revision", std::to_string(response.header().revision())});
   }
+  if (response.has_properties()) AddProperties(response.properties(), &table);
   if (response.has_audit()) {
     const bool ok = response.audit().ok();
     table.Row({"audit", ok ? run.paint(Hue::kGood, "ok")
@@ -58,8 +84,9 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
   table.Print(run.out);
 }
 
-ExitCode GetHull(const Invocation& run, const std::string& hull_id, bool audit) {
-  const auto response = run.MakeClient().GetHull(hull_id, audit);
+ExitCode GetHull(const Invocation& run, const v1::GetHullRequest& request) {
+  const std::string& hull_id = request.hull_id();
+  const auto response = run.MakeClient().GetHull(request);
   if (!response.ok()) return run.Fail(response.status());
   if (run.json()) {
     run.out << MessageJson(*response) << "\n";
@@ -68,7 +95,7 @@ ExitCode GetHull(const Invocation& run, const std::string& hull_id, bool audit) 
   } else {
     PrintHull(run, *response);
   }
-  if (audit && !response->audit().ok()) {
+  if (request.audit() && !response->audit().ok()) {
     run.err << "hullctl: the audit of " << hull_id << " found: " << response->audit().finding()
             << "; please report it with the points\n";
     return ExitCode::kRequestFailed;
@@ -76,37 +103,44 @@ ExitCode GetHull(const Invocation& run, const std::string& hull_id, bool audit) 
   return ExitCode::kDone;
 }
 
-struct HullOptions {
+struct CreateOptions {
   std::string hull_id;
-  bool flag = false;
+  bool if_absent = false;
 };
 
 }  // namespace
 
 void AddCreateCommand(Command program, Invocation* invocation) {
-  auto options = std::make_shared<HullOptions>();
+  auto options = std::make_shared<CreateOptions>();
   Command command = program.AddCommand("create", "Register an empty hull");
   command.AddText("ID", &options->hull_id, "ID of the hull, such as arm/3").Required();
-  command.AddFlag("--if-absent", &options->flag, "Succeed if the hull exists");
+  command.AddFlag("--if-absent", &options->if_absent, "Succeed if the hull exists");
   command.SetExamples({{"", "hullctl create arm/3"},
                        {"In a script that can run twice", "hullctl create arm/3 --if-absent"}});
   command.OnGiven([=] {
-    invocation->action = [=] { return Create(*invocation, options->hull_id, options->flag); };
+    invocation->action = [=] { return Create(*invocation, options->hull_id, options->if_absent); };
   });
 }
 
 void AddGetCommand(Command program, Invocation* invocation) {
-  auto options = std::make_shared<HullOptions>();
+  auto request = std::make_shared<v1::GetHullRequest>();
+  v1::GetHullRequest* const asked = request.get();
   Command command = program.AddCommand("get", "Show size, counts, and box of a hull");
-  command.AddText("ID", &options->hull_id, "ID of the hull").Required().Completes(ValueKind::kHull);
-  command.AddFlag("--audit", &options->flag,
-                  "Make the server check the hull with independent code");
+  command.AddText("ID", asked->mutable_hull_id(), "ID of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
+  command.AddFlag(
+      "--properties", [asked] { asked->set_properties(true); },
+      "Show volume, area, centroid, and inertia tensor about it, at density 1");
+  command.AddFlag(
+      "--audit", [asked] { asked->set_audit(true); },
+      "Make the server check the hull with independent code");
   AddFreshnessOptions(command, invocation);
   command.SetExamples(
-      {{"", "hullctl get arm/3"}, {"As JSON, for a script", "hullctl get arm/3 --output json"}});
-  command.OnGiven([=] {
-    invocation->action = [=] { return GetHull(*invocation, options->hull_id, options->flag); };
-  });
+      {{"", "hullctl get arm/3"},
+       {"How heavy is it, and where is its center of mass?", "hullctl get arm/3 --properties"},
+       {"As JSON, for a script", "hullctl get arm/3 --output json"}});
+  command.OnGiven([=] { invocation->action = [=] { return GetHull(*invocation, *request); }; });
 }
 
 }  // namespace hulld

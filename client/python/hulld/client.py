@@ -206,16 +206,17 @@ class Client(ClientBase):
         *,
         audit: bool = False,
         facets: bool = True,
+        properties: bool = False,
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hull:
         """Sizes, counts, and box of a hull. audit: the server also checks it by code independent of
         the builder. facets: False leaves out the counts of edges and facets, which need the
-        canonical hull. NotFoundError: no such hull.
+        canonical hull. properties: True adds volume, area, centroid, and inertia tensor.
+        NotFoundError: no such hull.
         """
-        return self._unary(
-            requests.get_hull(hull_id, audit, facets, self._viewer), timeout, freshness
-        )
+        call = requests.get_hull(hull_id, audit, facets, properties, self._viewer)
+        return self._unary(call, timeout, freshness)
 
     def get_hull_mesh(
         self,

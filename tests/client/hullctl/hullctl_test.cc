@@ -417,6 +417,18 @@ TEST_F(HullctlTest, EveryJsonOutputIsValid) {
 TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
   fake_.PutHull("a", {});
   EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
+TEST_F(HullctlTest, GetShowsProperties) {
+  fake_.PutHull("a", {});
+  EXPECT_THAT(Ask({"get", "a"}).out, testing::Not(HasSubstr("volume")));
+  const Ran ran = Ask({"get", "a", "--properties"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("volume            8 within 0\n"),
+                             HasSubstr("area              24 within 4e-15\n"),
+                             HasSubstr("centroid          0 0.5 0 within 1e-17\n"),
+                             HasSubstr("inertia xx yy zz  0 0 3 within 2e-16\n"),
+                             HasSubstr("inertia xy xz yz  -0.25 0 0 within 0\n")));
+}
+
   fake_.audit_finding = "edge 3 is not convex";
   const Ran ran = Ask({"get", "a", "--audit"});
   EXPECT_EQ(ran.code, 1);

@@ -127,6 +127,14 @@ def test_points_are_counted_and_cut_into_chunks(
     assert (hull.edge_count, hull.facet_count) == (12, 6)
     np.testing.assert_array_equal(hull.box, [[0, 0, 0], [1, 1, 1]])
     assert either.get_hull(name, facets=False).facet_count is None
+    assert hull.properties is None
+    properties = either.get_hull(name, properties=True).properties
+    assert properties.volume == hulld.BoundedValue(1.0, 0.0)
+    assert properties.area.value == 6 and 0 < properties.area.bound < 1e-14
+    np.testing.assert_array_equal(properties.centroid, [0.5, 0.5, 0.5])
+    np.testing.assert_array_equal(properties.centroid_bounds, np.zeros(3))
+    np.testing.assert_allclose(properties.inertia, np.eye(3) / 6, rtol=1e-15, atol=0)
+    assert (properties.inertia_bounds <= 2.0**-55).all()
 
 
 def test_points_come_from_an_iterator(either: Any, name: str) -> None:

@@ -139,6 +139,38 @@ TEST_F(HullCalls, GetReportsSizeBoxAndAudit) {
   EXPECT_TRUE(response.audit().ok()) << response.audit().finding();
 }
 
+TEST_F(HullCalls, GetReportsPropertiesWhenRequested) {
+  Put("cube", Cube(-1, 3));
+  Create("empty");
+  v1::GetHullRequest request;
+  request.set_hull_id("cube");
+  request.set_properties(true);
+  for (const bool without_facets : {false, true}) {
+    grpc::ClientContext context;
+    v1::GetHullResponse response;
+    request.set_without_facets(without_facets);
+    ASSERT_TRUE(hulls_->GetHull(&context, request, &response).ok());
+    const v1::HullProperties& properties = response.properties();
+    EXPECT_EQ(properties.volume().value(), 27);
+    EXPECT_EQ(properties.volume().bound(), 0);
+    EXPECT_EQ(properties.area().value(), 54);
+    EXPECT_GT(properties.area().bound(), 0);
+    EXPECT_LT(properties.area().bound(), 1e-13);
+    EXPECT_EQ(properties.centroid().x(), 0.5);
+    EXPECT_EQ(properties.centroid_bounds().z(), 0);
+    EXPECT_EQ(properties.inertia().yy(), 40.5);
+    EXPECT_EQ(properties.inertia().xz(), 0);
+    EXPECT_EQ(properties.inertia_bounds().zz(), 0);
+    EXPECT_EQ(response.facet_count(), without_facets ? 0 : 6);
+  }
+  EXPECT_FALSE(Get("cube").has_properties());
+  grpc::ClientContext context;
+  v1::GetHullResponse response;
+  request.set_hull_id("empty");
+  ASSERT_TRUE(hulls_->GetHull(&context, request, &response).ok());
+  EXPECT_FALSE(response.has_properties());
+}
+
 TEST_F(HullCalls, GetWithoutFacetsReportsAllElse) {
   Put("cube", Cube(-1, 3));
   for (const bool audit : {false, true}) {

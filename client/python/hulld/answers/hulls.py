@@ -106,12 +106,39 @@ class Audit:
 
 
 @dataclass(frozen=True)
+class BoundedValue:
+    """|value - true value| <= bound (proven). A value beyond the largest double is that double,
+    with an infinite bound."""
+
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class HullProperties:
+    """Measures of a hull in its own frame, at density 1, in powers of the caller's length unit.
+
+    Volume, centroid, and inertia are the doubles nearest to the exact values, and exact where their
+    bound is 0. volume: 0 if the dimension is less than 3. area: of the surface; of a polygon, both
+    sides count. centroid: x y z, the mean of the points of the hull. inertia: 3 x 3, about the
+    centroid. centroid_bounds (3), inertia_bounds (3 x 3): of each number.
+    """
+
+    volume: BoundedValue
+    area: BoundedValue
+    centroid: npt.NDArray[np.float64]
+    centroid_bounds: npt.NDArray[np.float64]
+    inertia: npt.NDArray[np.float64]
+    inertia_bounds: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class Hull:
     """Sizes, counts and box of a hull.
 
     edge_count, facet_count: None where they were not asked for. box: 2 x 3, the lowest and the
-    highest corner, in the caller's length unit; None when the hull is empty. audit: None where it
-    was not asked for.
+    highest corner, in the caller's length unit; None when the hull is empty. audit, properties:
+    None where they were not asked for; an empty hull has no properties.
     """
 
     info: HullInfo
@@ -120,6 +147,7 @@ class Hull:
     box: npt.NDArray[np.float64] | None
     audit: Audit | None
     header: Header
+    properties: HullProperties | None = None
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -143,6 +171,8 @@ class Hull:
                 f"{self.info.counts.duplicate} duplicate, {self.info.counts.inside} inside",
             ),
             ("box", None if self.box is None else f"{self.box[0]} to {self.box[1]}"),
+            ("volume", self.properties and self.properties.volume.value),
+            ("centroid", self.properties and self.properties.centroid),
             ("revision", self.info.revision),
             ("audit", self.audit and (self.audit.finding or "ok")),
         ]
@@ -326,6 +356,27 @@ def _box_of(message: Any) -> npt.NDArray[np.float64] | None:
     return np.array([[low.x, low.y, low.z], [high.x, high.y, high.z]])
 
 
+def _properties_of(message: Any) -> HullProperties | None:
+    if not message.HasField("properties"):
+        return None
+    found = message.properties
+
+    def vector(m: Any) -> npt.NDArray[np.float64]:
+        return np.array([m.x, m.y, m.z])
+
+    def tensor(m: Any) -> npt.NDArray[np.float64]:
+        return np.array([[m.xx, m.xy, m.xz], [m.xy, m.yy, m.yz], [m.xz, m.yz, m.zz]])
+
+    return HullProperties(
+        BoundedValue(found.volume.value, found.volume.bound),
+        BoundedValue(found.area.value, found.area.bound),
+        vector(found.centroid),
+        vector(found.centroid_bounds),
+        tensor(found.inertia),
+        tensor(found.inertia_bounds),
+    )
+
+
 def decode_created(data: bytes) -> CreatedHull:
     message = hull_pb2.CreateHullResponse.FromString(data)
     return CreatedHull(info_of(message.hull), message.created, header_of(message.header))
@@ -351,6 +402,7 @@ def decode_hull(data: bytes, with_facets: bool, viewer: Viewer | None) -> Hull:
         _box_of(message),
         audit,
         header_of(message.header),
+        _properties_of(message),
         viewer,
     )
 

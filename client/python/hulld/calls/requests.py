@@ -84,9 +84,14 @@ def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
     )
 
 
-def get_hull(hull_id: str, audit: bool, facets: bool, viewer: Viewer) -> Call[Hull]:
+def get_hull(
+    hull_id: str, audit: bool, facets: bool, properties: bool, viewer: Viewer
+) -> Call[Hull]:
     request = hull_pb2.GetHullRequest(
-        hull_id=arguments.hull_id(hull_id), audit=audit, without_facets=not facets
+        hull_id=arguments.hull_id(hull_id),
+        audit=audit,
+        without_facets=not facets,
+        properties=properties,
     )
     return Call(
         method_path("HullService", "GetHull"),
