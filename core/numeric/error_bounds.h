@@ -234,6 +234,18 @@ inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 // 2^18 u is 262144 u. A value above that is certainly positive. Proven.
 inline constexpr double kLeastOutward = 0x1p-35;
 
+// The angle between a direction of integers and its rounding to unit length (UnitDirection), in
+// radians. Components err by 2 u of the largest (kScaledDoublesError), so the vector by 2 sqrt(3) u
+// of its length. Normalization divides all components by one number, with an error of u each: 4.5 u
+// in total. Proven.
+inline constexpr double kUnitDirectionAngle = 8 * kUnitRoundoff;
+
+// The angle between the nearest point z of A - B and another point p of A - B, seen from the
+// origin: z . p >= |z|^2 because A - B is convex, so the cosine is at least |z| / |p| >= 1 - w, and
+// the angle at most sqrt(2 w) (1 + w / 4). For w <= 2^-40 this factor covers the second term and
+// the rounding of w and of the root. Times sqrt(2 w). Proven.
+inline constexpr double kNearestAngleRoundUp = 1 + 0x1p-30;
+
 // A rational number or its square root, with 60 bits or more, rounded to a double: u of itself and
 // less than 2^-60. The bound is twice that, plus the least double for gradual underflow. Proven.
 inline constexpr double kRoundedRelativeError = 2 * kUnitRoundoff;

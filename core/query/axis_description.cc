@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "core/base/check.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_search.h"
 
 namespace hulld {
@@ -46,6 +48,14 @@ SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n) {
   axis.feature_b.facet = FacetOf(pair.b().hull(), axis.feature_b.vertices);
   axis.kind = KindOf(pair, axis);
   return axis;
+}
+
+std::optional<IntegerVector> ExactAxis(const Decision& decision) {
+  if (const Vector* n = std::get_if<Vector>(&decision.axis)) {
+    return ToInteger(*n, LowestBitExponent(*n, kAboveAllExponents));
+  }
+  if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) return *n;
+  return std::nullopt;
 }
 
 Vector UnitDirection(const IntegerVector& n) {

@@ -1,8 +1,11 @@
 #ifndef HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_
 #define HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_
 
+#include <optional>
+
 #include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/ladder.h"
 #include "core/query/terms/axis.h"
 
 namespace hulld {
@@ -14,7 +17,10 @@ namespace hulld {
 // proven this). Cost: O(V) and a scan of the facets.
 SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n);
 
-// Returns n rounded to unit length. Requires: n not zero.
+// Returns the axis of a decision as integers, exactly; none if the hulls overlap.
+std::optional<IntegerVector> ExactAxis(const Decision& decision);
+
+// Returns n rounded to unit length, within an angle of kUnitDirectionAngle. Requires: n not zero.
 Vector UnitDirection(const IntegerVector& n);
 
 }  // namespace hulld

@@ -84,6 +84,8 @@ Answer Mirrored(Answer answer) {
     std::swap(answer.axis->feature_a, answer.axis->feature_b);
   }
   if (answer.witness) std::swap(answer.witness->p_WA, answer.witness->p_WB);
+  // 0 stays +0.
+  if (answer.normal) answer.normal->direction = Vector::Zero() - answer.normal->direction;
   if (answer.certificate) {
     auto& direction = answer.certificate->direction;
     if (Vector* n = std::get_if<Vector>(&direction)) *n = -*n;
@@ -93,20 +95,10 @@ Answer Mirrored(Answer answer) {
   return answer;
 }
 
-IntegerVector ToIntegers(const Vector& n) {
-  return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
-}
-
-std::optional<IntegerVector> ExactAxis(const Decision& decision) {
-  if (const Vector* n = std::get_if<Vector>(&decision.axis)) return ToIntegers(*n);
-  if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) return *n;
-  return std::nullopt;
-}
-
 // Returns true if the answer needs more than the relation, the axis and the analysis.
 bool NeedsMore(const QueryOptions& options) {
   return options.want_certificate || options.want_separation || options.want_witness ||
-         options.clearance.has_value();
+         options.want_normal || options.clearance.has_value();
 }
 
 // Adds the requested details beyond the relation, the axis and the analysis.
@@ -118,11 +110,13 @@ absl::Status AddRequestedDetails(const FloatPair& pair, const Decision& decision
     if (!certificate.ok()) return certificate.status();
     answer.certificate = *std::move(certificate);
   }
-  if (!options.want_separation && !options.want_witness && !options.clearance) {
+  if (!options.want_separation && !options.want_witness && !options.want_normal &&
+      !options.clearance) {
     return absl::OkStatus();
   }
   const SeparationRequest request = {options.want_separation, options.want_witness,
-                                     options.max_error, options.clearance, options.max_depth_bytes};
+                                     options.want_normal,     options.max_error,
+                                     options.clearance,       options.max_depth_bytes};
   SeparationAnswer found;
   if (absl::Status s = FindSeparation(pair, decision, cold, request, options.should_stop, found);
       !s.ok()) {
@@ -130,6 +124,7 @@ absl::Status AddRequestedDetails(const FloatPair& pair, const Decision& decision
   }
   answer.separation = found.separation;
   if (found.witness) answer.witness = *found.witness;
+  if (found.normal) answer.normal = *found.normal;
   answer.within_clearance = found.within_clearance;
   return absl::OkStatus();
 }

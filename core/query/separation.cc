@@ -14,6 +14,7 @@
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/rational.h"
 #include "core/numeric/vector.h"
+#include "core/query/axis_description.h"
 #include "core/query/exact/exact_depth.h"
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_pair.h"
@@ -29,6 +30,11 @@ namespace {
 // Expansions of a polytope between two polls. An expansion that creates many facets counts several
 // times.
 constexpr uint64_t kExpansionsPerPoll = 32;
+
+// The goal of the distance for a normal within kMaxNormalAngle: half the width of its bounds,
+// relative to it. The angle is then at most kMaxNormalAngle / sqrt(2), and the rest is for
+// rounding.
+constexpr double kNormalRelativeError = kMaxNormalAngle * kMaxNormalAngle / 8;
 
 // Returns the absolute separation from its bounds: their midpoint, and half their width rounded up.
 // The midpoint is positive because the upper bound is.
@@ -49,6 +55,7 @@ class SeparationSearch {
   SeparationSearch(const FloatPair& pair, const Decision& decision, bool cold,
                    uint64_t max_depth_bytes, const std::function<bool()>& should_stop)
       : pair_(pair),
+        decision_(decision),
         relation_(decision.relation),
         max_depth_bytes_(max_depth_bytes),
         should_stop_(should_stop),
@@ -89,6 +96,33 @@ class SeparationSearch {
     if (!request.witness) return absl::OkStatus();
     if (close && AddFloatWitness(answer)) return absl::OkStatus();
     return AddExactWitness(answer);
+  }
+
+  // Separated pairs only: floating point cannot tell two facets at about the same depth apart.
+  absl::Status AddNormal(SeparationAnswer& answer) {
+    if (relation_ == Relation::kTouching) {
+      const std::optional<IntegerVector> n = ExactAxis(decision_);
+      HULLD_CHECK(n.has_value());
+      answer.normal = Normal{UnitDirection(*n), kUnitDirectionAngle};
+      return absl::OkStatus();
+    }
+    if (!nearest_) {
+      if (AddFloatNormal(answer)) return absl::OkStatus();
+      SeparationGoal goal;
+      if (relation_ == Relation::kSeparated) goal.relative_error = kNormalRelativeError;
+      Bound(goal, false);
+      if (poll_.stopped()) return Stopped();
+      if (AddFloatNormal(answer)) return absl::OkStatus();
+      if (absl::Status s = FindExactly(); !s.ok()) return s;
+    }
+    // The point of A - B that attains the separation.
+    IntegerVector point = {0, 0, 0};
+    for (size_t i = 0; i < nearest_->point.pairs.size(); ++i) {
+      point = point + nearest_->point.weights[i] * exact_->Difference(nearest_->point.pairs[i]);
+    }
+    if (relation_ == Relation::kSeparated) point = -point;
+    answer.normal = Normal{UnitDirection(point), kUnitDirectionAngle};
+    return absl::OkStatus();
   }
 
   absl::Status AddClearance(double clearance, SeparationAnswer& answer) {
@@ -201,6 +235,27 @@ class SeparationSearch {
     return true;
   }
 
+  // Adds the normal of a separated pair: the direction from a point v of A - B, as computed, to the
+  // origin. Returns false if its bound would exceed kMaxNormalAngle. Some point p of A - B is
+  // within kCombinationErrorFactor of v and no longer than the upper bound, so the angle between p
+  // and the nearest point follows from both bounds, and that between v and p from their distance.
+  bool AddFloatNormal(SeparationAnswer& answer) const {
+    if (relation_ != Relation::kSeparated || bounds_.point.count == 0 || !(bounds_.low > 0)) {
+      return false;
+    }
+    const double width = (bounds_.high - bounds_.low) / bounds_.high;
+    const double rounding = kCombinationErrorFactor * pair_.size() / bounds_.low;
+    const double angle =
+        kNearestAngleRoundUp * std::sqrt(2 * width) + 2 * rounding + kUnitDirectionAngle;
+    if (!(angle <= kMaxNormalAngle)) return false;
+    Vector to_origin = Vector::Zero();
+    for (uint32_t i = 0; i < bounds_.point.count; ++i) {
+      to_origin -= Vector(bounds_.point.weights[i] * pair_.Difference(bounds_.point.pairs[i]));
+    }
+    answer.normal = Normal{Vector(to_origin / UnitOf(pair_.size())).normalized(), angle};
+    return true;
+  }
+
   // Returns the weighted sum of vertices of A, or of B, in the world frame.
   Vector ExactPoint(bool of_a, double& error) {
     const ExactCombination& point = nearest_->point;
@@ -230,6 +285,7 @@ class SeparationSearch {
   }
 
   const FloatPair& pair_;
+  const Decision& decision_;
   const Relation relation_;
   const uint64_t max_depth_bytes_;
   const std::function<bool()>& should_stop_;
@@ -252,6 +308,9 @@ absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, boo
   SeparationSearch search(pair, decision, cold, request.max_depth_bytes, should_stop);
   if (request.separation || request.witness) {
     if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;
+  }
+  if (request.normal) {
+    if (absl::Status s = search.AddNormal(answer); !s.ok()) return s;
   }
   if (!request.clearance) return absl::OkStatus();
   return search.AddClearance(*request.clearance, answer);

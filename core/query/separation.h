@@ -18,6 +18,7 @@ namespace hulld {
 struct SeparationRequest {
   bool separation = false;
   bool witness = false;
+  bool normal = false;
   std::optional<double> max_error;
   std::optional<double> clearance;
   // QueryOptions::max_depth_bytes.
@@ -25,8 +26,9 @@ struct SeparationRequest {
 };
 
 struct SeparationAnswer {
-  std::optional<Separation> separation;
+  OptionalSeparation separation;
   std::optional<Witness> witness;
+  std::optional<Normal> normal;
   std::optional<bool> within_clearance;
 };
 

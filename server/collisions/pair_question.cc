@@ -49,6 +49,7 @@ absl::Status EncodeAnswer(const hulld::Answer& answer, const QueryHull& a, const
   }
   if (answer.separation) EncodeSeparation(*answer.separation, response->mutable_separation());
   if (answer.witness) EncodeWitness(*answer.witness, response->mutable_witness());
+  if (answer.normal) EncodeNormal(*answer.normal, response->mutable_normal());
   if (answer.within_clearance) response->set_within_clearance(*answer.within_clearance);
   if (!wanted.axis() || !answer.axis.has_value()) return absl::OkStatus();
   return EncodeAxis(*answer.axis, a.hull(), b.hull(), response->mutable_axis());

@@ -36,6 +36,11 @@ void AddWitness(const Witness& witness, v1::AnswerColumns* columns) {
   columns->add_witness_errors(witness.error);
 }
 
+void AddNormal(const Normal& normal, v1::AnswerColumns* columns) {
+  for (int i = 0; i < 3; ++i) columns->add_normal_xyz(normal.direction[i]);
+  columns->add_normal_angle_bounds(normal.angle_bound);
+}
+
 // Fills the fixed-size columns.
 size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   size_t bytes = 0;
@@ -50,6 +55,11 @@ size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColu
     const bool known = answer != nullptr && answer->witness.has_value();
     AddWitness(known ? *answer->witness : Witness{none, none, kNone}, columns);
     bytes += (kWitnessNumbers + 1) * sizeof(double);
+  }
+  if (wanted.normal()) {
+    const bool known = answer != nullptr && answer->normal.has_value();
+    AddNormal(known ? *answer->normal : Normal{Vector::Constant(kNone), kNone}, columns);
+    bytes += 4 * sizeof(double);
   }
   if (wanted.has_clearance()) {
     columns->add_within_clearance(answer != nullptr && answer->within_clearance.value_or(false));

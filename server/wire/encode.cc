@@ -229,4 +229,9 @@ void EncodeWitness(const Witness& witness, v1::Witness* message) {
   message->set_error(witness.error);
 }
 
+void EncodeNormal(const Normal& normal, v1::Normal* message) {
+  EncodeVector(normal.direction, message->mutable_direction());
+  message->set_angle_bound(normal.angle_bound);
+}
+
 }  // namespace hulld::server

@@ -45,6 +45,7 @@ void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, 
                             v1::PieceCertificate* message);
 void EncodeSeparation(const Separation& separation, v1::Separation* message);
 void EncodeWitness(const Witness& witness, v1::Witness* message);
+void EncodeNormal(const Normal& normal, v1::Normal* message);
 
 }  // namespace hulld::server
 

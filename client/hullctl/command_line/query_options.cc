@@ -29,6 +29,9 @@ void AddWantedOptions(Command command, QueryDetails* details) {
   command.AddFlag(
       "--witness", [wanted] { wanted->set_witness(true); },
       "Show a point of each hull at which the separation is attained");
+  command.AddFlag(
+      "--normal", [wanted] { wanted->set_normal(true); },
+      "Show the direction in which the hulls are nearest or deepest, with its angle's bound");
   command.AddLength("--clearance", "Show if the separation is at most this",
                     [wanted](double length) { wanted->set_clearance(length); });
   command.AddLength(

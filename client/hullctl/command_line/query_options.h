@@ -20,8 +20,8 @@ struct QueryDetails {
   void Apply(v1::Wanted* file_wanted, double* file_tolerance) const;
 };
 
-// Declares --axis, --report, --certificate, --separation, --max-error, --witness, --clearance, and
-// --tolerance. `details` must outlive the parsing.
+// Declares --axis, --report, --certificate, --separation, --max-error, --witness, --normal,
+// --clearance, and --tolerance. `details` must outlive the parsing.
 void AddWantedOptions(Command command, QueryDetails* details);
 
 // Declares the same options plus --textbook and --verify.

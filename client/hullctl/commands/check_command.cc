@@ -103,6 +103,9 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
         .Row({"point of B", VectorText(witness.point_b())})
         .Row({"points within", ShortestText(witness.error())});
   }
+  if (response.has_normal()) {
+    table->Row({"normal", NormalText(response.normal())});
+  }
   if (response.has_within_clearance()) {
     const std::string clearance = ShortestText(request.wanted().clearance());
     table->Row({"clearance", (response.within_clearance() ? "within " : "more than ") + clearance});
@@ -246,6 +249,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
+       {"Which way out is the shortest?", "hullctl check arm box --separation --normal"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},
        {"Prove it", "hullctl check arm box --verify"},

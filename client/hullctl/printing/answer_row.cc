@@ -12,6 +12,7 @@ namespace hulld {
 namespace {
 
 constexpr int kWitnessNumbers = 6;
+constexpr int kNormalNumbers = 3;
 
 v1::Vector3 VectorOf(const double* xyz) {
   v1::Vector3 vector;
@@ -33,6 +34,8 @@ bool AreParallel(const v1::AnswerColumns& columns, size_t count) {
          columns.separations_size() == columns.separation_bounds_size() &&
          fits(columns.witness_xyz_size(), kWitnessNumbers) &&
          columns.witness_xyz_size() == kWitnessNumbers * columns.witness_errors_size() &&
+         fits(columns.normal_xyz_size(), kNormalNumbers) &&
+         columns.normal_xyz_size() == kNormalNumbers * columns.normal_angle_bounds_size() &&
          fits(columns.within_clearance_size()) && fits(columns.pieces_size(), 2);
 }
 
@@ -61,6 +64,12 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
     *row.witness->mutable_point_b() = VectorOf(xyz + 3);
     row.witness->set_error(columns.witness_errors(i));
   }
+  if (columns.normal_angle_bounds_size() > 0) {
+    row.normal.emplace();
+    *row.normal->mutable_direction() =
+        VectorOf(columns.normal_xyz().data() + ptrdiff_t{kNormalNumbers} * i);
+    row.normal->set_angle_bound(columns.normal_angle_bounds(i));
+  }
   if (columns.within_clearance_size() > 0) row.within_clearance = columns.within_clearance(i);
   if (columns.pieces_size() > 0) row.pieces = {columns.pieces(2 * i), columns.pieces(2 * i + 1)};
   return row;
@@ -83,6 +92,7 @@ std::string RowText(const AnswerRow& row, const Painter& paint,
     cells.push_back(VectorText(row.witness->point_a()));
     cells.push_back(VectorText(row.witness->point_b()));
   }
+  if (row.normal) cells.push_back(NormalText(*row.normal));
   if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
   if (row.pieces) cells.push_back(PiecesText(*row.pieces, piece_names));
   if (row.axis != nullptr) {
@@ -110,6 +120,7 @@ void AddRow(const AnswerRow& row, JsonObject* object) {
   object->Add("rung", v1::Rung_Name(row.rung));
   if (row.separation) object->AddJson("separation", MessageJson(*row.separation));
   if (row.witness) object->AddJson("witness", MessageJson(*row.witness));
+  if (row.normal) object->AddJson("normal", MessageJson(*row.normal));
   if (row.within_clearance) {
     object->AddJson("withinClearance", *row.within_clearance ? "true" : "false");
   }

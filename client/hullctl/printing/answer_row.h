@@ -25,6 +25,7 @@ struct AnswerRow {
   const v1::PieceProof* proof = nullptr;
   std::optional<v1::Separation> separation;
   std::optional<v1::Witness> witness;
+  std::optional<v1::Normal> normal;
   std::optional<bool> within_clearance;
   // The deciding pieces of bodies, -1 if none decided; absent without bodies.
   std::optional<std::pair<int32_t, int32_t>> pieces;

@@ -107,6 +107,10 @@ std::string SeparationText(const v1::Separation& separation) {
   return ShortestText(separation.value()) + " within " + ShortestText(separation.bound());
 }
 
+std::string NormalText(const v1::Normal& normal) {
+  return VectorText(normal.direction()) + " within " + ShortestText(normal.angle_bound()) + " rad";
+}
+
 std::string VerificationText(const Verification& verification, const Painter& paint) {
   switch (verification.verdict) {
     case Verdict::kValid:

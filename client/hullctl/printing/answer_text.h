@@ -30,6 +30,8 @@ inline std::string VectorText(const v1::Vector3& v) { return VectorText(v.x(), v
 std::string CertificateText(const v1::Certificate& certificate);
 // "-0.25 within 1e-16".
 std::string SeparationText(const v1::Separation& separation);
+// "0 1 0 within 1e-15 rad".
+std::string NormalText(const v1::Normal& normal);
 // "valid", or the verdict and the reason.
 std::string VerificationText(const Verification& verification, const Painter& paint);
 // {"verdict":"INVALID","reason":...}

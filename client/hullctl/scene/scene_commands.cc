@@ -35,8 +35,9 @@ constexpr char kYamlHelp[] =
     "  ask: {separation: true, clearance: 0.01}\n"
     "A pose is [x, y, z], [w, x, y, z, x, y, z] with a quaternion first, {xyz: ..., rpy: ...}, or\n"
     "{xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and the options of\n"
-    "'hullctl check': separation, witness, axis, certificate, analysis, clearance, max_error,\n"
-    "tolerance. `scale` converts coordinates of files to meters, rounded once. Relative file "
+    "'hullctl check': separation, witness, normal, axis, certificate, analysis, clearance,\n"
+    "max_error, tolerance. `scale` converts coordinates of files to meters, rounded once. Relative "
+    "file "
     "names\n"
     "start at the folder of the scene file.\n";
 

@@ -378,7 +378,7 @@ class SceneParser {
   absl::Status TakeAsk(const YAML::Node& node) {
     const auto entries =
         yaml_.EntriesOf(node, "ask",
-                        {"pairs", "movers", "axis", "separation", "max_error", "witness",
+                        {"pairs", "movers", "axis", "separation", "max_error", "witness", "normal",
                          "certificate", "analysis", "clearance", "tolerance"});
     if (!entries.ok()) return entries.status();
     for (const auto& [key, value] : *entries) {
@@ -443,6 +443,7 @@ class SceneParser {
     if (key == "axis") scene_.wanted.set_axis(*truth);
     if (key == "separation") scene_.wanted.set_separation(*truth);
     if (key == "witness") scene_.wanted.set_witness(*truth);
+    if (key == "normal") scene_.wanted.set_normal(*truth);
     if (key == "certificate") scene_.wanted.set_certificate(*truth);
     if (key == "analysis") scene_.wanted.set_analysis(*truth);
     return absl::OkStatus();

@@ -372,6 +372,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -384,16 +385,18 @@ class Client(ClientBase):
         a, b: an ID, the points of an inline shape (n x 3), either of them at a pose as in (ID,
         pose), or hulld.Placement; a pose is 4 x 4, a quaternion and a translation, or a
         translation. Nothing beyond the relation is computed unless asked for:
-        axis (the separating or touching axis and the features on it), separation (the distance, or
+        axis (any separating or touching axis and the features on it), separation (the distance, or
         minus the penetration depth, with a proven bound, at most max_error), witness (a point of
-        each hull that attain it), clearance (true if the separation is at most this; exact),
-        certificate (the proof of the relation), analysis (time, sizes, axes tested). tolerance:
-        allows WITHIN_TOLERANCE if |separation| is at most this; faster, never wrong. Lengths are in
-        the caller's unit.
+        each hull that attain it), normal (the direction in which they attain it), clearance (true
+        if the separation is at most this; exact), certificate (the proof of the relation), analysis
+        (time, sizes, axes tested). tolerance: allows WITHIN_TOLERANCE if |separation| is at most
+        this; faster, never wrong. Lengths are in the caller's unit.
 
         NotFoundError: no such hull. InvalidArgumentError: options that exclude each other.
         """
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         pair = Placements.of([a, b], orthogonality_tolerance=orthogonality_tolerance)
         call = requests.check_collision(pair, wanted, tolerance, method, self._viewer)
         return self._unary(call, timeout, freshness)
@@ -409,6 +412,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -425,7 +429,9 @@ class Client(ClientBase):
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._whole(call, lambda: BatchAssembly(asked, wanted), timeout, freshness)
 
@@ -440,6 +446,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -451,7 +458,9 @@ class Client(ClientBase):
         exactly. Retried only until the first part."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._parts(call, self._seconds(timeout), freshness)
 
@@ -469,6 +478,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -485,7 +495,9 @@ class Client(ClientBase):
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         call = requests.find_collisions(packed, scene, wanted, tolerance)
         return self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
 
@@ -503,6 +515,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -513,7 +526,9 @@ class Client(ClientBase):
         the totals. Retried only until the first part."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         call = requests.find_collisions(packed, scene, wanted, tolerance)
         return self._parts(call, self._seconds(timeout), freshness)
 
@@ -529,6 +544,7 @@ class Client(ClientBase):
         separation: bool = False,
         max_error: float | None = None,
         witness: bool = False,
+        normal: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
@@ -540,7 +556,9 @@ class Client(ClientBase):
         too. timeout: for each answer. The rest as in check_collisions."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
-        wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
+        wanted = Wanted(
+            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+        )
         opening = requests.open_stream(packed, asked, wanted, tolerance, only_changes, freshness)
         seconds = self._seconds(timeout)
         return CollisionStream(

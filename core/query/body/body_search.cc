@@ -84,6 +84,7 @@ QueryOptions OptionsOfEachPair(const QueryOptions& options) {
   each.want_axis = false;
   each.want_analysis = false;
   each.want_witness = false;
+  each.want_normal = false;
   each.threads = 1;
   return each;
 }

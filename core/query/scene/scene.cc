@@ -138,6 +138,7 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
   first_look_.want_certificate = false;
   first_look_.want_separation = false;
   first_look_.want_witness = false;
+  first_look_.want_normal = false;
   first_look_.threads = 1;
   for (const GroupPair& pair : options.ignored_groups) {
     ignored_.insert(std::minmax(pair.first, pair.second));

@@ -21,9 +21,11 @@ struct Answer {
   // If requested: true if separation <= QueryOptions::clearance. False if a hull is empty.
   std::optional<bool> within_clearance;
   // If requested; infinite if a hull is empty.
-  std::optional<Separation> separation;
+  OptionalSeparation separation;
   // If requested and neither hull is empty.
   Boxed<Witness> witness;
+  // If requested and neither hull is empty.
+  Boxed<Normal> normal;
   // If requested, the relation is SEPARATED or TOUCHING, and neither hull is empty.
   Boxed<SeparatingAxis> axis;
   // If requested.

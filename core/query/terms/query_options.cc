@@ -21,6 +21,7 @@ const char* ExactOption(const QueryOptions& options, const OptionNames& names) {
          : options.want_certificate             ? names.certificate
          : options.want_separation              ? names.separation
          : options.want_witness                 ? names.witness
+         : options.want_normal                  ? names.normal
          : options.clearance.has_value()        ? names.clearance
                                                 : nullptr;
 }
@@ -33,7 +34,8 @@ constexpr char kDepthPayload[] = "hulld/depth-bytes";
 absl::Status DepthTooLarge(uint64_t max_depth_bytes) {
   absl::Status status = absl::ResourceExhaustedError(
       absl::StrCat("the exact depth of this overlap needs more than ", max_depth_bytes,
-                   " bytes; ask with a max_error that rounding allows, or simplify the hulls"));
+                   " bytes; ask with a max_error that rounding allows and without the normal, or "
+                   "simplify the hulls"));
   status.SetPayload(kDepthPayload, absl::Cord());
   return status;
 }

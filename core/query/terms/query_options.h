@@ -14,6 +14,10 @@ namespace hulld {
 // coordinates of the two hulls, each about its center.
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
+// The largest bound of the angle of a normal, in radians. Floating point meets it if the hulls are
+// about as far apart as they are large; otherwise exact arithmetic finds the normal.
+inline constexpr double kMaxNormalAngle = 1e-6;
+
 enum class Method : uint8_t { kCertifiedSearch, kTextbookSat };
 
 struct QueryOptions {
@@ -23,6 +27,7 @@ struct QueryOptions {
   bool want_certificate = false;
   bool want_separation = false;
   bool want_witness = false;
+  bool want_normal = false;
   // The largest acceptable bound of a requested separation, in the caller's length unit. If absent:
   // kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
   // represent the value that accurately, the bound is its rounding error.
@@ -32,8 +37,8 @@ struct QueryOptions {
   std::optional<double> clearance;
   // tau >= 0, length. 0: the relation is always exact. Positive: the relation may be
   // kWithinTolerance if |separation| <= tau. Cannot be combined with a requested separation,
-  // witness, clearance or certificate, or with the textbook method, which need the exact relation
-  // (ValidateOptions).
+  // witness, normal, clearance or certificate, or with the textbook method, which need the exact
+  // relation (ValidateOptions).
   double tolerance = 0;
   // Textbook only: the most candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
@@ -51,7 +56,8 @@ struct QueryOptions {
   // True if an answer contains more than the relation and within_clearance.
   bool WantsDetails() const {
     // Branch-free, because every pair evaluates it.
-    return (want_axis | want_analysis | want_certificate | want_separation | want_witness) != 0;
+    return (want_axis | want_analysis | want_certificate | want_separation | want_witness |
+            want_normal) != 0;
   }
   // True if an answer names vertices or facets by index, or depends on a hull's canonical snapshot
   // in another way. A version of a LiveHull is then not sufficient.
@@ -76,6 +82,7 @@ struct OptionNames {
   const char* certificate = "want_certificate";
   const char* separation = "want_separation";
   const char* witness = "want_witness";
+  const char* normal = "want_normal";
   const char* textbook = "the textbook method";
 };
 

@@ -1,6 +1,10 @@
 #ifndef HULLD_CORE_QUERY_TERMS_SEPARATION_H_
 #define HULLD_CORE_QUERY_TERMS_SEPARATION_H_
 
+#include <cmath>
+#include <limits>
+
+#include "core/base/check.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -14,6 +18,31 @@ struct Separation {
   double bound = 0;
 };
 
+// A separation or none, as std::optional, without memory for a flag: no separation is NaN.
+class OptionalSeparation {
+ public:
+  OptionalSeparation() = default;
+  OptionalSeparation(const Separation& separation) : separation_(separation) {}  // NOLINT
+
+  bool has_value() const { return !std::isnan(separation_.value); }
+  explicit operator bool() const { return has_value(); }
+
+  // Requires: has_value().
+  const Separation& operator*() const {
+    HULLD_DCHECK(has_value());
+    return separation_;
+  }
+  Separation& operator*() {
+    HULLD_DCHECK(has_value());
+    return separation_;
+  }
+  const Separation* operator->() const { return &**this; }
+  Separation* operator->() { return &**this; }
+
+ private:
+  Separation separation_{std::numeric_limits<double>::quiet_NaN(), 0};
+};
+
 // Points of A and B (world frame) that attain the separation. Separated: the nearest points.
 // Touching: a common point. Overlapping: points that coincide after the shortest translation that
 // ends the overlap. `error` bounds the distance of each point from its hull, and from a point that
@@ -22,6 +51,16 @@ struct Witness {
   Vector p_WA;
   Vector p_WB;
   double error = 0;
+};
+
+// The direction (world frame, from A toward B, unit length up to rounding) in which the separation
+// is attained. Separated: from the nearest point of A to that of B, which is unique. Overlapping:
+// the direction of the shortest translation of B that ends the overlap. Touching: normal to a plane
+// with A on one side and B on the other. If several directions are equally good, one of them.
+// `angle_bound`: the angle to the exact direction is at most this, in radians.
+struct Normal {
+  Vector direction;
+  double angle_bound = 0;
 };
 
 }  // namespace hulld

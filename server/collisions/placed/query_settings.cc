@@ -17,6 +17,7 @@ constexpr OptionNames kFieldNames = {
     .certificate = "wanted.certificate",
     .separation = "wanted.separation",
     .witness = "wanted.witness",
+    .normal = "wanted.normal",
     .textbook = "METHOD_TEXTBOOK_SAT",
 };
 
@@ -34,6 +35,7 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   options.want_certificate = wanted.certificate();
   options.want_separation = wanted.separation();
   options.want_witness = wanted.witness();
+  options.want_normal = wanted.normal();
   if (wanted.has_max_error()) options.max_error = wanted.max_error();
   if (wanted.has_clearance()) options.clearance = wanted.clearance();
   options.tolerance = tolerance;

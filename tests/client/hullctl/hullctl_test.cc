@@ -291,25 +291,28 @@ TEST_F(HullctlTest, CheckShowsMeasuredValues) {
   answer.mutable_witness()->mutable_point_a()->set_x(1);
   answer.mutable_witness()->mutable_point_b()->set_x(1.5);
   answer.mutable_witness()->set_error(2e-16);
+  answer.mutable_normal()->mutable_direction()->set_y(1);
+  answer.mutable_normal()->set_angle_bound(1e-15);
   answer.set_within_clearance(true);
   answer.mutable_certificate()->mutable_integer_direction()->set_x(
       "123456789012345678901234567890");
   answer.mutable_certificate()->mutable_integer_direction()->set_y("-7");
   answer.mutable_certificate()->mutable_integer_direction()->set_z("0");
   answer.mutable_certificate()->add_pairs()->set_index_a(3);
-  const Ran ran = Ask({"check", "a", "b", "--max-error", "1e-3", "--witness", "--clearance", "0.75",
-                       "--certificate"});
+  const Ran ran = Ask({"check", "a", "b", "--max-error", "1e-3", "--witness", "--normal",
+                       "--clearance", "0.75", "--certificate"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   const v1::Wanted wanted = fake_.last_collision_request().wanted();
-  EXPECT_TRUE(wanted.separation() && wanted.witness() && wanted.certificate());
+  EXPECT_TRUE(wanted.separation() && wanted.witness() && wanted.normal() && wanted.certificate());
   EXPECT_EQ(wanted.max_error(), 1e-3);
   EXPECT_EQ(wanted.clearance(), 0.75);
   EXPECT_FALSE(wanted.axis() || wanted.analysis());
-  EXPECT_THAT(
-      ran.out,
-      AllOf(HasSubstr("separation     0.5 within 1e-16\n"), HasSubstr("point of B     1.5 0 0\n"),
-            HasSubstr("points within  2e-16\n"), HasSubstr("clearance      within 0.75\n"),
-            HasSubstr("n = 12345678...(30 digits) -7 0; A 3 with B 0\n")));
+  EXPECT_THAT(ran.out,
+              AllOf(HasSubstr("separation     0.5 within 1e-16\n"),
+                    HasSubstr("point of B     1.5 0 0\n"), HasSubstr("points within  2e-16\n"),
+                    HasSubstr("normal         0 1 0 within 1e-15 rad\n"),
+                    HasSubstr("clearance      within 0.75\n"),
+                    HasSubstr("n = 12345678...(30 digits) -7 0; A 3 with B 0\n")));
   EXPECT_EQ(Ask({"check", "a", "b", "--tolerance", "0.25"}).code, 0);
   EXPECT_EQ(fake_.last_collision_request().tolerance(), 0.25);
   EXPECT_FALSE(fake_.last_collision_request().wanted().has_clearance());
@@ -414,9 +417,6 @@ TEST_F(HullctlTest, EveryJsonOutputIsValid) {
   EXPECT_EQ(QuoteJson("a\"b\\c\n\x01"), "\"a\\\"b\\\\c\\u000a\\u0001\"");
 }
 
-TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
-  fake_.PutHull("a", {});
-  EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
 TEST_F(HullctlTest, GetShowsProperties) {
   fake_.PutHull("a", {});
   EXPECT_THAT(Ask({"get", "a"}).out, testing::Not(HasSubstr("volume")));
@@ -429,6 +429,9 @@ TEST_F(HullctlTest, GetShowsProperties) {
                              HasSubstr("inertia xy xz yz  -0.25 0 0 within 0\n")));
 }
 
+TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
+  fake_.PutHull("a", {});
+  EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
   fake_.audit_finding = "edge 3 is not convex";
   const Ran ran = Ask({"get", "a", "--audit"});
   EXPECT_EQ(ran.code, 1);

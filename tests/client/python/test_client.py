@@ -280,12 +280,14 @@ def test_one_pair_is_answered_with_all_that_is_wanted(either: Any, name: str) ->
     plain = either.check_collision(name, (name, (1, 0, 0)))
     assert plain.relation == hulld.Relation.TOUCHING and plain.colliding
     assert plain.separation is plain.axis is plain.witness is plain.certificate is None
+    assert plain.normal is None
     full = either.check_collision(
         name,
         (name, (3, 0, 0)),
         axis=True,
         analysis=True,
         witness=True,
+        normal=True,
         certificate=True,
         separation=True,
         clearance=2.0,
@@ -294,12 +296,16 @@ def test_one_pair_is_answered_with_all_that_is_wanted(either: Any, name: str) ->
     assert abs(full.separation.value - 2) <= full.separation.bound
     assert full.witness.point_b[0] - full.witness.point_a[0] == pytest.approx(2)
     assert full.axis.direction == pytest.approx([1, 0, 0])
+    assert full.normal.direction == pytest.approx([1, 0, 0])
+    assert 0 < full.normal.angle_bound <= 1e-6
     assert full.analysis.size_a == hulld.HullSize(8, 12, 6)
     n = np.array(full.certificate.direction)
     assert (CUBE @ n).max() < ((CUBE + [3, 0, 0]) @ n).min()
     deep = either.check_collision(name, (name, (0.25, 0, 0)), separation=True, certificate=True)
     assert deep.relation == hulld.Relation.OVERLAPPING
     assert abs(deep.separation.value + 0.75) <= deep.separation.bound
+    out = either.check_collision(name, (name, (0, -0.25, 0)), normal=True).normal
+    np.testing.assert_array_equal(out.direction, [0, -1, 0])
     assert deep.certificate.direction is None and deep.certificate.pairs
 
 
@@ -332,6 +338,7 @@ def test_a_batch_answers_as_single_questions_do(
         hulld.Placements(name, poses),
         separation=True,
         witness=True,
+        normal=True,
         axis=True,
         certificate=True,
         analysis=True,
@@ -346,6 +353,7 @@ def test_a_batch_answers_as_single_questions_do(
             (name, poses[b]),
             separation=True,
             witness=True,
+            normal=True,
             axis=True,
             clearance=0.1,
         )
@@ -355,6 +363,8 @@ def test_a_batch_answers_as_single_questions_do(
         np.testing.assert_array_equal(
             answers.witness_points[row], [one.witness.point_a, one.witness.point_b]
         )
+        np.testing.assert_array_equal(answers.normals[row], one.normal.direction)
+        assert answers[row].normal.angle_bound == one.normal.angle_bound
         assert answers.within_clearance[row] == one.within_clearance
         assert (answers.axes[row] is None) == (one.axis is None)
     assert all(certificate is not None for certificate in answers.certificates)

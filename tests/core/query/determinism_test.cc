@@ -40,6 +40,7 @@ QueryOptions Everything() {
   options.want_certificate = true;
   options.want_separation = true;
   options.want_witness = true;
+  options.want_normal = true;
   options.clearance = 1e-9;
   return options;
 }
@@ -73,6 +74,11 @@ void ExpectSameBits(const Answer& actual, const Answer& expected) {
     EXPECT_EQ(actual.witness->p_WA, expected.witness->p_WA);
     EXPECT_EQ(actual.witness->p_WB, expected.witness->p_WB);
     EXPECT_EQ(actual.witness->error, expected.witness->error);
+  }
+  ASSERT_EQ(actual.normal.has_value(), expected.normal.has_value());
+  if (expected.normal) {
+    EXPECT_EQ(actual.normal->direction, expected.normal->direction);
+    EXPECT_EQ(actual.normal->angle_bound, expected.normal->angle_bound);
   }
 }
 
@@ -144,6 +150,7 @@ TEST_F(Determinism, SwappingTheHullsMirrorsEveryField) {
       for (VertexPair& pair : back.certificate->pairs) std::swap(pair.a, pair.b);
     }
     if (back.witness) std::swap(back.witness->p_WA, back.witness->p_WB);
+    if (back.normal) back.normal->direction = -back.normal->direction;
     ExpectSameBits(back, there);
     if (HasFailure()) break;
   }

@@ -74,6 +74,8 @@ bool AreParallel(const v1::Wanted& wanted, const v1::AnswerColumns& columns, int
          IsParallel(columns.separation_bounds_size(), wanted.separation(), rows) &&
          IsParallel(columns.witness_xyz_size(), wanted.witness(), 6 * rows) &&
          IsParallel(columns.witness_errors_size(), wanted.witness(), rows) &&
+         IsParallel(columns.normal_xyz_size(), wanted.normal(), 3 * rows) &&
+         IsParallel(columns.normal_angle_bounds_size(), wanted.normal(), rows) &&
          IsParallel(columns.within_clearance_size(), wanted.has_clearance(), rows);
 }
 
@@ -248,6 +250,7 @@ std::string CheckPair(const v1::CheckCollisionRequest& request,
       response.has_separation() != wanted.separation() ||
       response.has_within_clearance() != wanted.has_clearance() ||
       (response.has_axis() && !wanted.axis()) || (response.has_witness() && !wanted.witness()) ||
+      (response.has_normal() && !wanted.normal()) ||
       (response.has_certificate() && !wanted.certificate())) {
     return "the answer holds something else than was wanted";
   }

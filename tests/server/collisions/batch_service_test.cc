@@ -31,6 +31,8 @@ class BatchCall : public ServerTest {
     std::vector<double> separations;
     std::vector<double> separation_bounds;
     std::vector<double> witness_xyz;
+    std::vector<double> normal_xyz;
+    std::vector<double> normal_angle_bounds;
     std::vector<bool> within_clearance;
     int messages = 0;
     size_t largest_message = 0;
@@ -62,6 +64,11 @@ class BatchCall : public ServerTest {
                                      columns.separation_bounds().end());
       batch.witness_xyz.insert(batch.witness_xyz.end(), columns.witness_xyz().begin(),
                                columns.witness_xyz().end());
+      batch.normal_xyz.insert(batch.normal_xyz.end(), columns.normal_xyz().begin(),
+                              columns.normal_xyz().end());
+      batch.normal_angle_bounds.insert(batch.normal_angle_bounds.end(),
+                                       columns.normal_angle_bounds().begin(),
+                                       columns.normal_angle_bounds().end());
       batch.within_clearance.insert(batch.within_clearance.end(),
                                     columns.within_clearance().begin(),
                                     columns.within_clearance().end());
@@ -254,6 +261,7 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
   request.mutable_wanted()->set_certificate(true);
   request.mutable_wanted()->set_separation(true);
   request.mutable_wanted()->set_witness(true);
+  request.mutable_wanted()->set_normal(true);
   request.mutable_wanted()->set_clearance(0.25);
   std::mt19937 random(5);
   std::uniform_int_distribution<int> half_steps(-2, 2);
@@ -276,6 +284,8 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
     ASSERT_EQ(batch.separations.size(), 24 * 24);
     ASSERT_EQ(batch.separation_bounds.size(), 24 * 24);
     ASSERT_EQ(batch.witness_xyz.size(), 6 * 24 * 24);
+    ASSERT_EQ(batch.normal_xyz.size(), 3 * 24 * 24);
+    ASSERT_EQ(batch.normal_angle_bounds.size(), 24 * 24);
     ASSERT_EQ(batch.within_clearance.size(), 24 * 24);
     EXPECT_EQ(batch.head.hulls(1).revision(), Get("ball").hull().revision());
     v1::BatchCheckCollisionsRequest relations_alone = request;
@@ -301,6 +311,14 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
         ASSERT_EQ(batch.witness_xyz[6 * i + 4], answer.witness().point_b().y()) << i;
       } else {
         ASSERT_TRUE(std::isnan(batch.witness_xyz[6 * i])) << i;
+      }
+      ASSERT_EQ(answer.has_normal(), answer.has_witness()) << i;
+      if (answer.has_normal()) {
+        ASSERT_EQ(batch.normal_xyz[3 * i + 1], answer.normal().direction().y()) << i;
+        ASSERT_EQ(batch.normal_angle_bounds[i], answer.normal().angle_bound()) << i;
+      } else {
+        ASSERT_TRUE(std::isnan(batch.normal_xyz[3 * i])) << i;
+        ASSERT_TRUE(std::isnan(batch.normal_angle_bounds[i])) << i;
       }
       ++counts[batch.relations[i]];
     }

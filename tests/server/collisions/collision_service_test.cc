@@ -177,6 +177,7 @@ TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
     request.mutable_wanted()->set_certificate(true);
     request.mutable_wanted()->set_separation(true);
     request.mutable_wanted()->set_witness(true);
+    request.mutable_wanted()->set_normal(true);
     request.mutable_wanted()->set_clearance(clearance);
     return Check(request);
   };
@@ -187,6 +188,8 @@ TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
   EXPECT_NEAR(apart.witness().point_a().x(), 1, apart.witness().error());
   EXPECT_NEAR(apart.witness().point_b().x(), 3, apart.witness().error());
   EXPECT_LE(apart.witness().error(), 1e-11);
+  EXPECT_NEAR(apart.normal().direction().x(), 1, 1e-11);
+  EXPECT_LE(apart.normal().angle_bound(), 1e-6);
   EXPECT_TRUE(apart.certificate().has_direction());
   EXPECT_FALSE(check(PlacementOf("cube", 3), std::nextafter(2, 0)).within_clearance());
   const v1::CheckCollisionResponse touching = check(PlacementOf("cube", 1), 0);
@@ -196,8 +199,11 @@ TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
   const v1::CheckCollisionResponse deep = check(PlacementOf("cube", 0.5), 0);
   EXPECT_LE(std::abs(deep.separation().value() + 0.5), deep.separation().bound());
   EXPECT_TRUE(deep.within_clearance());
+  EXPECT_EQ(deep.normal().direction().x(), 1);
+  EXPECT_LE(deep.normal().angle_bound(), 1e-15);
   const v1::CheckCollisionResponse nothing = check(PlacementOf("empty"), 5);
   EXPECT_EQ(nothing.separation().value(), std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(nothing.has_normal());
   EXPECT_TRUE(nothing.has_within_clearance());
   EXPECT_FALSE(nothing.within_clearance());
   EXPECT_FALSE(nothing.has_witness() || nothing.has_certificate());

@@ -32,6 +32,7 @@ v1::Wanted Everything() {
   wanted.set_certificate(true);
   wanted.set_separation(true);
   wanted.set_witness(true);
+  wanted.set_normal(true);
   wanted.set_clearance(1);
   return wanted;
 }
@@ -44,6 +45,7 @@ Answer FullAnswer() {
   answer.certificate->pairs = {{1, 2}, {3, 0}};
   answer.separation = Separation{-0.5, 0x1p-60};
   answer.witness = Witness{{1, 2, 3}, {4, 5, 6}, 0.25};
+  answer.normal = hulld::Normal{{0, 0.6, 0.8}, 0x1p-50};
   answer.within_clearance = true;
   return answer;
 }
@@ -117,6 +119,12 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   EXPECT_TRUE(std::isnan(columns.witness_xyz(12)));
   ASSERT_EQ(columns.witness_errors_size(), 4);
   EXPECT_EQ(columns.witness_errors(0), 0.25);
+  ASSERT_EQ(columns.normal_xyz_size(), 12);
+  EXPECT_EQ(columns.normal_xyz(2), 0.8);
+  EXPECT_TRUE(std::isnan(columns.normal_xyz(3)));
+  ASSERT_EQ(columns.normal_angle_bounds_size(), 4);
+  EXPECT_EQ(columns.normal_angle_bounds(0), 0x1p-50);
+  EXPECT_TRUE(std::isnan(columns.normal_angle_bounds(2)));
   EXPECT_THAT(columns.within_clearance(), ElementsAre(true, false, false, false));
   ASSERT_EQ(columns.pair_problems_size(), 1);
   EXPECT_EQ(columns.pair_problems(0).row(), 3);

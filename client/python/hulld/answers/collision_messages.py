@@ -25,6 +25,7 @@ from hulld.answers.collisions import (
     Feature,
     HullSize,
     HullVersion,
+    Normal,
     PieceCertificate,
     Problem,
     Relation,
@@ -147,6 +148,7 @@ def decode_collision(data: bytes, question: Placements, viewer: Viewer | None) -
         part("piece_b", _piece_of),
         _piece_certificates_of(message.piece_certificates),
         {hull.hull_id: version_of(hull) for hull in message.piece_hulls},
+        part("normal", lambda m: Normal(_vector(m.direction), m.angle_bound)),
         question,
         viewer,
     )
@@ -169,6 +171,8 @@ class ColumnReader:
     separation_bounds: list[npt.NDArray[np.float64]] = field(default_factory=list)
     witness_xyz: list[npt.NDArray[np.float64]] = field(default_factory=list)
     witness_errors: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    normal_xyz: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    normal_angle_bounds: list[npt.NDArray[np.float64]] = field(default_factory=list)
     within_clearance: list[Unsigned] = field(default_factory=list)
     pieces: list[Unsigned] = field(default_factory=list)
     problems: dict[int, Problem] = field(default_factory=dict)
@@ -187,6 +191,8 @@ class ColumnReader:
             9: (self.witness_errors, packed_doubles),
             10: (self.within_clearance, packed_varints),
             12: (self.pieces, packed_varints),
+            14: (self.normal_xyz, packed_doubles),
+            15: (self.normal_angle_bounds, packed_doubles),
         }
         for number, _, value in read_fields(data):
             if number in arrays:
@@ -278,6 +284,8 @@ class ColumnReader:
             self.problems,
             deciding(),
             self.piece_proofs,
+            doubles(wanted.normal, self.normal_xyz, (3,), "normal_xyz"),
+            doubles(wanted.normal, self.normal_angle_bounds, (), "normal_angle_bounds"),
         )
 
 

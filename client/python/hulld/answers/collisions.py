@@ -110,6 +110,21 @@ class Witness:
 
 
 @dataclass(frozen=True)
+class Normal:
+    """The direction in which the separation is attained, from A toward B; one of them, if there are
+    several.
+
+    direction: x y z in the world frame, of unit length up to rounding. SEPARATED: from the nearest
+    point of A to that of B. TOUCHING: normal to a plane that has A on one side and B on the other.
+    OVERLAPPING: that of the shortest translation of B that ends the overlap. angle_bound: the angle
+    to the exact direction is at most this, in radians (proven).
+    """
+
+    direction: npt.NDArray[np.float64]
+    angle_bound: float
+
+
+@dataclass(frozen=True)
 class Feature:
     """The points of a hull that lie farthest along an axis.
 
@@ -124,7 +139,9 @@ class Feature:
 
 @dataclass(frozen=True)
 class Axis:
-    """direction: x y z in the world frame, from A toward B, of unit length up to rounding."""
+    """Any direction that shows that the hulls are separated or touch; see Normal for that in which
+    they are nearest. direction: x y z in the world frame, from A toward B, of unit length up to
+    rounding."""
 
     direction: npt.NDArray[np.float64]
     kind: AxisKind
@@ -204,12 +221,13 @@ class Problem:
 class Collision:
     """The answer about a pair.
 
-    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness: None
-    if not asked for, or if there is none. within_clearance: separation <= clearance; None without a
-    clearance. hull_a, hull_b: the hulls or bodies of the answer, with their revisions. piece_a,
-    piece_b: of a body, the piece that decided; axis, analysis, and witness are of its hull. None
-    for a hull, and if no pair of pieces decided alone. piece_certificates: with a body, the proof
-    in place of the certificate; piece_hulls: then the hulls of all pieces, by ID.
+    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness,
+    normal: None if not asked for, or if there is none. within_clearance: separation <= clearance;
+    None without a clearance. hull_a, hull_b: the hulls or bodies of the answer, with their
+    revisions. piece_a, piece_b: of a body, the piece that decided; axis, analysis, witness, and
+    normal are of its hull. None for a hull, and if no pair of pieces decided alone.
+    piece_certificates: with a body, the proof in place of the certificate; piece_hulls: then the
+    hulls of all pieces, by ID.
     """
 
     relation: Relation
@@ -227,6 +245,7 @@ class Collision:
     piece_b: DecidingPiece | None = None
     piece_certificates: Sequence[PieceCertificate] = ()
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
+    normal: Normal | None = None
     _question: Placements | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
@@ -246,7 +265,7 @@ class Collision:
     def _repr_html_(self) -> str:
         """For notebooks: the viewer's page of both current hulls, if hullctl is found, and a
         table."""
-        separation, witness = self.separation, self.witness
+        separation, witness, normal = self.separation, self.witness, self.normal
         rows = [
             ("relation", self.relation.name),
             ("decided by", self.rung.name),
@@ -257,6 +276,7 @@ class Collision:
             ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
             ("point of A", witness and witness.point_a),
             ("point of B", witness and witness.point_b),
+            ("normal", normal and f"{normal.direction} within {normal.angle_bound!r} rad"),
             ("within clearance", self.within_clearance),
             ("axis", self.axis and self.axis.direction),
         ]
@@ -278,7 +298,7 @@ def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:
             parts.append(f"separation={value.value!r}")
         elif isinstance(value, (bool, tuple, Problem)) and value != ():
             parts.append(f"{part.name}={value!r}")
-        elif isinstance(value, (Witness, Axis, Certificate, Analysis)):
+        elif isinstance(value, (Witness, Normal, Axis, Certificate, Analysis)):
             parts.append(f"{part.name}=...")
     return f"{type(answer).__name__}({', '.join(parts)})"
 
@@ -313,6 +333,7 @@ class AnswerRow:
     piece_certificates: Sequence[PieceCertificate]
     pieces: tuple[int, int] | None
     problem: Problem | None
+    normal: Normal | None = None
 
     @property
     def colliding(self) -> bool:
@@ -334,12 +355,13 @@ class Answers:
 
     relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
     Relation.TOUCHING. If asked for: separations, separation_bounds (m), witness_points (m x 2 x 3:
-    the point of A, then of B, world frame), witness_errors (m), NaN in rows without one;
-    within_clearance (m, bool); axes, analyses, certificates, None in rows without one. Otherwise
-    None. problems: by row, the reason for a missing answer that is not in placement_problems.
-    pieces: m x 2, of bodies the pieces that decided, by index; -1 for a hull, and if no pair of
-    pieces decided alone; None without bodies. piece_proofs: by row, for a pair with a body, the
-    certificates of pairs of pieces; its entry of `certificates` is None.
+    the point of A, then of B, world frame), witness_errors (m), normals (m x 3),
+    normal_angle_bounds (m), NaN in rows without one; within_clearance (m, bool); axes, analyses,
+    certificates, None in rows without one. Otherwise None. problems: by row, the reason for a
+    missing answer that is not in placement_problems. pieces: m x 2, of bodies the pieces that
+    decided, by index; -1 for a hull, and if no pair of pieces decided alone; None without bodies.
+    piece_proofs: by row, for a pair with a body, the certificates of pairs of pieces; its entry of
+    `certificates` is None.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -355,6 +377,8 @@ class Answers:
     problems: Mapping[int, Problem]
     pieces: npt.NDArray[np.int32] | None = None
     piece_proofs: Mapping[int, Sequence[PieceCertificate]] = field(default_factory=dict)
+    normals: npt.NDArray[np.float64] | None = None
+    normal_angle_bounds: npt.NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.relations)
@@ -366,7 +390,7 @@ class Answers:
         def cell(column: Any) -> Any:
             return None if column is None else column[row]
 
-        separation = witness = pieces = within = None
+        separation = witness = normal = pieces = within = None
         if self.separations is not None and self.separation_bounds is not None:
             value, bound = float(self.separations[row]), float(self.separation_bounds[row])
             separation = None if np.isnan(value) else Separation(value, bound)
@@ -374,6 +398,9 @@ class Answers:
             error = float(self.witness_errors[row])
             point_a, point_b = self.witness_points[row]
             witness = None if np.isnan(error) else Witness(point_a, point_b, error)
+        if self.normals is not None and self.normal_angle_bounds is not None:
+            bound = float(self.normal_angle_bounds[row])
+            normal = None if np.isnan(bound) else Normal(self.normals[row], bound)
         relation = enum_or_zero(Relation, int(self.relations[row]))
         if self.within_clearance is not None and relation != Relation.UNSPECIFIED:
             within = bool(self.within_clearance[row])
@@ -392,6 +419,7 @@ class Answers:
             self.piece_proofs.get(row, ()),
             pieces,
             self.problems.get(row),
+            normal,
         )
 
     def __iter__(self) -> Iterator[AnswerRow]:

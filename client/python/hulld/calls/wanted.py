@@ -20,6 +20,7 @@ class Wanted:
     max_error: float | None = None
     witness: bool = False
     clearance: float | None = None
+    normal: bool = False
 
     def message(self) -> Any:
         return collision_pb2.Wanted(
@@ -30,4 +31,5 @@ class Wanted:
             max_error=arguments.optional_length(self.max_error, "max_error"),
             witness=self.witness,
             clearance=arguments.optional_length(self.clearance, "clearance"),
+            normal=self.normal,
         )

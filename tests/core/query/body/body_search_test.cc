@@ -28,6 +28,7 @@ QueryOptions Detailed() {
   QueryOptions options;
   options.want_separation = true;
   options.want_witness = true;
+  options.want_normal = true;
   options.want_axis = true;
   options.want_analysis = true;
   return options;
@@ -102,6 +103,7 @@ TEST(BodySearch, SwappingTheBodiesMirrorsTheAnswer) {
       EXPECT_EQ(answer->answer.separation->value, mirrored->answer.separation->value);
       EXPECT_EQ(answer->answer.separation->bound, mirrored->answer.separation->bound);
       EXPECT_EQ(answer->answer.witness->p_WA, mirrored->answer.witness->p_WB);
+      EXPECT_EQ(answer->answer.normal->direction, -mirrored->answer.normal->direction);
     }
   }
 }
