@@ -276,6 +276,15 @@ absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
   return absl::OkStatus();
 }
 
+absl::Status PlacementTable::AddShapes(Registry& registry, const std::function<bool()>& should_stop,
+                                       Resolved* resolved) {
+  absl::StatusOr<std::vector<HullView>> built = BuildInlineShapes(registry, shapes_, should_stop);
+  if (!built.ok()) return built.status();
+  shapes_ = {};
+  resolved->hulls.insert(resolved->hulls.end(), built->begin(), built->end());
+  return absl::OkStatus();
+}
+
 void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolved,
                                   const QueryOptions& options) {
   HULLD_CHECK(by_hull_begin_.size() == hull_count() + 1 && resolved.hulls.size() == hulls.size());

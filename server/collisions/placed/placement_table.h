@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -103,7 +104,11 @@ class PlacementTable {
 
   // Returns the lookup of hull_ids() for queries with these options.
   PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
-  // Sets all hulls. `resolved` is parallel to hull_ids().
+  // Builds the hulls of the inline shapes and appends them to the resolved hull_ids(). CANCELLED:
+  // should_stop returned true. RESOURCE_EXHAUSTED: --memory-limit.
+  absl::Status AddShapes(Registry& registry, const std::function<bool()>& should_stop,
+                         Resolved* resolved);
+  // Sets all hulls. `resolved` holds hull_ids(), then the inline shapes.
   void SetHulls(const Store& store, Resolved resolved, const QueryOptions& options);
   // Sets a few of hull_ids(), given by index, each once; the other hulls stay as they are.
   // `resolved` is parallel to `hulls`. Requires SortByHull.

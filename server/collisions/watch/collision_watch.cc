@@ -164,10 +164,13 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   const auto on_ready = [this, self = shared_from_this()] {
     Locked([this] { has_changes_ = true; });
   };
-  absl::StatusOr<WatchedHulls::Round> round = hulls_.Open(
-      table_.hull_ids(), on_ready, table_.LookupFor(options_, {kExpectedRounds * per_hull, true}),
-      [this] { return call().ShouldStop(); });
+  const auto should_stop = [this] { return call().ShouldStop(); };
+  absl::StatusOr<WatchedHulls::Round> round =
+      hulls_.Open(table_.hull_ids(), on_ready,
+                  table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
   if (!round.ok()) return round.status();
+  absl::Status built = table_.AddShapes(registry_, should_stop, &round->resolved);
+  if (!built.ok()) return built;
   Locked([this] { has_changes_ = true; });
   table_.SetHulls(registry_.store(), std::move(round->resolved), options_);
   revision_ = round->revision;
