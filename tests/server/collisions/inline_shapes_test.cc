@@ -83,7 +83,12 @@ std::vector<v1::Pose> Poses(int count) {
 
 class InlineShapes : public ServerTest {
  protected:
-  Client client() const { return Client({}, channel_); }
+  // Reports a refusal without another attempt.
+  Client client() const {
+    ClientOptions options;
+    options.retry.max_attempts = 1;
+    return Client(options, channel_);
+  }
 
   static v1::CheckCollisionRequest Pair(const v1::Placement& a, const v1::Placement& b,
                                         const v1::Wanted& wanted = {}) {
