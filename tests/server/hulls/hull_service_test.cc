@@ -100,7 +100,7 @@ TEST_F(HullCalls, CreateOfAnExistingHullFailsUnlessIfAbsent) {
   v1::CreateHullResponse response;
   const grpc::Status status = TryCreate("cube", false, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::ALREADY_EXISTS);
-  EXPECT_THAT(status.error_message(), HasSubstr("hull \"cube\" exists"));
+  EXPECT_THAT(status.error_message(), HasSubstr("hull \"cube\" already exists"));
   ASSERT_TRUE(TryCreate("cube", true, &response).ok());
   EXPECT_FALSE(response.created());
   EXPECT_EQ(response.hull().vertex_count(), 8);
