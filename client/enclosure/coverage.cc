@@ -293,7 +293,8 @@ class Cover {
 
 }  // namespace
 
-absl::StatusOr<Coverage> CoverMesh(const std::vector<CoveringPiece>& pieces, const TriangleMesh& mesh,
+absl::StatusOr<Coverage> CoverMesh(const std::vector<CoveringPiece>& pieces,
+                                   const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress) {
   Cover cover(pieces, mesh);
   if (absl::Status ready = cover.Prepare(); !ready.ok()) return ready;

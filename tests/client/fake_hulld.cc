@@ -55,7 +55,8 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     const std::lock_guard lock(fake_.mutex_);
     const bool exists = fake_.hulls_.count(request->hull_id()) > 0;
     if (exists && !request->if_absent()) {
-      return {grpc::StatusCode::ALREADY_EXISTS, "hull \"" + request->hull_id() + "\" already exists"};
+      return {grpc::StatusCode::ALREADY_EXISTS,
+              "hull \"" + request->hull_id() + "\" already exists"};
     }
     if (!exists) Create(request->hull_id());
     FillInfo(request->hull_id(), fake_.hulls_[request->hull_id()], response->mutable_hull());

@@ -28,7 +28,7 @@ absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* poin
     }
     return known.size() <= kMaxShapePoints ? absl::OkStatus() : TooManyPoints();
   };
-  const auto receive = [&](const PointBlock& block) {
+  const auto receive = [&](const PointChunk& block) {
     const absl::Status added = add(block.xyz);
     return added.ok() ? add(block.xyz_float) : added;
   };
@@ -44,7 +44,7 @@ absl::StatusOr<std::string> Register(const Client& client, const ReadRequest& re
   open.set_hull_id(HullSegment(request.path));
   open.set_create_if_absent(true);
   const auto replaced = client.ReplaceHull(open, [&request](const Client::PointSink& sink) {
-    return ReadPoints(request, [&sink](const PointBlock& block) { return sink(ToProto(block)); })
+    return ReadPoints(request, [&sink](const PointChunk& block) { return sink(ToProto(block)); })
         .status();
   });
   if (!replaced.ok()) return replaced.status();

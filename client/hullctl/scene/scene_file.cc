@@ -289,8 +289,7 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
 std::string Scene::NameOf(uint32_t placement) const {
   if (placement < names.size()) return names[placement];
   const std::string* const hull = HullOf(placement);
-  const bool is_shape =
-      hull != nullptr && hull->empty() && PlacementOf(placement).has_points();
+  const bool is_shape = hull != nullptr && hull->empty() && PlacementOf(placement).has_points();
   return absl::StrCat(placement, ":", hull == nullptr ? "" : is_shape ? "points" : *hull);
 }
 

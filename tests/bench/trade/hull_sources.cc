@@ -22,7 +22,7 @@ absl::StatusOr<Hull> HullOfFile(const std::string& path) {
   const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
   if (!format.ok()) return format.status();
   HullBuilder builder;
-  const auto receive = [&](PointBlock block) {
+  const auto receive = [&](PointChunk block) {
     block.xyz.insert(block.xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     return AddTo(builder, block.xyz);
   };

@@ -33,7 +33,8 @@ struct Fraction {
   int exponent;
 
   Rounded ToNearest() const { return RoundToNearest(numerator, denominator, exponent); }
-  Rational Value() const { return Rational(numerator, denominator) * PowerOfTwo(exponent); }
+  // Rational(numerator, denominator) causes false warnings of GCC 12.
+  Rational Value() const { return PowerOfTwo(exponent) * numerator / denominator; }
 };
 
 TEST(RoundToNearest, ExactNumbersHaveBoundZero) {

@@ -88,7 +88,7 @@ struct PointsRead {
   std::string finding;
 };
 
-void Take(const PointBlock& block, size_t most, PointsRead* to) {
+void Take(const PointChunk& block, size_t most, PointsRead* to) {
   if (!block.xyz.empty() && !block.xyz_float.empty()) to->finding = "a block of two kinds";
   if (block.size() == 0 || (most > 0 && block.size() > most)) to->finding = "a block of no size";
   if ((block.xyz.size() + block.xyz_float.size()) % 3 != 0) to->finding = "a block tears a point";
@@ -98,7 +98,7 @@ void Take(const PointBlock& block, size_t most, PointsRead* to) {
 
 PointsRead ReadPointsOf(PointReader reader, std::string_view content, const ReadOptions& options) {
   PointsRead read;
-  PointCollector points(options, [&](const PointBlock& block) {
+  PointCollector points(options, [&](const PointChunk& block) {
     Take(block, options.points_per_block, &read);
     return absl::OkStatus();
   });
