@@ -130,6 +130,7 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/body",
     "client/hullctl/scene",
     "client/hullctl/load",
+    "client/hullctl/local",
     "client/hullctl/view/bridge",
     "client/hullctl/view",
     "client/hullctl/parts",

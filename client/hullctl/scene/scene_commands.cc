@@ -36,10 +36,8 @@ constexpr char kYamlHelp[] =
     "A pose is [x, y, z], [w, x, y, z, x, y, z] with a quaternion first, {xyz: ..., rpy: ...}, or\n"
     "{xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and the options of\n"
     "'hullctl check': separation, witness, normal, axis, certificate, analysis, clearance,\n"
-    "max_error, tolerance. `scale` converts coordinates of files to meters, rounded once. Relative "
-    "file "
-    "names\n"
-    "start at the folder of the scene file.\n";
+    "max_error, tolerance. `scale` converts coordinates of files to meters, rounded once.\n"
+    "Relative file names start at the folder of the scene file.\n";
 
 // Deletes only the listed revision, if it was listed.
 absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& kept) {

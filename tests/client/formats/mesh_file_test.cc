@@ -67,9 +67,9 @@ TEST(MeshFile, OffFacesAreRead) {
 
 TEST(MeshFile, OffFacesMustNameVertices) {
   const TempFile file("a.off", "OFF\n1 1 0\n0 0 0\n3 0 0 1\n");
-  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr(":4: a face is"));
+  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr(":4: a face needs"));
   const TempFile huge("b.off", "OFF\n1 1 0\n0 0 0\n18446744073709551615 0 0 0\n");
-  EXPECT_THAT(Error(ReadMesh(huge.path())), HasSubstr(":4: a face is"));
+  EXPECT_THAT(Error(ReadMesh(huge.path())), HasSubstr(":4: a face needs"));
 }
 
 TEST(MeshFile, StlIsReadAsTriangles) {

@@ -72,6 +72,11 @@ class MessageFiller {
     for (int i = 0; i < descriptor->real_oneof_decl_count(); ++i) {
       FillOneof(message, descriptor->oneof_decl(i), depth);
     }
+    auto* const placement = dynamic_cast<v1::Placement*>(message);
+    // A placement has an ID or points; one with both is refused.
+    if (placement != nullptr && placement->has_points() && !in_.OneOf(4)) {
+      placement->clear_hull_id();
+    }
     if (in_.OneOf(64)) {
       AddUnknown(message->GetReflection()->MutableUnknownFields(message), depth);
     }
@@ -87,6 +92,7 @@ class MessageFiller {
     }
     // Requests have placements in one form; programs pack them themselves.
     if (name == "packed_placements") return in_.OneOf(32);
+    if (field.full_name() == "hulld.v1.Placement.points") return in_.OneOf(24);
     if (name == "freshness") return in_.OneOf(8);
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return !in_.OneOf(8);
     return !in_.OneOf(32);

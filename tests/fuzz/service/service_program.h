@@ -138,11 +138,14 @@ class ServiceProgram {
   v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
   v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
-  // Sometimes returns the request in packed form.
+  // Sometimes returns the request in packed form, unless inline shapes may be malformed.
   template <typename Request>
   std::optional<Request> MaybePacked(const Request& request) {
     if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
       return std::nullopt;
+    }
+    for (const v1::Placement& placement : request.placements()) {
+      if (placement.has_points()) return std::nullopt;
     }
     Request packed = request;
     *packed.mutable_packed_placements() = PackPlacements(request.placements());

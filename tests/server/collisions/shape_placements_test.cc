@@ -18,7 +18,7 @@
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
-namespace inline_shapes_test {
+namespace shape_placements_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -447,5 +447,5 @@ TEST_F(InlineShapes, TheirHullsCountAgainstTheMemoryLimit) {
   EXPECT_EQ(found->totals().pairs(), 40u * 39 / 2);
 }
 
-}  // namespace inline_shapes_test
+}  // namespace shape_placements_test
 }  // namespace hulld::server
