@@ -366,7 +366,7 @@ class Verifier:
         outer = _Motion(placement.pose)
         for index in range(len(body.pieces)):
             piece = body.pieces[index]
-            if piece.id not in piece_hulls:
+            if piece.id is None or piece.id not in piece_hulls:
                 raise VerificationError(
                     f"piece {index} of body {placement.id} is hull {piece.id}, whose revision "
                     "the answer does not state"
