@@ -157,6 +157,7 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
 // An event is exact at versions that it or an earlier message states.
 std::string CollisionWatchCheck::CheckSent(uint32_t placement, uint64_t revision, bool has_piece,
                                            const v1::DecidingPiece& piece) const {
+  if (open_.placements(static_cast<int>(placement)).has_points()) return {};
   const std::string& id = open_.placements(static_cast<int>(placement)).hull_id();
   const auto sent = versions_.find(id);
   if (sent == versions_.end() || sent->second.second != revision) {
@@ -177,7 +178,12 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   const Pair pair = {event.placement_a(), event.placement_b()};
   if (!IsWatched(pair)) return "it is not watched";
   const bool is_lost = event.kind() == v1::COLLISION_EVENT_KIND_LOST;
-  if (is_lost != (event.revision_a() == 0) || is_lost != (event.revision_b() == 0)) {
+  // An inline shape has no revision.
+  const auto has_revision = [&](uint32_t placement) {
+    return !is_lost && !open_.placements(static_cast<int>(placement)).has_points();
+  };
+  if (has_revision(event.placement_a()) != (event.revision_a() != 0) ||
+      has_revision(event.placement_b()) != (event.revision_b() != 0)) {
     return "an event has revisions where it has no answer, or the other way round";
   }
   if (event.has_within_clearance() != (open_.has_clearance() && !is_lost)) {
