@@ -21,8 +21,9 @@ struct StlReceiver {
   std::function<void(std::string_view name)> solid;
   // Parses a coordinate (axis: 0, 1, 2) of a text file.
   std::function<NumberText(std::string_view text, size_t axis, double* value)> parse;
+  // Receives a corner of a text file.
   std::function<absl::Status(const std::array<double, 3>& p, const StlErrorAt& error_at)> corner;
-  // The same for a binary file.
+  // Receives a corner of a binary file.
   std::function<absl::Status(const std::array<float, 3>& p, const StlErrorAt& error_at)>
       float_corner;
 };

@@ -79,7 +79,7 @@ class Call {
   // are timed individually, because the client determines the duration of the stream.
   void BeginMessage();
   void EndMessage() { EndMessage(message_arrival_); }
-  // As above for streams with several messages in flight: `arrival` is the message's.
+  // For streams with several messages in flight. `arrival`: the time at which the message arrived.
   void EndMessage(std::chrono::steady_clock::time_point arrival);
 
   // Counts a limit that was hit without ending the call, for example by one pair of a batch.

@@ -89,8 +89,9 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 
   Registry& registry_;
   CheckCall* const call_;
-  // Of A and B: the pose, and the position among the IDs or among the inline shapes.
+  // Poses of A and B.
   std::array<Pose, 2> X_W_;
+  // Indices of A and B: into shapes_ for a placement with points, otherwise into ids_.
   std::array<size_t, 2> subjects_;
   std::vector<std::string> ids_;
   InlineShapes shapes_;

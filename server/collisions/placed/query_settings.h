@@ -39,8 +39,8 @@ bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b);
 // the limit and its flag.
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
 
-// As above for a query with bodies: RESOURCE_EXHAUSTED means that it would need too many
-// certificates, or more memory than QueryOptions::max_depth_bytes.
+// Returns the server's error for an error of a query with bodies. RESOURCE_EXHAUSTED: it needs too
+// many certificates, or more memory than max_depth_bytes.
 absl::Status NameProofLimit(const absl::Status& status, uint64_t max_depth_bytes);
 
 // RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces take more than `limit` bytes.

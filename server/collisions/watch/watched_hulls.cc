@@ -91,8 +91,9 @@ std::set<size_t> WatchedHulls::PlacesOf(const WatchBatch& batch) const {
   return places;
 }
 
-// Resolves the places and adds those that use an older version of a hull found there. Repeats if it
-// added one, or if a body was put since whose pieces are not watched yet.
+// Resolves all places that use a changed hull at one revision. If a resolved hull is newer than the
+// version that another place uses, adds that place and repeats. Also repeats after a concurrent
+// change of a body whose new pieces are not watched yet.
 absl::Status WatchedHulls::Resolve(std::set<size_t> places,
                                    const std::function<bool()>& should_stop, Round* round) {
   while (true) {

@@ -187,8 +187,9 @@ TEST(Normal, FollowsARotationOfBoth) {
   }
 }
 
-// Of two facets at depths that differ by less than rounding, exact arithmetic finds the nearer one.
-TEST(Normal, TellsFacetsOfAlmostTheSameDepthApart) {
+// The depths of two facets differ by less than the rounding error. Exact arithmetic chooses the
+// nearer facet.
+TEST(Normal, DistinguishesFacetsOfNearlyEqualDepth) {
   const Hull cube = BuildHull(Shifted(LatticeCube(2, 2), Vector::Constant(-1)));
   const Hull point = BuildHull(std::vector<Vector>{{0, 0, 0}, {0x1p-60, 0, 0}});
   const double step = 0x1p-53;

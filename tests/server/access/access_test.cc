@@ -36,13 +36,13 @@ struct Outcome {
   std::string replies;
 };
 
-// What the tests below know of a call.
+// A call as the tests below exercise it.
 struct CallRule {
   Permission needed;
   // The messages of a request about a hull.
   std::function<std::vector<std::string>(const std::string& hull_id)> request;
-  // How the call refuses a hull outside the caller's prefix: by its status, by an entry in its
-  // reply, or not at all, as it names no hull.
+  // The refusal of a hull outside the caller's prefix is the status of the call or an entry in its
+  // reply. kNoHull: the call names no hull.
   enum { kByStatus, kInReply, kNoHull } refusal;
 };
 

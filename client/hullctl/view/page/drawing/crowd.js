@@ -12,7 +12,7 @@ const MOST_EDGES = 400000;
 export class Crowd extends DrawnGroup {
   clear() {
     super.clear();
-    // Of each drawn object: the index of its first vertex.
+    // From the index of a drawn object to the index of its first vertex.
     this.ranges = new Map();
   }
 

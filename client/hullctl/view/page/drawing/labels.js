@@ -1,5 +1,5 @@
-// Names over the objects, as text of the page. Labels do not overlap: those of the pair come first,
-// then those nearer to the camera.
+// Labels with the names of objects, as HTML over the canvas. Labels never overlap. The queried pair
+// has priority; then objects closer to the camera.
 import {THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
 

@@ -226,7 +226,7 @@ export class AnswerPanel {
         }));
   }
 
-  // The same query as a shell command; every number reads back as the same double.
+  // Shows the query as a shell command with round-trip decimal numbers.
   command(answer, open) {
     const [a, b] = this.model.pair.map((i) => this.model.objects[i]);
     const {poses} = answer;

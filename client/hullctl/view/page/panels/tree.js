@@ -13,8 +13,9 @@ const MOST_PIECE_ROWS = 100;
 
 const INDENT = 12;
 
-// Returns {prefix, members, groups} of objects whose names start with the prefix: those directly in
-// it, and groups of the others. A group that holds nothing but one group is merged with it.
+// Groups objects by the segments of their names. Returns {prefix, members, groups}: `members` lie
+// directly under the prefix, and `groups` hold the remaining objects. A group whose only content is
+// another group is merged with it.
 function treeOf(objects, prefix = '') {
   const members = [];
   const rest = new Map();
