@@ -9,18 +9,16 @@ import json
 import pathlib
 import shlex
 import struct
-import unittest
 
-import viewing
-import viewer_test
-from viewer_test import AT_REST
+import viewer_case
+from viewer_case import AT_REST
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 
-class PictureTest(viewer_test.ViewerCase):
+class PictureTest(viewer_case.ViewerCase):
     # --- The picture ---
 
     def test_faces_of_a_cube_differ(self):
@@ -29,22 +27,10 @@ class PictureTest(viewer_test.ViewerCase):
             self.browser.js("(() => { const {model} = hulldViewer; hulldViewer.setTheme(arguments[0]);"
                             " model.show = {...model.show, edges: false, labels: false, grid: false};"
                             " model.select(null); model.tell('shown'); })()", theme)
-            self.browser.wait("!hulldViewer.stage.waiting")
             # The ground and three faces: each has one color, with a brightness of its own.
-            shades = sorted(self.browser.js("""(() => {
-              const {stage} = hulldViewer;
-              const gl = stage.renderer.getContext();
-              const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-              const data = new Uint8Array(4 * w * h);
-              stage.renderer.render(stage.scene, stage.camera);
-              gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
-              const counts = new Map();
-              for (let i = 0; i < data.length; i += 4) {
-                const sum = data[i] + data[i + 1] + data[i + 2];
-                counts.set(sum, (counts.get(sum) || 0) + 1);
-              }
-              return [...counts].filter(([, count]) => count > 0.01 * w * h).map(([sum]) => sum);
-            })()"""))
+            shades = sorted(self.count_pixels(
+                "r + g + b",
+                "[...counts].filter(([, count]) => count > 0.01 * total).map(([sum]) => sum)"))
             self.assertEqual(len(shades), 4, theme)
             self.assertGreater(min(b - a for a, b in zip(shades, shades[1:])), 40, (theme, shades))
 
@@ -349,5 +335,4 @@ class PictureTest(viewer_test.ViewerCase):
 
 
 if __name__ == "__main__":
-    viewer_test.PROGRAMS = viewing.bin_directory()
-    unittest.main(verbosity=2)
+    viewer_case.main()

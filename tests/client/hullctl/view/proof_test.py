@@ -6,15 +6,13 @@
 import json
 import pathlib
 import subprocess
-import unittest
 from random import Random
 
-import viewing
-import viewer_test
-from viewer_test import AT_REST
+import viewer_case
+from viewer_case import AT_REST
 
 
-class ProofTest(viewer_test.ViewerCase):
+class ProofTest(viewer_case.ViewerCase):
     def page_verdict(self, response, request):
         """Returns the problem that the page finds in a recorded answer; empty if it is proven."""
         poses = []
@@ -125,5 +123,4 @@ class ProofTest(viewer_test.ViewerCase):
 
 
 if __name__ == "__main__":
-    viewer_test.PROGRAMS = viewing.bin_directory()
-    unittest.main(verbosity=2)
+    viewer_case.main()

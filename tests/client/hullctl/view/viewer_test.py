@@ -3,126 +3,17 @@
     /usr/bin/python3 viewer_test.py BIN_DIRECTORY [TEST...]
 """
 
-import base64
 import json
-import os
 import pathlib
-import re
-import shlex
-import struct
-import subprocess
-import unittest
 
-import viewing
+import viewer_case
+from viewer_case import AT_REST
 
-viewing.skip_unless_browser()
-
-from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-AT_REST = "hulldViewer.model.answer?.rest && hulldViewer.model.answer.update === hulldViewer.update"
 
-
-class ViewerCase(unittest.TestCase):
-    """One server and one browser for all tests; each test has its own viewer."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.hulld = viewing.Hulld(PROGRAMS)
-        cls.browser = viewing.Browser()
-        cls.hulld.add_box("box")
-        cls.hulld.add_box("room/left")
-        cls.hulld.add_box("room/right", low=(2.0, 0.0, 0.0))
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.close()
-        cls.hulld.stop()
-
-    def setUp(self):
-        self.browser.resize(1440, 900)
-        self.browser.problems()
-
-    def tearDown(self):
-        self.assertEqual(self.browser.problems(), [])
-
-    def view(self, *arguments):
-        """Opens `hullctl view ARGUMENTS` in the browser."""
-        viewer = self.hulld.view(*arguments)
-
-        def leave():
-            # The page would report that hullctl has ended.
-            self.browser.driver.get("about:blank")
-            self.assertEqual(viewer.stop(), 0, viewer.said)
-
-        self.addCleanup(leave)
-        self.browser.open(viewer.address)
-        return viewer
-
-    def canvas(self):
-        return self.browser.driver.find_element(By.ID, "canvas")
-
-    def pixels(self):
-        """Returns the number of colors of the canvas, and the part that is not ground."""
-        self.browser.wait("!hulldViewer.stage.waiting")
-        return self.browser.js("""(() => {
-          const {stage} = hulldViewer;
-          const gl = stage.renderer.getContext();
-          const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
-          const data = new Uint8Array(4 * w * h);
-          stage.renderer.render(stage.scene, stage.camera);
-          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
-          const counts = new Map();
-          for (let i = 0; i < data.length; i += 4) {
-            const color = data[i] << 16 | data[i + 1] << 8 | data[i + 2];
-            counts.set(color, (counts.get(color) || 0) + 1);
-          }
-          return {colors: counts.size, drawn: 1 - Math.max(...counts.values()) / (w * h)};
-        })()""")
-
-    def keys(self, *keys):
-        ActionChains(self.browser.driver).send_keys(*keys).perform()
-
-    def assert_answers_as_api(self):
-        """Asserts that the page at rest agrees bit by bit with the command that it shows."""
-        self.browser.wait(AT_REST)
-        command = shlex.split(self.browser.text("#command"))
-        self.assertEqual(command[:2], ["hullctl", "check"])
-        answer = self.hulld.json(*command[1:], server=self.browser.js("hulldViewer.server"))
-        words = {"RELATION_SEPARATED": "separated", "RELATION_TOUCHING": "touching",
-                 "RELATION_OVERLAPPING": "overlapping"}
-        self.assertIn(words[answer["relation"]], self.browser.text("#relation"))
-        fact = self.browser.fact
-        self.assertEqual(float(fact("separation")), answer["separation"]["value"])
-        self.assertEqual(float(fact("within")), answer["separation"]["bound"])
-        for name, point in (("point of A", "pointA"), ("point of B", "pointB")):
-            self.assertEqual([float(x) for x in fact(name).split()],
-                             [answer["witness"][point][k] for k in "xyz"])
-        if answer.get("axis"):
-            self.assertEqual([float(x) for x in fact("axis").split()],
-                             [answer["axis"]["direction"][k] for k in "xyz"])
-        self.assertEqual(fact("revisions"),
-                         f"{answer['hullA']['revision']} and {answer['hullB']['revision']}")
-        return answer
-
-    def drag_handle(self, right, up):
-        """Drags the handle of the plane that faces us by pixels, in several steps."""
-        x, y = self.browser.wait("""(() => {
-          const {stage, gizmo} = hulldViewer;
-          return stage.toScreen(gizmo.proxy.position.clone());
-        })()""")
-        width, height = self.browser.js(
-            "[hulldViewer.stage.canvas.clientWidth, hulldViewer.stage.canvas.clientHeight]")
-        chain = ActionChains(self.browser.driver)
-        chain.move_to_element_with_offset(self.canvas(), round(x - width / 2), round(y - height / 2))
-        chain.click_and_hold()
-        for _ in range(5):
-            chain.move_by_offset(right // 5, -up // 5)
-        chain.release().perform()
-
-
-class ViewerTest(ViewerCase):
+class ViewerTest(viewer_case.ViewerCase):
     # --- Pictures ---
 
     def test_canvas_is_not_blank_and_follows_what_is_shown(self):
@@ -381,26 +272,6 @@ class ViewerTest(ViewerCase):
                 self.browser.wait("document.querySelector('#collision-count').textContent"
                                   " === '1 pair collides'", seconds=90)
 
-    def test_files_are_not_stored_beside_hulls(self):
-        before = self.hulld.hullctl("list", "--output", "name")
-        self.view("room/left", "/usr/share/assimp/models/OBJ/spider.obj")
-        self.browser.wait("document.querySelector('#collision-count').textContent !== ''")
-        self.browser.js("hulldViewer.model.select(0); hulldViewer.model.select(1, true)")
-        self.assertEqual(self.hulld.hullctl("list", "--output", "name"), before)
-
-    def test_a_killed_viewer_leaves_nothing(self):
-        viewer = self.hulld.view("/usr/share/assimp/models/OBJ/spider.obj")
-        self.browser.open(viewer.address)
-        folder = pathlib.Path(self.browser.js("hulldViewer.server").removeprefix("unix:")).parent
-        self.assertTrue(folder.is_dir())
-        self.browser.driver.get("about:blank")
-        viewer.child.kill()
-        viewer.child.communicate()
-        # Bounded by the test's time limit only.
-        while folder.exists():
-            pass
-        self.assertEqual(self.hulld.hullctl("list", "view/", "--output", "name"), "")
-
     # --- The page ---
 
     def test_a_simpler_hull_is_shown_with_its_proven_error(self):
@@ -588,59 +459,6 @@ class ViewerTest(ViewerCase):
         self.browser.wait("hulldViewer.model.selected !== null")
         self.assert_answers_as_api()
 
-    def test_one_file_shows_all_without_a_server(self):
-        target = pathlib.Path(self.hulld.directory, "room.html")
-        self.hulld.hullctl("view", "room/left", "room/right", "--html", str(target))
-        self.browser.driver.get(target.as_uri())
-        self.browser.wait("document.body.dataset.fitted")
-        self.assertGreater(self.pixels()["drawn"], 0.03)
-        self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
-        self.assertAlmostEqual(float(self.browser.fact("separation")), 1)
-        self.assertIn("\u2713 Proven", self.browser.text("#proof"))
-        # It is not permitted to fetch anything, and requests nothing.
-        self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
-                                         ".filter(({name}) => !name.startsWith('data:')).length"), 0)
-        self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
-
-    def test_a_picture_without_a_window(self):
-        target = pathlib.Path(self.hulld.directory, "room.png")
-        said = self.hulld.hullctl("view", "room/left", "room/right", "--png", str(target),
-                                  "--size", "1200x800")
-        self.assertIn("1200 by 800 pixels", said)
-        png = target.read_bytes()
-        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
-        self.assertEqual(struct.unpack(">II", png[16:24]), (1200, 800))
-        # Shaded facets on a ground that reaches every corner, hence no panel.
-        self.browser.driver.get("about:blank")
-        colors = self.browser.driver.execute_async_script("""
-          const [base64, done] = arguments;
-          const image = new Image();
-          image.onload = () => {
-            const canvas = document.createElement('canvas');
-            [canvas.width, canvas.height] = [image.width, image.height];
-            const context = canvas.getContext('2d');
-            context.drawImage(image, 0, 0);
-            const {data} = context.getImageData(0, 0, image.width, image.height);
-            const at = (x, y) => String(data.slice(4 * (y * image.width + x)).slice(0, 3));
-            const all = new Set();
-            for (let x = 0; x < image.width; ++x) all.add(at(x, image.height / 2));
-            const [right, low] = [image.width - 2, image.height - 2];
-            done({all: all.size, corners: [at(2, 2), at(right, 2), at(2, low), at(right, low)]});
-          };
-          image.src = 'data:image/png;base64,' + base64;""", base64.b64encode(png).decode())
-        self.assertGreater(colors["all"], 20)
-        self.assertEqual(len(set(colors["corners"])), 1)
-
-    def test_a_picture_needs_a_browser(self):
-        for name, words in (("no-such-browser", "is not a program"), ("/bin/false", "produced no picture")):
-            refused = subprocess.run(
-                [*self.hulld.command(), "view", "box", "--png", "box.png"], text=True,
-                cwd=self.hulld.directory, capture_output=True,
-                env={**os.environ, "HULLCTL_BROWSER": name})
-            self.assertNotEqual(refused.returncode, 0)
-            self.assertIn(words, refused.stderr)
-        self.assertFalse(pathlib.Path(self.hulld.directory, "box.png").exists())
-
     def test_changes_hulls_only_with_edit(self):
         self.hulld.add_box("edited")
         self.view("edited")
@@ -707,5 +525,4 @@ class ViewerTest(ViewerCase):
 
 
 if __name__ == "__main__":
-    PROGRAMS = viewing.bin_directory()
-    unittest.main(verbosity=2)
+    viewer_case.main()

@@ -1,0 +1,91 @@
+"""Tests of files that the viewer reads and writes, in a real browser.
+
+    /usr/bin/python3 files_test.py BIN_DIRECTORY [TEST...]
+"""
+
+import base64
+import os
+import pathlib
+import struct
+import subprocess
+
+import viewer_case
+
+
+class FilesTest(viewer_case.ViewerCase):
+    def test_files_are_not_stored_beside_hulls(self):
+        before = self.hulld.hullctl("list", "--output", "name")
+        self.view("room/left", "/usr/share/assimp/models/OBJ/spider.obj")
+        self.browser.wait("document.querySelector('#collision-count').textContent !== ''")
+        self.browser.js("hulldViewer.model.select(0); hulldViewer.model.select(1, true)")
+        self.assertEqual(self.hulld.hullctl("list", "--output", "name"), before)
+
+    def test_a_killed_viewer_leaves_nothing(self):
+        viewer = self.hulld.view("/usr/share/assimp/models/OBJ/spider.obj")
+        self.browser.open(viewer.address)
+        folder = pathlib.Path(self.browser.js("hulldViewer.server").removeprefix("unix:")).parent
+        self.assertTrue(folder.is_dir())
+        self.browser.driver.get("about:blank")
+        viewer.child.kill()
+        viewer.child.communicate()
+        # Bounded by the test's time limit only.
+        while folder.exists():
+            pass
+        self.assertEqual(self.hulld.hullctl("list", "view/", "--output", "name"), "")
+
+    def test_one_file_shows_all_without_a_server(self):
+        target = pathlib.Path(self.hulld.directory, "room.html")
+        self.hulld.hullctl("view", "room/left", "room/right", "--html", str(target))
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait("document.body.dataset.fitted")
+        self.assertGreater(self.pixels()["drawn"], 0.03)
+        self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 1)
+        self.assertIn("\u2713 Proven", self.browser.text("#proof"))
+        # It is not permitted to fetch anything, and requests nothing.
+        self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
+                                         ".filter(({name}) => !name.startsWith('data:')).length"), 0)
+        self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
+
+    def test_a_picture_without_a_window(self):
+        target = pathlib.Path(self.hulld.directory, "room.png")
+        said = self.hulld.hullctl("view", "room/left", "room/right", "--png", str(target),
+                                  "--size", "1200x800")
+        self.assertIn("1200 by 800 pixels", said)
+        png = target.read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1200, 800))
+        # Shaded facets on a ground that reaches every corner, hence no panel.
+        self.browser.driver.get("about:blank")
+        colors = self.browser.driver.execute_async_script("""
+          const [base64, done] = arguments;
+          const image = new Image();
+          image.onload = () => {
+            const canvas = document.createElement('canvas');
+            [canvas.width, canvas.height] = [image.width, image.height];
+            const context = canvas.getContext('2d');
+            context.drawImage(image, 0, 0);
+            const {data} = context.getImageData(0, 0, image.width, image.height);
+            const at = (x, y) => String(data.slice(4 * (y * image.width + x)).slice(0, 3));
+            const all = new Set();
+            for (let x = 0; x < image.width; ++x) all.add(at(x, image.height / 2));
+            const [right, low] = [image.width - 2, image.height - 2];
+            done({all: all.size, corners: [at(2, 2), at(right, 2), at(2, low), at(right, low)]});
+          };
+          image.src = 'data:image/png;base64,' + base64;""", base64.b64encode(png).decode())
+        self.assertGreater(colors["all"], 20)
+        self.assertEqual(len(set(colors["corners"])), 1)
+
+    def test_a_picture_needs_a_browser(self):
+        for name, words in (("no-such-browser", "is not a program"), ("/bin/false", "produced no picture")):
+            refused = subprocess.run(
+                [*self.hulld.command(), "view", "box", "--png", "box.png"], text=True,
+                cwd=self.hulld.directory, capture_output=True,
+                env={**os.environ, "HULLCTL_BROWSER": name})
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn(words, refused.stderr)
+        self.assertFalse(pathlib.Path(self.hulld.directory, "box.png").exists())
+
+
+if __name__ == "__main__":
+    viewer_case.main()
