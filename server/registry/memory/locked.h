@@ -142,7 +142,7 @@ class Locked {
   uint64_t lookups() const { return mutex_.lookups_; }
 
   // Counts one of many lookups; first yields the mutex after kMostLookupsPerHold of them.
-  void LetOthersPass() {
+  void NoteLookupMaybeYield() {
     if (lookups() == kMostLookupsPerHold) {
       Unlock();
       Lock();

@@ -232,7 +232,7 @@ absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
   Locked locked(state_.mutex);
   bool is_behind = found->revision > state_.catalog.revision();
   for (auto hull = found->hulls.begin(); !is_behind && hull != found->hulls.end(); ++hull) {
-    locked.LetOthersPass();
+    locked.NoteLookupMaybeYield();
     is_behind = IsBehind(hull->first, hull->second);
   }
   if (!is_behind) return found;
@@ -304,7 +304,7 @@ absl::StatusOr<HullPage> RecordReader::ListHulls(const std::string& prefix,
   page.more = found->more;
   Locked locked(state_.mutex);
   for (const auto& [id, stored] : found->hulls) {
-    locked.LetOthersPass();
+    locked.NoteLookupMaybeYield();
     HullChange hull = Describe(id, stored);
     page.hulls.push_back({std::move(hull.record), hull.damaged});
   }
