@@ -30,7 +30,7 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     v1::WatchHullsResponse message;
     if (call->reader->Read(&message)) {
       // A call that did not resume sends the full state, without deletions since the loss.
-      if (is_new && reported_ && request_.after_revision() == 0) message.set_anew(true);
+      if (is_new && reported_ && request_.after_revision() == 0) message.set_restarted(true);
       connected_ = true;
       reported_ = reported_ || message.events_size() > 0;
       request_.set_after_revision(message.header().revision());

@@ -159,7 +159,7 @@ void WatchStream::SendBatch(const WatchBatch& batch) {
   sent_revision_ = batch.revision;
   EncodeHeader(registry_.store(), batch.revision, reply().mutable_header());
   reply().set_synced(batch.synced);
-  reply().set_anew(batch.restarted);
+  reply().set_restarted(batch.restarted);
   for (const HullChange& change : batch.changes) EncodeEvent(change, reply().add_events());
   Send();
 }

@@ -120,7 +120,7 @@ TEST_F(Watches, WatchesOfHullsResume) {
   do {
     message = watch->Next();
     ASSERT_TRUE(message.ok()) << message.status();
-    EXPECT_FALSE(message->anew());
+    EXPECT_FALSE(message->restarted());
     for (const v1::HullEvent& event : message->events()) reported.push_back(event.hull().hull_id());
   } while (!message->synced());
   // One event for its creation and one for its points, or one for both.

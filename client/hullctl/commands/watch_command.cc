@@ -55,7 +55,7 @@ std::string EventText(const v1::HullEvent& event) {
 }
 
 void PrintHullEvents(const v1::WatchHullsResponse& message, const Invocation& run) {
-  if (message.anew()) run.out << "# restart: discard the lines above\n";
+  if (message.restarted()) run.out << "# restart: discard the lines above\n";
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }

@@ -71,7 +71,7 @@ absl::Status HullFollower::Follow(HullWatch* watch) {
 }
 
 void HullFollower::Take(const v1::WatchHullsResponse& response) {
-  if (response.anew()) {
+  if (response.restarted()) {
     seen_since_restart_.clear();
     synced_ = false;
   }

@@ -48,7 +48,7 @@ struct WatchBatch {
   // Every change up to this revision was sent before, is in `changes`, or was superseded.
   uint64_t revision = 0;
   std::vector<HullChange> changes = {};
-  // `synced` and `anew` of v1::WatchHullsResponse.
+  // `synced` and `restarted` of v1::WatchHullsResponse.
   bool synced = false;
   bool restarted = false;
 };

@@ -515,7 +515,7 @@ def test_a_watch_tells_what_is_there_and_what_comes(either: Any, name: str) -> N
             changes = next(resumed)
         assert [(e.hull.hull_id, e.kind.name) for e in changes.events] == [(f"{name}/a", "PRESENT")]
         np.testing.assert_array_equal(changes.events[0].box, [[0, 0, 0], [1, 1, 1]])
-        assert not changes.anew
+        assert not changes.restarted
 
 
 def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) -> None:

@@ -35,7 +35,7 @@ void ServiceProgram::WatchHulls() {
   HullWatchCheck resumed(request);
   if (!WatchHullsOnce(request, false, &resumed) || !finding_.empty()) return;
   Reach("WatchHulls resumed");
-  if (resumed.is_anew() || !resumed.hulls().empty()) Note("a watch resumes as if it were new");
+  if (resumed.is_restarted() || !resumed.hulls().empty()) Note("a watch resumes as if it were new");
 }
 
 bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool then_change,
@@ -57,7 +57,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   };
   bool told = read_until([&] { return check->is_synced(); });
   // A resumed watch reports the changes only.
-  const bool tells_all = !Resumes(request) || check->is_anew();
+  const bool tells_all = !Resumes(request) || check->is_restarted();
   if (told && tells_all) CompareWatched(*check);
   if (told && then_change) {
     const auto before = hulls_;

@@ -38,12 +38,12 @@ bool HullWatchCheck::Watches(const std::string& hull_id) const {
 }
 
 std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
-  if (response.anew()) {
-    if (!Resumes(request_)) return "a watch from the start starts anew";
+  if (response.restarted()) {
+    if (!Resumes(request_)) return "a watch from the start restarts";
     hulls_.clear();
     bodies_.clear();
     is_synced_ = false;
-    is_anew_ = true;
+    is_restarted_ = true;
   } else if (response.header().revision() < header_.revision()) {
     return "the revision of a watch falls";
   }
@@ -85,7 +85,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
 std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const v1::HullInfo& hull = event.hull();
   if (!Watches(hull.hull_id())) return "it is not watched";
-  const bool is_resumed = Resumes(request_) && !is_anew_;
+  const bool is_resumed = Resumes(request_) && !is_restarted_;
   const bool was_body = bodies_.erase(hull.hull_id()) > 0;
   const bool was_known = was_body || hulls_.count(hull.hull_id()) > 0;
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {

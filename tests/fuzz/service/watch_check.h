@@ -28,7 +28,7 @@ class HullWatchCheck {
   // By ID. Complete after synced, unless the watch resumed another.
   const std::map<std::string, v1::HullInfo>& hulls() const { return hulls_; }
   bool is_synced() const { return is_synced_; }
-  bool is_anew() const { return is_anew_; }
+  bool is_restarted() const { return is_restarted_; }
   const v1::ResponseHeader& header() const { return header_; }
 
  private:
@@ -40,7 +40,7 @@ class HullWatchCheck {
   std::set<std::string> bodies_;
   v1::ResponseHeader header_;
   bool is_synced_ = false;
-  bool is_anew_ = false;
+  bool is_restarted_ = false;
 };
 
 // Follows one WatchCollisions call and its client's knowledge of the pairs.

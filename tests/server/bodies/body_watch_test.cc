@@ -105,10 +105,10 @@ TEST_F(BodyWatches, WatchHullsReportsBodiesOnRequest) {
 
   const auto put = PutBody("pair", {PlacementOf("cube")});
   ASSERT_TRUE(put.ok());
-  const v1::WatchHullsResponse anew = Told(*both);
-  EXPECT_THAT(Texts(anew), ElementsAre("CHANGED pair of 1"));
-  EXPECT_EQ(anew.events(0).hull().revision(), put->body().revision());
-  EXPECT_EQ(anew.events(0).hull().create_revision(), pair.create_revision());
+  const v1::WatchHullsResponse again = Told(*both);
+  EXPECT_THAT(Texts(again), ElementsAre("CHANGED pair of 1"));
+  EXPECT_EQ(again.events(0).hull().revision(), put->body().revision());
+  EXPECT_EQ(again.events(0).hull().create_revision(), pair.create_revision());
   // A piece grows: the event is about the hull.
   Grow("cube", {3, 0, 0});
   EXPECT_THAT(Texts(Told(*both)), ElementsAre("CHANGED cube"));

@@ -38,7 +38,7 @@ class Watch {
   v1::WatchHullsResponse Next() {
     v1::WatchHullsResponse message;
     while (reader_->Read(&message)) {
-      if (message.events_size() > 0 || message.synced() || message.anew()) break;
+      if (message.events_size() > 0 || message.synced() || message.restarted()) break;
     }
     return message;
   }
@@ -47,7 +47,7 @@ class Watch {
     std::vector<std::string> texts;
     v1::WatchHullsResponse message;
     while (!message.synced() && reader_->Read(&message)) {
-      if (message.anew()) texts.push_back("anew");
+      if (message.restarted()) texts.push_back("restarted");
       for (const v1::HullEvent& event : message.events()) texts.push_back(Text(event));
     }
     EXPECT_TRUE(message.synced());
@@ -169,7 +169,7 @@ TEST_F(WatchHulls, ResumesAfterTheLastHeader) {
   EXPECT_THAT(Watch(*hulls_, resume).ReadUntilSynced(), ElementsAre("DELETED a", "PRESENT b"));
   Restart(TestConfig());
   Create("c");
-  EXPECT_THAT(Watch(*hulls_, resume).ReadUntilSynced(), ElementsAre("anew", "PRESENT c"));
+  EXPECT_THAT(Watch(*hulls_, resume).ReadUntilSynced(), ElementsAre("restarted", "PRESENT c"));
 }
 
 TEST_F(WatchHulls, EndsWhenTheServerDrains) {
@@ -247,7 +247,7 @@ TEST_F(WatchHulls, AReaderFarBehindReceivesPresentAfterSynced) {
   while (received.size() < kHulls) {
     const v1::WatchHullsResponse message = watch.Next();
     ASSERT_GT(message.events_size(), 0);
-    EXPECT_FALSE(message.synced() || message.anew());
+    EXPECT_FALSE(message.synced() || message.restarted());
     for (const v1::HullEvent& event : message.events()) {
       EXPECT_TRUE(received.insert(event.hull().hull_id()).second);
       kinds.insert(event.kind());
@@ -283,13 +283,13 @@ class Mirror {
   using State = std::map<std::string, std::pair<uint64_t, uint64_t>>;
 
   void Fold(const v1::WatchHullsResponse& message) {
-    if (message.anew()) {
+    if (message.restarted()) {
       state_.clear();
       is_synced_ = false;
     }
     const uint64_t before = header_.revision();
     for (const v1::HullEvent& event : message.events()) FoldEvent(event, before);
-    EXPECT_TRUE(message.anew() || message.header().revision() >= header_.revision());
+    EXPECT_TRUE(message.restarted() || message.header().revision() >= header_.revision());
     header_ = message.header();
     is_synced_ = is_synced_ || message.synced();
   }
@@ -528,7 +528,7 @@ TEST_F(WatchHulls, TheClientGoesOnAfterARestart) {
   do {
     message = watch.Next();
     ASSERT_TRUE(message.ok()) << message.status();
-  } while (!message->anew());
+  } while (!message->restarted());
   EXPECT_EQ(Watch::Text(message->events(0)), "PRESENT b");
   watch.Cancel();
   while (message.ok()) message = watch.Next();

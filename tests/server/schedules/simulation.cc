@@ -217,7 +217,7 @@ void Simulate(Reached& reached) {
   };
   run([](Simulation& simulation) { RunClients(simulation); });
   if (store.was_killed() || Scheduler::Current().random().OneIn(4)) {
-    Scheduler::Current().Note("test: opens the store anew");
+    Scheduler::Current().Note("test: reopens the store");
     store.Reopen({});
     run([](Simulation& simulation) { Client(simulation).CheckAll(); });
   }

@@ -304,14 +304,14 @@ class HullChanges:
 
     header: every change up to this revision is in this message or an earlier one, unless a later
     change superseded it; a watch resumes from here. events: each hull at most once. synced: the
-    initial state is complete; later events are changes as they are committed. anew: discard all
+    initial state is complete; later events are changes as they are committed. restarted: discard all
     earlier events; the watch starts again with the full state.
     """
 
     header: Header
     events: Sequence[HullEvent]
     synced: bool
-    anew: bool
+    restarted: bool
 
 
 # --- From the contract's messages ---
@@ -419,7 +419,7 @@ def decode_changes(data: bytes) -> HullChanges:
         )
         for event in message.events
     )
-    return HullChanges(header_of(message.header), events, message.synced, message.anew)
+    return HullChanges(header_of(message.header), events, message.synced, message.restarted)
 
 
 _MESH_HEADER, _MESH_VERTICES, _MESH_FACETS = 1, 2, 3

@@ -20,7 +20,7 @@ class WatchPosition:
         with the full state, without deletions in between, which the message then states."""
         resumed = self.after is not None and self.after.revision > 0
         if first and self._has_events and not resumed:
-            changes = dataclasses.replace(changes, anew=True)
+            changes = dataclasses.replace(changes, restarted=True)
         self.connected = True
         self._has_events = self._has_events or bool(changes.events)
         self.after = changes.header
