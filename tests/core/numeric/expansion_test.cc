@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "tests/test_size.h"
+
 namespace hulld {
 namespace expansion_test {
 
@@ -34,7 +36,7 @@ double RandomDouble(std::mt19937_64& random) {
 
 TEST(Expansion, TwoSumAndTwoProductAreExact) {
   std::mt19937_64 random(1);
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < TestSize(20000, 2000); ++i) {
     const double a = RandomDouble(random);
     const double b = RandomDouble(random);
     const SumWithError sum = TwoSum(a, b);
@@ -46,7 +48,7 @@ TEST(Expansion, TwoSumAndTwoProductAreExact) {
 
 TEST(Expansion, SumsAndProductsAreExactAndNonoverlapping) {
   std::mt19937_64 random(2);
-  for (int i = 0; i < 5000; ++i) {
+  for (int i = 0; i < TestSize(5000, 500); ++i) {
     double x[8];
     for (double& value : x) value = RandomDouble(random);
     const auto e = Expansion<2>::DifferenceOf(x[0], x[1]) * Expansion<2>::DifferenceOf(x[2], x[3]);

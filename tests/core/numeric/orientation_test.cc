@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/test_size.h"
+
 namespace hulld {
 namespace orientation_test {
 
@@ -254,7 +256,7 @@ TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
   const double values[] = {0x1p60 - 0x1p8, -(0x1p60 - 0x1p8), 0x1p60, 1, -1, 0.5};
   const OrientationCounts before = ThreadOrientationCounts();
   for (const int scale : {-1070, -60, 0, 900}) {
-    for (int i = 0; i < 8000; ++i) {
+    for (int i = 0; i < TestSize(8000, 1000); ++i) {
       Points p;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(values[pick(random)], scale);
@@ -273,7 +275,7 @@ TEST(Orient3d, ExactOnMixedMagnitudes) {
                            1e-30, -1,       1,       1e16,     -1e16,   1e150,    -1e300,
                            1e308, -1.7e308, 1.7e308, 0x1p-306, 0x1p330, -0x1p-307};
   std::uniform_int_distribution<size_t> pick(0, std::size(values) - 1);
-  for (int i = 0; i < 5000; ++i) {
+  for (int i = 0; i < TestSize(5000, 500); ++i) {
     Points p;
     for (Vector& v : p)
       v = Vector(values[pick(random)], values[pick(random)], values[pick(random)]);

@@ -14,7 +14,7 @@ namespace hulld {
 namespace contact_matrix_test {
 
 #ifdef HULLD_SANITIZED
-constexpr int kStride = 7;
+constexpr int kStride = 23;
 constexpr int kFlatRounds = 600;
 #else
 constexpr int kStride = 1;

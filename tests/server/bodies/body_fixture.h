@@ -20,6 +20,8 @@ class BodyTest : public ServerTest {
     ClientOptions options;
     options.server = server_->address();
     options.own_connection = true;
+    // Reports a refusal instead of retrying until the deadline.
+    options.retry.max_attempts = 1;
     return Client(options);
   }
 

@@ -17,6 +17,7 @@
 #include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace hull_builder_test {
@@ -546,7 +547,7 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
 
 TEST(HullBuilder, ASnapshotStopsAtEveryPoll) {
   Random random(112);
-  constexpr int kVertices = 20000;
+  constexpr int kVertices = TestSize(20000, 4000);
   // Three passes over 2 V - 4 triangles, and seven over V vertices.
   ExpectToStopAnywhere(RandomOnSphere(random, kVertices, 2),
                        3 * (2 * kVertices - 4) + 7 * kVertices);

@@ -17,6 +17,7 @@
 #include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace hull_cost_test {
@@ -239,7 +240,7 @@ HullBuilder BuiltOneByOne(std::span<const Vector> points) {
 // expansions or integers of any size.
 TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
   for (const Extreme& extreme : Extremes()) {
-    for (const int n : {1000, 5000}) {
+    for (const int n : {TestSize(1000, 200), TestSize(5000, 1000)}) {
       if (extreme.needs == Arithmetic::kIntegers) continue;
       if (extreme.facets_one_by_one != nullptr && n > 2000) continue;
       const std::vector<Vector> points = extreme.make(n);

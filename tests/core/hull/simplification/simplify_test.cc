@@ -19,6 +19,7 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/oracle/brute_force_hausdorff.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace simplify_test {
@@ -173,7 +174,7 @@ TEST(SimplifyTarget, StopsWhenAsked) {
 
 // A stop at any poll ends the call with the caller's status.
 TEST(SimplifyTarget, StopsAtEveryStage) {
-  const Hull full = HullOf(Sphere(3000, 7));
+  const Hull full = HullOf(Sphere(TestSize(3000, 600), 7));
   for (const SimplifyTarget& limits : {SimplifyTarget{0, 0.02, {}}, SimplifyTarget{200, 0, {}}}) {
     int polls = 0;
     int last = INT_MAX;
@@ -354,7 +355,7 @@ void ExpectTrueForAllTargets(const Hull& full) {
 
 TEST(SimplifyOracle, SmallHullsAreNestedWithinTheirErrors) {
   Random random(TestSeed(22));
-  for (int k = 0; k < 12; ++k) {
+  for (int k = 0; k < TestSize(12, 2); ++k) {
     SCOPED_TRACE(k);
     ExpectTrueForAllTargets(HullOf(RandomLatticePoints(random, 24, 12)));
     ExpectTrueForAllTargets(HullOf(RandomOnSphere(random, 14, 3.0)));
@@ -365,7 +366,7 @@ TEST(SimplifyOracle, SmallHullsAreNestedWithinTheirErrors) {
 class SimplifyExtremeClouds : public testing::TestWithParam<Extreme> {};
 
 TEST_P(SimplifyExtremeClouds, AreNestedWithinTheirErrors) {
-  std::vector<Vector> points = GetParam().make(16);
+  std::vector<Vector> points = GetParam().make(TestSize(16, 12));
   if (points.size() > 18) points.resize(18);
   ExpectTrueForAllTargets(HullOf(points));
 }
@@ -377,7 +378,7 @@ INSTANTIATE_TEST_SUITE_P(Clouds, SimplifyExtremeClouds,
 TEST(SimplifyOracle, DistancesBeyondTheLargestDoubleAreInfinite) {
   Random random(TestSeed(23));
   bool has_infinite = false;
-  for (int k = 0; k < 20; ++k) {
+  for (int k = 0; k < TestSize(20, 5); ++k) {
     std::vector<Vector> points;
     for (int i = 0; i < 12; ++i) {
       const auto x = [&] { return random.Real(-1, 1) * 0x1.fffffffffffffp+1023; };

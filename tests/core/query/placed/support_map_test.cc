@@ -16,15 +16,13 @@
 #include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace support_map_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kDirections = 300;
-#else
-constexpr int kDirections = 3000;
-#endif
+constexpr int kDirections = TestSize(3000, 100);
+constexpr int kCorners = TestSize(20000, 4000);
 
 struct NamedSet {
   std::string name;
@@ -69,7 +67,7 @@ std::vector<NamedSet> Sets(Random& random) {
   std::vector<Vector> polygon = RandomOnSphere(random, 300, 1);
   for (Vector& p : polygon) p.z() = 0;
   sets.push_back({"polygon", polygon});
-  for (NamedSet& curved : CurvedSets(20000)) {
+  for (NamedSet& curved : CurvedSets(kCorners)) {
     curved.name = "large " + curved.name;
     sets.push_back(std::move(curved));
   }
@@ -247,13 +245,14 @@ TEST(SupportMap, ExtremeCoordinatesAreScanned) {
 // A map of V points takes O(V) memory for every set: sixteen times as many points take at most
 // about sixteen times as much.
 TEST(SupportMap, MemoryIsLinearForPointsAlongCurves) {
-  const std::vector<NamedSet> small = CurvedSets(4000);
-  const std::vector<NamedSet> large = CurvedSets(64000);
+  constexpr int kMany = TestSize(64000, 16000);
+  const std::vector<NamedSet> small = CurvedSets(kMany / 16);
+  const std::vector<NamedSet> large = CurvedSets(kMany);
   for (size_t i = 0; i < small.size(); ++i) {
     const double few = static_cast<double>(SupportMap(small[i].points).MemoryBytes());
     const double many = static_cast<double>(SupportMap(large[i].points).MemoryBytes());
     EXPECT_LT(many, 24 * few) << large[i].name;
-    EXPECT_LT(many, 600.0 * 64000) << large[i].name;
+    EXPECT_LT(many, 600.0 * kMany) << large[i].name;
   }
 }
 

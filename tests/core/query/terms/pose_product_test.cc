@@ -12,6 +12,7 @@
 #include "core/query/placed/placed_hull.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/body/rational_world.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace pose_product_test {
@@ -62,7 +63,7 @@ TEST(PoseProduct, RoundsWithinItsBounds) {
   Random random(TestSeed(1));
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const QueryHull query_cube(cube);
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < TestSize(300, 50); ++round) {
     Pose outer = RandomPose(random, std::ldexp(1.0, random.Between(-300, 300)));
     Pose inner = RandomPose(random, std::ldexp(1.0, random.Between(-300, 300)));
     if (round % 3 == 0) outer.q[random.Below(4)] *= std::ldexp(1.0, -random.Between(20, 900));
@@ -182,7 +183,7 @@ TEST(PoseProduct, WideProductsAreExactToo) {
 TEST(PoseProduct, ExtremesOfScaleAreDecidedAsRationalNumbersAre) {
   Random random(TestSeed(6));
   const std::array<double, 8> scales = {0x1p-1060, 1e-300, 1e-150, 1e-20, 1, 1e20, 1e150, 1e307};
-  for (int round = 0; round < 120; ++round) {
+  for (int round = 0; round < TestSize(120, 20); ++round) {
     const double size_a = scales[random.Below(8)];
     const double size_b = scales[random.Below(8)];
     const auto a = BuildHull(Scaled(RandomLatticePoints(random, 5, 3), size_a / 4));
