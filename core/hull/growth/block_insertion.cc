@@ -28,6 +28,10 @@ constexpr size_t kManyPerTriangle = 32;
 constexpr double kFineMapFineness = 5.6;
 constexpr double kWalksPerSurvivor = 0.6;
 
+// Share of duplicates in a sample above which the rest of the block is inserted in rounds, whose
+// order makes neighbors share memory.
+constexpr double kMostDuplicates = 0.875;
+
 // One call of InsertBlock.
 //
 // In most clouds, most points are inside. Samples of growing size shape the surface; then the map
@@ -44,8 +48,9 @@ class BlockInsertion {
         poll_(poll) {}
 
   bool Run() {
-    // A triangle's list takes memory even if it is unused.
-    if (!surface_.IsMeasurable() || 64 * points_.size() < surface_.triangle_count()) {
+    // Measuring a triangle and allocating its list cost about as much as a point inserted in
+    // rounds.
+    if (!surface_.IsMeasurable() || points_.size() < surface_.triangle_count()) {
       return InsertRounds();
     }
     for (size_t stride = FirstStride(); stride > 0; stride /= kSampleRatio) {
@@ -91,8 +96,8 @@ class BlockInsertion {
     ConflictLists lists(surface_, vertices_, poll_);
     if (surface_.triangle_count() <= kMostTrianglesToTest) {
       lists.Take(Sample(stride));
-    } else {
-      TakeByDirection(stride, lists);
+    } else if (!TakeByDirection(stride, lists)) {
+      return ConflictLists::Outcome::kGaveUp;
     }
     const ConflictLists::Outcome outcome = lists.InsertAll();
     if (outcome == ConflictLists::Outcome::kStopped) return outcome;
@@ -124,12 +129,14 @@ class BlockInsertion {
     }
   }
 
-  // Locates each point of the sample and adds the points outside to the lists.
-  void TakeByDirection(size_t stride, ConflictLists& lists) {
+  // Locates each point of the sample and adds the points outside to the lists. Returns false, and
+  // adds none, if most of the sample are duplicates.
+  bool TakeByDirection(size_t stride, ConflictLists& lists) {
     std::vector<Vector> outside;
     std::vector<TriangleId> seen;
+    size_t duplicates = 0;
     for (const Vector& p : SurvivorsOf(stride)) {
-      if (poll_.Step()) return;
+      if (poll_.Step()) return true;
       // Consecutive points are often close to each other.
       if (!seen.empty() && surface_.IsCertainlySeenFrom(vertices_, seen.back(), p)) {
         outside.push_back(p);
@@ -144,9 +151,16 @@ class BlockInsertion {
         seen.push_back(location->triangle);
       } else if (const auto corner = surface_.CornerAt(vertices_, location->triangle, p)) {
         vertices_.CountDuplicate(*corner);
+        ++duplicates;
       }
     }
-    lists.Take(outside, seen);
+    if (static_cast<double>(duplicates) > kMostDuplicates * static_cast<double>(asked_)) {
+      rest_ = std::move(outside);
+      rest_.insert(rest_.end(), astray_.begin(), astray_.end());
+      return false;
+    }
+    lists.Take(outside, seen, asked_);
+    return true;
   }
 
   // Returns the points of a sample that neither the map of directions nor, if many remain, a finer
@@ -155,7 +169,7 @@ class BlockInsertion {
     surface_.MeasureBefore(vertices_, points_.size() / stride, kBlockMapFineness,
                            kBlockWalksPerPoint, poll_);
     std::vector<Vector> survivors;
-    size_t asked = 0;
+    asked_ = 0;
     for (const Range& range : RangesOf(stride)) {
       const std::span<const Vector> points = points_.subspan(range.first, range.end - range.first);
       indices_.clear();
@@ -164,9 +178,9 @@ class BlockInsertion {
       for (const uint32_t i : indices_) {
         if (!IsDone(range.first + i)) survivors.push_back(points[i]);
       }
-      asked += points.size();
+      asked_ += points.size();
     }
-    surface_.CountRejected(asked, asked - survivors.size());
+    surface_.CountRejected(asked_, asked_ - survivors.size());
     if (survivors.size() > kManyPerTriangle * surface_.triangle_count() &&
         surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor,
                                poll_)) {
@@ -198,6 +212,8 @@ class BlockInsertion {
   std::vector<Vector> astray_;
   // Points to insert in rounds.
   std::vector<Vector> rest_;
+  // Number of points of the sample that were looked up in the map.
+  size_t asked_ = 0;
   // Surviving indices among the points being looked up in the map.
   std::vector<uint32_t> indices_;
 };

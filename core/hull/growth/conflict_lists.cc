@@ -20,6 +20,7 @@ constexpr size_t kMostMoves = 32;
 
 void ConflictLists::Take(std::span<const Vector> points) {
   CountTaken(points);
+  sample_size_ = points.size();
   std::vector<TriangleId> targets;
   surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { targets.push_back(id); });
   sources_.clear();
@@ -32,13 +33,13 @@ void ConflictLists::Take(std::span<const Vector> points) {
   }
   sources_.push_back(all);
   Distribute(targets);
-  is_trial_ = true;
 }
 
-void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen) {
+void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen,
+                         size_t sample_size) {
   HULLD_CHECK(points.size() == seen.size());
   CountTaken(points);
-  is_trial_ = false;
+  sample_size_ = sample_size;
   std::vector<TriangleId> targets;
   // Place among the targets, from 1, by triangle.
   std::vector<uint32_t> place(surface_.id_bound(), 0);
@@ -84,8 +85,8 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
 // True if most points are outside, judged after the first insertions. These add far points, so most
 // of a cloud is inside by then, or never will be.
 bool ConflictLists::IsMostlyOutside(size_t insertions) {
-  if (insertions != kTrialInsertions || !is_trial_) return false;
-  return 8 * (waiting_ + insertions) > 7 * taken_;
+  if (insertions != kTrialInsertions) return false;
+  return 8 * (waiting_ + insertions) > 7 * sample_size_;
 }
 
 std::vector<Vector> ConflictLists::TakeRest() {

@@ -29,7 +29,8 @@ class ConflictLists {
     kDone,
     // The poll stopped.
     kStopped,
-    // The points are moved so often that another order of insertion is faster; see TakeRest.
+    // The points are moved so often, or so many of them are outside, that another order of
+    // insertion is faster; see TakeRest.
     kGaveUp
   };
 
@@ -41,8 +42,9 @@ class ConflictLists {
   // Takes points at any location; points inside are counted and dropped. Requires: no pending
   // points. Cost: one test per point and triangle of the surface.
   void Take(std::span<const Vector> points);
-  // Takes points that see seen[i] strictly. Requires: no pending points.
-  void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
+  // Takes the points outside of a sample of sample_size points; points[i] sees seen[i] strictly.
+  // Requires: no pending points.
+  void Take(std::span<const Vector> points, std::span<const TriangleId> seen, size_t sample_size);
 
   // Adds all pending points.
   Outcome InsertAll();
@@ -94,8 +96,8 @@ class ConflictLists {
   size_t waiting_ = 0;
   size_t taken_ = 0;
   size_t moved_ = 0;
-  // True if the points were taken without triangles that they see.
-  bool is_trial_ = false;
+  // Number of points of the last sample, including those that were not taken.
+  size_t sample_size_ = 0;
   // Largest absolute coordinate of a point.
   double size_ = 0;
 
