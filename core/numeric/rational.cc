@@ -39,6 +39,25 @@ Rounded Round(double mantissa, int exponent) {
   return {value, std::abs(value) * kRoundedRelativeError + kLeastDouble};
 }
 
+// A square root as mantissa * 2^exponent, rounded down, with a relative error below 2^-63.
+ScaledInteger SquareRoot(const Integer& numerator, const Integer& denominator, int exponent) {
+  const int half = (kQuotientBits + BitsOf(denominator) - BitsOf(numerator)) / 2;
+  const Integer quotient = half >= 0 ? Integer((numerator << 2 * half) / denominator)
+                                     : Integer(numerator / (denominator << -2 * half));
+  return {sqrt(quotient), exponent - half};
+}
+
+// Returns x in units of 2^exponent. Requires: exponent <= x.exponent.
+Integer InUnits(const ScaledInteger& x, int exponent) {
+  HULLD_DCHECK(exponent <= x.exponent);
+  return x.mantissa << (x.exponent - exponent);
+}
+
+ScaledInteger Sum(const ScaledInteger& x, const ScaledInteger& y) {
+  const int exponent = std::min(x.exponent, y.exponent);
+  return {InUnits(x, exponent) + InUnits(y, exponent), exponent};
+}
+
 }  // namespace
 
 ScaledDouble ToScaledDouble(const Integer& value) {
@@ -89,25 +108,44 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent) {
   HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0);
   if (numerator.is_zero()) return {0, 0};
-  const int half = (kQuotientBits + BitsOf(denominator) - BitsOf(numerator)) / 2;
-  const Integer quotient = half >= 0 ? Integer((numerator << 2 * half) / denominator)
-                                     : Integer(numerator / (denominator << -2 * half));
-  const ScaledDouble scaled = ToScaledDouble(sqrt(quotient));
-  return Round(scaled.mantissa, scaled.exponent - half + exponent);
+  const ScaledInteger root = SquareRoot(numerator, denominator, exponent);
+  const ScaledDouble scaled = ToScaledDouble(root.mantissa);
+  return Round(scaled.mantissa, scaled.exponent + root.exponent);
+}
+
+ScaledInteger ExactSum(std::span<const double> terms) {
+  ScaledInteger sum{0, kAboveAllExponents};
+  for (const double term : terms) {
+    if (term == 0) continue;
+    const int exponent = LowestBitExponent(term);
+    sum = Sum(sum, {ToInteger(term, exponent), exponent});
+  }
+  return sum;
 }
 
 int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
-                      double threshold) {
-  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0 && threshold >= 0);
-  if (threshold == 0) return Sign(numerator);
-  const int lowest = LowestBitExponent(threshold);
-  const Integer odd = ToInteger(threshold, lowest);
-  // Compares numerator * 4^exponent with odd^2 * 4^lowest * denominator.
-  const int shift = 2 * (exponent - lowest);
+                      const ScaledInteger& threshold) {
+  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0 && Sign(threshold.mantissa) >= 0);
+  // Compares numerator * 4^exponent with threshold^2 * denominator.
+  const int shift = 2 * (exponent - threshold.exponent);
   Integer left = numerator;
-  Integer right = odd * odd * denominator;
+  Integer right = threshold.mantissa * threshold.mantissa * denominator;
   (shift >= 0 ? left : right) <<= std::abs(shift);
   return left < right ? -1 : left > right ? 1 : 0;
+}
+
+// A difference d - t of positive numbers is (d^2 - t^2) / (d + t): the numerator is exact, and the
+// sum of positive numbers is as accurate as its terms.
+Rounded RoundRootMinus(int sign, const Integer& numerator, const Integer& denominator, int exponent,
+                       const ScaledInteger& offset) {
+  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0 && Sign(offset.mantissa) >= 0);
+  if (sign == 0 || numerator.is_zero()) return RoundRatio(-offset.mantissa, 1, offset.exponent);
+  const ScaledInteger sum = Sum(SquareRoot(numerator, denominator, exponent), offset);
+  if (sign < 0) return RoundRatio(-sum.mantissa, 1, sum.exponent);
+  const ScaledInteger squares =
+      Sum({numerator, 2 * exponent},
+          {-offset.mantissa * offset.mantissa * denominator, 2 * offset.exponent});
+  return RoundRatio(squares.mantissa, denominator * sum.mantissa, squares.exponent - sum.exponent);
 }
 
 }  // namespace hulld

@@ -1,6 +1,8 @@
 #ifndef HULLD_CORE_NUMERIC_RATIONAL_H_
 #define HULLD_CORE_NUMERIC_RATIONAL_H_
 
+#include <span>
+
 #include "core/numeric/integer.h"
 
 namespace hulld {
@@ -32,10 +34,24 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
 // Returns sqrt(numerator / denominator) * 2^exponent. Requires: numerator >= 0, denominator > 0.
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent);
 
+// mantissa * 2^exponent.
+struct ScaledInteger {
+  Integer mantissa;
+  int exponent = 0;
+};
+
+// Returns the exact sum of doubles. Requires: finite terms.
+ScaledInteger ExactSum(std::span<const double> terms);
+
 // Returns the sign of sqrt(numerator / denominator) * 2^exponent - threshold, exactly. Requires:
-// numerator >= 0, denominator > 0, threshold finite and >= 0.
+// numerator >= 0, denominator > 0, threshold >= 0.
 int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
-                      double threshold);
+                      const ScaledInteger& threshold);
+
+// Returns sign * sqrt(numerator / denominator) * 2^exponent - offset, without loss by cancellation.
+// Requires: numerator >= 0, denominator > 0, offset >= 0.
+Rounded RoundRootMinus(int sign, const Integer& numerator, const Integer& denominator, int exponent,
+                       const ScaledInteger& offset);
 
 }  // namespace hulld
 

@@ -50,11 +50,11 @@ SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n) {
   return axis;
 }
 
-std::optional<IntegerVector> ExactAxis(const Decision& decision) {
-  if (const Vector* n = std::get_if<Vector>(&decision.axis)) {
+std::optional<IntegerVector> ExactAxis(const ExactDirection& axis) {
+  if (const Vector* n = std::get_if<Vector>(&axis)) {
     return ToInteger(*n, LowestBitExponent(*n, kAboveAllExponents));
   }
-  if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) return *n;
+  if (const IntegerVector* n = std::get_if<IntegerVector>(&axis)) return *n;
   return std::nullopt;
 }
 

@@ -4,9 +4,10 @@
 #include <optional>
 
 #include "core/numeric/integer.h"
+#include "core/numeric/vector.h"
 #include "core/query/exact/exact_pair.h"
-#include "core/query/ladder.h"
 #include "core/query/terms/axis.h"
+#include "core/query/terms/certificate.h"
 
 namespace hulld {
 
@@ -17,8 +18,9 @@ namespace hulld {
 // proven this). Cost: O(V) and a scan of the facets.
 SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n);
 
-// Returns the axis of a decision as integers, exactly; none if the hulls overlap.
-std::optional<IntegerVector> ExactAxis(const Decision& decision);
+// Returns the axis of a decision, or the direction of a certificate, as integers, exactly; none if
+// the hulls overlap.
+std::optional<IntegerVector> ExactAxis(const ExactDirection& axis);
 
 // Returns n rounded to unit length, within an angle of kUnitDirectionAngle. Requires: n not zero.
 Vector UnitDirection(const IntegerVector& n);

@@ -11,8 +11,6 @@
 #include "core/numeric/vector.h"
 
 namespace hulld {
-namespace {}  // namespace
-
 Box Box::Empty() { return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)}; }
 
 Box GrownBy(const Box& box, double clearance) {
@@ -47,6 +45,7 @@ Box BoundingBox(const PlacedHull& placed) {
     box.high[axis] = t[axis] + hull.Farthest(n).value + error;
     box.low[axis] = t[axis] - hull.Farthest(-n).value - error;
   }
+  for (const double radius : placed.radii()) box = GrownBy(box, radius);
   return box;
 }
 

@@ -27,8 +27,8 @@ struct Box {
   }
 };
 
-// Returns a box (world frame) that certainly contains the hull. Covers all of space beyond the
-// range of doubles. Empty for an empty hull.
+// Returns a box (world frame) that certainly contains the rounded hull. Covers all of space beyond
+// the range of doubles. Empty for an empty hull.
 Box BoundingBox(const PlacedHull& placed);
 
 // Returns a box, rounded outwards, that contains all points within `clearance` >= 0 of `box`.

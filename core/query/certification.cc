@@ -12,6 +12,7 @@
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/rational.h"
 #include "core/query/exact/exact_nearest.h"
 
 namespace hulld {
@@ -28,16 +29,26 @@ IntegerVector Reduced(const IntegerVector& n) {
   return {n.x / divisor, n.y / divisor, n.z / divisor};
 }
 
-// Returns n in its shortest form. The support along the result has the sign `sign` of the support
-// along n, -1 or 0.
-std::variant<std::monostate, Vector, IntegerVector> Shortest(ExactPair& pair,
-                                                             const IntegerVector& n, int sign) {
+IntegerVector ExactlyOf(const Vector& n) {
+  return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
+}
+
+// Returns n in its shortest form for which `proves` holds, as it does for n.
+template <typename Proves>
+ExactDirection Shortest(const IntegerVector& n, const Proves& proves) {
   IntegerVector reduced = Reduced(n);
   // A power of two scales the components to at most 2, for readability.
   const Vector rounded = ToScaledDoubles(reduced) * 0x1p-62;
-  const IntegerVector exact = ToInteger(rounded, LowestBitExponent(rounded, kAboveAllExponents));
-  if (SignOfSupport(pair, exact) <= sign) return rounded;
+  if (proves(ExactlyOf(rounded))) return rounded;
   return reduced;
+}
+
+// Returns the sign of the gap between the cores along n minus the sum of the radii.
+int CompareGap(ExactPair& pair, const IntegerVector& n, const ScaledInteger& radii) {
+  const Integer gap = -Dot(n, pair.Farthest(n).w);
+  if (Sign(gap) < 0) return -1;
+  return CompareSquareRoot(gap * gap, pair.norm() * pair.norm() * Dot(n, n), pair.exponent(),
+                           radii);
 }
 
 // Finds vertices of A - B that surround the origin.
@@ -127,7 +138,8 @@ absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& de
   certificate.direction = decision.axis;
   if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) {
     const int sign = decision.relation == Relation::kSeparated ? -1 : 0;
-    certificate.direction = Shortest(exact, *n, sign);
+    certificate.direction = Shortest(
+        *n, [&](const IntegerVector& short_n) { return SignOfSupport(exact, short_n) <= sign; });
     if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
   }
   const std::span<const VertexPair> known(decision.pairs.data(), decision.pair_count);
@@ -144,6 +156,34 @@ absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& de
     if (!pairs.ok()) return pairs.status();
     certificate.pairs = *std::move(pairs);
   }
+  return certificate;
+}
+
+absl::StatusOr<Certificate> MakeRoundedCertificate(ExactPair& exact, Relation relation,
+                                                   const Vector& hint,
+                                                   std::span<const VertexPair> seed,
+                                                   const std::function<bool()>& should_stop) {
+  HULLD_CHECK(relation != Relation::kWithinTolerance);
+  const ScaledInteger radii = exact.filter().RadiiPlus(0).Exact();
+  Certificate certificate;
+  const auto proves = [&](const IntegerVector& n) {
+    return CompareGap(exact, n, radii) >= (relation == Relation::kSeparated ? 1 : 0);
+  };
+  if (relation == Relation::kSeparated && !hint.isZero()) {
+    const bool is_proof = proves(ExactlyOf(hint));
+    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
+    if (is_proof) {
+      certificate.direction = hint;
+      return certificate;
+    }
+  }
+  absl::StatusOr<ExactNearest> nearest = FindNearestExactly(exact, seed, should_stop);
+  if (!nearest.ok()) return nearest.status();
+  if (relation != Relation::kOverlapping) {
+    certificate.direction = Shortest(-PointOf(exact, nearest->point), proves);
+    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
+  }
+  if (relation != Relation::kSeparated) certificate.pairs = std::move(nearest->point.pairs);
   return certificate;
 }
 

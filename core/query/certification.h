@@ -4,10 +4,14 @@
 #include <absl/status/statusor.h>
 
 #include <functional>
+#include <span>
 
+#include "core/numeric/vector.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/ladder.h"
 #include "core/query/terms/certificate.h"
+#include "core/query/terms/relation.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -17,6 +21,15 @@ namespace hulld {
 // CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop);
+
+// Returns the certificate of a relation of rounded hulls, not both of radius 0: the direction in
+// which the cores are nearest, and the pairs of vertices that surround the nearest point of A - B.
+// `hint`: a direction that may prove SEPARATED; zero if unknown. `seed`: pairs of vertices near
+// that point; at most four, may be empty. Otherwise as MakeCertificate.
+absl::StatusOr<Certificate> MakeRoundedCertificate(ExactPair& exact, Relation relation,
+                                                   const Vector& hint,
+                                                   std::span<const VertexPair> seed,
+                                                   const std::function<bool()>& should_stop);
 
 }  // namespace hulld
 

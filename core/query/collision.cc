@@ -14,9 +14,12 @@
 #include "core/query/axis_description.h"
 #include "core/query/certification.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_pair.h"
 #include "core/query/ladder.h"
+#include "core/query/rounded.h"
 #include "core/query/separation.h"
+#include "core/query/terms/separation_bounds.h"
 #include "core/query/textbook_sat.h"
 
 namespace hulld {
@@ -49,6 +52,7 @@ std::weak_ordering Compare(const PoseProduct* a, const PoseProduct* b) {
 [[gnu::noinline]] std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
   if (const auto order = Compare(a.X_WH(), b.X_WH()); order != 0) return order;
   if (const auto order = Compare(a.product(), b.product()); order != 0) return order;
+  if (const auto order = Compare(a.radii(), b.radii()); order != 0) return order;
   const QueryHull& hull_a = a.query_hull();
   const QueryHull& hull_b = b.query_hull();
   if (const auto order = hull_a.point_count() <=> hull_b.point_count(); order != 0) return order;
@@ -65,6 +69,17 @@ bool IsInOrder(const PlacedHull& a, const PlacedHull& b) {
   const double x_a = a.X_WH().t.x();
   const double x_b = b.X_WH().t.x();
   return x_a == x_b ? Compare(a, b) <= 0 : x_a < x_b;
+}
+
+bool IsRounded(const PlacedHull& a, const PlacedHull& b) {
+  return a.is_rounded() || b.is_rounded();
+}
+
+// OK, or INVALID_ARGUMENT if the textbook method is requested for rounded hulls.
+absl::Status ValidateRadii(const PlacedHull& a, const PlacedHull& b, const QueryOptions& options) {
+  if (options.method != Method::kTextbookSat || !IsRounded(a, b)) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the textbook method applies to hulls without a radius; leave out one of them");
 }
 
 AxisKind Mirrored(AxisKind kind) {
@@ -95,10 +110,34 @@ Answer Mirrored(Answer answer) {
   return answer;
 }
 
+bool WantsSeparation(const QueryOptions& options) {
+  return options.want_separation || options.want_witness || options.want_normal ||
+         options.clearance.has_value();
+}
+
 // Returns true if the answer needs more than the relation, the axis and the analysis.
 bool NeedsMore(const QueryOptions& options) {
-  return options.want_certificate || options.want_separation || options.want_witness ||
-         options.want_normal || options.clearance.has_value();
+  return options.want_certificate || WantsSeparation(options);
+}
+
+// Adds the requested details of the separation. `decision`: of the cores.
+absl::Status AddSeparation(const FloatPair& pair, const Decision& decision, bool cold,
+                           const QueryOptions& options, Answer& answer) {
+  if (!WantsSeparation(options)) return absl::OkStatus();
+  const SeparationRequest request = {options.want_separation, options.want_witness,
+                                     options.want_normal,     options.max_error,
+                                     options.clearance,       options.max_depth_bytes};
+  SeparationAnswer found;
+  if (absl::Status s = FindSeparation(pair, decision, answer.relation, cold, request,
+                                      options.should_stop, found);
+      !s.ok()) {
+    return s;
+  }
+  answer.separation = found.separation;
+  if (found.witness) answer.witness = *found.witness;
+  if (found.normal) answer.normal = *found.normal;
+  answer.within_clearance = found.within_clearance;
+  return absl::OkStatus();
 }
 
 // Adds the requested details beyond the relation, the axis and the analysis.
@@ -110,33 +149,17 @@ absl::Status AddRequestedDetails(const FloatPair& pair, const Decision& decision
     if (!certificate.ok()) return certificate.status();
     answer.certificate = *std::move(certificate);
   }
-  if (!options.want_separation && !options.want_witness && !options.want_normal &&
-      !options.clearance) {
-    return absl::OkStatus();
-  }
-  const SeparationRequest request = {options.want_separation, options.want_witness,
-                                     options.want_normal,     options.max_error,
-                                     options.clearance,       options.max_depth_bytes};
-  SeparationAnswer found;
-  if (absl::Status s = FindSeparation(pair, decision, cold, request, options.should_stop, found);
-      !s.ok()) {
-    return s;
-  }
-  answer.separation = found.separation;
-  if (found.witness) answer.witness = *found.witness;
-  if (found.normal) answer.normal = *found.normal;
-  answer.within_clearance = found.within_clearance;
-  return absl::OkStatus();
+  return AddSeparation(pair, decision, cold, options, answer);
 }
 
 // Adds the description of the axis, and its kind to the analysis.
-absl::Status AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
-                     Answer& answer) {
+absl::Status AddAxis(const FloatPair& pair, const ExactDirection& direction,
+                     uint64_t directions_tried, const QueryOptions& options, Answer& answer) {
   if (options.want_analysis) {
     answer.analysis = Analysis();
-    answer.analysis->axes_tested = decision.directions_tried;
+    answer.analysis->axes_tested = directions_tried;
   }
-  const std::optional<IntegerVector> n = ExactAxis(decision);
+  const std::optional<IntegerVector> n = ExactAxis(direction);
   if (!n) return absl::OkStatus();
   ExactPair exact(pair, options.should_stop);
   SeparatingAxis axis = DescribeAxis(exact, *n);
@@ -160,12 +183,65 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
   answer.relation = decision.relation;
   answer.rung = decision.rung;
   if (options.want_axis || options.want_analysis) {
-    if (absl::Status s = AddAxis(pair, decision, options, answer); !s.ok()) return s;
+    absl::Status s = AddAxis(pair, decision.axis, decision.directions_tried, options, answer);
+    if (!s.ok()) return s;
   }
   if (NeedsMore(options)) {
     absl::Status s = AddRequestedDetails(pair, decision, cache == nullptr, options, answer);
     if (!s.ok()) return s;
   }
+  return answer;
+}
+
+// Adds the axis, the analysis, and the certificate of rounded hulls. The axis is the direction of
+// the certificate.
+absl::Status AddRoundedEvidence(const FloatPair& pair, uint64_t directions_tried,
+                                const QueryOptions& options, Answer& answer) {
+  Certificate certificate;
+  const bool has_axis =
+      answer.relation == Relation::kSeparated || answer.relation == Relation::kTouching;
+  if (has_axis || options.want_certificate) {
+    SeparationBounds bounds;
+    if (pair.usable()) {
+      SeparationGoal goal;
+      goal.relative_error = kDefaultRelativeMaxError;
+      bounds = BoundDistance(pair, -pair.CenterDifference(), goal);
+    }
+    ExactPair exact(pair, options.should_stop);
+    absl::StatusOr<Certificate> made = MakeRoundedCertificate(
+        exact, answer.relation, TowardOrigin(pair, bounds),
+        std::span(bounds.point.pairs).first(bounds.point.count), options.should_stop);
+    if (!made.ok()) return made.status();
+    certificate = *std::move(made);
+  }
+  if (options.want_axis || options.want_analysis) {
+    absl::Status s = AddAxis(pair, certificate.direction, directions_tried, options, answer);
+    if (!s.ok()) return s;
+  }
+  if (options.want_certificate) answer.certificate = std::move(certificate);
+  return absl::OkStatus();
+}
+
+// CertifiedSearch of rounded hulls, not both of radius 0. Requires: as CertifiedSearch.
+absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
+                                     const QueryOptions& options, PairCache* cache) {
+  const FloatPair pair(a, b);
+  Decision decision;
+  absl::Status decided =
+      DecideRounded(pair, options.tolerance, cache, options.should_stop, decision);
+  if (!decided.ok()) return decided;
+  Answer answer;
+  answer.relation = decision.relation;
+  answer.rung = decision.rung;
+  if (options.want_axis || options.want_analysis || options.want_certificate) {
+    absl::Status s = AddRoundedEvidence(pair, decision.directions_tried, options, answer);
+    if (!s.ok()) return s;
+  }
+  if (!WantsSeparation(options)) return answer;
+  Decision of_cores;
+  absl::Status s = Decide(pair, 0, nullptr, Purpose::kEvidence, options.should_stop, of_cores);
+  if (s.ok()) s = AddSeparation(pair, of_cores, /*cold=*/true, options, answer);
+  if (!s.ok()) return s;
   return answer;
 }
 
@@ -199,9 +275,10 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
 
 absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const PlacedHull& b,
                                                const QueryOptions& options, PairCache* cache) {
-  if (IsInOrder(a, b)) return CertifiedSearch(a, b, options, cache);
+  const auto search = IsRounded(a, b) ? SearchRounded : CertifiedSearch;
+  if (IsInOrder(a, b)) return search(a, b, options, cache);
   if (cache != nullptr) *cache = Mirrored(*cache);
-  absl::StatusOr<Answer> answer = CertifiedSearch(b, a, options, cache);
+  absl::StatusOr<Answer> answer = search(b, a, options, cache);
   if (cache != nullptr) *cache = Mirrored(*cache);
   if (!answer.ok()) return answer;
   return Mirrored(*std::move(answer));
@@ -243,8 +320,9 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
 [[gnu::noinline]] absl::StatusOr<Answer> AnswerAny(const PlacedHull& a, const PlacedHull& b,
                                                    const QueryOptions& options, PairCache* cache) {
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
+  if (absl::Status status = ValidateRadii(a, b, options); !status.ok()) return status;
   if (a.empty() || b.empty()) return AnswerOfEmpty(options);
-  if (options.WantsRelationOnly()) return RelationOnly(a, b, options, cache);
+  if (options.WantsRelationOnly() && !IsRounded(a, b)) return RelationOnly(a, b, options, cache);
   HULLD_CHECK(!options.WantsCanonical() ||
               (a.query_hull().canonical() != nullptr && b.query_hull().canonical() != nullptr));
   std::optional<std::chrono::steady_clock::time_point> start;
@@ -262,6 +340,7 @@ absl::StatusOr<TextbookCheck> TextbookCheck::Begin(const PlacedHull& a, const Pl
                                                    const QueryOptions& options) {
   HULLD_CHECK(options.method == Method::kTextbookSat);
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
+  if (absl::Status status = ValidateRadii(a, b, options); !status.ok()) return status;
   TextbookCheck check(a, b, options);
   if (a.empty() || b.empty()) return check;
   const auto start = TextbookSearch::Clock::now();
@@ -292,7 +371,7 @@ absl::StatusOr<Answer> TextbookCheck::Finish() {
 
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
-  if (IsValidRelationOnly(options) && !a.empty() && !b.empty()) {
+  if (IsValidRelationOnly(options) && !a.empty() && !b.empty() && !IsRounded(a, b)) {
     return RelationOnly(a, b, options, cache);
   }
   return AnswerAny(a, b, options, cache);

@@ -17,11 +17,11 @@
 
 namespace hulld {
 
-// Computes the relation of hulls A and B at their poses, exact for every finite input, and the
-// details requested by the options. `cache` may be null and does not change the relation, the
+// Computes the relation of rounded hulls A and B at their poses, exact for every finite input, and
+// the details requested by the options. `cache` may be null and does not change the relation, the
 // separation or its bound. Swapping A and B mirrors the answer. INVALID_ARGUMENT: see
-// ValidateOptions. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed.
-// CANCELLED: should_stop returned true.
+// ValidateOptions; the textbook method for a hull with a radius. RESOURCE_EXHAUSTED: the textbook
+// method would test more axes than allowed. CANCELLED: should_stop returned true.
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options = {}, PairCache* cache = nullptr);
 

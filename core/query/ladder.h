@@ -6,11 +6,9 @@
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <variant>
 
-#include "core/numeric/integer.h"
-#include "core/numeric/vector.h"
 #include "core/query/floating/float_pair.h"
+#include "core/query/terms/certificate.h"
 #include "core/query/terms/pair_cache.h"
 #include "core/query/terms/relation.h"
 #include "core/query/terms/rung.h"
@@ -26,7 +24,7 @@ struct Decision {
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
-  std::variant<std::monostate, Vector, IntegerVector> axis;
+  ExactDirection axis;
   // Overlapping: none, or four pairs; the hull of their differences contains 0 strictly inside.
   // Touching: none, or three pairs, repetitions included; the hull of their differences contains 0.
   uint32_t pair_count = 0;

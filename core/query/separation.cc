@@ -12,6 +12,7 @@
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/numeric/vector.h"
 #include "core/query/axis_description.h"
@@ -21,6 +22,7 @@
 #include "core/query/floating/float_depth.h"
 #include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_search.h"
+#include "core/query/terms/length_sum.h"
 #include "core/query/terms/query_options.h"
 #include "core/query/terms/separation_bounds.h"
 
@@ -44,24 +46,31 @@ Separation MiddleOf(const SeparationBounds& bounds) {
   return {middle, std::nextafter(half, kInfinity)};
 }
 
-// Returns true if separation <= clearance, given the comparison of the absolute separation with
-// |clearance|.
-bool IsWithin(Relation relation, int comparison) {
-  return relation == Relation::kSeparated ? comparison <= 0 : comparison >= 0;
+// The sign of a separation with this relation.
+int SignOf(Relation relation) {
+  return relation == Relation::kSeparated ? 1 : relation == Relation::kTouching ? 0 : -1;
 }
 
+// The radius of a rounded hull, within u of itself.
+double RadiusOf(const PlacedHull& placed) { return placed.radii()[0] + placed.radii()[1]; }
+
+// Searches the separation of the cores. That of the rounded hulls is less by the sum of their
+// radii, and attained in the same direction: the reach of A - B along each unit vector grows by
+// that sum.
 class SeparationSearch {
  public:
-  SeparationSearch(const FloatPair& pair, const Decision& decision, bool cold,
+  SeparationSearch(const FloatPair& pair, const Decision& decision, Relation relation, bool cold,
                    uint64_t max_depth_bytes, const std::function<bool()>& should_stop)
       : pair_(pair),
         decision_(decision),
-        relation_(decision.relation),
+        core_(decision.relation),
+        relation_(relation),
+        radii_(pair.RadiiPlus(0)),
         max_depth_bytes_(max_depth_bytes),
         should_stop_(should_stop),
         poll_(should_stop, kExpansionsPerPoll),
-        size_(pair.a().query_hull().radius() + pair.b().query_hull().radius()) {
-    if (relation_ == Relation::kTouching) {
+        size_(pair.a().query_hull().radius() + pair.b().query_hull().radius() + radii_.value()) {
+    if (core_ == Relation::kTouching) {
       start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
     } else if (pair.usable()) {
       StartFrom(decision, cold);
@@ -80,15 +89,11 @@ class SeparationSearch {
       goal.relative_error = kDefaultRelativeMaxError;
       goal.size = size_;
     }
-    Bound(goal, request.witness);
+    const bool close = core_ != Relation::kTouching && BoundClosely(goal, request.witness);
     if (poll_.stopped()) return Stopped();
-    const Separation middle = MiddleOf(bounds_);
-    const bool close =
-        std::isfinite(bounds_.high) &&
-        middle.bound <= goal.absolute_error + goal.relative_error * (goal.size + middle.value);
     if (request.separation) {
       if (close) {
-        answer.separation = WithSign(middle);
+        answer.separation = FromBounds();
       } else if (absl::Status s = AddExactSeparation(answer); !s.ok()) {
         return s;
       }
@@ -100,59 +105,71 @@ class SeparationSearch {
 
   // Separated pairs only: floating point cannot tell two facets at about the same depth apart.
   absl::Status AddNormal(SeparationAnswer& answer) {
-    if (relation_ == Relation::kTouching) {
-      const std::optional<IntegerVector> n = ExactAxis(decision_);
-      HULLD_CHECK(n.has_value());
-      answer.normal = Normal{UnitDirection(*n), kUnitDirectionAngle};
-      return absl::OkStatus();
-    }
-    if (!nearest_) {
+    if (!nearest_ && core_ != Relation::kTouching) {
       if (AddFloatNormal(answer)) return absl::OkStatus();
       SeparationGoal goal;
-      if (relation_ == Relation::kSeparated) goal.relative_error = kNormalRelativeError;
+      if (core_ == Relation::kSeparated) goal.relative_error = kNormalRelativeError;
       Bound(goal, false);
       if (poll_.stopped()) return Stopped();
       if (AddFloatNormal(answer)) return absl::OkStatus();
       if (absl::Status s = FindExactly(); !s.ok()) return s;
     }
-    // The point of A - B that attains the separation.
-    IntegerVector point = {0, 0, 0};
-    for (size_t i = 0; i < nearest_->point.pairs.size(); ++i) {
-      point = point + nearest_->point.weights[i] * exact_->Difference(nearest_->point.pairs[i]);
-    }
-    if (relation_ == Relation::kSeparated) point = -point;
-    answer.normal = Normal{UnitDirection(point), kUnitDirectionAngle};
+    answer.normal = Normal{UnitDirection(NormalDirection()), kUnitDirectionAngle};
     return absl::OkStatus();
   }
 
+  // Compares the separation of the cores with the sum of the clearance and the radii.
   absl::Status AddClearance(double clearance, SeparationAnswer& answer) {
-    if (relation_ == Relation::kTouching || (relation_ == Relation::kSeparated && clearance <= 0) ||
-        (relation_ == Relation::kOverlapping && clearance >= 0) || std::isinf(clearance)) {
-      // The separation is finite, so the sign of an infinite clearance decides.
-      answer.within_clearance = relation_ == Relation::kSeparated ? clearance > 0 : clearance >= 0;
+    if (const std::optional<bool> known = KnownWithin(clearance)) {
+      answer.within_clearance = *known;
       return absl::OkStatus();
     }
-    const double threshold = std::abs(clearance);
-    const auto open = [&] { return !(bounds_.low > threshold || bounds_.high < threshold); };
-    if (open()) {
-      SeparationGoal goal;
-      goal.threshold = threshold;
-      Bound(goal, false);
-      if (poll_.stopped()) return Stopped();
+    const LengthSum most = pair_.RadiiPlus(clearance);
+    const int sign = most.Sign();
+    int comparison = SignOf(core_) - sign;
+    if (comparison == 0 && sign != 0) {
+      if (absl::Status s = CompareAbsolute(sign, most, comparison); !s.ok()) return s;
+      comparison *= sign;
     }
-    int comparison = bounds_.high < threshold ? -1 : 1;
-    if (open()) {
-      if (absl::Status s = FindExactly(); !s.ok()) return s;
-      comparison = CompareSquareRoot(nearest_->numerator,
-                                     exact_->norm() * exact_->norm() * nearest_->denominator,
-                                     exact_->exponent(), threshold);
-    }
-    answer.within_clearance = IsWithin(relation_, comparison);
+    answer.within_clearance = comparison <= 0;
     return absl::OkStatus();
   }
 
  private:
   static absl::Status Stopped() { return absl::CancelledError("stopped in a query"); }
+
+  // Returns true if separation <= clearance, if the relation or an infinite clearance shows it.
+  std::optional<bool> KnownWithin(double clearance) const {
+    // The separation is finite.
+    if (std::isinf(clearance)) return clearance > 0;
+    if (relation_ == Relation::kSeparated) {
+      return clearance <= 0 ? std::optional(false) : std::nullopt;
+    }
+    if (clearance >= 0) return true;
+    return relation_ == Relation::kTouching ? std::optional(false) : std::nullopt;
+  }
+
+  // Sets `comparison` to the sign of the absolute separation of the cores minus |sum|. Requires:
+  // both not 0. `sign`: that of the sum.
+  absl::Status CompareAbsolute(int sign, const LengthSum& sum, int& comparison) {
+    const double low = sign > 0 ? sum.low() : -sum.high();
+    const double high = sign > 0 ? sum.high() : -sum.low();
+    const auto open = [&] { return !(bounds_.low > high || bounds_.high < low); };
+    if (open()) {
+      SeparationGoal goal;
+      goal.threshold = std::abs(sum.value());
+      Bound(goal, false);
+      if (poll_.stopped()) return Stopped();
+    }
+    comparison = bounds_.high < low ? -1 : 1;
+    if (!open()) return absl::OkStatus();
+    if (absl::Status s = FindExactly(); !s.ok()) return s;
+    ScaledInteger threshold = sum.Exact();
+    threshold.mantissa = abs(threshold.mantissa);
+    comparison =
+        CompareSquareRoot(nearest_->numerator, ExactDenominator(), exact_->exponent(), threshold);
+    return absl::OkStatus();
+  }
 
   // Chooses the start of the floating-point search: the axis that it found, or four pairs with
   // differences that surround the origin. The choice does not depend on the suggestion of a cache.
@@ -173,7 +190,7 @@ class SeparationSearch {
   // the vertices that this visits.
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
-    if (relation_ == Relation::kSeparated) {
+    if (core_ == Relation::kSeparated) {
       bounds_ = BoundDistance(pair_, toward_, goal);
       seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
     } else {
@@ -186,36 +203,85 @@ class SeparationSearch {
     if (nearest_) return absl::OkStatus();
     exact_.emplace(pair_, should_stop_);
     absl::StatusOr<ExactNearest> nearest =
-        relation_ == Relation::kOverlapping
+        core_ == Relation::kOverlapping
             ? FindDepthExactly(*exact_, seed_, max_depth_bytes_, should_stop_)
-        : relation_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
-                                            : FindNearestExactly(*exact_, start_, should_stop_);
+        : core_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
+                                        : FindNearestExactly(*exact_, start_, should_stop_);
     if (!nearest.ok()) return nearest.status();
     nearest_ = *std::move(nearest);
     return absl::OkStatus();
   }
 
-  Rounded ExactLength() const {
-    return RoundSquareRoot(nearest_->numerator,
-                           exact_->norm() * exact_->norm() * nearest_->denominator,
-                           exact_->exponent());
+  // The squared absolute separation of the cores is the numerator of nearest_ over this.
+  Integer ExactDenominator() const {
+    return exact_->norm() * exact_->norm() * nearest_->denominator;
+  }
+
+  // Returns a positive multiple of the exact normal. Requires: FindExactly, unless the cores touch.
+  IntegerVector NormalDirection() {
+    if (core_ == Relation::kTouching) {
+      const std::optional<IntegerVector> n = ExactAxis(decision_.axis);
+      HULLD_CHECK(n.has_value());
+      return *n;
+    }
+    const IntegerVector point = PointOf(*exact_, nearest_->point);
+    return core_ == Relation::kSeparated ? -point : point;
+  }
+
+  // Improves the bounds. Returns true if FromBounds then meets the goal.
+  bool BoundClosely(const SeparationGoal& goal, bool want_point) {
+    SeparationGoal of_cores = goal;
+    if (!radii_.is_zero()) {
+      // The value may be less than the separation of the cores, by no more than the size.
+      of_cores.absolute_error /= 2;
+      of_cores.relative_error /= 4;
+    }
+    Bound(of_cores, want_point);
+    if (poll_.stopped() || !std::isfinite(bounds_.high)) return false;
+    const Separation found = FromBounds();
+    return std::isfinite(found.bound) && SignOf(relation_) * found.value > 0 &&
+           found.bound <=
+               goal.absolute_error + goal.relative_error * (goal.size + std::abs(found.value));
+  }
+
+  // Returns the separation from bounds of that of the cores. Requires: finite bounds.
+  Separation FromBounds() const {
+    const Separation cores = WithSign(MiddleOf(bounds_));
+    if (radii_.is_zero()) return cores;
+    const double value = cores.value - radii_.value();
+    const double rounding = radii_.error() + 4 * kUnitRoundoff * std::abs(value);
+    return {value, std::nextafter((cores.bound + rounding) * (1 + 4 * kUnitRoundoff), kInfinity)};
   }
 
   Separation WithSign(const Separation& length) const {
-    return {relation_ == Relation::kOverlapping ? -length.value : length.value, length.bound};
+    return {core_ == Relation::kOverlapping ? -length.value : length.value, length.bound};
   }
 
   absl::Status AddExactSeparation(SeparationAnswer& answer) {
-    if (absl::Status s = FindExactly(); !s.ok()) return s;
+    if (core_ != Relation::kTouching) {
+      if (absl::Status s = FindExactly(); !s.ok()) return s;
+    }
     const Rounded length = ExactLength();
-    answer.separation = WithSign({length.value, length.bound});
+    answer.separation = Separation{length.value, length.bound};
     return absl::OkStatus();
+  }
+
+  Rounded ExactLength() const {
+    if (core_ == Relation::kTouching) return RoundRootMinus(0, 0, 1, 0, radii_.Exact());
+    if (!radii_.is_zero()) {
+      return RoundRootMinus(SignOf(core_), nearest_->numerator, ExactDenominator(),
+                            exact_->exponent(), radii_.Exact());
+    }
+    const Rounded length =
+        RoundSquareRoot(nearest_->numerator, ExactDenominator(), exact_->exponent());
+    return {SignOf(core_) * length.value, length.bound};
   }
 
   // Returns false if the point is not known accurately enough.
   bool AddFloatWitness(SeparationAnswer& answer) const {
     const FloatCombination& point = bounds_.point;
-    if (point.count == 0) return false;
+    // Radii multiply the error of the direction, which only exact arithmetic keeps small.
+    if (point.count == 0 || !radii_.is_zero()) return false;
     const double rounding = kCombinationErrorFactor * pair_.size();
     const double width =
         std::max(bounds_.point_length - bounds_.low, bounds_.high - bounds_.point_length);
@@ -240,7 +306,7 @@ class SeparationSearch {
   // within kCombinationErrorFactor of v and no longer than the upper bound, so the angle between p
   // and the nearest point follows from both bounds, and that between v and p from their distance.
   bool AddFloatNormal(SeparationAnswer& answer) const {
-    if (relation_ != Relation::kSeparated || bounds_.point.count == 0 || !(bounds_.low > 0)) {
+    if (core_ != Relation::kSeparated || bounds_.point.count == 0 || !(bounds_.low > 0)) {
       return false;
     }
     const double width = (bounds_.high - bounds_.low) / bounds_.high;
@@ -248,11 +314,7 @@ class SeparationSearch {
     const double angle =
         kNearestAngleRoundUp * std::sqrt(2 * width) + 2 * rounding + kUnitDirectionAngle;
     if (!(angle <= kMaxNormalAngle)) return false;
-    Vector to_origin = Vector::Zero();
-    for (uint32_t i = 0; i < bounds_.point.count; ++i) {
-      to_origin -= Vector(bounds_.point.weights[i] * pair_.Difference(bounds_.point.pairs[i]));
-    }
-    answer.normal = Normal{Vector(to_origin / UnitOf(pair_.size())).normalized(), angle};
+    answer.normal = Normal{TowardOrigin(pair_, bounds_).normalized(), angle};
     return true;
   }
 
@@ -280,13 +342,38 @@ class SeparationSearch {
     Witness witness;
     witness.p_WA = ExactPoint(true, witness.error);
     witness.p_WB = ExactPoint(false, witness.error);
+    if (!radii_.is_zero()) MoveToSurfaces(witness);
     answer.witness = witness;
     return absl::OkStatus();
   }
 
+  // Moves points of the cores along the normal to the surfaces of the rounded hulls. The direction
+  // errs by kUnitDirectionAngle and u of its length, a radius by u of itself, products and sums by
+  // u per component. Proven.
+  void MoveToSurfaces(Witness& witness) {
+    const Vector n = UnitDirection(NormalDirection());
+    const double radius_a = RadiusOf(pair_.a());
+    const double radius_b = RadiusOf(pair_.b());
+    witness.p_WA += radius_a * n;
+    witness.p_WB -= radius_b * n;
+    if (relation_ == Relation::kTouching) witness.p_WB = witness.p_WA;
+    const double largest =
+        std::max(witness.p_WA.cwiseAbs().maxCoeff(), witness.p_WB.cwiseAbs().maxCoeff());
+    witness.error += 16 * kUnitRoundoff * std::max(radius_a, radius_b) +
+                     4 * kUnitRoundoff * largest + 4 * kLeastDouble;
+    if (std::isfinite(largest)) return;
+    for (Vector* const p : {&witness.p_WA, &witness.p_WB}) {
+      *p = p->cwiseMax(-kLargestDouble).cwiseMin(kLargestDouble);
+    }
+    witness.error = kInfinity;
+  }
+
   const FloatPair& pair_;
   const Decision& decision_;
+  // The relations of the cores and of the rounded hulls, and the sum of the radii.
+  const Relation core_;
   const Relation relation_;
+  const LengthSum radii_;
   const uint64_t max_depth_bytes_;
   const std::function<bool()>& should_stop_;
   StopPoll poll_;
@@ -301,11 +388,12 @@ class SeparationSearch {
 
 }  // namespace
 
-absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
-                            const SeparationRequest& request,
+absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Relation relation,
+                            bool cold, const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer) {
-  HULLD_CHECK(decision.relation != Relation::kWithinTolerance);
-  SeparationSearch search(pair, decision, cold, request.max_depth_bytes, should_stop);
+  HULLD_CHECK(decision.relation != Relation::kWithinTolerance &&
+              relation != Relation::kWithinTolerance);
+  SeparationSearch search(pair, decision, relation, cold, request.max_depth_bytes, should_stop);
   if (request.separation || request.witness) {
     if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;
   }

@@ -49,6 +49,9 @@ std::weak_ordering Compare(const Pose& a, const Pose& b) {
 
 std::weak_ordering Compare(const BodyPiece& a, const BodyPiece& b) {
   if (const auto order = Compare(a.X_BP, b.X_BP); order != 0) return order;
+  if (a.radius != b.radius) {
+    return a.radius < b.radius ? std::weak_ordering::less : std::weak_ordering::greater;
+  }
   if (a.hull == b.hull) return std::weak_ordering::equivalent;
   const uint32_t count = a.hull->point_count();
   if (const auto order = count <=> b.hull->point_count(); order != 0) return order;
@@ -62,6 +65,7 @@ std::weak_ordering Compare(const BodyPiece& a, const BodyPiece& b) {
 // A total order of placed bodies by content. The poses usually decide.
 bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
   if (const auto order = Compare(a.X_WB(), b.X_WB()); order != 0) return order < 0;
+  if (a.radius() != b.radius()) return a.radius() < b.radius();
   const auto pieces_a = a.body().pieces();
   const auto pieces_b = b.body().pieces();
   if (pieces_a.size() != pieces_b.size()) return pieces_a.size() < pieces_b.size();

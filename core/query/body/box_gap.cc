@@ -28,6 +28,10 @@ BoxGap::BoxGap(const PlacedBody& x, const PlacedBody& y) {
       x.body().boxes().size() + y.body().boxes().size() + offset.cwiseAbs().maxCoeff();
   usable_ = IsFilterSize(size);
   error_ = kBoxGapErrorFactor * size;
+  if (const double radii = x.radius() + y.radius(); radii > 0) {
+    // Rounding: u of the sum of the radii, and u of each of two sums with it.
+    error_ += radii * (1 + 8 * kUnitRoundoff);
+  }
   for (int i = 0; i < 3; ++i) R_XY_.col(i) = TransposedProduct(R_WX, Vector(R_WY.col(i)));
   abs_R_XY_ = R_XY_.cwiseAbs();
   p_XY_ = TransposedProduct(R_WX, offset);
@@ -50,7 +54,7 @@ double BoxGap::AtLeast(const Box& of_x, const Box& of_y) const {
 
 Box BoundingBox(const PlacedBody& placed) {
   if (placed.body().is_hull()) {
-    return BoundingBox(PlacedHull(*placed.body().pieces()[0].hull, placed.X_WB()));
+    return BoundingBox(PlacedHull(*placed.body().pieces()[0].hull, placed.X_WB(), placed.radius()));
   }
   const Box box = placed.body().boxes().all();
   if (box.IsEmpty()) return Box::Empty();
@@ -61,7 +65,7 @@ Box BoundingBox(const PlacedBody& placed) {
   const Vector center = Product(R, Vector(0.5 * (box.low + box.high))) + t;
   const Vector error = Vector::Constant(kBoxGapErrorFactor * size);
   const Vector half = Product(R.cwiseAbs(), Vector(0.5 * (box.high - box.low))) + error;
-  return {center - half, center + half};
+  return GrownBy({center - half, center + half}, placed.radius());
 }
 
 }  // namespace hulld

@@ -7,7 +7,8 @@
 
 namespace hulld {
 
-// Lower bounds of the separation of boxes of two bodies, each box in its body's frame.
+// Lower bounds of the separation of boxes of two bodies, each box in its body's frame and grown by
+// the body's radius.
 class BoxGap {
  public:
   BoxGap(const PlacedBody& x, const PlacedBody& y);

@@ -13,20 +13,25 @@
 
 namespace hulld {
 
-// A body, or a hull queried together with bodies, at a pose. Pieces are placed on demand.
+// A body, or a hull queried together with bodies, at a pose. Its radius is added to that of each
+// piece. Pieces are placed on demand.
 class PlacedBody {
  public:
-  // `body` must outlive the result. Requires: a valid pose (ValidatePose).
-  PlacedBody(const QueryBody& body, const Pose& X_WB) : body_(&body), X_WB_(X_WB) {
+  // `body` must outlive the result. Requires: a valid pose (ValidatePose), and a radius that is
+  // finite and not negative.
+  PlacedBody(const QueryBody& body, const Pose& X_WB, double radius = 0)
+      : body_(&body), X_WB_(X_WB), radius_(radius) {
     HULLD_DCHECK(IsValidPose(X_WB));
   }
 
   const QueryBody& body() const { return *body_; }
   const Pose& X_WB() const { return X_WB_; }
+  double radius() const { return radius_; }
 
  private:
   const QueryBody* body_;
   Pose X_WB_;
+  double radius_;
 };
 
 // One piece in the world. Not movable: the placed hull refers to the pose stored here.
@@ -37,11 +42,11 @@ class PlacedPiece {
     HULLD_DCHECK(index < body.body().pieces().size());
     const BodyPiece& piece = body.body().pieces()[index];
     if (body.body().is_hull()) {
-      placed_.emplace(*piece.hull, body.X_WB());
+      placed_.emplace(*piece.hull, body.X_WB(), body.radius());
       return;
     }
     product_.emplace(body.X_WB(), piece.X_BP);
-    placed_.emplace(*piece.hull, *product_);
+    placed_.emplace(*piece.hull, *product_, body.radius(), piece.radius);
   }
   PlacedPiece(const PlacedPiece&) = delete;
   PlacedPiece& operator=(const PlacedPiece&) = delete;

@@ -10,7 +10,7 @@ PieceBoxes::PieceBoxes(std::span<const BodyPiece> pieces) {
   std::vector<Box> boxes;
   boxes.reserve(pieces.size());
   for (const BodyPiece& piece : pieces) {
-    const Box box = BoundingBox(PlacedHull(*piece.hull, piece.X_BP));
+    const Box box = BoundingBox(PlacedHull(*piece.hull, piece.X_BP, piece.radius));
     boxes.push_back(box);
     if (box.IsEmpty()) continue;
     size_ = std::max({size_, box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff()});

@@ -15,17 +15,18 @@
 
 namespace hulld {
 
-// A hull at a fixed pose in the frame of its body.
+// A hull at a fixed pose in the frame of its body, with the radius of a rounded hull.
 struct BodyPiece {
   const QueryHull* hull;
   Pose X_BP;
+  double radius = 0;
 };
 
 // A box for each piece, in the body's frame, and a tree of these boxes. Holds no reference to the
 // hulls, so it remains valid as long as their points do not change. Immutable.
 class PieceBoxes {
  public:
-  // Requires: valid poses (ValidatePose; PlacedHull checks them). Cost: O(n log n) and six support
+  // Requires: valid poses and radii (PlacedHull checks them). Cost: O(n log n) and six support
   // points for each piece.
   explicit PieceBoxes(std::span<const BodyPiece> pieces);
 
@@ -48,8 +49,8 @@ class PieceBoxes {
 class QueryBody {
  public:
   // Builds a body from zero or more pieces. Requires: valid poses, and boxes built from the same
-  // pieces or from pieces with the same hulls as point sets (unchecked except for the count: a
-  // check would rebuild the boxes).
+  // pieces or from pieces that differ only in hulls of the same point sets (unchecked except for
+  // the count: a check would rebuild the boxes).
   QueryBody(std::vector<BodyPiece> pieces, std::shared_ptr<const PieceBoxes> boxes)
       : is_hull_(false), pieces_(std::move(pieces)), boxes_(std::move(boxes)) {
     HULLD_DCHECK(boxes_ != nullptr && boxes_->tree().empty() == pieces_.empty());

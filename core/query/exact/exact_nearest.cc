@@ -121,6 +121,14 @@ SimplexFace NearestPart(const std::vector<ExactCorner>& corners) {
 
 }  // namespace
 
+IntegerVector PointOf(ExactPair& pair, const ExactCombination& combination) {
+  IntegerVector point = {0, 0, 0};
+  for (size_t i = 0; i < combination.pairs.size(); ++i) {
+    point = point + combination.weights[i] * pair.Difference(combination.pairs[i]);
+  }
+  return point;
+}
+
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                                 const std::function<bool()>& should_stop) {
   HULLD_CHECK(seed.size() <= 4);

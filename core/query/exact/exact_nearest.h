@@ -29,6 +29,9 @@ struct ExactNearest {
   Integer denominator;
 };
 
+// Returns a positive multiple of the point.
+IntegerVector PointOf(ExactPair& pair, const ExactCombination& combination);
+
 // Finds the exact nearest point, for hulls of every dimension, by the walk of Gilbert, Johnson and
 // Keerthi (1988) in integers. Keeps a part (vertex, edge, triangle) of A - B with its nearest point
 // strictly inside, and adds the farthest vertex toward the origin until no vertex is farther. The

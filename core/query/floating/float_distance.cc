@@ -18,6 +18,11 @@ constexpr int kMaxSteps = 128;
 
 using Corner = MinkowskiVertex<Vector>;
 
+// Lower bound of the distance from the support along a unit vector.
+double LowOf(const FloatPair& pair, const FloatPair::Support& farthest) {
+  return -farthest.value - kReachErrorFactor * pair.size();
+}
+
 // The corners of the part of A - B that is nearest to the origin so far.
 class Walk {
  public:
@@ -31,7 +36,7 @@ class Walk {
       if (!(length > 0)) break;
       n /= length;
       const FloatPair::Support farthest = pair_.Farthest(n);
-      bounds_.low = std::max(bounds_.low, LowOf(farthest));
+      bounds_.low = std::max(bounds_.low, LowOf(pair_, farthest));
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();
@@ -45,10 +50,6 @@ class Walk {
   }
 
  private:
-  double LowOf(const FloatPair::Support& farthest) const {
-    return -farthest.value - kReachErrorFactor * pair_.size();
-  }
-
   bool Contains(VertexPair pair) const {
     return std::any_of(corners_.begin(), corners_.begin() + count_,
                        [&](const Corner& corner) { return corner.pair == pair; });
@@ -113,6 +114,26 @@ class Walk {
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal) {
   HULLD_CHECK(pair.usable());
   return Walk(pair, goal).Run(n);
+}
+
+double DistanceAlong(const FloatPair& pair, const Vector& n) {
+  const Vector scaled = n / n.cwiseAbs().maxCoeff();
+  return LowOf(pair, pair.Farthest(Vector(scaled / scaled.norm())));
+}
+
+double DistanceOfTriangle(const FloatPair& pair, const VertexPair* pairs) {
+  const double unit = UnitOf(pair.size());
+  const auto corner = [&](int i) { return Vector(1 / unit * pair.Difference(pairs[i])); };
+  const NearestPart nearest = NearestOnTriangle(corner(0), corner(1), corner(2));
+  return nearest.point.norm() * unit + kCombinationErrorFactor * pair.size();
+}
+
+Vector TowardOrigin(const FloatPair& pair, const SeparationBounds& bounds) {
+  Vector to_origin = Vector::Zero();
+  for (uint32_t i = 0; i < bounds.point.count; ++i) {
+    to_origin -= Vector(bounds.point.weights[i] * pair.Difference(bounds.point.pairs[i]));
+  }
+  return to_origin / UnitOf(pair.size());
 }
 
 }  // namespace hulld

@@ -3,6 +3,7 @@
 
 #include "core/query/floating/float_pair.h"
 #include "core/query/terms/separation_bounds.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -12,6 +13,16 @@ namespace hulld {
 // the reach of A - B along any unit vector. `n`: the initial direction; zero gives no bounds. The
 // bounds may miss the goal. Requires: pair.usable().
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal);
+
+// Returns the vector from the point of A - B in `bounds` to the origin; zero if it is unknown.
+Vector TowardOrigin(const FloatPair& pair, const SeparationBounds& bounds);
+
+// Returns a **proven** lower bound of the distance of two hulls, from their gap along n; negative
+// if n shows no gap. Requires: n not zero, and pair.usable().
+double DistanceAlong(const FloatPair& pair, const Vector& n);
+// Returns a **proven** upper bound of the distance, from the point nearest to the origin of the
+// triangle of the differences of three pairs, which may be equal. Requires: pair.usable().
+double DistanceOfTriangle(const FloatPair& pair, const VertexPair* pairs);
 
 }  // namespace hulld
 

@@ -11,6 +11,7 @@
 #include "core/numeric/exponent_limits.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
+#include "core/query/terms/length_sum.h"
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
@@ -51,6 +52,14 @@ class FloatPair {
   double size() const { return size_; }
   // t_B - t_A, rounded.
   const PlainVector& offset() const { return offset_; }
+
+  // The exact sum of the radii of both hulls and a finite clearance. Everything else here describes
+  // the cores.
+  LengthSum RadiiPlus(double clearance) const {
+    const std::array<double, 2>& a = a_->radii();
+    const std::array<double, 2>& b = b_->radii();
+    return LengthSum({a[0], a[1], b[0], b[1], clearance});
+  }
 
   // A vertex of A - B far along a direction.
   struct Support {

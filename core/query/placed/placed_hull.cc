@@ -36,17 +36,22 @@ Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
 
 }  // namespace
 
-PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
+PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH, double radius)
     : hull_(&hull),
       X_WH_(X_WH),
       R_WH_(RotationOf(X_WH.q)),
-      rotated_center_(Product(R_WH_, hull.center())) {
+      rotated_center_(Product(R_WH_, hull.center())),
+      radii_{radius, 0} {
   HULLD_DCHECK(ValidatePose(X_WH).ok());
+  HULLD_DCHECK(radius >= 0 && std::isfinite(radius));
 }
 
-PlacedHull::PlacedHull(const QueryHull& hull, const PoseProduct& X_WH)
-    : PlacedHull(hull, X_WH.rounded()) {
+PlacedHull::PlacedHull(const QueryHull& hull, const PoseProduct& X_WH, double radius,
+                       double piece_radius)
+    : PlacedHull(hull, X_WH.rounded(), radius) {
+  HULLD_DCHECK(piece_radius >= 0 && std::isfinite(piece_radius));
   product_ = &X_WH;
+  radii_[1] = piece_radius;
 }
 
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {

@@ -10,16 +10,23 @@
 
 namespace hulld {
 
+// A direction of any length, exact as given: in doubles if these suffice, otherwise in integers.
+using ExactDirection = std::variant<std::monostate, Vector, IntegerVector>;
+
 // A proof of a relation. Independent code can check it in O(V) exact operations from the vertices
 // and the poses.
 //
 // SEPARATED: a direction n, world frame, with max n.A < min n.B. TOUCHING: n not zero, max n.A <=
 // min n.B, and at most four pairs; the hull of their differences contains 0. OVERLAPPING: no
 // direction, and at most six pairs; the hull of their differences contains 0 strictly inside
-// (Steinitz 1913). The direction is exact as given and of any length: in doubles if these suffice,
-// otherwise in integers.
+// (Steinitz 1913).
+//
+// Rounded hulls, with A and B their cores and r > 0 the sum of their radii. SEPARATED: min n.B -
+// max n.A > r |n|. TOUCHING: it is r |n|, and at most three pairs; the hull of their differences
+// comes within r of 0. OVERLAPPING: no direction, and at most four pairs; that hull comes nearer
+// than r.
 struct Certificate {
-  std::variant<std::monostate, Vector, IntegerVector> direction;
+  ExactDirection direction;
   std::vector<VertexPair> pairs;
 };
 
