@@ -2,6 +2,7 @@
 
 #include <absl/container/flat_hash_map.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -49,7 +50,10 @@ v1::PackedPlacements PackPlacements(
     const v1::Vector3& t = placement.pose().translation();
     packed.add_poses(placement.pose().has_rotation() ? q.w() : 1);
     for (const double number : {q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) packed.add_poses(number);
+    packed.add_radii(placement.radius());
   }
+  const auto is_zero = [](double radius) { return radius == 0; };
+  if (std::all_of(packed.radii().begin(), packed.radii().end(), is_zero)) packed.clear_radii();
   const auto id_count = static_cast<uint32_t>(packed.hull_ids_size());
   for (const auto& [i, shape] : shaped) packed.set_hulls(i, id_count + shape);
   return packed;

@@ -95,12 +95,12 @@ absl::StatusOr<std::optional<PlacedVertices>> AnswerChecker::FetchHull(
     if (!points.xyz_float().empty()) {
       xyz = widened_.emplace_back(points.xyz_float().begin(), points.xyz_float().end());
     }
-    return PlacedVertices{xyz, placement.pose(), nullptr, true};
+    return PlacedVertices{xyz, placement.pose(), nullptr, true, {placement.radius()}};
   }
   const auto mesh = Fetch(version, problem);
   if (!mesh.ok()) return mesh.status();
   if (*mesh == nullptr) return std::nullopt;
-  return PlacedVertices{(*mesh)->xyz, placement.pose()};
+  return PlacedVertices{(*mesh)->xyz, placement.pose(), nullptr, false, {placement.radius()}};
 }
 
 absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::HullVersion& version,
@@ -157,7 +157,11 @@ absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
     const auto mesh = Fetch(*hull->second, problem);
     if (!mesh.ok()) return mesh.status();
     if (*mesh == nullptr) return pieces;
-    pieces.push_back({(*mesh)->xyz, placement.pose(), &piece.pose()});
+    pieces.push_back({(*mesh)->xyz,
+                      placement.pose(),
+                      &piece.pose(),
+                      false,
+                      {placement.radius(), piece.radius()}});
   }
   return pieces;
 }

@@ -13,9 +13,7 @@
 namespace hulld {
 namespace {
 
-// Limits of the contract: Caratheodory's number for a point of the hull, and Steinitz's for an
-// interior point.
-constexpr int kMostTouchingPairs = 4;
+// Limit of the contract: Steinitz's number for an interior point.
 constexpr int kMostOverlappingPairs = 6;
 // Far above the digits of a cross product of coordinates of degree nine in doubles.
 constexpr size_t kMostDigits = 100'000;
@@ -32,36 +30,6 @@ absl::Status ReadInteger(const std::string& text, BigInteger* number) {
   *number = BigInteger(text.substr(first));
   if (sign == 1) *number = -*number;
   return absl::OkStatus();
-}
-
-absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n) {
-  switch (certificate.exact_direction_case()) {
-    case v1::Certificate::kDirection: {
-      const v1::Vector3& d = certificate.direction();
-      const std::array<double, 3> numbers = {d.x(), d.y(), d.z()};
-      if (!AreFinite(numbers)) return ProofFails("the direction holds a number that is not finite");
-      CommonExponent exponent;
-      exponent.Include(numbers);
-      for (int i = 0; i < 3; ++i) (*n)[i] = exponent.ToInteger(numbers[i]);
-      break;
-    }
-    case v1::Certificate::kIntegerDirection: {
-      const v1::IntegerDirection& d = certificate.integer_direction();
-      if (absl::Status s = ReadInteger(d.x(), &(*n)[0]); !s.ok()) return s;
-      if (absl::Status s = ReadInteger(d.y(), &(*n)[1]); !s.ok()) return s;
-      if (absl::Status s = ReadInteger(d.z(), &(*n)[2]); !s.ok()) return s;
-      break;
-    }
-    case v1::Certificate::EXACT_DIRECTION_NOT_SET:
-      return ProofFails("the certificate has no direction");
-  }
-  if (IsZero(*n)) return ProofFails("the direction is zero");
-  return absl::OkStatus();
-}
-
-// Returns the sign of min n.B - max n.A.
-int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
-  return (b.Extent(n).first * a.scale - a.Extent(n).second * b.scale).sign();
 }
 
 absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& vertex,
@@ -123,29 +91,97 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int most, const Exac
   return absl::OkStatus();
 }
 
-// Returns points of A - B, times both scales.
-std::vector<BigVector> Differences(const v1::Certificate& certificate, const ExactHull& a,
-                                   const ExactHull& b) {
-  std::vector<BigVector> differences;
-  for (const v1::VertexPair& pair : certificate.pairs()) {
-    differences.push_back(b.scale * a.World(pair.index_a()) - a.scale * b.World(pair.index_b()));
-  }
-  return differences;
-}
-
 absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& a,
                            const ExactHull& b) {
+  const auto differences = DifferencesOf(certificate, kMostTouchingPairs, a, b);
+  if (!differences.ok()) return differences.status();
   BigVector n;
   if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
   if (GapSign(a, b, n) < 0) {
     return ProofFails("the direction does not keep the insides apart: max n.A > min n.B");
   }
-  if (HoldsOriginOnBoundary(Differences(certificate, a, b))) return absl::OkStatus();
+  if (HoldsOriginOnBoundary(*differences)) return absl::OkStatus();
   return ProofFails(
       "the vertex pairs show no common point: 0 is not in the hull of their differences");
 }
 
+absl::Status CheckOverlapping(const v1::Certificate& certificate, const ExactHull& a,
+                              const ExactHull& b) {
+  const auto differences = DifferencesOf(certificate, kMostOverlappingPairs, a, b);
+  if (!differences.ok()) return differences.status();
+  if (HoldsOriginInside(*differences)) return absl::OkStatus();
+  return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
+}
+
+// The sum of the radii at the scale of A - B: times both scales.
+BigInteger RadiiOf(const ExactHull& a, const ExactHull& b) {
+  return (a.radius + b.radius) * a.scale * b.scale;
+}
+
+// Returns the sign of min n.B - max n.A - r |n|, r the sum of the radii. Requires: r > 0.
+int RoundedGapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
+  const BigInteger gap = b.Extent(n).first * a.scale - a.Extent(n).second * b.scale;
+  if (gap < 0) return -1;
+  const BigInteger r = RadiiOf(a, b);
+  return BigInteger(gap * gap - r * r * Dot(n, n)).sign();
+}
+
+// CheckExactly for hulls with radii, not both 0.
+absl::Status CheckRounded(v1::Relation relation, const v1::Certificate& certificate,
+                          const ExactHull& a, const ExactHull& b) {
+  const bool is_separated = relation == v1::RELATION_SEPARATED;
+  const bool is_touching = relation == v1::RELATION_TOUCHING;
+  if (is_separated || is_touching) {
+    BigVector n;
+    if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
+    if (RoundedGapSign(a, b, n) < (is_separated ? 1 : 0)) {
+      return ProofFails(
+          "the gap between the hulls along the direction is too small for their radii");
+    }
+    if (is_separated) return absl::OkStatus();
+  }
+  const auto differences =
+      DifferencesOf(certificate, is_touching ? kMostTouchingPairs : kMostOverlappingPairs, a, b);
+  if (!differences.ok()) return differences.status();
+  const BigInteger r = RadiiOf(a, b);
+  if (ComesWithin(*differences, r * r, /*nearer=*/!is_touching)) return absl::OkStatus();
+  return ProofFails(
+      "the hull of the differences of the vertex pairs is too far from 0 for the radii");
+}
+
 }  // namespace
+
+absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n, int* exponent) {
+  int of_integers = 0;
+  switch (certificate.exact_direction_case()) {
+    case v1::Certificate::kDirection: {
+      const v1::Vector3& d = certificate.direction();
+      const std::array<double, 3> numbers = {d.x(), d.y(), d.z()};
+      if (!AreFinite(numbers)) return ProofFails("the direction holds a number that is not finite");
+      CommonExponent common;
+      common.Include(numbers);
+      for (int i = 0; i < 3; ++i) (*n)[i] = common.ToInteger(numbers[i]);
+      of_integers = common.exponent();
+      break;
+    }
+    case v1::Certificate::kIntegerDirection: {
+      const v1::IntegerDirection& d = certificate.integer_direction();
+      if (absl::Status s = ReadInteger(d.x(), &(*n)[0]); !s.ok()) return s;
+      if (absl::Status s = ReadInteger(d.y(), &(*n)[1]); !s.ok()) return s;
+      if (absl::Status s = ReadInteger(d.z(), &(*n)[2]); !s.ok()) return s;
+      break;
+    }
+    case v1::Certificate::EXACT_DIRECTION_NOT_SET:
+      return ProofFails("the certificate has no direction");
+  }
+  if (IsZero(*n)) return ProofFails("the direction is zero");
+  if (exponent != nullptr) *exponent = of_integers;
+  return absl::OkStatus();
+}
+
+int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
+  return (b.Extent(n).first * a.scale - a.Extent(n).second * b.scale).sign();
+}
 
 absl::Status ProofFails(const std::string& reason) { return absl::FailedPreconditionError(reason); }
 
@@ -157,20 +193,23 @@ absl::Status CheckRelation(v1::Relation relation) {
   return ProofFails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
 }
 
-absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& given, const ExactHull& a,
-                          const ExactHull& b) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& given, int most,
+                                                     const ExactHull& a, const ExactHull& b) {
   const v1::Certificate certificate = Located(given, a, b);
-  if (relation != v1::RELATION_SEPARATED) {
-    const int most =
-        relation == v1::RELATION_OVERLAPPING ? kMostOverlappingPairs : kMostTouchingPairs;
-    if (absl::Status s = CheckPairs(certificate, most, a, b); !s.ok()) return s;
+  if (absl::Status s = CheckPairs(certificate, most, a, b); !s.ok()) return s;
+  std::vector<BigVector> differences;
+  for (const v1::VertexPair& pair : certificate.pairs()) {
+    differences.push_back(b.scale * a.World(pair.index_a()) - a.scale * b.World(pair.index_b()));
   }
+  return differences;
+}
+
+absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
+                          const ExactHull& a, const ExactHull& b) {
+  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  if (a.radius + b.radius > 0) return CheckRounded(relation, certificate, a, b);
   if (relation == v1::RELATION_TOUCHING) return CheckTouching(certificate, a, b);
-  if (relation == v1::RELATION_OVERLAPPING) {
-    if (HoldsOriginInside(Differences(certificate, a, b))) return absl::OkStatus();
-    return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
-  }
+  if (relation == v1::RELATION_OVERLAPPING) return CheckOverlapping(certificate, a, b);
   BigVector n;
   if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
   if (GapSign(a, b, n) > 0) return absl::OkStatus();

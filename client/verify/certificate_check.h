@@ -2,8 +2,13 @@
 #define HULLD_CLIENT_VERIFY_CERTIFICATE_CHECK_H_
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <vector>
 
 #include "client/verify/exact_hull.h"
+#include "client/verify/exact_vector.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -22,6 +27,22 @@ absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& cert
 // Same as above, for hulls that are not empty, both at one exponent.
 absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
                           const ExactHull& a, const ExactHull& b);
+
+// Reads the direction of a certificate as integers times 2^exponent. FAILED_PRECONDITION: it is
+// missing, malformed, or zero.
+absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n,
+                           int* exponent = nullptr);
+
+// Limit of the contract: Caratheodory's number for a point of a hull.
+inline constexpr int kMostTouchingPairs = 4;
+
+// Returns the points of A - B that the vertex pairs represent, times both scales.
+// FAILED_PRECONDITION: more than `most` pairs, or one that names no vertex.
+absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& certificate, int most,
+                                                     const ExactHull& a, const ExactHull& b);
+
+// Returns the sign of min n.B - max n.A.
+int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n);
 
 // Returns FAILED_PRECONDITION with the reason for the failed proof.
 absl::Status ProofFails(const std::string& reason);

@@ -75,6 +75,10 @@ bool AreFinite(std::span<const double> numbers) {
 absl::Status CheckPlacement(const PlacedVertices& hull) {
   if (absl::Status s = CheckFinite(hull.xyz, "a hull"); !s.ok()) return s;
   if (absl::Status s = CheckPose(hull.pose); !s.ok()) return s;
+  if (absl::Status s = CheckFinite(hull.radii, "a radius"); !s.ok()) return s;
+  if (hull.radii[0] < 0 || hull.radii[1] < 0) {
+    return absl::FailedPreconditionError("a radius is negative");
+  }
   return hull.in_body == nullptr ? absl::OkStatus() : CheckPose(*hull.in_body);
 }
 
@@ -82,6 +86,7 @@ void IncludeLengths(const PlacedVertices& hull, CommonExponent* lengths) {
   lengths->Include(hull.xyz);
   lengths->Include(Translation(hull.pose));
   if (hull.in_body != nullptr) lengths->Include(Translation(*hull.in_body));
+  lengths->Include(hull.radii);
 }
 
 BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& lengths) {
@@ -97,6 +102,7 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
 ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths)
     : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
+  radius = lengths.ToInteger(hull.radii[0]) + lengths.ToInteger(hull.radii[1]);
   const BigRotation outer = ToIntegers(Rotation(hull.pose));
   const BigVector t = ToIntegers(Translation(hull.pose), lengths);
   if (hull.in_body == nullptr) {

@@ -3,6 +3,7 @@
 
 #include <absl/status/status.h>
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -14,7 +15,7 @@
 
 namespace hulld {
 
-// Input of a check: the vertices of a hull, n x 3, and its pose.
+// Input of a check: the vertices of a hull, n x 3, its pose, and its radius.
 struct PlacedVertices {
   std::span<const double> xyz;
   const v1::Pose& pose;
@@ -24,14 +25,18 @@ struct PlacedVertices {
   // True: points with this hull, in any order, as of an inline shape. A certificate then names its
   // vertices by their coordinates.
   bool in_any_order = false;
+  // Radii of the placement and of the piece of a body; the radius of the rounded hull is their sum.
+  std::array<double, 2> radii = {};
 };
 
 bool AreFinite(std::span<const double> numbers);
 
-// OK, or FAILED_PRECONDITION: a number that is not finite, or a rotation of zero.
+// OK, or FAILED_PRECONDITION: a number that is not finite, a rotation of zero, or a negative
+// radius.
 absl::Status CheckPlacement(const PlacedVertices& hull);
 
-// Widens the exponent to cover the vertices and translations of this hull. Requires CheckPlacement.
+// Widens the exponent to cover the vertices, translations, and radii of this hull. Requires
+// CheckPlacement.
 void IncludeLengths(const PlacedVertices& hull, CommonExponent* lengths);
 
 // Vertices in the frame of their hull, shared by all of its placements.
@@ -59,6 +64,8 @@ struct ExactHull {
   // > 0
   BigInteger scale;
   BigVector shift;
+  // The exact sum of the radii, at the exponent of the lengths; not times scale.
+  BigInteger radius;
 };
 
 }  // namespace hulld

@@ -50,6 +50,34 @@ bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
   return AreWeights(weights);
 }
 
+// Squared distances of 0 from points of a convex hull, as fractions, compared with r^2.
+class Reach {
+ public:
+  Reach(const BigInteger& r_squared, bool nearer) : r_squared_(r_squared), nearer_(nearer) {}
+
+  bool Holds(const BigInteger& numerator, const BigInteger& denominator) const {
+    const BigInteger most = r_squared_ * denominator;
+    return nearer_ ? numerator < most : numerator <= most;
+  }
+  // The point of an edge nearest to 0, if it is inside the edge.
+  bool HoldsEdge(const BigVector& a, const BigVector& b) const {
+    const BigVector e = b - a;
+    const BigVector moment = Cross(a, b);
+    return Dot(a, e) < 0 && Dot(b, e) > 0 && Holds(Dot(moment, moment), Dot(e, e));
+  }
+  // The point of a triangle nearest to 0, if it is in the triangle; not for one without area.
+  bool HoldsTriangle(const BigVector& a, const BigVector& b, const BigVector& c) const {
+    const BigVector normal = Cross(b - a, c - a);
+    const BigInteger height = Dot(normal, a);
+    return !IsZero(normal) && Dot(normal, Cross(a, b)) >= 0 && Dot(normal, Cross(b, c)) >= 0 &&
+           Dot(normal, Cross(c, a)) >= 0 && Holds(height * height, Dot(normal, normal));
+  }
+
+ private:
+  const BigInteger& r_squared_;
+  const bool nearer_;
+};
+
 }  // namespace
 
 void CommonExponent::Include(double number) {
@@ -101,6 +129,22 @@ bool HoldsOriginInside(std::span<const BigVector> points) {
     }
   }
   return spans_space;
+}
+
+// The point nearest to 0 is a vertex, or inside an edge or a triangle, or it is 0 itself.
+bool ComesWithin(std::span<const BigVector> points, const BigInteger& r_squared, bool nearer) {
+  const Reach reach(r_squared, nearer);
+  const size_t n = points.size();
+  for (size_t i = 0; i < n; ++i) {
+    if (reach.Holds(Dot(points[i], points[i]), 1)) return true;
+    for (size_t j = i + 1; j < n; ++j) {
+      if (reach.HoldsEdge(points[i], points[j])) return true;
+      for (size_t k = j + 1; k < n; ++k) {
+        if (reach.HoldsTriangle(points[i], points[j], points[k])) return true;
+      }
+    }
+  }
+  return HoldsOriginInside(points);
 }
 
 }  // namespace hulld

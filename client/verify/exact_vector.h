@@ -55,6 +55,10 @@ bool HoldsOriginOnBoundary(std::span<const BigVector> points);
 // Returns true if 0 is in the interior of the convex hull of the points.
 bool HoldsOriginInside(std::span<const BigVector> points);
 
+// Returns true if a point of the convex hull of the points is within r of 0 or, if `nearer`, less
+// than r from it. Cost: cubic in the number of points.
+bool ComesWithin(std::span<const BigVector> points, const BigInteger& r_squared, bool nearer);
+
 }  // namespace hulld
 
 #endif  // HULLD_CLIENT_VERIFY_EXACT_VECTOR_H_

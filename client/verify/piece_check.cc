@@ -56,13 +56,15 @@ std::pair<double, double> Between(const BigInteger& number, const BigInteger& sc
   return {value - size * 0x1p-48, value + size * 0x1p-48};
 }
 
-// The least axis-aligned box of a hull in the world.
+// The least axis-aligned box of a rounded hull in the world.
 struct WorldBox {
   WorldBox(const ExactHull& hull, int exponent) : scale(hull.scale) {
     for (int k = 0; k < 3; ++k) {
       BigVector axis = {0, 0, 0};
       axis[k] = 1;
       std::tie(low[k], high[k]) = hull.Extent(axis);
+      low[k] -= hull.radius * scale;
+      high[k] += hull.radius * scale;
       rounded_low[k] = Between(low[k], scale, exponent).first;
       rounded_high[k] = Between(high[k], scale, exponent).second;
     }

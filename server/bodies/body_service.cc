@@ -56,7 +56,9 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
     }
     const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
     if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());
-    body.pieces.push_back({known->second, *pose});
+    const absl::Status radius = ValidateRadius(piece.radius());
+    if (!radius.ok()) return Prefixed(absl::StrCat("pieces[", i, "].radius"), radius);
+    body.pieces.push_back({known->second, *pose, piece.radius()});
   }
   return body;
 }
@@ -175,6 +177,7 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
     v1::Placement* const placement = response->add_pieces();
     placement->set_hull_id(body->hull_ids()[piece.hull]);
     EncodePose(piece.X_BP, placement->mutable_pose());
+    placement->set_radius(piece.radius);
   }
   return absl::OkStatus();
 }

@@ -97,19 +97,19 @@ absl::Status EncodeProof(const Store& store, const std::vector<PieceCertificate>
 
 }  // namespace
 
-PairSide::PairSide(HullView view, const Pose& X_W, bool canonical, bool as_body)
+PairSide::PairSide(HullView view, const Pose& X_W, double radius, bool canonical, bool as_body)
     : view_(std::move(view)) {
   if (is_body()) {
-    body_.emplace(view_.body->query, X_W);
+    body_.emplace(view_.body->query, X_W, radius);
     return;
   }
   const QueryHull& hull =
       canonical ? view_.served->canonical_query_hull() : view_.served->query_hull();
   if (as_body) {
     own_ = std::make_unique<const QueryBody>(hull);
-    body_.emplace(*own_, X_W);
+    body_.emplace(*own_, X_W, radius);
   } else {
-    hull_.emplace(hull, X_W);
+    hull_.emplace(hull, X_W, radius);
   }
 }
 
@@ -153,6 +153,14 @@ absl::Status PairQuestion::ReadPlacement(size_t side, bool present,
   const absl::StatusOr<Pose> pose = DecodePose(placement.pose());
   if (!pose.ok()) return Prefixed(".pose.", pose.status());
   X_W_[side] = *pose;
+  radii_[side] = placement.radius();
+  if (absl::Status s = ValidateRadius(radii_[side]); !s.ok()) return Prefixed(".radius", s);
+  if (is_textbook() && radii_[side] > 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        ".radius is ", radii_[side],
+        ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; leave out one of "
+        "them"));
+  }
   return absl::OkStatus();
 }
 
@@ -178,8 +186,8 @@ absl::Status PairQuestion::Place(Resolved resolved) {
   EncodeHeader(registry_.store(), resolved.as_of(), response.mutable_header());
   EncodeVersion(registry_.store(), a.record, response.mutable_hull_a());
   EncodeVersion(registry_.store(), b.record, response.mutable_hull_b());
-  a_.emplace(std::move(a), X_W_[0], lookup_.canonical, has_body_);
-  b_.emplace(std::move(b), X_W_[1], lookup_.canonical, has_body_);
+  a_.emplace(std::move(a), X_W_[0], radii_[0], lookup_.canonical, has_body_);
+  b_.emplace(std::move(b), X_W_[1], radii_[1], lookup_.canonical, has_body_);
   return absl::OkStatus();
 }
 

@@ -33,7 +33,7 @@ class PairSide {
  public:
   // canonical: as in the lookup of the hulls. as_body: true if the other side is a body; a hull is
   // then a body with a single piece.
-  PairSide(HullView view, const Pose& X_W, bool canonical, bool as_body);
+  PairSide(HullView view, const Pose& X_W, double radius, bool canonical, bool as_body);
   PairSide(const PairSide&) = delete;
   PairSide& operator=(const PairSide&) = delete;
 
@@ -89,8 +89,9 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 
   Registry& registry_;
   CheckCall* const call_;
-  // Poses of A and B.
+  // Poses and radii of A and B.
   std::array<Pose, 2> X_W_;
+  std::array<double, 2> radii_;
   // Indices of A and B: into shapes_ for a placement with points, otherwise into ids_.
   std::array<size_t, 2> subjects_;
   std::vector<std::string> ids_;

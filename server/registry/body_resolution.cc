@@ -62,7 +62,7 @@ absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<con
   std::vector<BodyPiece> pieces;
   pieces.reserve(body->pieces().size());
   for (const StoredPiece& piece : body->pieces()) {
-    pieces.push_back({query_hulls[piece.hull], piece.X_BP});
+    pieces.push_back({query_hulls[piece.hull], piece.X_BP, piece.radius});
   }
   auto boxes = body->BoxesOf(pieces, std::move(revisions));
   HullRecord record;

@@ -3,7 +3,9 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 namespace hulld::server {
@@ -86,6 +88,10 @@ std::string EncodeStoredBody(const StoredBody& body) {
     for (const double component : piece.X_BP.q) writer.Add(component);
     for (int i = 0; i < 3; ++i) writer.Add<double>(piece.X_BP.t[i]);
   }
+  const auto is_rounded = [](const StoredPiece& piece) { return piece.radius > 0; };
+  if (std::ranges::any_of(body.pieces, is_rounded)) {
+    for (const StoredPiece& piece : body.pieces) writer.Add(piece.radius);
+  }
   return writer.Take();
 }
 
@@ -105,6 +111,14 @@ absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::strin
     for (int k = 0; k < 3; ++k) piece.X_BP.t[k] = reader.Next<double>();
     if (piece.hull >= hulls || !IsValidPose(piece.X_BP)) {
       return absl::DataLossError(absl::StrCat("its piece ", i, " is invalid"));
+    }
+  }
+  const bool has_radii = !reader.at_end();
+  for (uint64_t i = 0; i < pieces && reader.ok() && has_radii; ++i) {
+    double& radius = body.pieces[i].radius;
+    radius = reader.Next<double>();
+    if (!(radius >= 0 && std::isfinite(radius))) {
+      return absl::DataLossError(absl::StrCat("the radius of its piece ", i, " is invalid"));
     }
   }
   if (!reader.ok() || !reader.at_end()) {

@@ -21,11 +21,12 @@ struct BodyRecord {
   uint64_t revision = 0;
 };
 
-// A piece of a body: a hull, as an index into the body's list of hulls, and its pose in the frame
-// of the body.
+// A piece of a body: a hull, as an index into the body's list of hulls, its pose in the frame of
+// the body, and its radius.
 struct StoredPiece {
   uint32_t hull = 0;
   Pose X_BP;
+  double radius = 0;
 };
 
 // A body with its pieces.
@@ -39,7 +40,8 @@ struct StoredBody {
   size_t MemoryBytes() const;
 };
 
-// Encodes all fields but the ID, which is the key.
+// Encodes all fields but the ID, which is the key. Radii follow at the end, unless all are 0, as in
+// records from before radii existed.
 std::string EncodeStoredBody(const StoredBody& body);
 // DATA_LOSS: no body has this encoding.
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);

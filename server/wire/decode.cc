@@ -149,6 +149,15 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   return pose;
 }
 
+absl::Status ValidateRadius(double radius) {
+  if (IsValidRadius(radius)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(" is ",
+                                                 std::isnan(radius)   ? "NaN"
+                                                 : std::isinf(radius) ? "infinite"
+                                                                      : absl::StrCat(radius),
+                                                 "; it must be a finite length of at least 0"));
+}
+
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
                                           SteadyClock::time_point began) {
   Freshness freshness;

@@ -43,6 +43,11 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
 // As DecodePose without validation.
 Pose ReadPose(const v1::Pose& message);
 
+// True for a radius of a placement or of a piece: finite and at least 0.
+inline bool IsValidRadius(double radius) { return radius >= 0 && radius < kInfinity; }
+// Returns OK, or INVALID_ARGUMENT " is NaN; it must be ...", to follow the name of the field.
+absl::Status ValidateRadius(double radius);
+
 // Packed poses have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
 // Returns the i-th packed pose without validation (ValidatePose). Cost: 2 ns.

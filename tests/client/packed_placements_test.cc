@@ -40,11 +40,13 @@ class Packed : public ServerTest {
       t->set_x(number(random));
       t->set_y(number(random));
       t->set_z(number(random));
+      placement->set_radius(i % 3 == 0 ? 0.25 : 0);
     }
     placements.Mutable(0)->mutable_pose()->clear_rotation();
     placements.Mutable(4)->clear_pose();
     // A zero quaternion.
     placements.Mutable(1)->mutable_pose()->mutable_rotation()->Clear();
+    placements.Mutable(7)->set_radius(-1);
     return placements;
   }
 
@@ -113,6 +115,8 @@ TEST_F(Packed, BatchesAnswerTheSame) {
   EXPECT_THAT(zeros.message(), HasSubstr("packed_placements.poses[1].rotation"));
   EXPECT_THAT(answer.front().placement_problems(2).message(),
               HasSubstr("packed_placements.hull_ids[3]"));
+  EXPECT_EQ(answer.front().placement_problems(3).message(),
+            "packed_placements.radii[7] is -1; it must be a finite length of at least 0");
   EXPECT_EQ(Relations(answer), Relations(expected));
   EXPECT_THAT(Relations(answer), IsSupersetOf({v1::RELATION_UNSPECIFIED, v1::RELATION_SEPARATED,
                                                v1::RELATION_OVERLAPPING}));
@@ -192,6 +196,11 @@ TEST_F(Packed, ErrorsNameTheList) {
   EXPECT_THAT(BatchError(request),
               HasSubstr("packed_placements.hulls[0] is 1, but packed_placements.hull_ids holds 1"));
   packed->set_hulls(0, 0);
+  packed->add_radii(1);
+  packed->add_radii(1);
+  EXPECT_THAT(BatchError(request),
+              HasSubstr("packed_placements.radii holds 2 numbers for 1 placements"));
+  packed->clear_radii();
   *request.add_placements() = PlacementOf("cube");
   EXPECT_THAT(BatchError(request), HasSubstr("both set"));
   request.clear_placements();

@@ -131,4 +131,17 @@ int Compare(const SquaredLength& length, double threshold) {
               integers[0] * integers[0] * length.denominator * length.ruler_squared);
 }
 
+int CompareSum(int sign, const SquaredLength& length, std::span<const double> terms) {
+  std::vector<double> numbers(terms.begin(), terms.end());
+  numbers.push_back(length.unit);
+  const std::vector<Integer> integers = ToIntegers(numbers);
+  Integer sum = 0;
+  for (size_t i = 0; i < terms.size(); ++i) sum += integers[i];
+  const int sign_of_length = length.numerator == 0 ? 0 : sign;
+  if (sign_of_length != Sign(sum)) return sign_of_length < Sign(sum) ? -1 : 1;
+  const Integer unit = integers.back();
+  return sign_of_length * Sign(length.numerator * unit * unit -
+                               sum * sum * length.denominator * length.ruler_squared);
+}
+
 }  // namespace hulld::oracle

@@ -32,6 +32,8 @@ SquaredLength BruteForceDepth(std::span<const Point> a, const Placement& X_WA,
 bool IsWithin(const SquaredLength& length, double value, double bound);
 // Returns the sign of the length minus a finite threshold >= 0.
 int Compare(const SquaredLength& length, double threshold);
+// Returns the sign of sign * length minus the exact sum of finite terms.
+int CompareSum(int sign, const SquaredLength& length, std::span<const double> terms);
 
 }  // namespace hulld::oracle
 

@@ -2,6 +2,7 @@
 #define HULLD_TESTS_ORACLE_CERTIFICATE_CHECK_H_
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,12 @@ struct Certificate {
 // max n.A <= min n.B, and at most four pairs, with 0 in the hull of their differences. OVERLAPPING:
 // no direction, and at most six pairs, with 0 strictly inside the hull of their differences.
 std::string FaultOf(const Certificate& certificate, Relation relation, const WorldPoints& points);
+
+// As FaultOf for hulls with radii, at least one of them not 0. `radii`: their exact sum is r.
+std::string FaultOfRounded(const Certificate& certificate, Relation relation,
+                           std::span<const Point> a, const Placement& X_WA,
+                           std::span<const Point> b, const Placement& X_WB,
+                           std::span<const double> radii);
 
 }  // namespace hulld::oracle
 

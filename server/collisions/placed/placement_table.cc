@@ -78,6 +78,11 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
         absl::StrCat("packed_placements.poses holds ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
   }
+  if (!packed.radii().empty() && packed.radii_size() != packed.hulls_size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packed_placements.radii holds ", packed.radii_size(), " numbers for ",
+                     packed.hulls_size(), " placements; give one for each, or none"));
+  }
   const auto shapes = static_cast<uint32_t>(packed.shape_sizes_size());
   const uint32_t hulls = static_cast<uint32_t>(packed.hull_ids_size()) + shapes;
   for (int i = 0; i < packed.hulls_size(); ++i) {
@@ -111,7 +116,7 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
     v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements, const char* what) {
   const bool is_packed = packed.hull_ids_size() + packed.shape_sizes_size() + packed.hulls_size() +
-                             packed.poses_size() >
+                             packed.poses_size() + packed.radii_size() >
                          0;
   if (is_packed && !placements.empty()) {
     return absl::InvalidArgumentError(
@@ -163,13 +168,18 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
   const size_t count = packed.hulls_size();
   hull_of_.reserve(count);
   poses_.Swap(packed.mutable_poses());
+  radii_.Swap(packed.mutable_radii());
   for (size_t i = 0; i < count; ++i) {
     const uint32_t named = packed.hulls(static_cast<int>(i));
     hull_of_.push_back(hulls[named]);
-    if (HasHull(i)) {
+    if (!HasHull(i)) {
+      malformed_.emplace(i, malformed[named]);
+    } else if (IsValidRadius(RadiusAt(i))) {
       CheckPose(i, "packed_placements.poses[", "].");
     } else {
-      malformed_.emplace(i, malformed[named]);
+      hull_of_[i] = kNoHull;
+      malformed_.emplace(i, Prefixed(absl::StrCat("packed_placements.radii[", i, "]"),
+                                     ValidateRadius(RadiusAt(i))));
     }
   }
 }
@@ -187,8 +197,8 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
     const v1::Placement& placement = placements[static_cast<int>(i)];
     const auto known = index_of.find(placement.hull_id());
     const bool is_known = known != index_of.end() && !placement.has_points();
-    const absl::Status status =
-        is_known ? absl::OkStatus() : CheckSubject(caller, placement, &shapes_);
+    absl::Status status = Prefixed("radius", ValidateRadius(placement.radius()));
+    if (status.ok() && !is_known) status = CheckSubject(caller, placement, &shapes_);
     if (!status.ok()) {
       malformed_.emplace(i, Prefixed(absl::StrCat("placements[", i, "]."), status));
       continue;
@@ -201,6 +211,10 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
       hull_of_[i] = static_cast<uint32_t>(ids_.size());
       index_of.emplace(placement.hull_id(), hull_of_[i]);
       ids_.push_back(placement.hull_id());
+    }
+    if (placement.radius() > 0) {
+      radii_.Resize(static_cast<int>(count), 0);
+      radii_[static_cast<int>(i)] = placement.radius();
     }
     WritePose(ReadPose(placement.pose()), i, &poses_);
     CheckPose(i, "placements[", "].pose.");
@@ -227,11 +241,12 @@ size_t PlacementTable::MemoryBytes() const {
     constexpr size_t kNodeBytes = 64;
     of_errors += kNodeBytes;
     // Packed placements share the error of an ID.
-    if (!is_packed_ || HasHull(i)) of_errors += ErrorBytes(status);
+    if (!is_packed_ || HasHull(i) || !IsValidRadius(RadiusAt(i))) of_errors += ErrorBytes(status);
   }
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
   const size_t each = 2 * sizeof(uint32_t) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
-  const size_t of_poses = static_cast<size_t>(poses_.Capacity()) * sizeof(double);
+  const size_t of_poses =
+      static_cast<size_t>(poses_.Capacity() + radii_.Capacity()) * sizeof(double);
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() * (sizeof(std::string) + KnownHulls::kBytesEach) +
          hull_count() * (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) +
@@ -391,7 +406,7 @@ void PlacementTable::TakeHullsOfPieces() {
 
 PlacedBody PlacementTable::PlaceBody(size_t i) const {
   if (!is_answerable(i)) return PlacedBody(NoBody(), Pose());
-  return PlacedBody(*query_bodies_[hull_of_[i]], PoseAt(i));
+  return PlacedBody(*query_bodies_[hull_of_[i]], PoseAt(i), RadiusAt(i));
 }
 
 void PlacementTable::SortByHull() {
@@ -413,7 +428,7 @@ const QueryHull& PlacementTable::HullAt(size_t i) const {
 
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
-  return PlacedHull(*query_hulls_[hull_of_[i]], PoseAt(i));
+  return PlacedHull(*query_hulls_[hull_of_[i]], PoseAt(i), RadiusAt(i));
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {

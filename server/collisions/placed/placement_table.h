@@ -136,8 +136,8 @@ class PlacementTable {
     return std::span(by_hull_).subspan(by_hull_begin_[k],
                                        by_hull_begin_[k + 1] - by_hull_begin_[k]);
   }
-  // Hull of a placement; nullopt if the ID or the inline shape is malformed, or the ID is outside
-  // the caller's prefix.
+  // Hull of a placement; nullopt if the ID, the inline shape, or the radius is malformed, or the ID
+  // is outside the caller's prefix.
   std::optional<size_t> hull_of(size_t i) const {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
@@ -179,6 +179,7 @@ class PlacementTable {
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
   void CheckPose(size_t i, const char* of, const char* after);
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
+  double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
   void TakeBodies();
@@ -195,7 +196,9 @@ class PlacementTable {
   // its pose, packed.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
-  // Errors of malformed IDs, inline shapes, and poses, by placement.
+  // The radius of each placement; empty if all are 0.
+  google::protobuf::RepeatedField<double> radii_;
+  // Errors of malformed IDs, inline shapes, radii, and poses, by placement.
   std::unordered_map<size_t, absl::Status> malformed_;
   bool is_packed_ = false;
   // Index into hulls_ of each hull named by packed placements.

@@ -24,6 +24,7 @@ constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 struct Hull {
   std::vector<double> xyz;
   v1::Pose pose;
+  double radius = 0;
 };
 
 Hull At(std::vector<double> xyz, double x = 0, double y = 0, double z = 0) {
@@ -84,7 +85,8 @@ v1::Certificate Integers(const std::string& x, const std::string& y, const std::
 
 absl::Status Check(v1::Relation relation, const v1::Certificate& certificate, const Hull& a,
                    const Hull& b) {
-  return CheckCertificate(relation, certificate, {a.xyz, a.pose}, {b.xyz, b.pose});
+  return CheckCertificate(relation, certificate, {a.xyz, a.pose, nullptr, false, {a.radius}},
+                          {b.xyz, b.pose, nullptr, false, {b.radius}});
 }
 
 void ExpectInvalid(v1::Relation relation, const v1::Certificate& certificate, const Hull& a,
@@ -332,6 +334,52 @@ TEST(CertificateCheck, AcceptsNothingThatIsFalse) {
   EXPECT_GT(accepted[kSeparated], kScenes / 10);
   EXPECT_GT(accepted[kTouching], kScenes / 100);
   EXPECT_GT(accepted[kOverlapping], kScenes / 200);
+}
+
+Hull Ball(double radius, double x = 0, double y = 0, double z = 0) {
+  Hull hull = At({0, 0, 0}, x, y, z);
+  hull.radius = radius;
+  return hull;
+}
+
+TEST(CertificateCheck, RadiiCloseTheGapToTheLastBit) {
+  const Pairs centers = {{0, 0}};
+  const Hull a = Ball(2);
+  const Hull less = Ball(std::nextafter(3.0, 0), 3, 4);
+  const Hull equal = Ball(3, 3, 4);
+  const Hull more = Ball(std::nextafter(3.0, 4), 3, 4);
+  const std::string lacks = "too small for their radii";
+  const std::string far = "too far from 0 for the radii";
+  ExpectValid(kSeparated, Direction(3, 4, 0), a, less);
+  ExpectInvalid(kSeparated, Direction(3, 4, 1e-7), a, less, lacks);
+  ExpectInvalid(kSeparated, Direction(-3, -4, 0), a, less, lacks);
+  ExpectInvalid(kTouching, Direction(3, 4, 0, centers), a, less, far);
+  ExpectInvalid(kSeparated, Direction(3, 4, 0), a, equal, lacks);
+  ExpectValid(kTouching, Direction(0.75, 1, 0, centers), a, equal);
+  ExpectValid(kTouching, Integers("3", "4", "0", centers), Turned(a, 2, 1, 0, 1), equal);
+  ExpectInvalid(kTouching, Direction(3, 4, 0), a, equal, far);
+  ExpectInvalid(kTouching, Direction(3, 5, 0, centers), a, equal, lacks);
+  ExpectInvalid(kOverlapping, PairsOnly(centers), a, equal, far);
+  ExpectInvalid(kTouching, Direction(3, 4, 0, centers), a, more, lacks);
+  ExpectValid(kOverlapping, PairsOnly(centers), a, more);
+}
+
+TEST(CertificateCheck, PairsComeNearWithinEdgesTrianglesAndInsides) {
+  Hull cube = At(Cube());
+  cube.radius = 0.25;
+  // Above a facet, beside an edge, and inside.
+  ExpectValid(kTouching, Direction(0, 0, 1, {{1, 0}, {3, 0}, {5, 0}, {7, 0}}), cube,
+              Ball(0.5, 0.25, 0.5, 1.75));
+  ExpectInvalid(kTouching, Direction(0, 0, 1, {{1, 0}, {3, 0}}), cube, Ball(0.5, 0.25, 0.5, 1.75),
+                "too far from 0");
+  ExpectValid(kTouching, Direction(3, 4, 0, {{6, 0}, {7, 0}}), cube, Ball(4.75, 4, 5, 0.5));
+  ExpectValid(kOverlapping, PairsOnly({{0, 0}, {6, 0}, {5, 0}, {3, 0}}), cube,
+              Ball(0.01, 0.5, 0.5, 0.5));
+  ExpectValid(kOverlapping, PairsOnly({{0, 0}, {7, 0}}), cube, Ball(0, 0.5, 0.5, 0.5));
+  Hull bad = Ball(-1);
+  ExpectInvalid(kSeparated, Direction(1, 0, 0), cube, bad, "a radius is negative");
+  bad.radius = INFINITY;
+  ExpectInvalid(kSeparated, Direction(1, 0, 0), cube, bad, "not finite");
 }
 
 }  // namespace certificate_check_test

@@ -56,11 +56,16 @@ struct Body {
   }
   std::vector<PlacedVertices> pieces() const {
     std::vector<PlacedVertices> all;
-    for (size_t i = 0; i < hulls.size(); ++i) all.push_back({hulls[i], pose, &poses[i]});
+    for (size_t i = 0; i < hulls.size(); ++i) {
+      all.push_back({hulls[i], pose, &poses[i], false, {radius, piece_radius}});
+    }
     return all;
   }
 
   v1::Pose pose;
+  // Of its placement and of each piece.
+  double radius = 0;
+  double piece_radius = 0;
   std::deque<std::vector<double>> hulls;
   std::deque<v1::Pose> poses;
 };
@@ -245,6 +250,24 @@ TEST(PieceCheck, HullsAreOnePieceEach) {
   proofs[0].set_piece_a(1);
   EXPECT_THAT(std::string(CheckPieceCertificates(kTouching, proofs, hull, b.pieces()).message()),
               HasSubstr("A has 1 pieces"));
+}
+
+TEST(PieceCheck, RadiiGrowTheBoxes) {
+  Body a, b;
+  a.Add(Cube(), At(0, 0, 0));
+  b.Add(Cube(), At(2, 0, 0));
+  EXPECT_THAT(Fault(kSeparated, {}, a, b), IsEmpty());
+  a.radius = 0.25;
+  a.piece_radius = 0.25;
+  b.radius = std::nextafter(0.5, 0);
+  EXPECT_THAT(Fault(kSeparated, {}, a, b), IsEmpty());
+  b.radius = 0.5;
+  EXPECT_THAT(Fault(kSeparated, {}, a, b), HasSubstr("pieces 0 of A and 0 of B have no"));
+  EXPECT_THAT(Fault(kTouching, {Proof(0, 0, kTouching, 1, 0, 0, {{4, 0}})}, a, b), IsEmpty());
+  b.piece_radius = 0x1p-60;
+  EXPECT_THAT(Fault(kTouching, {Proof(0, 0, kTouching, 1, 0, 0, {{4, 0}})}, a, b),
+              HasSubstr("too small for their radii"));
+  EXPECT_THAT(Fault(kOverlapping, {Proof(0, 0, kOverlapping, 0, 0, 0, {{4, 0}})}, a, b), IsEmpty());
 }
 
 TEST(PieceCheck, EmptyPiecesAreSettled) {

@@ -80,6 +80,52 @@ TEST(BodySearch, RelationIsTheStrongestOfAllPairsOfPieces) {
   for (const int count : relations) EXPECT_GT(count, 3);
 }
 
+// Every pair of pieces is decided with the sum of four radii.
+TEST(BodySearch, RadiiOfBodiesAndPiecesAddUp) {
+  Random random(TestSeed(8));
+  std::array<int, 3> relations = {};
+  for (int round = 0; round < 120; ++round) {
+    OwnBody a, b;
+    for (OwnBody* const body : {&a, &b}) {
+      for (int i = random.Between(1, 9); i > 0; --i) {
+        body->Add(RandomLatticePoints(random, random.Between(1, 3), 2),
+                  At(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3)),
+                  random.Between(0, 2) / 4.0);
+      }
+      body->Finish();
+    }
+    const PlacedBody placed_a = a.Placed(At(0, 0, 0), 0.25);
+    const PlacedBody placed_b =
+        b.Placed(At(random.Between(-14, 14), random.Between(-6, 6), 0), 0.5);
+    Relation strongest = Relation::kSeparated;
+    double least = kInfinity;
+    for (uint32_t i = 0; i < a.pieces.size(); ++i) {
+      for (uint32_t j = 0; j < b.pieces.size(); ++j) {
+        // The sums are exact.
+        const PlacedHull piece_a(a.query_hulls[i], a.pieces[i].X_BP, 0.25 + a.pieces[i].radius);
+        Pose X_WP = b.pieces[j].X_BP;
+        X_WP.t += placed_b.X_WB().t;
+        const PlacedHull piece_b(b.query_hulls[j], X_WP, 0.5 + b.pieces[j].radius);
+        const Answer answer = CheckCollision(piece_a, piece_b, Detailed()).value();
+        if (Strength(answer.relation) > Strength(strongest)) strongest = answer.relation;
+        least = std::min(least, answer.separation->value);
+      }
+    }
+    const auto quick = CheckBodies(placed_a, placed_b, QueryOptions());
+    EXPECT_EQ(quick->answer.relation, strongest) << round;
+    const auto detailed = CheckBodies(placed_a, placed_b, Detailed());
+    EXPECT_EQ(detailed->answer.relation, strongest) << round;
+    EXPECT_NEAR(detailed->answer.separation->value, least, detailed->answer.separation->bound);
+    EXPECT_EQ(CheckBodies(placed_b, placed_a, Detailed())->answer.separation->value,
+              detailed->answer.separation->value);
+    QueryOptions proven;
+    proven.want_certificate = true;
+    EXPECT_EQ(CheckBodies(placed_a, placed_b, proven)->answer.relation, strongest);
+    ++relations[static_cast<size_t>(strongest)];
+  }
+  for (const int count : relations) EXPECT_GT(count, 3);
+}
+
 TEST(BodySearch, SwappingTheBodiesMirrorsTheAnswer) {
   Random random(TestSeed(2));
   for (int round = 0; round < 40; ++round) {

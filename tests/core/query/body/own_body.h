@@ -24,13 +24,15 @@ struct OwnBody {
   std::vector<BodyPiece> pieces;
   std::optional<QueryBody> query;
 
-  void Add(const std::vector<Vector>& points, const Pose& X_BP) {
+  void Add(const std::vector<Vector>& points, const Pose& X_BP, double radius = 0) {
     hulls.push_back(points.empty() ? Hull() : BuildHull(points));
     query_hulls.emplace_back(hulls.back());
-    pieces.push_back({&query_hulls.back(), X_BP});
+    pieces.push_back({&query_hulls.back(), X_BP, radius});
   }
   void Finish() { query.emplace(pieces); }
-  PlacedBody Placed(const Pose& X_WB) const { return PlacedBody(*query, X_WB); }
+  PlacedBody Placed(const Pose& X_WB, double radius = 0) const {
+    return PlacedBody(*query, X_WB, radius);
+  }
 };
 
 // Adds hulls of a few lattice points each, some rotated, some empty.
