@@ -10,19 +10,21 @@
 
 namespace hulld {
 
-// Points with a convex hull that stands for a shape.
+// A rounded hull that stands for a shape.
 struct ShapeHull {
   // n x 3, in the frame of the shape.
   std::vector<double> xyz;
-  // The hull contains the shape and extends at most this far beyond it, in meters; proven, up to
-  // the rounding of this number. 0 for boxes, and for meshes, which are replaced by their hull.
+  // Placement.radius, in meters.
+  double radius = 0;
+  // The rounded hull contains the shape and extends at most this far beyond it, in meters; proven,
+  // up to the rounding of this number. 0 but for cylinders; a mesh is replaced by its hull.
   double excess = 0;
 };
 
-// Returns points of a hull around the shape. Box: its corners, exact but for halving the smallest
-// numbers. Cylinder: a prism of kCylinderSides sides around it. Sphere: a geodesic polyhedron of
-// 162 vertices around it. Capsule: the hull of two of these. Each is as tight as possible within a
-// few units of roundoff. Requires sizes above 0, as ReadUrdf ensures, and no mesh.
+// Returns the rounded hull of a shape. Box: its corners. Sphere: its center and radius. Capsule:
+// its segment and radius. These are exact but for halving the smallest numbers. Cylinder: a prism
+// of kCylinderSides sides around it, as tight as possible within a few units of roundoff. Requires
+// sizes above 0, as ReadUrdf ensures, and no mesh.
 ShapeHull PrimitiveHull(const CollisionShape& shape);
 inline constexpr int kCylinderSides = 32;
 

@@ -1,5 +1,6 @@
 #include "client/hullctl/body/body_command.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,7 +31,7 @@ ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   if (arguments.if_revision) request.set_if_revision(*arguments.if_revision);
   if (arguments.pieces.empty() == arguments.file.empty()) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "give the pieces as HULL or HULL@POSE, or with --pieces FILE, but not both"));
+        "give the pieces as HULL[@POSE][:RADIUS], or with --pieces FILE, but not both"));
   }
   for (const std::string& text : arguments.pieces) {
     const absl::StatusOr<v1::Placement> piece = ParsePiece(text);
@@ -70,13 +71,18 @@ ExitCode GetBody(const Invocation& run, const BodyArguments& arguments) {
   run.out << body.body_id() << " at revision " << body.revision() << ", created at "
           << body.create_revision() << "\n";
   Table table;
+  const bool has_radii = std::ranges::any_of(
+      response->pieces(), [](const v1::Placement& piece) { return piece.radius() > 0; });
   std::vector<std::string> head = {"PIECE", "HULL", "POSE"};
+  if (has_radii) head.push_back("RADIUS");
   for (std::string& title : head) title = run.paint(Hue::kHeading, title);
   table.Row(head);
   for (int i = 0; i < response->pieces_size(); ++i) {
     const v1::Placement& piece = response->pieces(i);
     const std::string pose = PoseText(piece.pose());
-    table.Row({std::to_string(i), piece.hull_id(), pose.empty() ? "-" : pose});
+    std::vector<std::string> row = {std::to_string(i), piece.hull_id(), pose.empty() ? "-" : pose};
+    if (has_radii) row.push_back(ShortestText(piece.radius()));
+    table.Row(row);
   }
   table.Print(run.out);
   return ExitCode::kDone;
@@ -143,11 +149,12 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
   Command put = body.AddCommand("put", "Create a body, or replace all of its pieces");
   AddName(put, arguments);
   put.AddTexts(
-         "HULL[@POSE]", &arguments->pieces,
-         "Pieces: hulls, each at [w,x,y,z,]tx,ty,tz in the frame of the body (default: no motion)")
+         "HULL[@POSE][:RADIUS]", &arguments->pieces,
+         "Pieces: hulls, each at [w,x,y,z,]tx,ty,tz in the frame of the body (default: no motion), "
+         "grown by a ball of the radius (default: 0)")
       .Completes(ValueKind::kHull);
   put.AddText("--pieces", &arguments->file,
-              "JSON file of pieces, as 'body get --output json' writes it, instead of HULL@POSE; - "
+              "JSON file of pieces, as 'body get --output json' writes it, instead of HULL; - "
               "is standard input")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
@@ -156,6 +163,7 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
   put.SetExamples(
       {{"", "hullctl body put bracket plate rib@0,0.05,0 rib@0,-0.05,0"},
        {"Turned by a quarter about z", "hullctl body put bracket plate rib@1,0,0,1,0,0,0"},
+       {"With a margin", "hullctl body put bracket plate:0.002 rib@0,0.05,0:0.002"},
        {"A copy", "hullctl body get bracket --output json | hullctl body put copy --pieces -"}});
   OnGiven(put, invocation, arguments, PutBody);
 }

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <cmath>
 #include <memory>
 #include <string_view>
 
@@ -14,15 +15,26 @@
 namespace hulld {
 
 absl::StatusOr<v1::Placement> ParsePiece(const std::string& text) {
-  const size_t at = text.find('@');
+  const size_t colon = text.find(':');
+  const std::string placed = text.substr(0, colon);
+  const size_t at = placed.find('@');
   v1::Placement piece;
-  piece.set_hull_id(text.substr(0, at));
+  piece.set_hull_id(placed.substr(0, at));
   if (piece.hull_id().empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(Quoted(text), " names no hull; a piece is HULL or HULL@[w,x,y,z,]tx,ty,tz"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        Quoted(text), " names no hull; a piece is HULL[@[w,x,y,z,]tx,ty,tz][:RADIUS]"));
+  }
+  if (colon != std::string::npos) {
+    double radius = 0;
+    if (ParseDouble(text.substr(colon + 1), &radius) != NumberText::kNumber ||
+        !std::isfinite(radius) || radius < 0) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(Quoted(text), ": the radius after the colon is not a length of at least 0"));
+    }
+    piece.set_radius(radius);
   }
   if (at == std::string::npos) return piece;
-  const absl::StatusOr<v1::Pose> pose = ParsePose(text.substr(at + 1));
+  const absl::StatusOr<v1::Pose> pose = ParsePose(placed.substr(at + 1));
   if (!pose.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(Quoted(text), ": ", pose.status().message()));
   }

@@ -15,7 +15,7 @@ namespace hulld {
 
 using Pieces = google::protobuf::RepeatedPtrField<v1::Placement>;
 
-// Parses "HULL" or "HULL@POSE", with a pose as in ParsePose.
+// Parses "HULL[@POSE][:RADIUS]", with a pose as in ParsePose.
 absl::StatusOr<v1::Placement> ParsePiece(const std::string& text);
 
 // Adds the pieces of a JSON file, as written by 'hullctl body get --output json': {"pieces":[...]};

@@ -39,6 +39,11 @@ std::string SideText(const v1::Placement& placement, const v1::HullVersion& hull
          Counted(static_cast<uint64_t>(placement.points().xyz_size()) / 3, "point") + ")";
 }
 
+// Appends the radius of a side, if it has one.
+std::string WithRadius(const std::string& side, const v1::Placement& placement) {
+  return placement.radius() == 0 ? side : side + ", radius " + ShortestText(placement.radius());
+}
+
 std::string PieceText(const v1::DecidingPiece& piece) {
   return std::to_string(piece.index()) + ": " + VersionText(piece.hull());
 }
@@ -118,8 +123,8 @@ void PrintAnswerTable(const Invocation& run, const PairArguments& arguments,
                       const Verification* verification) {
   Table table;
   table.Row({"relation", PaintedRelation(response.relation(), run.paint)})
-      .Row({"A", SideText(request.a(), response.hull_a(), arguments.a)})
-      .Row({"B", SideText(request.b(), response.hull_b(), arguments.b)})
+      .Row({"A", WithRadius(SideText(request.a(), response.hull_a(), arguments.a), request.a())})
+      .Row({"B", WithRadius(SideText(request.b(), response.hull_b(), arguments.b), request.b())})
       .Row({"decided by", RungText(response.rung())});
   AddPieces(response, &table);
   AddMeasures(request, response, &table);
@@ -225,6 +230,10 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   command.AddText("B", &arguments->b, kSideHelp).Required().Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
+  command.AddLength("--radius-a", "Grow A by a ball of this radius: a point becomes a sphere",
+                    [request](double radius) { request->mutable_a()->set_radius(radius); });
+  command.AddLength("--radius-b", "Grow B by a ball of this radius",
+                    [request](double radius) { request->mutable_b()->set_radius(radius); });
   AddQueryOptions(command, &arguments->details);
   AddFreshnessOptions(command, invocation);
   PairArguments* const checked = arguments.get();
@@ -244,13 +253,14 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       "append'. A file without an extension needs a path, such as ./part. Lengths are in the unit\n"
       "of the points. For a body ('hullctl body --help'), the answer names the deciding pieces,\n"
       "and its certificate has one part for each pair of pieces that boxes do not decide;\n"
-      "--output json shows them. --textbook takes no bodies.");
+      "--output json shows them. --textbook takes no bodies and no radii.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
        {"Which way out is the shortest?", "hullctl check arm box --separation --normal"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
+       {"With a margin of 2 mm about the arm", "hullctl check arm box --radius-a 0.002"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},

@@ -43,6 +43,11 @@ class PieceFetcher {
     if (!body.ok()) return body.status();
     for (int i = 0; i < body->pieces_size(); ++i) {
       const v1::Placement& piece = body->pieces(i);
+      if (piece.radius() > 0) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("body ", Quoted(word), ": piece ", i,
+                         " has a radius; 'cover' takes only hulls without one"));
+      }
       const absl::Status taken = AddHull(piece.hull_id(), NumbersOf(piece.pose()));
       if (absl::IsNotFound(taken)) {
         return absl::NotFoundError(

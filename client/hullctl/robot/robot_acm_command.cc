@@ -89,7 +89,7 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
                     const Client& client, const std::atomic<bool>& stopped,
                     std::map<LinkPair, Tally>* tallies, const std::vector<uint32_t>& pairs) {
   WaypointStream::Scope scope;
-  for (const RobotPart& part : model.parts) scope.moving.push_back(part.hull_id);
+  AddMoving(model, &scope);
   scope.pairs = pairs;
   absl::Status problem;
   WaypointStream stream(

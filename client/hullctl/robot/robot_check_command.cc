@@ -49,6 +49,7 @@ struct RobotCheckArguments {
 struct Cast {
   std::vector<std::string> names;
   std::vector<std::string> fixed_hulls;
+  std::vector<double> fixed_radii;
   std::vector<double> fixed_poses;
 };
 
@@ -188,7 +189,9 @@ absl::Status RobotCheck::AddScene() {
   for (uint32_t i = 0; i < scene_.size(); ++i) {
     cast_.names.push_back(scene_.NameOf(i));
     cast_.fixed_hulls.push_back(*scene_.HullOf(i));
-    const Pose7 pose = NumbersOf(scene_.PlacementOf(i).pose());
+    const v1::Placement placement = scene_.PlacementOf(i);
+    cast_.fixed_radii.push_back(placement.radius());
+    const Pose7 pose = NumbersOf(placement.pose());
     cast_.fixed_poses.insert(cast_.fixed_poses.end(), pose.begin(), pose.end());
   }
   return absl::OkStatus();
@@ -422,12 +425,8 @@ void RobotCheck::PrintHead() {
   if (run_.json() || run_.names()) return;
   for (const RobotPart& part : model_.parts) {
     if (part.hull.excess == 0) continue;
-    run_.out << "# " << part.name << ": "
-             << (part.kind == ShapeKind::kCylinder ? "a cylinder"
-                 : part.kind == ShapeKind::kSphere ? "a sphere"
-                                                   : "a capsule")
-             << " within a polyhedron that reaches at most " << ShortestText(part.hull.excess)
-             << " beyond it\n";
+    run_.out << "# " << part.name << ": a cylinder within a polyhedron that reaches at most "
+             << ShortestText(part.hull.excess) << " beyond it\n";
   }
   for (const std::string& note : model_.notes) run_.out << "# " << note << "\n";
   run_.out << "# " << Counted(pairs_.size() / 2, "pair");
@@ -470,8 +469,9 @@ ExitCode RobotCheck::Run() {
   absl::Status status = RegisterHulls(run_, arguments_.robot, client_, &temporary_, &model_);
   if (!status.ok()) return run_.Fail(status);
   WaypointStream::Scope scope;
-  for (const RobotPart& part : model_.parts) scope.moving.push_back(part.hull_id);
+  AddMoving(model_, &scope);
   scope.fixed = cast_.fixed_hulls;
+  scope.fixed_radii = cast_.fixed_radii;
   scope.fixed_poses = cast_.fixed_poses;
   scope.pairs = pairs_;
   double tolerance = 0;

@@ -19,16 +19,14 @@ namespace hulld {
 
 const char kRobotHelp[] =
     "FILE is a robot description (URDF). Each collision shape becomes a hull in its own frame: a\n"
-    "mesh its convex hull, a box itself, and a cylinder, sphere, or capsule an enclosing "
-    "polyhedron\n"
-    "whose excess is printed. A mesh file of several named parts that are all convex, as V-HACD "
-    "and\n"
-    "CoACD write them, becomes one hull per part; --split does so with any parts. The hulls are\n"
-    "deleted at the end, unless --prefix keeps them. Meshes are obj, stl, ply, off, gltf, or dae. "
-    "A\n"
-    "package://NAME/ is searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and "
-    "in\n"
-    "the folders above FILE. Units are meters and radians, as in URDF. Poses are computed in\n"
+    "mesh its convex hull, a box itself, and a cylinder an enclosing polyhedron whose excess is\n"
+    "printed. A sphere becomes its center and a capsule its segment, both exact with their "
+    "radius.\n"
+    "A mesh file of several named parts that are all convex, as V-HACD and CoACD write them,\n"
+    "becomes one hull per part; --split does so with any parts. The hulls are deleted at the end,\n"
+    "unless --prefix keeps them, without radii. Meshes are obj, stl, ply, off, gltf, or dae. A\n"
+    "package://NAME/ is searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and\n"
+    "in the folders above FILE. Units are meters and radians, as in URDF. Poses are computed in\n"
     "floating point; answers are exact for these poses.\n";
 
 namespace {
@@ -91,7 +89,6 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
       part.link = static_cast<int>(link);
       part.name = from.name;
       part.X_LS = shape.X_LS;
-      part.kind = shape.kind;
       part.hull = std::move(piece.hull);
       part.mesh = std::move(piece.mesh);
     }
@@ -199,6 +196,13 @@ absl::Status RegisterHulls(const Invocation& run, const RobotArguments& argument
     part.mesh = {};
   }
   return absl::OkStatus();
+}
+
+void AddMoving(const RobotModel& model, WaypointStream::Scope* scope) {
+  for (const RobotPart& part : model.parts) {
+    scope->moving.push_back(part.hull_id);
+    scope->moving_radii.push_back(part.hull.radius);
+  }
 }
 
 }  // namespace hulld

@@ -11,6 +11,7 @@
 #include "client/formats/mesh_file.h"
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
+#include "client/hullctl/robot/waypoint_stream.h"
 #include "client/hullctl/view/temporary_hulls.h"
 #include "client/robot/robot.h"
 #include "client/robot/shape_hull.h"
@@ -40,7 +41,6 @@ struct RobotPart {
   // The link's name, followed by "/1", "/2", and so on if it has several parts.
   std::string name;
   RigidPose X_LS = kNoMotion;
-  ShapeKind kind = ShapeKind::kMesh;
   ShapeHull hull;
   // Surface, as in MeshPiece; dropped by RegisterHulls.
   TriangleMesh mesh;
@@ -70,6 +70,9 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments);
 // mesh (kSwellToWarn).
 absl::Status RegisterHulls(const Invocation& run, const RobotArguments& arguments,
                            const Client& client, TemporaryHulls* temporary, RobotModel* model);
+
+// Adds all parts as the moving ones. Requires their IDs.
+void AddMoving(const RobotModel& model, WaypointStream::Scope* scope);
 
 }  // namespace hulld
 

@@ -37,8 +37,10 @@ absl::StatusOr<v1::StreamCollisionsResponse> WaypointStream::Open(
   for (const std::string& hull : scope_.fixed) packed->add_hull_ids(hull);
   for (uint32_t placement = 0; placement < all_moving; ++placement) {
     packed->add_hulls(placement % moving);
+    packed->add_radii(scope_.moving_radii[placement % moving]);
   }
   for (uint32_t i = 0; i < scope_.fixed.size(); ++i) packed->add_hulls(moving + i);
+  packed->mutable_radii()->Add(scope_.fixed_radii.begin(), scope_.fixed_radii.end());
   packed->mutable_poses()->Add(poses.begin(), poses.end());
   packed->mutable_poses()->Add(scope_.fixed_poses.begin(), scope_.fixed_poses.end());
   for (uint32_t lane = 0; lane < count; ++lane) {

@@ -22,9 +22,12 @@ namespace hulld {
 class WaypointStream {
  public:
   struct Scope {
-    // Hulls of the moving parts, and of the fixed ones with their poses (seven numbers each).
+    // Hulls and radii of the moving parts, and of the fixed ones with their poses (seven numbers
+    // each).
     std::vector<std::string> moving;
+    std::vector<double> moving_radii;
     std::vector<std::string> fixed;
+    std::vector<double> fixed_radii;
     std::vector<double> fixed_poses;
     // Two indices each: into `moving`, then continuing into `fixed`.
     std::vector<uint32_t> pairs;

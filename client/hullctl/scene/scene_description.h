@@ -34,6 +34,7 @@ struct PieceDefinition {
   std::string name;
   std::string hull_id;
   RigidPose X_BP = kNoMotion;
+  double radius = 0;
 };
 
 struct BodyDefinition {
@@ -49,6 +50,7 @@ struct PlacementDefinition {
   std::string hull_id;
   int body = -1;
   RigidPose X_WO = kNoMotion;
+  double radius = 0;
   // Pairs within a group are never queried. Empty: no group.
   std::string group;
 };

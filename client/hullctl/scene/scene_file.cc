@@ -104,6 +104,11 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
         absl::StrCat("packedPlacements.poses holds ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven"));
   }
+  if (packed.radii_size() > 0 && packed.radii_size() != packed.hulls_size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packedPlacements.radii holds ", packed.radii_size(), " numbers for ",
+                     packed.hulls_size(), " placements; give one for each, or none"));
+  }
   const int count = packed.hull_ids_size() + packed.shape_sizes_size();
   for (const uint32_t hull : packed.hulls()) {
     if (hull < static_cast<uint32_t>(count)) continue;
@@ -283,6 +288,7 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
   translation.set_x(pose[4]);
   translation.set_y(pose[5]);
   translation.set_z(pose[6]);
+  if (packed.radii_size() > 0) result.set_radius(packed.radii(static_cast<int>(placement)));
   return result;
 }
 

@@ -68,7 +68,8 @@ absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& b
   const bool same =
       std::equal(defined.pieces().begin(), defined.pieces().end(), found->pieces().begin(),
                  found->pieces().end(), [](const v1::Placement& a, const v1::Placement& b) {
-                   return a.hull_id() == b.hull_id() && BitsOf(a.pose()) == BitsOf(b.pose());
+                   return a.hull_id() == b.hull_id() && BitsOf(a.pose()) == BitsOf(b.pose()) &&
+                          a.radius() == b.radius();
                  });
   return same ? Change::kNone : Change::kReplace;
 }

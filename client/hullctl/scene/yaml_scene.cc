@@ -202,6 +202,15 @@ class SceneParser {
     return yaml_.ErrorAt(node, "at: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
   }
 
+  // Reads a length of at least 0. YamlReader refuses numbers that are not finite.
+  absl::StatusOr<double> LengthOf(const YAML::Node& node, const std::string& key) const {
+    auto length = yaml_.Number(node, key);
+    if (length.ok() && *length < 0) {
+      return yaml_.ErrorAt(node, absl::StrCat(key, " must be at least 0"));
+    }
+    return length;
+  }
+
   // Returns the ID of a hull defined in the file.
   absl::StatusOr<std::string> DefinedHull(const YAML::Node& node) const {
     const auto name = yaml_.Text(node, "hull");
@@ -246,7 +255,7 @@ class SceneParser {
   absl::Status TakePiece(const YAML::Node& node, std::set<std::string>* taken,
                          BodyDefinition* body) const {
     const std::string what = absl::StrCat("a piece of body ", Quoted(body->name));
-    const auto entries = yaml_.EntriesOf(node, what, {"hull", "id", "at"});
+    const auto entries = yaml_.EntriesOf(node, what, {"hull", "id", "at", "radius"});
     if (!entries.ok()) return entries.status();
     PieceDefinition piece;
     for (const auto& [key, value] : *entries) {
@@ -254,6 +263,12 @@ class SceneParser {
         const auto pose = PoseOf(value);
         if (!pose.ok()) return pose.status();
         piece.X_BP = *pose;
+        continue;
+      }
+      if (key == "radius") {
+        const auto radius = LengthOf(value, key);
+        if (!radius.ok()) return radius.status();
+        piece.radius = *radius;
         continue;
       }
       if (!piece.hull_id.empty()) return yaml_.ErrorAt(value, what + " takes hull or id, not both");
@@ -297,7 +312,8 @@ class SceneParser {
 
   absl::Status TakePlace(const YAML::Node& node, PlacementDefinition* placement) const {
     const std::string what = absl::StrCat("placement ", Quoted(placement->name));
-    const auto entries = yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "group"});
+    const auto entries =
+        yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "radius", "group"});
     if (!entries.ok()) return entries.status();
     int objects = 0;
     for (const auto& [key, value] : *entries) {
@@ -305,6 +321,12 @@ class SceneParser {
         const auto pose = PoseOf(value);
         if (!pose.ok()) return pose.status();
         placement->X_WO = *pose;
+        continue;
+      }
+      if (key == "radius") {
+        const auto radius = LengthOf(value, key);
+        if (!radius.ok()) return radius.status();
+        placement->radius = *radius;
         continue;
       }
       if (key == "group") {
@@ -426,9 +448,8 @@ class SceneParser {
 
   absl::Status TakeQueryOption(const std::string& key, const YAML::Node& node) {
     if (key == "max_error" || key == "clearance" || key == "tolerance") {
-      const auto length = yaml_.Number(node, key);
+      const auto length = LengthOf(node, key);
       if (!length.ok()) return length.status();
-      if (*length < 0) return yaml_.ErrorAt(node, absl::StrCat(key, " must be at least 0"));
       if (key == "tolerance") {
         scene_.tolerance = *length;
       } else if (key == "clearance") {
@@ -501,9 +522,10 @@ class Classes {
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
 };
 
-v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP) {
+v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP, double radius) {
   v1::Placement placement;
   placement.set_hull_id(id);
+  placement.set_radius(radius);
   if (X_WP == kNoMotion) return placement;
   v1::Pose& pose = *placement.mutable_pose();
   if (X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
@@ -525,23 +547,24 @@ std::vector<uint32_t> AddPlacement(const SceneDescription& from,
                                    const PlacementDefinition& placement, BodyForm form,
                                    Scene* scene) {
   const auto add = [scene](const std::string& name, const std::string& id, const RigidPose& X_WP,
-                           int body) {
-    *scene->request.add_placements() = PlacementAt(id, X_WP);
+                           double radius, int body) {
+    *scene->request.add_placements() = PlacementAt(id, X_WP, radius);
     scene->names.push_back(name);
     scene->body_of.push_back(body);
     return scene->size() - 1;
   };
   if (placement.body < 0) {
-    return {add(placement.name, placement.hull_id, placement.X_WO, -1)};
+    return {add(placement.name, placement.hull_id, placement.X_WO, placement.radius, -1)};
   }
   const BodyDefinition& body = from.bodies[static_cast<size_t>(placement.body)];
   if (form == BodyForm::kWhole) {
-    return {add(placement.name, body.body_id, placement.X_WO, placement.body)};
+    return {add(placement.name, body.body_id, placement.X_WO, placement.radius, placement.body)};
   }
   std::vector<uint32_t> indices;
   for (const PieceDefinition& piece : body.pieces) {
     indices.push_back(add(absl::StrCat(placement.name, "/", piece.name), piece.hull_id,
-                          Compose(placement.X_WO, piece.X_BP), -1));
+                          Compose(placement.X_WO, piece.X_BP), placement.radius + piece.radius,
+                          -1));
   }
   return indices;
 }
@@ -552,7 +575,7 @@ v1::PutBodyRequest BodyRequest(const BodyDefinition& body) {
   v1::PutBodyRequest request;
   request.set_body_id(body.body_id);
   for (const PieceDefinition& piece : body.pieces) {
-    *request.add_pieces() = PlacementAt(piece.hull_id, piece.X_BP);
+    *request.add_pieces() = PlacementAt(piece.hull_id, piece.X_BP, piece.radius);
   }
   return request;
 }

@@ -20,6 +20,7 @@ from hulld.answers.collisions import Collision
 from hulld.client import Client
 from hulld.connection import PathLike
 from hulld.geometry.points import PointsLike, as_points
+from hulld.geometry.placements import Placement
 from hulld.geometry.poses import PoseLike
 from hulld.programs import find_program
 
@@ -256,14 +257,21 @@ def shared_client() -> Client:
 
 
 def check(
-    a: PointsLike, b: PointsLike, *, pose_a: PoseLike = None, pose_b: PoseLike = None, **query: Any
+    a: PointsLike,
+    b: PointsLike,
+    *,
+    pose_a: PoseLike = None,
+    pose_b: PoseLike = None,
+    radius_a: float = 0.0,
+    radius_b: float = 0.0,
+    **query: Any,
 ) -> Collision:
     """The relation of the convex hulls of two point sets, in one line:
 
         hulld.check(points_a, points_b, separation=True).separation.value
 
-    a, b: n x 3 points, or objects with `vertices` or `points`, as in append_points. query: the
-    keyword arguments of Client.check_collision. A server in memory answers; it starts at the first
+    a, b: n x 3 points, or objects with `vertices` or `points`, as in append_points. radius_a,
+    radius_b: as in Placement; one point with a radius is a sphere. query: the keyword arguments of Client.check_collision. A server in memory answers; it starts at the first
     call, ends with this process, and keeps the latest 64 point sets.
     """
     points = [as_points(a, "a"), as_points(b, "b")]
@@ -278,7 +286,11 @@ def check(
                 client.replace_hull(ids[-1], array, create=True)
             known[ids[-1]] = None
             known.move_to_end(ids[-1])
-        answer = client.check_collision((ids[0], pose_a), (ids[1], pose_b), **query)
+        answer = client.check_collision(
+            Placement(ids[0], pose_a, radius=radius_a),
+            Placement(ids[1], pose_b, radius=radius_b),
+            **query,
+        )
         while len(known) > _MOST_SHAPES:
             client.delete_hull(known.popitem(last=False)[0])
     return answer

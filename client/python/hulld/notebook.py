@@ -192,7 +192,7 @@ def scene_json(placements: Placements, pairs: Sequence[tuple[int, int]]) -> str:
     return json.dumps(
         {
             "placements": [
-                {**subject(index), "pose": pose(numbers)}
+                {**subject(index), "pose": pose(numbers), "radius": placements.radius(index)}
                 for index, numbers in enumerate(placements.poses.tolist())
             ],
             "pairs": [index for pair in pairs for index in pair],

@@ -8,7 +8,7 @@ stores, at the revisions that the answer names.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations
 from typing import Protocol, Union
@@ -96,14 +96,17 @@ class _Motion:
 
 
 class _Piece:
-    """A hull where it stands; its vertices are moved when they are needed first."""
+    """A rounded hull where it stands; its vertices are moved when they are needed first. radii:
+    their sum is the radius."""
 
     def __init__(
         self,
         vertices: npt.NDArray[np.float64],
         motions: Sequence[_Motion],
+        radii: Sequence[float],
         in_any_order: bool = False,
     ) -> None:
+        self.radius = sum((Fraction(radius) for radius in radii), Fraction(0))
         self._vertices = vertices
         self._motions = motions
         self._in_any_order = in_any_order
@@ -135,7 +138,10 @@ class _Piece:
         """The least box along the axes of the world. Requires points."""
         if self._box is None:
             self._box = [
-                (min(p[axis] for p in self.points), max(p[axis] for p in self.points))
+                (
+                    min(p[axis] for p in self.points) - self.radius,
+                    max(p[axis] for p in self.points) + self.radius,
+                )
                 for axis in range(3)
             ]
         return self._box
@@ -185,6 +191,50 @@ def _surrounds_origin(points: Sequence[_Point]) -> bool:
     return True
 
 
+def _squared_distances(points: Sequence[_Point]) -> Iterator[Fraction]:
+    """Squared distances of 0 from points of the convex hull, among them the nearest one if 0 is not
+    inside: of vertices, and of the feet of perpendiculars in edges and triangles."""
+    for p in points:
+        yield _dot(p, p)
+    for p, q in combinations(points, 2):
+        e, moment = _minus(q, p), _cross(p, q)
+        if _dot(p, e) < 0 < _dot(q, e):
+            yield _dot(moment, moment) / _dot(e, e)
+    for p, q, r in combinations(points, 3):
+        n = _cross(_minus(q, p), _minus(r, p))
+        if n == _ORIGIN:
+            continue
+        if all(_dot(n, _cross(a, b)) >= 0 for a, b in ((p, q), (q, r), (r, p))):
+            yield _dot(n, p) ** 2 / _dot(n, n)
+
+
+def _check_rounded(
+    relation: Relation,
+    n: _Point,
+    gap: Fraction | None,
+    differences: Sequence[_Point],
+    radius: Fraction,
+) -> None:
+    """Checks the parts of a certificate of hulls with radii. gap: min n.B - max n.A. radius: their
+    sum, not 0."""
+    if relation != Relation.OVERLAPPING:
+        assert gap is not None
+        more = gap * gap - radius * radius * _dot(n, n)
+        if n == _ORIGIN or gap < 0 or more < 0 or (relation == Relation.SEPARATED and more == 0):
+            raise VerificationError("the gap along the direction is too small for the radii")
+        if relation == Relation.SEPARATED:
+            return
+    if len(differences) > (4 if relation == Relation.TOUCHING else 6):
+        raise VerificationError("the certificate has too many vertex pairs")
+    limit = radius * radius
+    is_near = any(
+        squared < limit or (squared == limit and relation == Relation.TOUCHING)
+        for squared in _squared_distances(differences)
+    )
+    if not is_near and not _surrounds_origin(differences):
+        raise VerificationError("the vertex pairs are too far apart for the radii")
+
+
 def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -> None:
     """Checks that the certificate proves the relation of two hulls."""
     differences = []
@@ -192,8 +242,11 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
         differences.append(
             _minus(a.moved(pair.index_a, pair.vertex_a), b.moved(pair.index_b, pair.vertex_b))
         )
+    radius = a.radius + b.radius
     if relation == Relation.OVERLAPPING:
-        if not _surrounds_origin(differences):
+        if radius > 0:
+            _check_rounded(relation, _ORIGIN, None, differences, radius)
+        elif not _surrounds_origin(differences):
             raise VerificationError("the differences of the vertex pairs do not surround 0")
         return
     if certificate.direction is None:
@@ -206,6 +259,9 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
     if not a.points or not b.points:
         raise VerificationError("a hull is empty, and needs no certificate")
     gap = min(_dot(n, p) for p in b.points) - max(_dot(n, p) for p in a.points)
+    if radius > 0:
+        _check_rounded(relation, n, gap, differences, radius)
+        return
     if relation == Relation.SEPARATED:
         if gap <= 0:
             raise VerificationError("the direction does not separate: max n.A >= min n.B")
@@ -352,9 +408,10 @@ class Verifier:
 
     def _hull(self, placement: Placement, version: HullVersion) -> _Piece:
         motions = [_Motion(placement.pose)]
+        radii = [placement.radius]
         if placement.shape is None:
-            return _Piece(self._vertices(version), motions)
-        return _Piece(placement.shape.astype(np.float64), motions, in_any_order=True)
+            return _Piece(self._vertices(version), motions, radii)
+        return _Piece(placement.shape.astype(np.float64), motions, radii, in_any_order=True)
 
     def _pieces(
         self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
@@ -372,7 +429,8 @@ class Verifier:
                     "the answer does not state"
                 )
             inner = _Motion(Pose() if piece.pose is None else piece.pose)
-            pieces.append(_Piece(self._vertices(piece_hulls[piece.id]), [inner, outer]))
+            vertices = self._vertices(piece_hulls[piece.id])
+            pieces.append(_Piece(vertices, [inner, outer], [placement.radius, piece.radius]))
         return pieces
 
     def _vertices(self, version: HullVersion) -> npt.NDArray[np.float64]:

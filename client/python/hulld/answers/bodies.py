@@ -31,8 +31,8 @@ class BodyInfo:
 
 @dataclass(frozen=True)
 class Body:
-    """pieces: in the order of put_body, each a hull at a pose in the frame of the body, with the
-    same doubles."""
+    """pieces: in the order of put_body, each a hull with a radius at a pose in the frame of the
+    body, with the same doubles."""
 
     info: BodyInfo
     pieces: Placements
@@ -83,14 +83,18 @@ def decode_body(data: bytes) -> Body:
     places: dict[str, int] = {}
     indices = np.empty(len(message.pieces), np.uint32)
     poses = np.zeros((len(message.pieces), 7))
+    radii = np.zeros(len(message.pieces))
     for row, piece in enumerate(message.pieces):
         indices[row] = places.setdefault(piece.hull_id, len(places))
         q, t = piece.pose.rotation, piece.pose.translation
         turned = piece.pose.HasField("rotation")
         poses[row, :4] = (q.w, q.x, q.y, q.z) if turned else (1, 0, 0, 0)
         poses[row, 4:] = (t.x, t.y, t.z)
+        radii[row] = piece.radius
     return Body(
-        _info_of(message.body), Placements(list(places), poses, indices), header_of(message.header)
+        _info_of(message.body),
+        Placements(list(places), poses, indices, radii=radii),
+        header_of(message.header),
     )
 
 

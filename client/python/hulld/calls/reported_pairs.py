@@ -34,7 +34,11 @@ class WatchedPlacements:
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
         self.placements = Placements(
-            placements.ids, placements.poses.copy(), placements.indices, shapes=placements.shapes
+            placements.ids,
+            placements.poses.copy(),
+            placements.indices,
+            shapes=placements.shapes,
+            radii=placements.radii,
         )
         self.clearance = clearance
         self.orthogonality_tolerance = orthogonality_tolerance

@@ -182,6 +182,7 @@ def _put_placement(target: Any, placements: Placements, index: int) -> None:
         target.hull_id = subject
     else:
         target.points.MergeFromString(point_block(subject).finish())
+    target.radius = placements.radius(index)
     pose = placements.poses[index]
     w, x, y, z, tx, ty, tz = pose.tolist()
     target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))

@@ -23,7 +23,8 @@ from hulld.geometry.poses import (
 )
 from hulld.wire import MessageWriter
 
-_HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS = 1, 2, 3, 4, 5  # of PackedPlacements
+# Fields of PackedPlacements.
+_HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS, _RADII = 1, 2, 3, 4, 5, 6
 #: The most points of an inline shape.
 _MOST_SHAPE_POINTS = 4096
 
@@ -34,14 +35,18 @@ class Placement:
     identity.
 
     points: 1 to 4096, n x 3. They mean the same as a registered hull of these points, and are not
-    stored. ValueError: a malformed ID or shape, or not exactly one of both.
+    stored. radius: grows the shape, or each piece of the body, by a closed ball: a point becomes a
+    sphere, a segment a capsule. ValueError: a malformed ID, shape, or radius, or not exactly one of
+    ID and points.
     """
 
     id: str | None = None
     pose: PoseLike = None
     points: PointsLike | None = None
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", arguments.number(self.radius, "radius", least=0))
         if self.points is None:
             arguments.hull_id(self.id, "the ID of a placement")
         elif self.id is not None:
@@ -95,14 +100,15 @@ class Placements:
     ids: the distinct IDs. poses: for each placement, as in pack_poses; None: the identity.
     indices: for each placement, the index of its ID or, from the number of IDs on, of its shape;
     None: each is placed once, or a single one as often as there are poses. shapes: inline shapes,
-    the points of each as in Placement. orthogonality_tolerance, quaternion_order: as in pack_poses.
+    the points of each as in Placement. radii: of each placement, or one for all, as in Placement;
+    None: 0. orthogonality_tolerance, quaternion_order: as in pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses
         Placements(["arm", "box"], poses, [0, 1, 1, 1])  # four placements of two hulls
         Placements([], poses, shapes=[points])           # one inline shape at n poses
 
-    ValueError: the lists do not fit each other, or hold a malformed ID or shape.
+    ValueError: the lists do not fit each other, or hold a malformed ID, shape, or radius.
     """
 
     def __init__(
@@ -112,6 +118,7 @@ class Placements:
         indices: npt.ArrayLike | None = None,
         *,
         shapes: Sequence[PointsLike] = (),
+        radii: npt.ArrayLike | None = None,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         quaternion_order: QuaternionOrder = "wxyz",
     ) -> None:
@@ -144,6 +151,8 @@ class Placements:
             raise ValueError(f"there are {len(packed)} poses for {len(chosen)} placements")
         self.indices: npt.NDArray[np.uint32] = chosen
         self.poses: PackedPoses = packed
+        #: None if all are 0.
+        self.radii: npt.NDArray[np.float64] | None = as_radii(radii, len(chosen))
 
     @classmethod
     def of(
@@ -179,6 +188,7 @@ class Placements:
             rows,
             np.array(indices, np.uint32),
             shapes=list(shapes.values()),
+            radii=[placement.radius for placement in single],
             orthogonality_tolerance=orthogonality_tolerance,
         )
 
@@ -188,7 +198,10 @@ class Placements:
     def __getitem__(self, index: int) -> Placement:
         pose = Pose.from_packed(self.poses[index])
         one = self.subject(index)
-        return Placement(one, pose) if isinstance(one, str) else Placement(pose=pose, points=one)
+        radius = self.radius(index)
+        if isinstance(one, str):
+            return Placement(one, pose, radius=radius)
+        return Placement(pose=pose, points=one, radius=radius)
 
     def __repr__(self) -> str:
         shapes = f" and {len(self.shapes)} shapes" if self.shapes else ""
@@ -198,6 +211,10 @@ class Placements:
         """The ID of a placement, or the points of its inline shape."""
         one = int(self.indices[index])
         return self.ids[one] if one < len(self.ids) else self.shapes[one - len(self.ids)]
+
+    def radius(self, index: int) -> float:
+        """The radius of a placement."""
+        return 0.0 if self.radii is None else float(self.radii[index])
 
     def packed(self) -> MessageWriter:
         """The message PackedPlacements."""
@@ -210,10 +227,29 @@ class Placements:
         if self.shapes:
             message.uint32s(_SHAPE_SIZES, np.array([len(shape) for shape in self.shapes], np.uint32))
             message.message(_SHAPE_POINTS, point_block(np.concatenate(self.shapes)))
+        if self.radii is not None:
+            message.doubles(_RADII, self.radii)
         return message
 
 
 PlacementsLike = Union[Placements, Iterable[PlacementLike]]
+
+
+def as_radii(radii: npt.ArrayLike | None, count: int) -> npt.NDArray[np.float64] | None:
+    """A radius for each of `count` placements; None if all are 0. ValueError: another number of
+    them, or one that is negative or not finite."""
+    if radii is None:
+        return None
+    array = arguments.as_floats(arguments.as_array(radii, "radii"), "radii").astype(np.float64)
+    if array.ndim == 0:
+        array = np.full(count, array)
+    if array.shape != (count,):
+        raise ValueError(f"radii has the shape {array.shape}; it takes one for each of {count}")
+    good = np.isfinite(array) & (array >= 0)
+    if not good.all():
+        at = int(np.argmin(good))
+        raise ValueError(f"radii[{at}] is {array[at]}; it must be a finite length of at least 0")
+    return array if array.any() else None
 
 
 def as_integers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:

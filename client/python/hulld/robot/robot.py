@@ -46,13 +46,14 @@ _SWELL_TO_WARN = 1.5
 class Part:
     """A hull of a robot: a shape, or a convex piece of a mesh. name: that of the link, followed by
     /1, /2, and so on if the link has several. points: n x 3, in the frame of the shape. X_LS: its
-    pose in the frame of the link. excess: the hull extends at most this far beyond the shape.
-    mesh_volume: 0 if it is unknown."""
+    pose in the frame of the link. radius: as in Placement. excess: the rounded hull extends at most
+    this far beyond the shape. mesh_volume: 0 if it is unknown."""
 
     name: str
     link: int
     X_LS: PoseNumbers
     points: npt.NDArray[np.float64]
+    radius: float = 0.0
     excess: float = 0.0
     mesh_volume: float = 0.0
 
@@ -75,6 +76,7 @@ class Robot:
         """left_out: pairs of links that are not checked, the lower index first."""
         self._description = description
         self.parts = tuple(parts)
+        self._radii = np.array([part.radius for part in parts])
         self._pairs = [
             (a, b)
             for a, part in enumerate(parts)
@@ -101,7 +103,7 @@ class Robot:
     ) -> Self:
         """Reads a URDF file and its meshes; asks no server.
 
-        Boxes are exact, meshes become their convex hulls; cylinders, spheres, and capsules become
+        Boxes, spheres, and capsules are exact; meshes become their convex hulls, cylinders
         enclosing polyhedra. Shapes of one link are not checked against each other. Without `srdf`,
         neither are adjacent links, which a joint connects, or joints through links without shapes;
         `adjacent` includes these. srdf: a file; exactly the pairs that it disables are left out.
@@ -137,7 +139,7 @@ class Robot:
                 except (OSError, ValueError) as error:
                     place = f"{os.fspath(path)}:{shape.line}: link {link.name!r}"
                     raise type(error)(f"{place}: {error}") from None
-                found += [Part(link.name, index, shape.X_LS, p, 0.0, v) for p, v in pieces]
+                found += [Part(link.name, index, shape.X_LS, p, mesh_volume=v) for p, v in pieces]
             if len(found) > 1:
                 found = [replace(part, name=f"{link.name}/{i + 1}") for i, part in enumerate(found)]
             parts += found
@@ -280,7 +282,7 @@ class Robot:
         for first in range(0, max(1, len(values)), max(1, per_call)):
             poses = self._part_poses(values[first : first + max(1, per_call)], X_WB)
             batch = self.client.check_collisions(
-                *_many_robots(ids, poses, around, pairs),
+                *_many_robots(ids, self._radii, poses, around, pairs),
                 separation=separation,
                 clearance=clearance,
                 tolerance=tolerance,
@@ -431,13 +433,14 @@ class Robot:
 
 def _many_robots(
     ids: Sequence[str],
+    radii: npt.NDArray[np.float64],
     poses: npt.NDArray[np.float64],
     scene: Placements,
     pairs: npt.NDArray[np.uint32],
 ) -> tuple[Placements, npt.NDArray[np.uint32]]:
     """The placements of n robots, then of the scene, and the pairs of each robot. ids: of the
-    parts, then of the scene. poses: n x parts x 7. pairs: of one robot, the scene behind its parts.
-    """
+    parts, then of the scene. radii: of the parts. poses: n x parts x 7. pairs: of one robot, the
+    scene behind its parts."""
     count, parts = poses.shape[:2]
     robots = np.arange(count, dtype=np.uint32)[:, np.newaxis, np.newaxis]
     # The scene is behind all robots.
@@ -448,6 +451,8 @@ def _many_robots(
     placements.ids = [*ids]
     placements.poses = np.concatenate([poses.reshape(-1, 7), scene.poses])
     placements.indices = np.concatenate([of_parts, scene.indices + np.uint32(parts)])
+    around = np.zeros(len(scene)) if scene.radii is None else scene.radii
+    placements.radii = np.concatenate([np.tile(radii, count), around])
     return placements, shifted.reshape(-1, 2)
 
 
