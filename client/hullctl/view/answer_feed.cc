@@ -151,6 +151,7 @@ v1::Placement PlacementOf(const ViewObject& object) {
                                                    object.hull->xyz.end());
   }
   *placement.mutable_pose() = ToPose(object.pose);
+  placement.set_radius(object.radius);
   return placement;
 }
 

@@ -218,11 +218,14 @@ std::string ProblemMessage(const std::string& message) {
   return TextMessage("problem", {{"message", QuoteJson(message)}});
 }
 
+std::string NumberJson(double number) {
+  return std::isfinite(number) ? ShortestText(number) : "null";
+}
+
 std::string NumbersJson(const double* numbers, size_t count) {
   std::string json = "[";
   for (size_t i = 0; i < count; ++i) {
-    absl::StrAppend(&json, i > 0 ? "," : "",
-                    std::isfinite(numbers[i]) ? ShortestText(numbers[i]) : "null");
+    absl::StrAppend(&json, i > 0 ? "," : "", NumberJson(numbers[i]));
   }
   return json + "]";
 }
@@ -237,6 +240,7 @@ std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
                         .Add("hullId", object.hull_id)
                         .AddJson("file", std::to_string(object.file))
                         .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
+                        .AddJson("radius", NumberJson(object.radius))
                         .Close());
   }
   return json + "]";
@@ -268,6 +272,7 @@ std::string BodyFrame(const v1::GetBodyResponse& body) {
                     JsonObject()
                         .Add("hullId", piece.hull_id())
                         .AddJson("pose", NumbersJson(pose.data(), pose.size()))
+                        .AddJson("radius", NumberJson(piece.radius()))
                         .Close());
   }
   return StartFrame(JsonObject()

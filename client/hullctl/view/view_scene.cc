@@ -128,13 +128,7 @@ absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
     const std::string& hull_id = *file->HullOf(i);
     const std::string& name = file->names.empty() ? hull_id : file->names[i];
     const v1::Placement placement = file->PlacementOf(i);
-    if (placement.radius() > 0) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(path, ": placement ", name,
-                       " has a radius, which the viewer does not draw; remove it, or use 'hullctl "
-                       "scene check'"));
-    }
-    scene->objects.push_back({name, hull_id, -1, NumbersOf(placement.pose())});
+    scene->objects.push_back({name, hull_id, -1, NumbersOf(placement.pose()), placement.radius()});
   }
   scene->rules = std::move(file->request);
   scene->rules.clear_placements();

@@ -40,6 +40,8 @@ struct ViewObject {
   // Index into ViewScene::files, -1: none.
   int file = -1;
   Pose7 pose = kIdentityPose;
+  // Placement.radius. Only the hull is drawn; answers and proofs take it into account.
+  double radius = 0;
   // FileShape::hull of its file; null for an ID.
   std::shared_ptr<const HullMesh> hull = nullptr;
 };

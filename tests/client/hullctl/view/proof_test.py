@@ -16,20 +16,22 @@ class ProofTest(viewer_case.ViewerCase):
     def page_verdict(self, response, request):
         """Returns the problem that the page finds in a recorded answer; empty if it is proven."""
         poses = []
+        radii = [request[side].get("radius", 0) for side in "ab"]
         for side in "ab":
             pose = request[side].get("pose", {})
             rotation = pose.get("rotation", {"w": 1})
             poses.append([rotation.get(k, 0) for k in "wxyz"] +
                          [pose.get("translation", {}).get(k, 0) for k in "xyz"])
         return self.browser.driver.execute_async_script("""
-          const [relation, certificate, ids, poses, done] = arguments;
+          const [relation, certificate, ids, poses, radii, done] = arguments;
           import('hulld/proof/certificate.js').then(({certificateProblem}) => {
             const sides = ids.map((id, k) =>
-                ({xyz: hulldViewer.model.hulls.get(id).xyz, poses: [poses[k].map(Number)]}));
+                ({xyz: hulldViewer.model.hulls.get(id).xyz, poses: [poses[k].map(Number)],
+                  radii: [radii[k]]}));
             done(certificateProblem(relation, certificate, ...sides));
           }).catch((error) => done(String(error)));""",
             response["relation"], response.get("certificate", {}),
-            [request[side]["hullId"] for side in "ab"], poses)
+            [request[side]["hullId"] for side in "ab"], poses, radii)
 
     def hullctl_verdict(self, record):
         target = pathlib.Path(self.hulld.directory, "judged.json")
@@ -47,14 +49,17 @@ class ProofTest(viewer_case.ViewerCase):
         self.view("proof/a", "proof/b", "room/left", "room/right")
         record = pathlib.Path(self.hulld.directory, "record.json")
         questions = [("proof/a", "proof/b", [random.gauss(0, 1) for _ in range(4)] +
-                      [random.gauss(0, far) for _ in range(3)]) for far in (0.5, 0.5, 2, 4, 1e9)]
-        # They share a face, an edge, or a corner.
-        questions += [("room/left", "room/right", [1, 0, 0, 0, *t])
-                      for t in ((-1, 0.3, 0), (-1, 1, 0), (-1, 1, -3))]
+                      [random.gauss(0, far) for _ in range(3)], radius)
+                     for far in (0.5, 0.5, 2, 4, 1e9) for radius in (0, 0.75)]
+        # They share a face, an edge, or a corner; then they are 1.5 apart or 2.5.
+        questions += [("room/left", "room/right", [1, 0, 0, 0, *t], radius)
+                      for t, radius in (((-1, 0.3, 0), 0), ((-1, 1, 0), 0), ((-1, 1, -3), 0),
+                                        ((0.5, 0.3, 0), 0.75), ((0.5, 3, 0), 1.25))]
         proven = refuted = 0
         relations = set()
-        for a, b, pose in questions:
+        for a, b, pose, radius in questions:
             self.hulld.hullctl("check", a, b, "--certificate", "--record", str(record),
+                               "--radius-a", repr(radius), "--radius-b", repr(radius),
                                "--pose-b", ",".join(map(repr, pose)))
             honest = json.loads(record.read_text())
             for forge in (lambda r: None, self.swap_relation, self.bend_direction, self.drop_pair,

@@ -24,8 +24,9 @@ struct Scene {
   std::vector<PlacedHull> placements;
 };
 
-// Hulls of all dimensions, including an empty one, on a lattice where many touch.
-Scene MakeScene(uint64_t seed, int placements, int side) {
+// Hulls of all dimensions, including an empty one, on a lattice where many touch; each third one
+// with this radius.
+Scene MakeScene(uint64_t seed, int placements, int side, double radius = 0) {
   Random random(TestSeed(seed));
   Scene scene;
   scene.hulls.emplace_back();
@@ -39,7 +40,7 @@ Scene MakeScene(uint64_t seed, int placements, int side) {
     if (i % 3 == 0) pose.q = {2, 1, 0, 0};
     pose.t = Vector(random.Below(side), random.Below(side), random.Below(side));
     const auto hull = static_cast<size_t>(random.Below(static_cast<int>(scene.hulls.size())));
-    scene.placements.push_back(*PlacedHull::Make(scene.query_hulls[hull], pose));
+    scene.placements.emplace_back(scene.query_hulls[hull], pose, i % 3 == 1 ? radius : 0);
   }
   return scene;
 }
@@ -94,6 +95,16 @@ TEST(Scene, AgreesWithAllPairsInOrderOnAnyNumberOfThreads) {
     EXPECT_LT(totals.candidates, asked / 20);
     EXPECT_GE(totals.candidates, totals.found);
   }
+}
+
+TEST(Scene, RadiiGrowTheBoxes) {
+  const Scene scene = MakeScene(825, 400, 16, 1.5);
+  uint64_t asked = 0;
+  const Found expected = BruteForce(
+      scene, [](uint32_t, uint32_t) { return true; }, &asked);
+  SceneTotals totals;
+  EXPECT_TRUE(Search(scene, SceneOptions(), &totals) == expected);
+  EXPECT_GT(totals.found, Search(MakeScene(825, 400, 16), SceneOptions(), &totals).size());
 }
 
 TEST(Scene, GroupsAndMoversLeaveOutTheirPairs) {

@@ -140,10 +140,12 @@ export class AnswerPanel {
     // An inline shape has no version, and never changes.
     if (version.hullId && model.revisionOf(object.hullId) !== version.revision)
       return `${object.name} has changed since the answer`;
-    const {pose} = object;
+    const {pose, radius = 0} = object;
     if (!pose.every((value, i) => value === answer.poses[7 * k + i]))
       return `${object.name} has moved since the answer`;
-    return {xyz: hull.xyz, poses: piece ? [pose, piece.pose] : [pose]};
+    return piece ?
+        {xyz: hull.xyz, poses: [pose, piece.pose], radii: [radius, piece.radius]} :
+        {xyz: hull.xyz, poses: [pose], radii: [radius]};
   }
 
   verdict(answer) {
@@ -232,7 +234,8 @@ export class AnswerPanel {
     const {poses} = answer;
     const text =
         `hullctl check ${a.hullId} ${b.hullId} --separation --witness --axis --certificate ` +
-        `--pose-a ${poseText(poses.slice(0, 7))} --pose-b ${poseText(poses.slice(7))}`;
+        `--pose-a ${poseText(poses.slice(0, 7))} --pose-b ${poseText(poses.slice(7))}` +
+        [a, b].map(({radius}, k) => radius ? ` --radius-${'ab'[k]} ${radius}` : '').join('');
     return element(
         'details', {className: 'command', open: Boolean(open)},
         element('summary', {}, 'Ask the same in a shell'),

@@ -23,10 +23,12 @@ const isRotated = (pose) => pose.slice(0, 4).some((value) => value !== 0);
 // An exact hull in the world: p_W = (rows p + shift) / scale in integers, all lengths at one power
 // of two.
 class ExactHull {
-  // placed: {xyz, poses}: the pose of the hull and, for a piece of a body, of the piece in the
-  // body.
-  constructor({xyz, poses}, exponent) {
+  // placed: {xyz, poses, radii}: the pose and radius of the hull and, for a piece of a body, of the
+  // piece in the body.
+  constructor({xyz, poses, radii = []}, exponent) {
     this.xyz = xyz;
+    // The exact sum of the radii, not times scale.
+    this.radius = toIntegers(radii, exponent).reduce((total, radius) => total + radius, 0n);
     this.exponent = exponent;
     this.rows = [[1n, 0n, 0n], [0n, 1n, 0n], [0n, 0n, 1n]];
     this.scale = 1n;
@@ -67,8 +69,10 @@ class ExactHull {
   }
 }
 
-function checkPlacement({xyz, poses}) {
+function checkPlacement({xyz, poses, radii = []}) {
   require(xyz.every(Number.isFinite), 'a hull holds a number that is not finite');
+  require(areFinite(radii), 'a radius holds a number that is not finite');
+  require(radii.every((radius) => radius >= 0), 'a radius is negative');
   for (const pose of poses) {
     require(areFinite(pose.slice(4)), 'a translation holds a number that is not finite');
     require(areFinite(pose.slice(0, 4)), 'a rotation holds a number that is not finite');
@@ -158,6 +162,49 @@ function holdsOriginInside(points) {
   return spansSpace;
 }
 
+// Returns true if a point of the hull of the points is within r of 0 or, if `nearer`, less than r
+// from it. The nearest one is a vertex, or inside an edge or a triangle, or it is 0 itself.
+function comesWithin(points, rSquared, nearer) {
+  const holds = (numerator, denominator) => nearer ?
+      numerator < rSquared * denominator :
+      numerator <= rSquared * denominator;
+  const holdsEdge = (p, q) => {
+    const e = difference(q, p);
+    const moment = cross(p, q);
+    return dot(p, e) < 0n && dot(q, e) > 0n && holds(dot(moment, moment), dot(e, e));
+  };
+  const holdsTriangle = (p, q, r) => {
+    const normal = cross(difference(q, p), difference(r, p));
+    const sides = [cross(p, q), cross(q, r), cross(r, p)];
+    return !isZero(normal) && sides.every((side) => dot(normal, side) >= 0n) &&
+        holds(dot(normal, p) ** 2n, dot(normal, normal));
+  };
+  return holdsOriginInside(points) ||
+      points.some(
+          (p, i) => holds(dot(p, p), 1n) ||
+              points.slice(i + 1).some(
+                  (q, j) => holdsEdge(p, q) ||
+                      points.slice(i + j + 2).some((r) => holdsTriangle(p, q, r))));
+}
+
+// Checks a certificate of hulls with radii, not both 0.
+function checkRounded(relation, certificate, a, b) {
+  const r = (a.radius + b.radius) * a.scale * b.scale;
+  if (relation !== 'RELATION_OVERLAPPING') {
+    const n = readDirection(certificate);
+    const width = gap(a, b, n);
+    const more = width ** 2n - r ** 2n * dot(n, n);
+    require(
+        width >= 0n && (relation === 'RELATION_SEPARATED' ? more > 0n : more >= 0n),
+        'the gap between the hulls along the direction is too small for their radii');
+    if (relation === 'RELATION_SEPARATED') return;
+  }
+  const points = differences(relation, certificate, a, b);
+  require(
+      comesWithin(points, r ** 2n, relation === 'RELATION_OVERLAPPING'),
+      'the hull of the differences of the vertex pairs is too far from 0 for the radii');
+}
+
 function check(relation, certificate, placedA, placedB) {
   require(
       ['RELATION_SEPARATED', 'RELATION_TOUCHING', 'RELATION_OVERLAPPING'].includes(relation),
@@ -168,11 +215,15 @@ function check(relation, certificate, placedA, placedB) {
   }
   checkPlacement(placedA);
   checkPlacement(placedB);
-  const lengths =
-      [placedA, placedB].flatMap(({xyz, poses}) => [xyz, ...poses.map((pose) => pose.slice(4))]);
+  const lengths = [placedA, placedB].flatMap(
+      ({xyz, poses, radii = []}) => [xyz, radii, ...poses.map((pose) => pose.slice(4))]);
   const exponent = commonExponent(...lengths);
   const a = new ExactHull(placedA, exponent);
   const b = new ExactHull(placedB, exponent);
+  if (a.radius + b.radius > 0n) {
+    checkRounded(relation, certificate, a, b);
+    return;
+  }
   if (relation === 'RELATION_SEPARATED') {
     require(
         gap(a, b, readDirection(certificate)) > 0n,
@@ -195,8 +246,9 @@ function check(relation, certificate, placedA, placedB) {
 }
 
 // Returns the missing proof, or an empty text if the certificate proves that A and B are in this
-// relation. The certificate is in the JSON mapping of the contract; a and b are {xyz, poses}: the
-// vertices, and the poses of the hull from the world inward (two for a piece of a body).
+// relation. The certificate is in the JSON mapping of the contract; a and b are {xyz, poses, radii}:
+// the vertices, and the poses and radii of the hull from the world inward (two for a piece of a
+// body).
 //
 // Cost: O(vertices) operations on integers of any length: about two microseconds per vertex.
 export function certificateProblem(relation, certificate, a, b) {
