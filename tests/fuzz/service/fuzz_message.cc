@@ -93,7 +93,7 @@ class MessageFiller {
     // Requests have placements in one form; programs pack them themselves.
     if (name == "packed_placements") return in_.OneOf(32);
     if (field.full_name() == "hulld.v1.Placement.points") return in_.OneOf(24);
-    if (name == "freshness") return in_.OneOf(8);
+    if (name == "freshness" || name == "radius") return in_.OneOf(8);
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return !in_.OneOf(8);
     return !in_.OneOf(32);
   }
@@ -209,7 +209,8 @@ class MessageFiller {
   double Length(const FieldDescriptor& field) {
     const std::string& name = field.name();
     const double number = Double();
-    const bool is_length = name == "tolerance" || name == "max_error" || name == "clearance";
+    const bool is_length = name == "tolerance" || name == "max_error" || name == "clearance" ||
+                           name == "radius" || name == "radii";
     return is_length && tame_ ? std::abs(number) : number;
   }
 

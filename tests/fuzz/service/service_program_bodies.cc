@@ -130,9 +130,12 @@ void ServiceProgram::AskAboutBody() {
   v1::CheckCollisionRequest request;
   FillMessage(in_, Hints(), request.mutable_b());
   request.mutable_a()->set_hull_id(any_body());
+  // No double may hold its sum with the radius of a piece.
+  request.mutable_a()->clear_radius();
   if (in_.OneOf(3)) {
     request.mutable_b()->set_hull_id(any_body());
     request.mutable_b()->clear_pose();
+    request.mutable_b()->clear_radius();
   } else if (!in_.OneOf(4)) {
     request.mutable_b()->set_hull_id(AnyHull());
     v1::Pose* const pose = request.mutable_b()->mutable_pose();
@@ -165,7 +168,8 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
   const Pieces a = pieces_of(request.a());
   const Pieces b = pieces_of(request.b());
   // A body that is unknown or has another pose cannot be compared with its pieces.
-  const bool is_elsewhere = bodies_.contains(request.b().hull_id()) && request.b().has_pose();
+  const bool is_elsewhere = bodies_.contains(request.b().hull_id()) &&
+                            (request.b().has_pose() || request.b().radius() != 0);
   const bool is_known =
       bodies_.contains(request.b().hull_id()) || hulls_.contains(request.b().hull_id());
   if (is_elsewhere || !is_known || a.size() * b.size() > kMostComparedPairs) return;
@@ -196,7 +200,7 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
   const auto placed = [&vertices](const Pieces& pieces) {
     std::vector<PlacedVertices> all;
     for (const v1::Placement& piece : pieces) {
-      all.push_back({vertices[piece.hull_id()], piece.pose()});
+      all.push_back({vertices[piece.hull_id()], piece.pose(), nullptr, false, {piece.radius()}});
     }
     return all;
   };
