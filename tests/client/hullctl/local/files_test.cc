@@ -82,6 +82,42 @@ TEST_F(Files, MeetHullsAndAreVerified) {
   EXPECT_EQ(Ask({"check", cube, "ball", "--textbook", "--axis"}).code, 0);
 }
 
+TEST_F(Files, HaveRadii) {
+  Put("cube", server::Cube());
+  const std::string center = Write("center.xyz", {0, 0, 0});
+  const auto check = [&](const std::string& radius) {
+    return Ask({"check", "cube", center, "--pose-b", "4,5,0.5", "--radius-a", "2", "--radius-b",
+                radius, "--verify"});
+  };
+  const Ran touching = check("3");
+  EXPECT_EQ(touching.code, 0) << touching.err;
+  EXPECT_THAT(touching.out, HasSubstr("TOUCHING"));
+  EXPECT_THAT(touching.out, HasSubstr(", radius 2\n"));
+  EXPECT_THAT(touching.out, HasSubstr("(1 point), radius 3\n"));
+  EXPECT_THAT(touching.out, HasSubstr("valid"));
+  EXPECT_THAT(check("2.9999999999999996").out, HasSubstr("SEPARATED"));
+  EXPECT_THAT(check("3.0000000000000004").out, HasSubstr("OVERLAPPING"));
+  EXPECT_THAT(check("-1").err, HasSubstr("\"-1\" is not a length of at least 0"));
+  const std::string record = (folder_ / "rounded.json").string();
+  ASSERT_EQ(Ask({"check", "cube", center, "--radius-b", "1", "--record", record}).code, 0);
+  EXPECT_EQ(Ask({"verify", record}).code, 0);
+}
+
+TEST_F(Files, PiecesHaveRadii) {
+  Put("cube", server::Cube());
+  const std::string center = Write("center.xyz", {0, 0, 0});
+  ASSERT_EQ(Ask({"body", "put", "row", "cube", "cube@4,0,0:0.25"}).code, 0);
+  EXPECT_THAT(Ask({"body", "get", "row"}).out, HasSubstr("1      cube  4,0,0  0.25\n"));
+  const Ran ran = Ask({"check", "row", center, "--pose-b", "6,0.5,0.5", "--radius-a", "0.25",
+                       "--radius-b", "0.5", "--verify"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
+  EXPECT_THAT(ran.out, HasSubstr("piece of A   1: cube"));
+  EXPECT_THAT(Ask({"body", "put", "row", "cube:wide"}).err,
+              HasSubstr("\"cube:wide\": the radius after the colon is not a length"));
+  EXPECT_THAT(Ask({"body", "put", "row", ":1"}).err, HasSubstr("names no hull"));
+}
+
 TEST_F(Files, OfManyPointsSendTheirVertices) {
   server::Coordinates cloud = server::Cube(-2, 4);
   const server::Coordinates inside = server::Sphere(5000);

@@ -53,6 +53,31 @@ TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
   EXPECT_THAT(ran.err, HasSubstr("warning: j is at 5, beyond its limits -3 to 1"));
 }
 
+// A sphere and a capsule, lying along x: their surfaces meet at 3 - 0.5 - 0.25 - 1 = 1.25.
+TEST_F(HullctlRobot, SpheresAndCapsulesAreExact) {
+  const TempFile urdf("round.urdf", R"(<robot name="round">
+  <link name="a"><collision><geometry><sphere radius="0.5"/></geometry></collision></link>
+  <joint name="i" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="3 0 0"/>
+    <axis xyz="1 0 0"/><limit lower="-3" upper="1"/></joint>
+  <link name="b"><collision><origin rpy="0 1.5707963267948966 0"/>
+    <geometry><capsule radius="0.25" length="2"/></geometry></collision></link>
+</robot>)");
+  const auto relation = [&](const char* value) {
+    return Ask({"robot", "check", urdf.path(), "--adjacent", "--joint", std::string("i=") + value})
+        .out;
+  };
+  EXPECT_THAT(relation("0"), HasSubstr("a\tb\tSEPARATED\t1.25"));
+  EXPECT_THAT(relation("0"), Not(HasSubstr("polyhedron")));
+  EXPECT_THAT(relation("-1.2499999"), HasSubstr("SEPARATED"));
+  EXPECT_THAT(relation("-1.2500001"), HasSubstr("OVERLAPPING"));
+  const TempFile scene("scene.yaml",
+                       "hulls: {p: {points: [[0, 0, 0]]}}\nplace: {ball: {hull: p, at: [0, 1, 0], "
+                       "radius: 0.5}}\n");
+  ASSERT_EQ(Ask({"scene", "apply", scene.path()}).code, 0);
+  const Ran around = Ask({"robot", "check", urdf.path(), "--scene", scene.path()});
+  EXPECT_THAT(around.out, HasSubstr("a\tball\tTOUCHING")) << around.err;
+}
+
 TEST_F(HullctlRobot, PrefixKeepsTheHulls) {
   EXPECT_EQ(Robot({"--prefix", "arm/"}).code, 0);
   EXPECT_EQ(Hulls(), "arm/a\narm/b\narm/c\n");

@@ -164,6 +164,14 @@ TEST_F(HullctlSceneBodies, APoseThatDiffersInOneBitIsPutAgain) {
   EXPECT_THAT(Ask({"scene", "diff", cell_.path()}).out, HasSubstr("~ cell/ell\tbody to replace"));
 }
 
+TEST_F(HullctlSceneBodies, ARadiusThatDiffersIsPutAgain) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  const TempFile grown("grown.yaml", Cell("[1.5, 1, 0], radius: 0.25"));
+  EXPECT_THAT(Ask({"scene", "apply", grown.path()}).out, HasSubstr("~ cell/ell\tbody replaced"));
+  EXPECT_THAT(Ask({"body", "get", "cell/ell"}).out, HasSubstr("cell/cube  1.5,1,0  0.25"));
+  EXPECT_EQ(Ask({"scene", "diff", grown.path()}).code, 0);
+}
+
 TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
   Ran ran = Ask({"scene", "check", cell_.path()});
   EXPECT_EQ(ran.code, 4);

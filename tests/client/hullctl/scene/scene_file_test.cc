@@ -103,13 +103,15 @@ TEST(SceneFile, JsonIsOneOfThreeMessages) {
 
 TEST(SceneFile, PackedPlacementsAreTheSameScene) {
   const auto scene = Read(R"({"packedPlacements":{"hullIds":["a","b"],"hulls":[1,0],
-      "poses":[1,0,0,0, 0,0,0,  2,1,0,0, 5,6,7]},"pairs":[0,1]})");
+      "poses":[1,0,0,0, 0,0,0,  2,1,0,0, 5,6,7],"radii":[0,0.5]},"pairs":[0,1]})");
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_EQ(scene->size(), 2u);
   EXPECT_EQ(scene->NameOf(0), "0:b");
   EXPECT_EQ(scene->PlacementOf(1).hull_id(), "a");
   EXPECT_EQ(scene->PlacementOf(1).pose().rotation().x(), 1);
   EXPECT_EQ(scene->PlacementOf(1).pose().translation().z(), 7);
+  EXPECT_EQ(scene->PlacementOf(0).radius(), 0);
+  EXPECT_EQ(scene->PlacementOf(1).radius(), 0.5);
 }
 
 TEST(SceneFile, GroupsAndMoversLeaveOutPairs) {

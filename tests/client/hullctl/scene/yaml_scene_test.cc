@@ -110,6 +110,20 @@ TEST(YamlScene, BodiesBecomeTheirPieces) {
   EXPECT_EQ(scene->PlacementOf(4).pose().translation().z(), 1);
 }
 
+TEST(YamlScene, PiecesAndPlacementsHaveRadii) {
+  const std::string text =
+      "hulls: {h: {points: [[0, 0, 0]]}}\nbodies: {b: [{hull: h, radius: 0.5}, {hull: h}]}\n"
+      "place: {a: {hull: h, radius: 2}, b: {body: b, radius: 0.25}}";
+  const SceneDescription scene = Parse(text);
+  const v1::PutBodyRequest body = BodyRequest(scene.bodies[0]);
+  EXPECT_EQ(body.pieces(0).radius(), 0.5);
+  EXPECT_EQ(body.pieces(1).radius(), 0);
+  const auto whole = ToScene(scene, "cell.yaml", BodyForm::kWhole);
+  EXPECT_EQ(whole->PlacementOf(0).radius(), 2);
+  EXPECT_EQ(whole->PlacementOf(1).radius(), 0.25);
+  EXPECT_EQ(ToScene(scene, "cell.yaml", BodyForm::kPieces)->PlacementOf(1).radius(), 0.75);
+}
+
 TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
   const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n";
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h}, b: {body: b}}"),
@@ -168,6 +182,8 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
       {"place: {a: {id: x}}\nask: {pairs: [[a, a]], movers: [a]}", "cannot be combined"},
       {"ask: {separation: yes}", "cell.yaml:1:19: separation takes true or false"},
       {"ask: {clearance: -1}", "clearance must be at least 0"},
+      {"place: {a: {id: x, radius: -1}}", "cell.yaml:1:28: radius must be at least 0"},
+      {"place: {a: {id: x, radius: wide}}", "radius: \"wide\" is not a number"},
       {"hulls: {h: {box: [1, 1, 1]}}\nbodies: {h: [{hull: h}]}",
        "names of hulls and bodies must differ"},
       {"a: [", "cell.yaml:"},
