@@ -208,27 +208,22 @@ def _squared_distances(points: Sequence[_Point]) -> Iterator[Fraction]:
             yield _dot(n, p) ** 2 / _dot(n, n)
 
 
-def _check_rounded(
-    relation: Relation,
-    n: _Point,
-    gap: Fraction | None,
-    differences: Sequence[_Point],
-    radius: Fraction,
-) -> None:
-    """Checks the parts of a certificate of hulls with radii. gap: min n.B - max n.A. radius: their
-    sum, not 0."""
-    if relation != Relation.OVERLAPPING:
-        assert gap is not None
-        more = gap * gap - radius * radius * _dot(n, n)
-        if n == _ORIGIN or gap < 0 or more < 0 or (relation == Relation.SEPARATED and more == 0):
-            raise VerificationError("the gap along the direction is too small for the radii")
-        if relation == Relation.SEPARATED:
-            return
-    if len(differences) > (4 if relation == Relation.TOUCHING else 6):
+def _check_gap(relation: Relation, n: _Point, gap: Fraction, radius: Fraction) -> None:
+    """Checks the direction of hulls with radii. gap: min n.B - max n.A. radius: their sum."""
+    more = gap * gap - radius * radius * _dot(n, n)
+    if n == _ORIGIN or gap < 0 or more < 0 or (relation == Relation.SEPARATED and more == 0):
+        raise VerificationError("the gap along the direction is too small for the radii")
+
+
+def _check_nearness(relation: Relation, differences: Sequence[_Point], radius: Fraction) -> None:
+    """Checks the vertex pairs of hulls with radii that touch or overlap. radius: their sum, not
+    0."""
+    is_touching = relation == Relation.TOUCHING
+    if len(differences) > (4 if is_touching else 6):
         raise VerificationError("the certificate has too many vertex pairs")
     limit = radius * radius
     is_near = any(
-        squared < limit or (squared == limit and relation == Relation.TOUCHING)
+        squared < limit or (squared == limit and is_touching)
         for squared in _squared_distances(differences)
     )
     if not is_near and not _surrounds_origin(differences):
@@ -245,7 +240,7 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
     radius = a.radius + b.radius
     if relation == Relation.OVERLAPPING:
         if radius > 0:
-            _check_rounded(relation, _ORIGIN, None, differences, radius)
+            _check_nearness(relation, differences, radius)
         elif not _surrounds_origin(differences):
             raise VerificationError("the differences of the vertex pairs do not surround 0")
         return
@@ -260,7 +255,9 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
         raise VerificationError("a hull is empty, and needs no certificate")
     gap = min(_dot(n, p) for p in b.points) - max(_dot(n, p) for p in a.points)
     if radius > 0:
-        _check_rounded(relation, n, gap, differences, radius)
+        _check_gap(relation, n, gap, radius)
+        if relation == Relation.TOUCHING:
+            _check_nearness(relation, differences, radius)
         return
     if relation == Relation.SEPARATED:
         if gap <= 0:

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <vector>
 
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
@@ -87,6 +88,60 @@ TEST(RoundToNearest, NoDoubleIsNearer) {
     for (const double toward : {-kInfinity, kInfinity}) {
       const double neighbor = std::nextafter(rounded.value, toward);
       EXPECT_LE(error, abs(Rational(ExactValue(neighbor) - f.Value()))) << "round " << round;
+    }
+  }
+}
+
+Rational ExactValue(const ScaledInteger& x) {
+  return PowerOfTwo(x.exponent) * Rational(BigInteger(x.mantissa.str()));
+}
+
+TEST(ExactSum, LosesNothing) {
+  const std::vector<double> terms = {0x1p1000, 1, -0x1p-1074, 0, 3 * 0x1p-60, -0x1p1000};
+  Rational sum = 0;
+  for (const double term : terms) sum += ExactValue(term);
+  EXPECT_EQ(ExactValue(ExactSum(terms)), sum);
+  EXPECT_EQ(ExactSum(std::vector<double>{0.0, -0.0}).mantissa, 0);
+}
+
+// sqrt(n^2 + 1) - n is 1 / (2 n) but for a relative 1 / (4 n^2), below the bound here.
+TEST(RoundRootMinus, KeepsTheDigitsOfATinyDifference) {
+  for (const int bits : {40, 200, 900}) {
+    const Integer n = Integer(1) << bits;
+    const Rounded over = RoundRootMinus(1, n * n + 1, 1, 0, {n, 0});
+    EXPECT_NEAR(over.value * std::ldexp(1.0, bits), 0.5, 1e-15);
+    EXPECT_LE(over.bound, over.value * 0x1p-50);
+    const Rounded under = RoundRootMinus(1, n * n - 1, 1, 0, {n, 0});
+    EXPECT_NEAR(under.value * std::ldexp(1.0, bits), -0.5, 1e-15);
+  }
+}
+
+TEST(RoundRootMinus, SignsAndZerosAreExact) {
+  EXPECT_EQ(RoundRootMinus(1, 25, 4, 1, {5, 0}).value, 0);
+  EXPECT_EQ(RoundRootMinus(1, 25, 4, 1, {5, 0}).bound, 0);
+  EXPECT_EQ(RoundRootMinus(1, 25, 1, 0, {1, 1}).value, 3);
+  EXPECT_EQ(RoundRootMinus(-1, 25, 1, 0, {1, 1}).value, -7);
+  EXPECT_EQ(RoundRootMinus(0, 0, 1, 0, {3, -1}).value, -1.5);
+  EXPECT_EQ(RoundRootMinus(-1, 1, 1, 1023, {1, 1023}).bound, kInfinity);
+  EXPECT_EQ(RoundRootMinus(1, 2, 1, -3000, {1, -3000}).value, kLeastDouble);
+}
+
+TEST(RoundRootMinus, IsWithinItsBound) {
+  std::mt19937_64 random(3103);
+  for (int round = 0; round < 2000; ++round) {
+    const auto numerator = static_cast<int64_t>(random() >> 20);
+    const auto denominator = static_cast<int64_t>(random() >> 34) + 1;
+    const auto offset = static_cast<int64_t>(random() >> (16 + round % 40));
+    const int sign = round % 2 == 0 ? 1 : -1;
+    const int exponent = round % 7 - 3;
+    const Rounded got = RoundRootMinus(sign, numerator, denominator, exponent, {offset, -20});
+    // value - bound + offset <= sign * root <= value + bound + offset.
+    const Rational squared = PowerOfTwo(2 * exponent) * numerator / denominator;
+    for (const int side : {-1, 1}) {
+      const Rational end =
+          ExactValue(got.value) + side * ExactValue(got.bound) + PowerOfTwo(-20) * offset;
+      const Rational signed_square = end < 0 ? Rational(-end * end) : Rational(end * end);
+      EXPECT_GE(side * (signed_square - sign * squared), 0) << round;
     }
   }
 }

@@ -22,7 +22,7 @@ from hulld.answers.collisions import Batch, Problem, Relation
 from hulld.calls.freshness import Freshness
 from hulld.client import Client
 from hulld.errors import NotFoundError, error_class
-from hulld.geometry.placements import Placements, PlacementsLike
+from hulld.geometry.placements import Placements, PlacementsLike, as_radii
 from hulld.geometry.poses import PoseLike, pack_pose
 from hulld.local_server import shared_client
 from hulld.robot.answers import RobotCheck, collect
@@ -452,7 +452,8 @@ def _many_robots(
     placements.poses = np.concatenate([poses.reshape(-1, 7), scene.poses])
     placements.indices = np.concatenate([of_parts, scene.indices + np.uint32(parts)])
     around = np.zeros(len(scene)) if scene.radii is None else scene.radii
-    placements.radii = np.concatenate([np.tile(radii, count), around])
+    all_radii = np.concatenate([np.tile(radii, count), around])
+    placements.radii = as_radii(all_radii, len(all_radii))
     return placements, shifted.reshape(-1, 2)
 
 
