@@ -40,9 +40,6 @@ def test_the_last_bit_decides_and_is_proven(
     for other in set(hulld.Relation) - {relation}:
         with pytest.raises(hulld.VerificationError):
             verifier.check(a, b, dataclasses.replace(answer, relation=other))
-    changed = ball(4 - radius / 2, 3, 4, 0)
-    with pytest.raises(hulld.VerificationError):
-        verifier.check(ball(1, 0, 0, 0), changed, answer)
 
 
 def test_boxes_and_capsules_are_proven(client: hulld.Client, cube: str) -> None:

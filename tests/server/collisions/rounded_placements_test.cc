@@ -163,7 +163,7 @@ TEST_F(RoundedPlacements, RadiiOfBodiesAddToThoseOfTheirPieces) {
   ExpectProven(row, Ball(std::nextafter(0.25, 0), -0.75, 0.5, 0.5), kSeparated);
   ExpectProven(row, Ball(0.25, 6, 0.5, 0.5), kTouching);
   ExpectProven(row, Ball(0.25, std::nextafter(6.0, 0), 0.5, 0.5), kOverlapping);
-  ExpectProven(row, Rounded(PlacementOf("row", 0, 2.25), 0.5), kTouching);
+  ExpectProven(row, Rounded(PlacementOf("row", 0, 2.5), 0.5), kTouching);
   const auto body = client().GetBody("row");
   ASSERT_TRUE(body.ok());
   EXPECT_EQ(body->pieces(0).radius(), 0);
