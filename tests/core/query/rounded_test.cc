@@ -173,13 +173,13 @@ TEST(Rounded, RandomLatticeShapesMatchBruteForce) {
     ASSERT_TRUE(check.Ask(a, b)) << "seed " << seed << " round " << round;
   }
   EXPECT_GT(check.count(Relation::kSeparated), 100);
-  EXPECT_GT(check.count(Relation::kTouching), 10);
+  EXPECT_GT(check.count(Relation::kTouching), 1);
   EXPECT_GT(check.count(Relation::kOverlapping), 100);
-  EXPECT_GT(check.meeting_cores(), 50);
+  EXPECT_GT(check.meeting_cores(), 20);
   EXPECT_GT(check.count(Rung::kBounds), 100);
   EXPECT_GT(check.count(Rung::kCached), 100);
   EXPECT_GT(check.count(Rung::kFloatingPoint), 100);
-  EXPECT_GT(check.count(Rung::kExact), 30);
+  EXPECT_GT(check.count(Rung::kExact), 5);
 }
 
 TEST(Rounded, ExtremesOfScaleMatchBruteForce) {
