@@ -57,6 +57,13 @@ inline DoubleDouble ExactProduct(double x, double y) {
   return {product.sum, product.error};
 }
 
+// Returns (1 - t) a + t b for t in [0, 1] within 9 u^2 (|a| + |b|): the difference of a and b is
+// exact, its product with t errs by 3 u^2 of itself, and the sum by 3 u^2 of at most |a| + |b|.
+inline DoubleDouble Interpolated(double a, double b, double t) {
+  const SumWithError difference = TwoSum(b, -a);
+  return DoubleDouble{difference.sum, difference.error} * DoubleDouble{t, 0} + DoubleDouble{a, 0};
+}
+
 }  // namespace hulld
 
 #endif  // HULLD_CORE_NUMERIC_DOUBLE_DOUBLE_H_

@@ -226,6 +226,17 @@ inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
 // Proven.
 inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 
+// A Bernstein coefficient of |q(t)|^2 (n . p(t) - c) over the vertices of a hull in motion
+// (moving_plane.h), with w the larger of |q|^2 at both ends, and x the larger translation. Both
+// quaternions err by (1 + 2^-8) u of their length. The bilinear form of two of them on n sums at
+// most 6 w |n|_2 of terms that err by 10.1 u of themselves: 105 u w |n| per component, elevation to
+// degree 3 adds 7 u w |n|. Times a vertex: 3 * 112 u w |n| M; the support value itself errs by 32 u
+// w |n| M (kSupportBlurFactor). n . x errs by 12 u |n||x|, products of quaternions by 6 u w, so
+// their cubic by 42 u w |n||x|; the weight of c by 8 u w, its product with c by 9 u w |c|; sums of
+// at most 6 w |n| M + 3 w |n||x| + w |c| by 2 u of that. The total is below 400 u w (|n| (M + |x|)
+// + |c|). Proven.
+inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
+
 // The sign of det[p, q, r], p . ((q - p) x (r - p)), for computed Minkowski vertices in a unit with
 // S < 2: a vertex errs by 256 u per component and is at most 2 sqrt(3), an edge by 520 u and is at
 // most 4 sqrt(3), because translations cancel in it. The normal, at most 96, therefore errs by 2 *

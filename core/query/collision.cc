@@ -101,12 +101,7 @@ Answer Mirrored(Answer answer) {
   if (answer.witness) std::swap(answer.witness->p_WA, answer.witness->p_WB);
   // 0 stays +0.
   if (answer.normal) answer.normal->direction = Vector::Zero() - answer.normal->direction;
-  if (answer.certificate) {
-    auto& direction = answer.certificate->direction;
-    if (Vector* n = std::get_if<Vector>(&direction)) *n = -*n;
-    if (IntegerVector* n = std::get_if<IntegerVector>(&direction)) *n = -*n;
-    for (VertexPair& pair : answer.certificate->pairs) std::swap(pair.a, pair.b);
-  }
+  if (answer.certificate) answer.certificate = Mirrored(*std::move(answer.certificate));
   return answer;
 }
 

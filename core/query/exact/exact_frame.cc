@@ -97,6 +97,8 @@ bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) 
 
 bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation) {
   if (placed.product() == nullptr) return FindSmallRotation(placed.X_WH().q, rotation);
+  // At a time inside a motion, numbers have more bits than a fixed width usually holds.
+  if (placed.product()->motion() != nullptr) return false;
   SmallRotation outer, inner;
   if (!FindSmallRotation(placed.product()->X_WB().q, outer)) return false;
   if (!FindSmallRotation(placed.product()->X_BP().q, inner)) return false;
@@ -121,6 +123,10 @@ std::array<const Pose*, 2> PosesOf(const PlacedHull& placed) {
 }
 
 int TranslationExponent(const PlacedHull& placed, int otherwise) {
+  if (placed.product() != nullptr && placed.product()->motion() != nullptr) {
+    return std::min(otherwise,
+                    TranslationExponentAt(*placed.product()->motion(), placed.product()->time()));
+  }
   for (const Pose* pose : PosesOf(placed)) otherwise = LowestBitExponent(pose->t, otherwise);
   return otherwise;
 }

@@ -130,7 +130,8 @@ IntegerVector PointOf(ExactPair& pair, const ExactCombination& combination) {
 }
 
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
-                                                const std::function<bool()>& should_stop) {
+                                                const std::function<bool()>& should_stop,
+                                                const IntegerVector* half) {
   HULLD_CHECK(seed.size() <= 4);
   std::vector<ExactCorner> corners;
   for (const VertexPair& p : seed) corners.push_back(pair.Corner(p));
@@ -142,6 +143,9 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
     const IntegerVector& n = part.toward_origin;
     if (!IsZero(n)) {
       ExactCorner farthest = pair.Farthest(n);
+      if (half != nullptr) {
+        farthest.w = Sign(Dot(n, *half)) < 0 ? farthest.w - *half : farthest.w + *half;
+      }
       if (pair.stopped()) return absl::CancelledError("stopped in an exact query");
       if (Dot(n, farthest.w) > Dot(n, part.corners[0].w)) {
         corners = std::move(part.corners);

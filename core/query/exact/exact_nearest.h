@@ -36,10 +36,13 @@ IntegerVector PointOf(ExactPair& pair, const ExactCombination& combination);
 // Keerthi (1988) in integers. Keeps a part (vertex, edge, triangle) of A - B with its nearest point
 // strictly inside, and adds the farthest vertex toward the origin until no vertex is farther. The
 // distance decreases strictly, so no part recurs and the walk terminates. Directions have degree at
-// most 3 in the coordinates. `seed`: initial pairs; may be empty. Requires: at most four initial
-// pairs. CANCELLED: should_stop, which may be empty, returned true.
+// most 3 in the coordinates. `seed`: initial pairs; may be empty. `half`: if not null, the
+// search is over the sum of A - B and the segment from -half to half, and a pair stands for one of
+// two points. Requires: at most four initial pairs. CANCELLED: should_stop, which may be empty,
+// returned true.
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
-                                                const std::function<bool()>& should_stop);
+                                                const std::function<bool()>& should_stop,
+                                                const IntegerVector* half = nullptr);
 
 }  // namespace hulld
 

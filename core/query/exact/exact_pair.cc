@@ -19,23 +19,7 @@ struct IntegerRotation {
   Integer norm_squared;
 };
 
-IntegerRotation RotationOf(const std::array<double, 4>& q) {
-  if (SmallRotation small; FindSmallRotation(q, small)) {
-    IntegerRotation rotation;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) rotation.rows[i][j] = ToInteger(WideOf(small.rows[i][j]));
-    }
-    rotation.norm_squared = ToInteger(WideOf(small.norm));
-    return rotation;
-  }
-  int exponent = kAboveAllExponents;
-  for (const double component : q) {
-    if (component != 0) exponent = std::min(exponent, LowestBitExponent(component));
-  }
-  const Integer w = ToInteger(q[0], exponent);
-  const Integer x = ToInteger(q[1], exponent);
-  const Integer y = ToInteger(q[2], exponent);
-  const Integer z = ToInteger(q[3], exponent);
+IntegerRotation RotationOf(const Integer& w, const Integer& x, const Integer& y, const Integer& z) {
   const Integer ww = w * w;
   const Integer xx = x * x;
   const Integer yy = y * y;
@@ -52,9 +36,45 @@ IntegerRotation RotationOf(const std::array<double, 4>& q) {
           ww + xx + yy + zz};
 }
 
+IntegerRotation RotationOf(const std::array<double, 4>& q) {
+  if (SmallRotation small; FindSmallRotation(q, small)) {
+    IntegerRotation rotation;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) rotation.rows[i][j] = ToInteger(WideOf(small.rows[i][j]));
+    }
+    rotation.norm_squared = ToInteger(WideOf(small.norm));
+    return rotation;
+  }
+  int exponent = kAboveAllExponents;
+  for (const double component : q) {
+    if (component != 0) exponent = std::min(exponent, LowestBitExponent(component));
+  }
+  return RotationOf(ToInteger(q[0], exponent), ToInteger(q[1], exponent), ToInteger(q[2], exponent),
+                    ToInteger(q[3], exponent));
+}
+
+// Returns the rotation of a motion at a time.
+IntegerRotation RotationAt(const Motion& motion, double time) {
+  if (IsTranslation(motion)) return RotationOf(motion.start.q);
+  const std::array<Integer, 4> q = QuaternionAt(motion, time);
+  return RotationOf(q[0], q[1], q[2], q[3]);
+}
+
+// Returns the rotation of the outer pose of a product.
+IntegerRotation OuterRotation(const PoseProduct& product) {
+  return product.motion() == nullptr ? RotationOf(product.X_WB().q)
+                                     : RotationAt(*product.motion(), product.time());
+}
+
+// Returns the translation of the outer pose of a product over 2^exponent.
+IntegerVector OuterTranslation(const PoseProduct& product, int exponent) {
+  if (product.motion() == nullptr) return ToInteger(product.X_WB().t, exponent);
+  return TranslationAt(*product.motion(), product.time(), exponent);
+}
+
 IntegerRotation RotationOf(const PlacedHull& placed) {
   if (placed.product() == nullptr) return RotationOf(placed.X_WH().q);
-  const IntegerRotation outer = RotationOf(placed.product()->X_WB().q);
+  const IntegerRotation outer = OuterRotation(*placed.product());
   const IntegerRotation inner = RotationOf(placed.product()->X_BP().q);
   IntegerRotation product;
   for (int i = 0; i < 3; ++i) {
@@ -71,11 +91,11 @@ IntegerRotation RotationOf(const PlacedHull& placed) {
 IntegerVector ScaledTranslation(const PlacedHull& placed, const Integer& norm, int exponent) {
   const PoseProduct* const product = placed.product();
   if (product == nullptr) return norm * ToInteger(placed.X_WH().t, exponent);
-  const IntegerRotation body = RotationOf(product->X_WB().q);
+  const IntegerRotation body = OuterRotation(*product);
   const IntegerVector t_P = ToInteger(product->X_BP().t, exponent);
   const IntegerVector turned = {Dot(body.rows[0], t_P), Dot(body.rows[1], t_P),
                                 Dot(body.rows[2], t_P)};
-  return (norm / body.norm_squared) * turned + norm * ToInteger(product->X_WB().t, exponent);
+  return (norm / body.norm_squared) * turned + norm * OuterTranslation(*product, exponent);
 }
 
 }  // namespace

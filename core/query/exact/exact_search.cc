@@ -154,11 +154,12 @@ class Search {
     // Any thickness is valid; one of the size of the hulls keeps the search well shaped.
     const Coordinates width = pair_.Difference({pair_.FarthestA(Direction{1, 1, 1}), 0});
     if (pair_.stopped()) return Stopped();
-    Number half = 1;
+    Coordinates half = {0, 0, 0};
+    half[axis] = 1;
     for (int i = 0; i < 3; ++i) {
-      half += Sign(width[i]) < 0 ? Number(-width[i]) : width[i];
+      half[axis] += Sign(width[i]) < 0 ? Number(-width[i]) : width[i];
     }
-    search.Thicken(axis, half);
+    search.Thicken(half);
     absl::StatusOr<ExactSearchResult> result = RunAndReport(search);
     if (result.ok() && result->relation == Relation::kOverlapping) {
       result->relation = Relation::kTouching;

@@ -136,9 +136,8 @@ PortalSearch<Pair>::PortalSearch(Pair& pair, const std::function<bool()>& should
       position_error_(kMinkowskiErrorFactor * pair.filter().size()) {}
 
 template <typename Pair>
-void PortalSearch<Pair>::Thicken(int axis, Number half) {
-  axis_ = axis;
-  half_ = std::move(half);
+void PortalSearch<Pair>::Thicken(const Coordinates& half) {
+  halves_[half_count_++] = half;
   filtered_ = false;
 }
 
@@ -146,9 +145,9 @@ template <typename Pair>
 const typename Pair::Coordinates& PortalSearch<Pair>::Exact(const Point& point) const {
   if (!point.exact) {
     point.exact = pair_.Difference(point.pair);
-    if (axis_ >= 0) {
-      Number& thick = (*point.exact)[axis_];
-      thick = point.side < 0 ? Number(thick - half_) : Number(thick + half_);
+    for (size_t i = 0; i < half_count_; ++i) {
+      Coordinates& w = *point.exact;
+      w = (point.sides >> i & 1) != 0 ? w + halves_[i] : w - halves_[i];
     }
   }
   return *point.exact;
@@ -267,7 +266,9 @@ typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   } else {
     point.pair = {pair_.FarthestA(n.exact()), pair_.FarthestB(n.exact())};
   }
-  if (axis_ >= 0) point.side = Sign(n.exact()[axis_]) < 0 ? -1 : 1;
+  for (size_t i = 0; i < half_count_; ++i) {
+    if (Sign(Dot(n.exact(), halves_[i])) >= 0) point.sides |= 1u << i;
+  }
   if (filtered_) point.w = pair_.filter().Difference(point.pair);
   return point;
 }
@@ -295,7 +296,7 @@ typename PortalSearch<Pair>::Result PortalSearch<Pair>::Run() {
 template <typename Pair>
 std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryEnd(
     const FloatSearchResult& end) {
-  HULLD_DCHECK(axis_ < 0);
+  HULLD_DCHECK(half_count_ == 0);
   if (!filtered_ || end.pair_count == 0) return std::nullopt;
   if (poll_.Step()) return Result{};
   std::array<Point, 4> corners;
@@ -428,7 +429,7 @@ typename PortalSearch<Pair>::Result PortalSearch<Pair>::RefinePortal() {
     w = Farthest(n);
     if (pair_.stopped()) return {};
     const bool is_corner = std::any_of(portal_.begin(), portal_.end(), [&](const Point& corner) {
-      return corner.pair == w.pair && corner.side == w.side;
+      return corner.pair == w.pair && corner.sides == w.sides;
     });
     if ((is_corner ? side : SignAlong(n, w)) < 0) return {Verdict::kSeparated, n.exact(), {}};
     if (is_corner || SignOfAdvance(n, p, q, r, w) <= 0) {

@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_EXACT_PORTAL_SEARCH_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -15,7 +16,7 @@ namespace hulld {
 
 // Finds the position of the origin relative to a convex set C of dimension 3. Shoots a ray from a
 // point inside C through the origin and searches for the facet of C through which it leaves. C is A
-// - B, or A - B thickened along a coordinate axis.
+// - B, or A - B thickened along given vectors.
 //
 // A portal is a triangle of vertices of C that the ray crosses. The search explores the far side of
 // its plane by the support vertex w along its normal n, pointing away from the center. If n.w < 0,
@@ -43,8 +44,8 @@ class PortalSearch {
   // 3 (unchecked: SearchExactly finds the dimension first).
   PortalSearch(Pair& pair, const std::function<bool()>& should_stop);
 
-  // Thickens C: by +-half along a coordinate axis.
-  void Thicken(int axis, Number half);
+  // Thickens C: adds the segment from -half to half. May be called up to three times.
+  void Thicken(const Coordinates& half);
 
   enum class Verdict { kSeparated, kTouching, kOverlapping, kStopped };
   struct Result {
@@ -74,8 +75,8 @@ class PortalSearch {
   // if there is a filter.
   struct Point {
     VertexPair pair = {};
-    // The end of C's thickness, -1 or 1; 0 if C is not thickened.
-    int side = 0;
+    // The ends of C's thicknesses: bit i is set at the positive end of thickness i.
+    unsigned sides = 0;
     Vector w = Vector::Zero();
     // Computed on demand.
     mutable std::optional<Coordinates> exact;
@@ -115,8 +116,8 @@ class PortalSearch {
   bool filtered_;
   // Error bound of a point's components, if filtered.
   double position_error_;
-  int axis_ = -1;
-  Number half_;
+  std::array<Coordinates, 3> halves_;
+  size_t half_count_ = 0;
   // From the center through the origin; the exact value is computed on demand.
   mutable std::optional<Coordinates> exact_ray_;
   Vector ray_ = Vector::Zero();

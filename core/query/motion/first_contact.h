@@ -41,6 +41,11 @@ struct MotionOptions {
 // hulls, added.
 inline constexpr double kDefaultRelativeResolution = 1e-9;
 
+// The least MotionOptions::resolution, relative to the largest absolute coordinates of the hulls
+// and of their translations, added. Above the rounding of planes, which kMotionPlaneErrorFactor
+// bounds. A choice.
+inline constexpr double kLeastRelativeResolution = 0x1p-38;
+
 // Returns OK, or INVALID_ARGUMENT for a max_time_error outside (0, 1], or a resolution that is
 // negative or NaN.
 absl::Status ValidateMotionOptions(const MotionOptions& options);

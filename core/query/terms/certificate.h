@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_QUERY_TERMS_CERTIFICATE_H_
 #define HULLD_CORE_QUERY_TERMS_CERTIFICATE_H_
 
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -29,6 +30,14 @@ struct Certificate {
   ExactDirection direction;
   std::vector<VertexPair> pairs;
 };
+
+// Returns the proof for (B, A) of a proof for (A, B).
+inline Certificate Mirrored(Certificate certificate) {
+  if (Vector* n = std::get_if<Vector>(&certificate.direction)) *n = -*n;
+  if (IntegerVector* n = std::get_if<IntegerVector>(&certificate.direction)) *n = -*n;
+  for (VertexPair& pair : certificate.pairs) std::swap(pair.a, pair.b);
+  return certificate;
+}
 
 }  // namespace hulld
 

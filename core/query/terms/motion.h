@@ -3,6 +3,9 @@
 
 #include <absl/status/status.h>
 
+#include <array>
+
+#include "core/numeric/integer.h"
 #include "core/query/terms/pose.h"
 
 namespace hulld {
@@ -24,6 +27,15 @@ bool IsTranslation(const Motion& motion);
 // field of the end; or q(t) vanishes at some t, which is so if and only if q1 = -s q0 for a
 // positive s. Exact.
 absl::Status ValidateMotion(const Motion& motion);
+
+// Exact values of a motion at a time in [0, 1], in integers.
+//
+// Returns a positive multiple of q(time).
+std::array<Integer, 4> QuaternionAt(const Motion& motion, double time);
+// Returns the exponent of a power of two that divides x(time).
+int TranslationExponentAt(const Motion& motion, double time);
+// Returns x(time) over 2^exponent. Requires: exponent <= TranslationExponentAt(motion, time).
+IntegerVector TranslationAt(const Motion& motion, double time, int exponent);
 
 }  // namespace hulld
 

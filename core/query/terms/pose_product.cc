@@ -9,6 +9,8 @@
 #include "core/numeric/double_double.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/integer.h"
+#include "core/numeric/rational.h"
 
 namespace hulld {
 namespace {
@@ -77,7 +79,59 @@ std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
   return result;
 }
 
+// Returns the quaternion of a motion at a time times a power of two, each component rounded once.
+Quaternion RoundedExactlyAt(const Motion& motion, double time) {
+  const std::array<Integer, 4> q = QuaternionAt(motion, time);
+  int largest = 0;
+  for (const Integer& component : q) {
+    if (component != 0) largest = std::max(largest, static_cast<int>(msb(abs(component))));
+  }
+  Quaternion rounded;
+  for (int i = 0; i < 4; ++i) rounded[i] = RoundToNearest(q[i], 1, -largest).value;
+  return rounded;
+}
+
+// Returns the quaternion of a motion at a time times a positive number, each component within u of
+// the largest, and terms of the size of u^2.
+Quaternion RoundedAt(const Motion& motion, double time) {
+  const Quaternion& q0 = motion.start.q;
+  const Quaternion& q1 = motion.end.q;
+  double largest = 0;
+  for (int i = 0; i < 4; ++i) largest = std::max({largest, std::abs(q0[i]), std::abs(q1[i])});
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  Quaternion q;
+  double remaining = 0;
+  for (int i = 0; i < 4; ++i) {
+    q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time).high;
+    remaining = std::max(remaining, std::abs(q[i]));
+  }
+  if (remaining < kInterpolationLeastRemainder) return RoundedExactlyAt(motion, time);
+  return q;
+}
+
 }  // namespace
+
+PoseProduct::PoseProduct(const Motion& motion, double time) : motion_(&motion), time_(time) {
+  HULLD_DCHECK(ValidateMotion(motion).ok() && time >= 0 && time <= 1);
+  rounded_.q = RoundedAt(motion, time);
+  const Vector& x0 = motion.start.t;
+  const Vector& x1 = motion.end.t;
+  const double size = x0.cwiseAbs().maxCoeff() + x1.cwiseAbs().maxCoeff();
+  if (size <= kProductMaxTranslation) {
+    for (int i = 0; i < 3; ++i) {
+      const DoubleDouble x = Interpolated(x0[i], x1[i], time);
+      rounded_.t[i] = x.high;
+      translation_rest_[i] = x.low;
+    }
+    translation_error_ = kProductTranslationError * size + kProductUnderflow;
+  } else {
+    // Any value in range: only exact arithmetic will use this pose.
+    rounded_.t = (x0 / 2 + x1 / 2).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
+    translation_error_ = std::numeric_limits<double>::infinity();
+  }
+  X_WB_ = rounded_;
+}
 
 PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP_(X_BP) {
   HULLD_DCHECK(IsValidPose(X_WB) && IsValidPose(X_BP));

@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_TERMS_POSE_PRODUCT_H_
 
 #include "core/numeric/vector.h"
+#include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
 
 namespace hulld {
@@ -9,12 +10,19 @@ namespace hulld {
 // X_WP = X_WB X_BP, the pose of a piece P of a body B in the world: p_W = R(q_B) (R(q_P) p_P /
 // |q_P|^2 + t_P) / |q_B|^2 + t_B over the reals for the given doubles. The product is rational, and
 // in general no pose of doubles represents it. Exact arithmetic uses the two factors; floating
-// point uses a rounding with a known error.
+// point uses a rounding with a known error. So is the pose of a motion at a time, X_WB = X_WB(t).
 class PoseProduct {
  public:
   // Requires: both poses valid (ValidatePose). Cost: about 100 ns, less if one has no rotation.
   PoseProduct(const Pose& X_WB, const Pose& X_BP);
+  // X_WB(time), with an identity X_BP. `motion` must outlive the result. Requires: a valid motion
+  // (ValidateMotion), and a time in [0, 1]. Cost: about 100 ns.
+  PoseProduct(const Motion& motion, double time);
 
+  // Null if X_WB is a pose; otherwise it is this motion at time().
+  const Motion* motion() const { return motion_; }
+  double time() const { return time_; }
+  // Rounded if motion() is not null.
   const Pose& X_WB() const { return X_WB_; }
   const Pose& X_BP() const { return X_BP_; }
 
@@ -29,6 +37,8 @@ class PoseProduct {
   double translation_error() const { return translation_error_; }
 
  private:
+  const Motion* motion_ = nullptr;
+  double time_ = 0;
   Pose X_WB_;
   Pose X_BP_;
   Pose rounded_;

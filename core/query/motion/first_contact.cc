@@ -1,0 +1,95 @@
+#include "core/query/motion/first_contact.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include "core/query/motion/translation_search.h"
+#include "core/query/motion/turning_search.h"
+
+namespace hulld {
+namespace {
+
+std::array<double, 15> ValuesOf(const MovingHull& moving) {
+  const Pose& start = moving.X_WH.start;
+  const Pose& end = moving.X_WH.end;
+  return {start.q[0],  start.q[1],  start.q[2], start.q[3], start.t.x(),
+          start.t.y(), start.t.z(), end.q[0],   end.q[1],   end.q[2],
+          end.q[3],    end.t.x(),   end.t.y(),  end.t.z(),  moving.radius};
+}
+
+// Returns true if (A, B) is in a total order by content, so that both orders of a pair yield the
+// same answer.
+bool IsInOrder(const MovingHull& a, const MovingHull& b) {
+  const auto values_a = ValuesOf(a);
+  const auto values_b = ValuesOf(b);
+  if (values_a != values_b) return values_a < values_b;
+  if (a.hull.point_count() != b.hull.point_count()) {
+    return a.hull.point_count() < b.hull.point_count();
+  }
+  for (uint32_t i = 0; i < a.hull.point_count(); ++i) {
+    const Vector p_a = a.hull.point(i);
+    const Vector p_b = b.hull.point(i);
+    if (p_a != p_b) {
+      return std::lexicographical_compare(p_a.begin(), p_a.end(), p_b.begin(), p_b.end());
+    }
+  }
+  return true;
+}
+
+// Converts the answer for (A, B) to the answer for (B, A).
+FirstContact Mirrored(FirstContact contact) {
+  for (SeparatedInterval& interval : contact.intervals) {
+    if (Vector* n = std::get_if<Vector>(&interval.direction)) *n = -*n;
+    if (IntegerVector* n = std::get_if<IntegerVector>(&interval.direction)) *n = -*n;
+    if (interval.offset) interval.offset = -*interval.offset;
+  }
+  if (contact.certificate) contact.certificate = Mirrored(*std::move(contact.certificate));
+  return contact;
+}
+
+absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
+  const absl::Status status = ValidateMotion(moving.X_WH);
+  if (!status.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": ", status.message()));
+  }
+  if (moving.radius != 0) {
+    return absl::UnimplementedError(absl::StrCat(name, ": motions of hulls with a radius"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ValidateMotionOptions(const MotionOptions& options) {
+  if (!(options.max_time_error > 0 && options.max_time_error <= 1)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_time_error is ", options.max_time_error, "; it must be in (0, 1]"));
+  }
+  if (options.resolution && !(*options.resolution >= 0)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("resolution is ", *options.resolution, "; it must be at least 0"));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
+                                              const MotionOptions& options) {
+  if (absl::Status s = ValidateMotionOptions(options); !s.ok()) return s;
+  if (absl::Status s = ValidateMoving("a", a); !s.ok()) return s;
+  if (absl::Status s = ValidateMoving("b", b); !s.ok()) return s;
+  if (a.hull.empty() || b.hull.empty()) return FirstContact();
+  if (!IsInOrder(a, b)) {
+    absl::StatusOr<FirstContact> contact = FindFirstContact(b, a, options);
+    if (contact.ok()) contact = Mirrored(*std::move(contact));
+    return contact;
+  }
+  if (IsTranslation(a.X_WH) && IsTranslation(b.X_WH)) return TranslationSearch(a, b, options).Run();
+  return TurningSearch(a, b, options).Run();
+}
+
+}  // namespace hulld

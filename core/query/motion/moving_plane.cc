@@ -1,0 +1,164 @@
+#include "core/query/motion/moving_plane.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "core/base/check.h"
+#include "core/numeric/double_double.h"
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/query/placed/plain_vector.h"
+
+namespace hulld {
+namespace {
+
+using Quaternion = std::array<double, 4>;
+
+// A hull turns too far in an interval if a Bernstein coefficient of |q(t)|^2 is below this times
+// the largest of |q|^2 at the ends: about 220 degrees, if both have one length. A choice.
+constexpr double kLeastRelativeWeight = 0x1p-4;
+
+double LargestOf(const Quaternion& q) {
+  return std::max(std::max(std::abs(q[0]), std::abs(q[1])),
+                  std::max(std::abs(q[2]), std::abs(q[3])));
+}
+
+double Dot(const Quaternion& p, const Quaternion& q) {
+  return (p[0] * q[0] + p[1] * q[1]) + (p[2] * q[2] + p[3] * q[3]);
+}
+
+Quaternion At(const Quaternion& q0, const Quaternion& q1, double t) {
+  Quaternion q;
+  for (int i = 0; i < 4; ++i) q[i] = Interpolated(q0[i], q1[i], t).high;
+  return q;
+}
+
+// Returns the symmetric bilinear form of p and q that is R(q)^T n for p = q.
+PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVector& n) {
+  const PlainVector u(p[1], p[2], p[3]);
+  const PlainVector v(q[1], q[2], q[3]);
+  const double scale = p[0] * q[0] - Dot(u, v);
+  return (scale * n + (Dot(v, n) * u + Dot(u, n) * v)) - (p[0] * Cross(v, n) + q[0] * Cross(u, n));
+}
+
+// Returns the largest n.v over the points of a hull, within kSupportBlurFactor times its largest
+// coordinate times a bound of n.
+double Reach(const QueryHull& hull, const PlainVector& n) {
+  // Too short to matter in kMotionPlaneErrorFactor.
+  if (LargestComponent(n) < kDirectionMin) return 0;
+  if (IsFilterSize(hull.max_abs_coordinate())) return hull.Farthest(n).value;
+  double reach = -kInfinity;
+  for (uint32_t i = 0; i < hull.point_count(); ++i) {
+    reach = std::max(reach, hulld::Dot(n, PlainVector(hull.point(i))));
+  }
+  return reach;
+}
+
+using Cubic = std::array<double, 4>;
+
+// Returns the Bernstein coefficients of a quadratic times a linear polynomial.
+Cubic Product(const std::array<double, 3>& f, double g0, double g1) {
+  return {f[0] * g0, (f[0] * g1 + 2 * f[1] * g0) / 3, (2 * f[1] * g1 + f[2] * g0) / 3, f[2] * g1};
+}
+
+}  // namespace
+
+// Bernstein coefficients over an interval, of a hull in motion.
+struct MovingPlane::Bounds {
+  // Of |q|^2, and the largest of |q|^2 at both ends.
+  Cubic weights;
+  double weight = 0;
+  // The largest and the least of those of |q|^2 n.p over all vertices.
+  Cubic most;
+  Cubic least;
+  // Error bound of these, without the part of the offset.
+  double error = 0;
+  // False if the hull turns too far.
+  bool usable = false;
+};
+
+MovingPlane::MovingPlane(const MovingHull& a, const MovingHull& b)
+    : a_(SideOf(a)), b_(SideOf(b)), size_(a_.size + b_.size) {}
+
+MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
+  HULLD_DCHECK(!moving.hull.empty());
+  const Pose& start = moving.X_WH.start;
+  const Pose& end = moving.X_WH.end;
+  Side side{&moving.hull, start.q, end.q, start.t, end.t, 0};
+  int exponent = 0;
+  std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
+  for (int i = 0; i < 4; ++i) {
+    side.q0[i] = std::ldexp(start.q[i], -exponent);
+    side.q1[i] = std::ldexp(end.q[i], -exponent);
+  }
+  side.size = moving.hull.max_abs_coordinate() +
+              std::max(start.t.cwiseAbs().maxCoeff(), end.t.cwiseAbs().maxCoeff());
+  return side;
+}
+
+MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, double start,
+                                          double end) {
+  Bounds bounds;
+  if (!(side.size >= kMotionMinSize && side.size <= kMotionMaxSize)) return bounds;
+  const Quaternion p = At(side.q0, side.q1, start);
+  const Quaternion q = At(side.q0, side.q1, end);
+  if (std::min(LargestOf(p), LargestOf(q)) < kInterpolationLeastRemainder) return bounds;
+  const std::array<double, 3> norms = {Dot(p, p), Dot(p, q), Dot(q, q)};
+  bounds.weights = Product(norms, 1, 1);
+  bounds.weight = std::max(norms[0], norms[2]);
+  for (const double w : bounds.weights) {
+    if (w < kLeastRelativeWeight * bounds.weight) return bounds;
+  }
+  bounds.usable = true;
+
+  const PlainVector first = TurnedBack(p, p, n);
+  const PlainVector middle = TurnedBack(p, q, n);
+  const PlainVector last = TurnedBack(q, q, n);
+  const PlainVector turned[4] = {first, 1.0 / 3 * (first + 2 * middle),
+                                 1.0 / 3 * (2 * middle + last), last};
+  const auto along = [&](double t) {
+    PlainVector x;
+    x.x = Interpolated(side.x0.x(), side.x1.x(), t).high;
+    x.y = Interpolated(side.x0.y(), side.x1.y(), t).high;
+    x.z = Interpolated(side.x0.z(), side.x1.z(), t).high;
+    return hulld::Dot(PlainVector(n), x);
+  };
+  const Cubic moved = Product(norms, along(start), along(end));
+  for (int i = 0; i < 4; ++i) {
+    bounds.most[i] = Reach(*side.hull, turned[i]) + moved[i];
+    bounds.least[i] = moved[i] - Reach(*side.hull, -turned[i]);
+  }
+  bounds.error = kMotionPlaneErrorFactor * bounds.weight * LargestComponent(n) * side.size;
+  return bounds;
+}
+
+MovingPlane::Result MovingPlane::Try(const Vector& n, double start, double end,
+                                     double margin) const {
+  HULLD_DCHECK(0 <= start && start <= end && end <= 1);
+  Result result{false, 0, -kInfinity};
+  const Bounds a = BoundsOf(a_, n, start, end);
+  const Bounds b = BoundsOf(b_, n, start, end);
+  if (!a.usable || !b.usable) return result;
+  double low = -kInfinity;
+  double high = kInfinity;
+  for (int i = 0; i < 4; ++i) {
+    low = std::max(low, a.most[i] / a.weights[i]);
+    high = std::min(high, b.least[i] / b.weights[i]);
+  }
+  result.offset = low / 2 + high / 2;
+  result.gap = high - low;
+  const double offset_error =
+      kMotionPlaneErrorFactor * (std::abs(result.offset) + std::abs(margin));
+  const double error_a = a.error + offset_error * a.weight;
+  const double error_b = b.error + offset_error * b.weight;
+  result.proven = true;
+  for (int i = 0; i < 4; ++i) {
+    result.proven = result.proven &&
+                    a.most[i] + error_a < (result.offset - margin) * a.weights[i] &&
+                    b.least[i] - error_b > (result.offset + margin) * b.weights[i];
+  }
+  return result;
+}
+
+}  // namespace hulld

@@ -1,0 +1,65 @@
+#ifndef HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_
+#define HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_
+
+#include <array>
+
+#include "core/numeric/vector.h"
+#include "core/query/motion/first_contact.h"
+
+namespace hulld {
+
+// Planes between two hulls in motion over intervals of time, in floating point with a proven bound.
+//
+// Let q(t) be the rotation of a hull and x(t) its translation. For a plane n.p = c and a vertex v,
+// |q(t)|^2 (n.p(t) - c) = (R(q(t))^T n).v + |q(t)|^2 (n.x(t) - c) is a cubic polynomial in t. Over
+// an interval, R(q(t))^T n has three Bernstein coefficients: a bilinear form of the quaternions at
+// both ends. Elevated to degree 3, they are four directions in the hull's frame, and the largest
+// value of a Bernstein coefficient over all vertices is the hull's support value along one of them.
+// So four support values of each hull prove a plane for all vertices and all times of the interval
+// (Farouki and Rajan 1987). The offset may be chosen last: each coefficient bounds it.
+class MovingPlane {
+ public:
+  // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), neither is empty.
+  MovingPlane(const MovingHull& a, const MovingHull& b);
+
+  // The size of the pair: the largest absolute coordinates of the hulls and of their translations,
+  // added.
+  double size() const { return size_; }
+
+  struct Result {
+    // True if the plane at `offset` has A and B, without their radii, farther than `margin` on its
+    // two sides at all times of the interval.
+    bool proven = false;
+    double offset = 0;
+    // Width of the range of offsets, before rounding errors; not above the least separation along
+    // n. -infinity if a hull turns too far for a statement.
+    double gap = 0;
+  };
+  // Tries the direction n (world frame, from A toward B, of unit length up to rounding) from time
+  // `start` to `end`. A margin may be negative. Requires: 0 <= start <= end <= 1.
+  Result Try(const Vector& n, double start, double end, double margin = 0) const;
+
+ private:
+  struct Side {
+    const QueryHull* hull;
+    // Quaternions at both ends of the motion, at a common power of two.
+    std::array<double, 4> q0;
+    std::array<double, 4> q1;
+    Vector x0;
+    Vector x1;
+    // Sum of the largest absolute coordinates of the hull and of its translations.
+    double size;
+  };
+  struct Bounds;
+
+  static Side SideOf(const MovingHull& moving);
+  static Bounds BoundsOf(const Side& side, const Vector& n, double start, double end);
+
+  Side a_;
+  Side b_;
+  double size_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_

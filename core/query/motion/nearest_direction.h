@@ -1,0 +1,22 @@
+#ifndef HULLD_CORE_QUERY_MOTION_NEAREST_DIRECTION_H_
+#define HULLD_CORE_QUERY_MOTION_NEAREST_DIRECTION_H_
+
+#include <absl/status/statusor.h>
+
+#include <functional>
+
+#include "core/numeric/vector.h"
+#include "core/query/floating/float_pair.h"
+
+namespace hulld {
+
+// Returns the direction from A to B in which they are nearest, of unit length up to rounding. No
+// claim depends on its accuracy: it is that of floating point if pair.usable(), and exact but for
+// its rounding otherwise. Zero if the pair meets, or floating point finds no direction. `first`: an
+// initial direction, not zero. CANCELLED: should_stop, which may be empty, returned true.
+absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
+                                        const std::function<bool()>& should_stop);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_MOTION_NEAREST_DIRECTION_H_

@@ -1,0 +1,51 @@
+#ifndef HULLD_CORE_QUERY_MOTION_PAIR_AT_H_
+#define HULLD_CORE_QUERY_MOTION_PAIR_AT_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <optional>
+
+#include "core/query/floating/float_pair.h"
+#include "core/query/ladder.h"
+#include "core/query/motion/first_contact.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/certificate.h"
+#include "core/query/terms/pose_product.h"
+
+namespace hulld {
+
+// Two hulls in motion at a time, for queries of hulls at rest; exact, without rounding of the pose.
+// Not movable, because its parts refer to each other.
+class PairAt {
+ public:
+  // Both hulls must outlive the result. Requires: neither is empty, valid motions
+  // (ValidateMotion), and a time in [0, 1].
+  PairAt(const MovingHull& a, const MovingHull& b, double time);
+  PairAt(const PairAt&) = delete;
+  PairAt& operator=(const PairAt&) = delete;
+
+  const FloatPair& pair() const { return *pair_; }
+
+  // Decides the relation at the time, exactly. CANCELLED: should_stop, which may be empty, returned
+  // true.
+  absl::StatusOr<Decision> Decide(const std::function<bool()>& should_stop) const;
+  // Returns the proof of a decision at the time. Errors: as Decide.
+  absl::StatusOr<Certificate> Certify(const Decision& decision,
+                                      const std::function<bool()>& should_stop) const;
+
+ private:
+  std::optional<PoseProduct> product_a_;
+  std::optional<PoseProduct> product_b_;
+  std::optional<PlacedHull> placed_a_;
+  std::optional<PlacedHull> placed_b_;
+  std::optional<FloatPair> pair_;
+};
+
+// Returns the error of a search that should_stop ended.
+inline absl::Status MotionStopped() { return absl::CancelledError("stopped in a motion"); }
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_MOTION_PAIR_AT_H_

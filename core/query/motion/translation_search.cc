@@ -1,0 +1,259 @@
+#include "core/query/motion/translation_search.h"
+
+#include <absl/status/status.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/rational.h"
+#include "core/query/exact/exact_nearest.h"
+#include "core/query/ladder.h"
+#include "core/query/motion/nearest_direction.h"
+#include "core/query/motion/sweep.h"
+
+namespace hulld {
+namespace {
+
+// Floating point ends when the gap is this small relative to the pair, or after this many steps;
+// exact queries do the rest. Choices.
+constexpr double kLeastRelativeGap = 0x1p-46;
+constexpr int kMostFloatSteps = 24;
+// Share of the gap that a step in floating point leaves open, more than rounding takes. A choice.
+constexpr double kOpenShare = 0x1p-10;
+// Factor between the strides of successive exact queries. A choice.
+constexpr int64_t kStrideFactor = 16;
+
+// Positions among the non-negative doubles, in ascending order.
+int64_t OrdinalOf(double x) { return std::bit_cast<int64_t>(x); }
+double DoubleAt(int64_t ordinal) { return std::bit_cast<double>(ordinal); }
+
+// A rational number in [0, 1], rounded down.
+struct FloorTime {
+  double value;
+  bool exact;
+};
+
+// Requires: numerator >= 0, denominator > 0. Numbers above 1 become 1.
+FloorTime RoundDown(const Integer& numerator, const Integer& denominator) {
+  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0);
+  if (numerator >= denominator) return {1, numerator == denominator};
+  if (numerator.is_zero()) return {0, true};
+  // Returns the sign of x - numerator / denominator.
+  const auto compare = [&](double x) {
+    if (x == 0) return -1;
+    const int lowest = LowestBitExponent(x);
+    const Integer scaled = ToInteger(x, lowest) * denominator;
+    return lowest < 0 ? scaled.compare(Integer(numerator << -lowest))
+                      : Integer(scaled << lowest).compare(numerator);
+  };
+  double value = RoundToNearest(numerator, denominator, 0).value;
+  int order = compare(value);
+  if (order > 0) {
+    value = std::nextafter(value, 0.0);
+    order = compare(value);
+  }
+  return {value, order == 0};
+}
+
+IntegerVector ToExact(const std::variant<Vector, IntegerVector>& direction) {
+  if (const IntegerVector* n = std::get_if<IntegerVector>(&direction)) return *n;
+  const Vector& n = std::get<Vector>(direction);
+  return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
+}
+
+Vector DisplacementOf(const Motion& motion) { return motion.end.t - motion.start.t; }
+
+}  // namespace
+
+// The unit of the pair at time 1/2 divides half of each translation.
+TranslationSearch::Middle::Middle(const MovingHull& a, const MovingHull& b,
+                                  const std::function<bool()>& should_stop)
+    : at(a, b, 0.5), pair(at.pair(), should_stop) {
+  const auto half_of = [&](const Motion& motion) {
+    const IntegerVector step =
+        ToInteger(motion.end.t, pair.exponent()) - ToInteger(motion.start.t, pair.exponent());
+    return IntegerVector{step.x / 2, step.y / 2, step.z / 2};
+  };
+  half = pair.norm() * (half_of(b.X_WH) - half_of(a.X_WH));
+}
+
+TranslationSearch::Middle& TranslationSearch::middle() {
+  if (!middle_) middle_.emplace(a_, b_, options_.should_stop);
+  return *middle_;
+}
+
+absl::StatusOr<FirstContact> TranslationSearch::Run() {
+  if (absl::Status s = AdvanceInFloatingPoint(); !s.ok()) return s;
+  if (absl::Status s = Narrow(); !s.ok()) return s;
+  return Conclude();
+}
+
+absl::Status TranslationSearch::AdvanceInFloatingPoint() {
+  const Vector displacement = DisplacementOf(b_.X_WH) - DisplacementOf(a_.X_WH);
+  Vector toward = Vector::Zero();
+  for (int step = 0; step < kMostFloatSteps; ++step) {
+    if (poll_.Step()) return MotionStopped();
+    const PairAt start(a_, b_, lower_);
+    if (!start.pair().usable()) return absl::OkStatus();
+    if (step == 0) toward = -Vector(start.pair().CenterDifference());
+    if (toward.isZero(0)) return absl::OkStatus();
+    const absl::StatusOr<Vector> found =
+        NearestDirection(start.pair(), toward, options_.should_stop);
+    if (!found.ok()) return found.status();
+    const Vector& n = *found;
+    if (n.isZero(0)) return absl::OkStatus();
+    const auto gap_at = [&](const PairAt& at) {
+      return -at.pair().Farthest(n).value - at.pair().SupportError(n);
+    };
+    const double gap = gap_at(start);
+    if (!(gap > kLeastRelativeGap * start.pair().size())) return absl::OkStatus();
+    lower_excluded_ = true;
+    const double speed = -n.dot(displacement);
+    const double until = lower_ + gap / speed * (1 - kOpenShare);
+    const bool to_end = !(speed > 0) || !(until < 1);
+    const PairAt end(a_, b_, to_end ? 1 : until);
+    if (!end.pair().usable() || !(gap_at(end) > 0)) return absl::OkStatus();
+    if (to_end) {
+      TakeSeparatedFrom(lower_, n);
+      return absl::OkStatus();
+    }
+    if (!(until > lower_)) return absl::OkStatus();
+    lower_ = until;
+    intervals_.push_back({lower_, n, std::nullopt});
+    toward = n;
+  }
+  return absl::OkStatus();
+}
+
+// Queries until lower_ and upper_ are equal or adjacent.
+absl::Status TranslationSearch::Narrow() {
+  for (;;) {
+    if (upper_state_ != Upper::kUnknown) {
+      if (lower_ >= upper_) return absl::OkStatus();
+      if (lower_excluded_ && OrdinalOf(upper_) - OrdinalOf(lower_) == 1) return absl::OkStatus();
+    }
+    if (absl::Status s = QueryAt(NextTime()); !s.ok()) return s;
+  }
+}
+
+double TranslationSearch::NextTime() const {
+  if (!lower_excluded_) return lower_;
+  const int64_t low = OrdinalOf(lower_);
+  const int64_t high = OrdinalOf(upper_);
+  const int64_t farthest = upper_state_ == Upper::kUnknown ? high : low + (high - low) / 2;
+  return DoubleAt(std::min(low + stride_, farthest));
+}
+
+absl::Status TranslationSearch::QueryAt(double time) {
+  if (poll_.Step()) return MotionStopped();
+  stride_ = std::min<int64_t>(stride_ * kStrideFactor, OrdinalOf(1.0));
+  const PairAt at(a_, b_, time);
+  absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
+  if (!decision.ok()) return decision.status();
+  if (decision->relation != Relation::kSeparated) {
+    upper_ = time;
+    upper_state_ = Upper::kContact;
+    relation_ = decision->relation;
+    return absl::OkStatus();
+  }
+  if (const Vector* n = std::get_if<Vector>(&decision->axis)) return TakeSeparating(time, *n);
+  return TakeSeparating(time, std::get<IntegerVector>(std::move(decision->axis)));
+}
+
+// Takes a direction that separates the pair at a time.
+absl::Status TranslationSearch::TakeSeparating(double time, Direction direction) {
+  const IntegerVector n = ToExact(direction);
+  const Integer speed = Dot(n, middle().half);
+  if (Sign(speed) >= 0) {
+    // Without motion along the direction, it separates at all times.
+    TakeSeparatedFrom(speed.is_zero() ? 0 : time, std::move(direction));
+    return absl::OkStatus();
+  }
+  // n.(w - (2 t - 1) half) < 0 for all w of C at the middle, and at the end of this interval 0 for
+  // one of them.
+  const Integer reach = Dot(n, middle().pair.Farthest(n).w);
+  if (middle().pair.stopped()) return MotionStopped();
+  const FloorTime until = RoundDown(-reach - speed, -2 * speed);
+  HULLD_CHECK(until.value > time || (until.value == time && !until.exact));
+  if (until.value == 1 && !until.exact) {
+    TakeSeparatedFrom(0, std::move(direction));
+    return absl::OkStatus();
+  }
+  if (until.value > time && restarts_left_ > 0) {
+    --restarts_left_;
+    stride_ = 1;
+  }
+  lower_ = until.value;
+  lower_excluded_ = !until.exact;
+  intervals_ = {{lower_, std::move(direction), std::nullopt}};
+  return absl::OkStatus();
+}
+
+void TranslationSearch::TakeSeparatedFrom(double time, Direction direction) {
+  upper_ = time;
+  upper_state_ = Upper::kSeparatedAfter;
+  after_ = std::move(direction);
+}
+
+absl::StatusOr<FirstContact> TranslationSearch::Conclude() {
+  // A plane that only touches at lower_ proves nothing there, but the swept pair has a better one.
+  const bool covered = upper_ < lower_ || (upper_ == lower_ && (lower_excluded_ || upper_ == 0));
+  if (upper_state_ == Upper::kSeparatedAfter && covered) return Separated();
+  if (upper_state_ == Upper::kSeparatedAfter || relation_ == Relation::kTouching) {
+    // A pair without motion touches at all times.
+    if (!IsZero(middle().half)) {
+      absl::StatusOr<SweptRelation> swept =
+          FindSweptRelation(middle().pair, middle().half, options_.should_stop);
+      if (!swept.ok()) return swept.status();
+      if (swept->relation == Relation::kSeparated) {
+        TakeSeparatedFrom(0, *std::move(swept->axis));
+        return Separated();
+      }
+      relation_ = swept->relation;
+    }
+  }
+  FirstContact contact;
+  contact.relation = relation_;
+  contact.separated_until = lower_;
+  contact.contact_time = upper_;
+  if (options_.want_certificate) {
+    if (absl::Status s = AddCertificate(contact); !s.ok()) return s;
+  }
+  return contact;
+}
+
+FirstContact TranslationSearch::Separated() {
+  FirstContact contact;
+  if (!options_.want_certificate) return contact;
+  if (upper_ > 0) {
+    contact.intervals = std::move(intervals_);
+    contact.intervals.back().until = upper_;
+  }
+  contact.intervals.push_back({1, *std::move(after_), std::nullopt});
+  return contact;
+}
+
+absl::Status TranslationSearch::AddCertificate(FirstContact& contact) {
+  if (lower_ > 0) contact.intervals = std::move(intervals_);
+  if (upper_state_ == Upper::kSeparatedAfter) {
+    absl::StatusOr<ExactNearest> nearest =
+        FindNearestExactly(middle().pair, {}, options_.should_stop, &middle().half);
+    if (!nearest.ok()) return nearest.status();
+    contact.certificate = Certificate{{}, std::move(nearest->point.pairs)};
+    return absl::OkStatus();
+  }
+  const PairAt at(a_, b_, upper_);
+  const absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
+  if (!decision.ok()) return decision.status();
+  absl::StatusOr<Certificate> certificate = at.Certify(*decision, options_.should_stop);
+  if (!certificate.ok()) return certificate.status();
+  contact.certificate = *std::move(certificate);
+  return absl::OkStatus();
+}
+
+}  // namespace hulld

@@ -1,0 +1,240 @@
+#include "tests/oracle/moving_points.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "tests/oracle/origin_position.h"
+
+namespace hulld::oracle {
+namespace {
+
+using RationalVector = std::array<Rational, 3>;
+
+Rational Dot(const RationalVector& a, const RationalVector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// A pose at a time: p_W = rows p / norm + x.
+struct PoseAt {
+  std::array<RationalVector, 3> rows;
+  Rational norm;
+  RationalVector x;
+};
+
+PoseAt At(const Motion& motion, const Rational& t) {
+  Rational q[4];
+  for (int i = 0; i < 4; ++i) {
+    q[i] = (1 - t) * Rational(motion.start.q[i]) + t * Rational(motion.end.q[i]);
+  }
+  const auto& [w, x, y, z] = q;
+  PoseAt pose;
+  pose.norm = w * w + x * x + y * y + z * z;
+  pose.rows = {
+      RationalVector{w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+      RationalVector{2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
+      RationalVector{2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
+  for (int i = 0; i < 3; ++i) {
+    pose.x[i] = (1 - t) * Rational(motion.start.t[i]) + t * Rational(motion.end.t[i]);
+  }
+  return pose;
+}
+
+RationalVector Placed(const PoseAt& pose, const Point& p) {
+  const RationalVector own = {Rational(p[0]), Rational(p[1]), Rational(p[2])};
+  RationalVector placed;
+  for (int i = 0; i < 3; ++i) placed[i] = Dot(pose.rows[i], own) / pose.norm + pose.x[i];
+  return placed;
+}
+
+std::vector<RationalVector> AllPlaced(const MovingPoints& moving, const Rational& t) {
+  const PoseAt pose = At(moving.motion, t);
+  std::vector<RationalVector> placed;
+  for (const Point& p : moving.points) placed.push_back(Placed(pose, p));
+  return placed;
+}
+
+// Scales points to integers by a common factor.
+Integer CommonDenominator(std::span<const RationalVector> points) {
+  Integer scale = 1;
+  for (const RationalVector& p : points) {
+    for (const Rational& x : p) scale = lcm(scale, Integer(denominator(x)));
+  }
+  return scale;
+}
+
+IntegerVector Scaled(const RationalVector& p, const Integer& scale) {
+  IntegerVector scaled;
+  for (int i = 0; i < 3; ++i) {
+    scaled[i] = Integer(numerator(p[i])) * (scale / Integer(denominator(p[i])));
+  }
+  return scaled;
+}
+
+OriginPosition PositionAt(std::span<const RationalVector> differences, const RationalVector& step,
+                          const Rational& t) {
+  std::vector<RationalVector> shifted;
+  for (const RationalVector& w : differences) {
+    shifted.push_back({w[0] - t * step[0], w[1] - t * step[1], w[2] - t * step[2]});
+  }
+  const Integer scale = CommonDenominator(shifted);
+  std::vector<IntegerVector> points;
+  for (const RationalVector& w : shifted) points.push_back(Scaled(w, scale));
+  return LocateByPolarCone(points);
+}
+
+IntegerVector Times(const Integer& s, const IntegerVector& a) {
+  return {s * a[0], s * a[1], s * a[2]};
+}
+
+// Adds the times in [0, 1] at which t d lies in the affine hull of points, if one time does.
+void AddEvents(std::span<const IntegerVector> points, const IntegerVector& d,
+               std::set<Rational>& events) {
+  const auto add = [&](const Integer& numerator, const Integer& denominator) {
+    if (denominator == 0) return;
+    const Rational t(numerator, denominator);
+    if (t >= 0 && t <= 1) events.insert(t);
+  };
+  for (size_t i = 0; i < points.size(); ++i) {
+    add(Dot(points[i], d), Dot(d, d));
+    for (size_t j = i + 1; j < points.size(); ++j) {
+      // t d x e = p x e for a point p and the direction e of a line.
+      const IntegerVector e = Subtract(points[j], points[i]);
+      const IntegerVector across = Cross(d, e);
+      add(Dot(Cross(points[i], e), across), Dot(across, across));
+      for (size_t k = j + 1; k < points.size(); ++k) {
+        const IntegerVector n = Cross(e, Subtract(points[k], points[i]));
+        add(Dot(n, points[i]), Dot(n, d));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+WorldPoints PlaceInWorldAt(const MovingPoints& a, const MovingPoints& b, const Rational& time) {
+  std::vector<RationalVector> all = AllPlaced(a, time);
+  const size_t count_a = all.size();
+  for (const RationalVector& p : AllPlaced(b, time)) all.push_back(p);
+  const Integer scale = CommonDenominator(all);
+  WorldPoints world;
+  for (size_t i = 0; i < all.size(); ++i) {
+    (i < count_a ? world.a : world.b).push_back(Scaled(all[i], scale));
+  }
+  return world;
+}
+
+Relation RelationAt(const MovingPoints& a, const MovingPoints& b, const Rational& time) {
+  const WorldPoints world = PlaceInWorldAt(a, b, time);
+  return world.a.size() * world.b.size() <= 36 ? RelationByPolarCone(world)
+                                               : RelationByLinearProgram(world);
+}
+
+TranslationContact BruteForceTranslation(const MovingPoints& a, const MovingPoints& b) {
+  std::vector<RationalVector> differences;
+  for (const RationalVector& p : AllPlaced(a, 0)) {
+    for (const RationalVector& q : AllPlaced(b, 0)) {
+      differences.push_back({p[0] - q[0], p[1] - q[1], p[2] - q[2]});
+    }
+  }
+  std::sort(differences.begin(), differences.end());
+  differences.erase(std::unique(differences.begin(), differences.end()), differences.end());
+  RationalVector step;
+  for (int i = 0; i < 3; ++i) {
+    step[i] = (Rational(b.motion.end.t[i]) - Rational(b.motion.start.t[i])) -
+              (Rational(a.motion.end.t[i]) - Rational(a.motion.start.t[i]));
+  }
+  std::vector<RationalVector> all = differences;
+  all.push_back(step);
+  const Integer scale = CommonDenominator(all);
+  std::vector<IntegerVector> points;
+  for (const RationalVector& w : differences) points.push_back(Scaled(w, scale));
+  std::set<Rational> events = {0, 1};
+  AddEvents(points, Scaled(step, scale), events);
+
+  TranslationContact contact;
+  std::optional<Rational> previous;
+  for (const Rational& t : events) {
+    if (previous &&
+        PositionAt(differences, step, (*previous + t) / 2) == OriginPosition::kInside) {
+      contact.relation = Relation::kOverlapping;
+    }
+    const OriginPosition position = PositionAt(differences, step, t);
+    previous = t;
+    if (position == OriginPosition::kOutside) continue;
+    if (!contact.first) contact.first = t;
+    if (contact.relation == Relation::kSeparated) contact.relation = Relation::kTouching;
+    if (position == OriginPosition::kInside) contact.relation = Relation::kOverlapping;
+    if (contact.relation == Relation::kOverlapping) break;
+  }
+  return contact;
+}
+
+namespace {
+
+// Returns n.p over all points, |q|^2 (n.p - offset) if there is an offset, at a time.
+std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterval& interval,
+                               const Rational& t) {
+  const PoseAt pose = At(moving.motion, t);
+  std::vector<Rational> values;
+  for (const Point& p : moving.points) {
+    const Rational along = Dot(interval.direction, Placed(pose, p));
+    values.push_back(interval.offset ? pose.norm * (along - *interval.offset) : along);
+  }
+  return values;
+}
+
+// Returns the Bernstein coefficients of the cubic with these values at 0, 1/3, 2/3, and 1.
+std::array<Rational, 4> Bernstein(const Rational& f0, const Rational& f1, const Rational& f2,
+                                  const Rational& f3) {
+  return {f0, (-5 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / 6,
+          (2 * f0 - 9 * f1 + 18 * f2 - 5 * f3) / 6, f3};
+}
+
+// Returns true if all coefficients of all points have this strict sign.
+bool HasSign(const MovingPoints& moving, const SeparatedInterval& interval, const Rational& from,
+             int sign) {
+  std::vector<Rational> values[4];
+  for (int i = 0; i < 4; ++i) {
+    values[i] = ValuesAt(moving, interval, from + (interval.until - from) * i / 3);
+  }
+  for (size_t v = 0; v < moving.points.size(); ++v) {
+    for (const Rational& c :
+         Bernstein(values[0][v], values[1][v], values[2][v], values[3][v])) {
+      if (sign * c <= 0) return false;
+    }
+  }
+  return true;
+}
+
+// Returns the least n.b minus the largest n.a.
+Rational Gap(const MovingPoints& a, const MovingPoints& b, const SeparatedInterval& interval,
+             const Rational& t) {
+  const std::vector<Rational> of_a = ValuesAt(a, interval, t);
+  const std::vector<Rational> of_b = ValuesAt(b, interval, t);
+  return *std::min_element(of_b.begin(), of_b.end()) - *std::max_element(of_a.begin(), of_a.end());
+}
+
+}  // namespace
+
+std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
+                    std::span<const SeparatedInterval> intervals, const Rational& until,
+                    bool meets) {
+  Rational from = 0;
+  for (const SeparatedInterval& interval : intervals) {
+    if (interval.until <= from) return "an interval is empty";
+    if (interval.offset) {
+      if (!HasSign(a, interval, from, -1)) return "a point of A is beyond the plane";
+      if (!HasSign(b, interval, from, 1)) return "a point of B is before the plane";
+    } else {
+      if (Gap(a, b, interval, from) <= 0) return "no gap at the start of an interval";
+      const bool is_last = &interval == &intervals.back();
+      const Rational gap = Gap(a, b, interval, interval.until);
+      if (gap < 0 || (gap == 0 && !(is_last && meets))) return "no gap at the end of an interval";
+    }
+    from = interval.until;
+  }
+  return from == until ? "" : "the intervals end at another time";
+}
+
+}  // namespace hulld::oracle

@@ -1,0 +1,63 @@
+#ifndef HULLD_TESTS_ORACLE_MOVING_POINTS_H_
+#define HULLD_TESTS_ORACLE_MOVING_POINTS_H_
+
+#include <array>
+#include <boost/multiprecision/cpp_int.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/oracle/brute_force_relation.h"
+
+namespace hulld::oracle {
+
+using Rational = boost::multiprecision::number<boost::multiprecision::cpp_rational_backend,
+                                               boost::multiprecision::et_off>;
+
+// q(t) = (1 - t) q0 + t q1 and x(t) = (1 - t) x0 + t x1 for t in [0, 1].
+struct Motion {
+  Placement start;
+  Placement end;
+};
+
+// Points and their motion.
+struct MovingPoints {
+  std::span<const Point> points;
+  Motion motion;
+};
+
+// Returns both point sets at a time, directly from the definition.
+WorldPoints PlaceInWorldAt(const MovingPoints& a, const MovingPoints& b, const Rational& time);
+// Returns the relation of their hulls at a time.
+Relation RelationAt(const MovingPoints& a, const MovingPoints& b, const Rational& time);
+
+// The first contact of two translations, and the strongest relation over all times.
+struct TranslationContact {
+  Relation relation = Relation::kSeparated;
+  std::optional<Rational> first;
+};
+
+// Tries every event time in [0, 1]: 0, 1, and each time at which the origin crosses the plane of
+// three points of A - B, the line of two, or a point. The origin enters the hull of A - B at one of
+// these, and is inside between two of them if at all. For at most about 30 differences.
+TranslationContact BruteForceTranslation(const MovingPoints& a, const MovingPoints& b);
+
+// A proof of separation from the end of the previous interval on.
+struct SeparatedInterval {
+  Rational until;
+  std::array<Rational, 3> direction;
+  std::optional<Rational> offset;
+};
+
+// Returns the defect of intervals that should prove separation from 0 to `until`, or an empty
+// string. With an offset: the Bernstein coefficients of |q(t)|^2 (n.p(t) - offset) of every point,
+// by interpolation at four times. Without one: n.(b - a) at both ends, where 0 is allowed at the
+// last end if the pair meets.
+std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
+                    std::span<const SeparatedInterval> intervals, const Rational& until,
+                    bool meets);
+
+}  // namespace hulld::oracle
+
+#endif  // HULLD_TESTS_ORACLE_MOVING_POINTS_H_
