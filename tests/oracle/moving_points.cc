@@ -11,7 +11,7 @@ namespace {
 
 using RationalVector = std::array<Rational, 3>;
 
-Rational Dot(const RationalVector& a, const RationalVector& b) {
+Rational Product(const RationalVector& a, const RationalVector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
@@ -43,7 +43,7 @@ PoseAt At(const Motion& motion, const Rational& t) {
 RationalVector Placed(const PoseAt& pose, const Point& p) {
   const RationalVector own = {Rational(p[0]), Rational(p[1]), Rational(p[2])};
   RationalVector placed;
-  for (int i = 0; i < 3; ++i) placed[i] = Dot(pose.rows[i], own) / pose.norm + pose.x[i];
+  for (int i = 0; i < 3; ++i) placed[i] = Product(pose.rows[i], own) / pose.norm + pose.x[i];
   return placed;
 }
 
@@ -80,11 +80,8 @@ OriginPosition PositionAt(std::span<const RationalVector> differences, const Rat
   const Integer scale = CommonDenominator(shifted);
   std::vector<IntegerVector> points;
   for (const RationalVector& w : shifted) points.push_back(Scaled(w, scale));
-  return LocateByPolarCone(points);
-}
-
-IntegerVector Times(const Integer& s, const IntegerVector& a) {
-  return {s * a[0], s * a[1], s * a[2]};
+  const std::vector<IntegerVector> origin = {{0, 0, 0}};
+  return LocateInDifference(points, origin);
 }
 
 // Adds the times in [0, 1] at which t d lies in the affine hull of points, if one time does.
@@ -92,7 +89,7 @@ void AddEvents(std::span<const IntegerVector> points, const IntegerVector& d,
                std::set<Rational>& events) {
   const auto add = [&](const Integer& numerator, const Integer& denominator) {
     if (denominator == 0) return;
-    const Rational t(numerator, denominator);
+    const Rational t = Rational(numerator) / Rational(denominator);
     if (t >= 0 && t <= 1) events.insert(t);
   };
   for (size_t i = 0; i < points.size(); ++i) {
@@ -155,8 +152,7 @@ TranslationContact BruteForceTranslation(const MovingPoints& a, const MovingPoin
   TranslationContact contact;
   std::optional<Rational> previous;
   for (const Rational& t : events) {
-    if (previous &&
-        PositionAt(differences, step, (*previous + t) / 2) == OriginPosition::kInside) {
+    if (previous && PositionAt(differences, step, (*previous + t) / 2) == OriginPosition::kInside) {
       contact.relation = Relation::kOverlapping;
     }
     const OriginPosition position = PositionAt(differences, step, t);
@@ -178,7 +174,7 @@ std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterv
   const PoseAt pose = At(moving.motion, t);
   std::vector<Rational> values;
   for (const Point& p : moving.points) {
-    const Rational along = Dot(interval.direction, Placed(pose, p));
+    const Rational along = Product(interval.direction, Placed(pose, p));
     values.push_back(interval.offset ? pose.norm * (along - *interval.offset) : along);
   }
   return values;
@@ -187,8 +183,8 @@ std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterv
 // Returns the Bernstein coefficients of the cubic with these values at 0, 1/3, 2/3, and 1.
 std::array<Rational, 4> Bernstein(const Rational& f0, const Rational& f1, const Rational& f2,
                                   const Rational& f3) {
-  return {f0, (-5 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / 6,
-          (2 * f0 - 9 * f1 + 18 * f2 - 5 * f3) / 6, f3};
+  return {f0, (-5 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / 6, (2 * f0 - 9 * f1 + 18 * f2 - 5 * f3) / 6,
+          f3};
 }
 
 // Returns true if all coefficients of all points have this strict sign.
@@ -199,8 +195,7 @@ bool HasSign(const MovingPoints& moving, const SeparatedInterval& interval, cons
     values[i] = ValuesAt(moving, interval, from + (interval.until - from) * i / 3);
   }
   for (size_t v = 0; v < moving.points.size(); ++v) {
-    for (const Rational& c :
-         Bernstein(values[0][v], values[1][v], values[2][v], values[3][v])) {
+    for (const Rational& c : Bernstein(values[0][v], values[1][v], values[2][v], values[3][v])) {
       if (sign * c <= 0) return false;
     }
   }
@@ -235,6 +230,24 @@ std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
     from = interval.until;
   }
   return from == until ? "" : "the intervals end at another time";
+}
+
+std::string FaultOfBriefContact(const MovingPoints& a, const MovingPoints& b, const Rational& from,
+                                const Rational& until,
+                                std::span<const std::pair<uint32_t, uint32_t>> pairs) {
+  if (pairs.size() > 4) return "more than four pairs";
+  std::vector<RationalVector> differences;
+  for (const Rational& t : {from, until}) {
+    const std::vector<RationalVector> of_a = AllPlaced(a, t);
+    const std::vector<RationalVector> of_b = AllPlaced(b, t);
+    for (const auto& [i, j] : pairs) {
+      const RationalVector& p = of_a.at(i);
+      const RationalVector& q = of_b.at(j);
+      differences.push_back({p[0] - q[0], p[1] - q[1], p[2] - q[2]});
+    }
+  }
+  return PositionAt(differences, {0, 0, 0}, 0) == OriginPosition::kOutside ? "the pairs do not meet"
+                                                                           : "";
 }
 
 }  // namespace hulld::oracle

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/oracle/brute_force_relation.h"
@@ -57,6 +59,12 @@ struct SeparatedInterval {
 std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
                     std::span<const SeparatedInterval> intervals, const Rational& until,
                     bool meets);
+
+// Returns the defect of a proof that two translations meet at some time between two, or an empty
+// string: 0 is in the hull of the differences of at most four pairs at both times.
+std::string FaultOfBriefContact(const MovingPoints& a, const MovingPoints& b, const Rational& from,
+                                const Rational& until,
+                                std::span<const std::pair<uint32_t, uint32_t>> pairs);
 
 }  // namespace hulld::oracle
 

@@ -36,7 +36,10 @@ class Walk {
       if (!(length > 0)) break;
       n /= length;
       const FloatPair::Support farthest = pair_.Farthest(n);
-      bounds_.low = std::max(bounds_.low, LowOf(pair_, farthest));
+      if (const double low = LowOf(pair_, farthest); low > bounds_.low) {
+        bounds_.low = low;
+        bounds_.direction = n;
+      }
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();

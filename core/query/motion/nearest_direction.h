@@ -5,6 +5,7 @@
 
 #include <functional>
 
+#include "core/numeric/integer.h"
 #include "core/numeric/vector.h"
 #include "core/query/floating/float_pair.h"
 
@@ -16,6 +17,10 @@ namespace hulld {
 // initial direction, not zero. CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
                                         const std::function<bool()>& should_stop);
+
+// Returns the same direction exactly, of any length; zero if the pair meets. Errors: as above.
+absl::StatusOr<IntegerVector> ExactNearestDirection(const FloatPair& pair,
+                                                    const std::function<bool()>& should_stop);
 
 }  // namespace hulld
 

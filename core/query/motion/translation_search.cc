@@ -135,10 +135,27 @@ absl::Status TranslationSearch::Narrow() {
   for (;;) {
     if (upper_state_ != Upper::kUnknown) {
       if (lower_ >= upper_) return absl::OkStatus();
-      if (lower_excluded_ && OrdinalOf(upper_) - OrdinalOf(lower_) == 1) return absl::OkStatus();
+      if (lower_excluded_ && OrdinalOf(upper_) - OrdinalOf(lower_) == 1) {
+        // A pair that overlaps at upper_ met before. One that touches may have met at upper_.
+        const bool may_meet_at_upper =
+            upper_state_ == Upper::kContact && relation_ == Relation::kTouching;
+        if (!may_meet_at_upper || raised_) return absl::OkStatus();
+        if (absl::Status s = RaiseToNearest(); !s.ok()) return s;
+        continue;
+      }
     }
     if (absl::Status s = QueryAt(NextTime()); !s.ok()) return s;
   }
+}
+
+// Takes the direction in which the pair is nearest at lower_. So close to the contact, its plane
+// holds a face, edge, or vertex of C that the origin meets first.
+absl::Status TranslationSearch::RaiseToNearest() {
+  raised_ = true;
+  const PairAt at(a_, b_, lower_);
+  absl::StatusOr<IntegerVector> n = ExactNearestDirection(at.pair(), options_.should_stop);
+  if (!n.ok()) return n.status();
+  return TakeSeparating(lower_, *std::move(n));
 }
 
 double TranslationSearch::NextTime() const {

@@ -53,6 +53,7 @@ class TranslationSearch {
 
   absl::Status AdvanceInFloatingPoint();
   absl::Status Narrow();
+  absl::Status RaiseToNearest();
   double NextTime() const;
   absl::Status QueryAt(double time);
   absl::Status TakeSeparating(double time, Direction direction);
@@ -84,6 +85,8 @@ class TranslationSearch {
   // Number of doubles from lower_ to the next query, and how often it may still return to 1.
   int64_t stride_ = 1;
   int restarts_left_ = 16;
+  // True if the direction in which the pair is nearest at lower_ was tried.
+  bool raised_ = false;
 };
 
 }  // namespace hulld

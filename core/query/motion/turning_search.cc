@@ -148,7 +148,10 @@ absl::StatusOr<bool> TurningSearch::RemainsTolerable(Vector n) {
     const absl::StatusOr<Vector> nearest = DirectionAt(time);
     if (!nearest.ok()) return nearest.status();
     // Where the hulls meet, the last direction may be better.
-    if (plane_.Try(*nearest, time, time).gap > plane_.Try(n, time, time).gap) n = *nearest;
+    if (!nearest->isZero(0) &&
+        plane_.Try(*nearest, time, time).gap > plane_.Try(n, time, time).gap) {
+      n = *nearest;
+    }
   }
   return true;
 }

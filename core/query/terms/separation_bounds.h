@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/numeric/vector.h"
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
@@ -39,6 +40,8 @@ struct FloatCombination {
 // Bounds proven in floating point of the distance of the origin from A - B, or from its boundary.
 struct SeparationBounds {
   double low = 0;
+  // Distances: the unit direction, up to rounding, along which `low` is proven; zero if none is.
+  Vector direction = Vector::Zero();
   double high = std::numeric_limits<double>::infinity();
   // The best point found that attains the distance; count 0 if unknown.
   FloatCombination point;

@@ -1,0 +1,213 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/query/motion/first_contact.h"
+#include "tests/core/checks/point_sets.h"
+#include "tests/core/query/motion/motion_check.h"
+
+namespace hulld {
+namespace turning_test {
+
+using oracle::Rational;
+
+std::vector<Vector> Box(double x, double y, double z) {
+  std::vector<Vector> corners;
+  for (int i = 0; i < 8; ++i) corners.push_back({i & 1 ? x : -x, i & 2 ? y : -y, i & 4 ? z : -z});
+  return corners;
+}
+
+Motion AtRest(const Vector& t = Vector::Zero()) { return {{{1, 0, 0, 0}, t}, {{1, 0, 0, 0}, t}}; }
+
+// Turns about z by up to an angle.
+Motion Spinning(double angle, const Vector& from, const Vector& to) {
+  return {{{1, 0, 0, 0}, from}, {{std::cos(angle / 2), 0, 0, std::sin(angle / 2)}, to}};
+}
+
+FirstContact Find(const OwnMoving& a, const OwnMoving& b, MotionOptions options = {}) {
+  options.want_certificate = true;
+  absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving(), options);
+  EXPECT_TRUE(contact.ok()) << contact.status();
+  if (!contact.ok()) return FirstContact();
+  EXPECT_TRUE(ContactIsProven(a, b, *contact));
+  const absl::StatusOr<FirstContact> mirrored = FindFirstContact(b.moving(), a.moving(), options);
+  EXPECT_TRUE(mirrored.ok());
+  EXPECT_EQ(mirrored->relation, contact->relation);
+  EXPECT_EQ(mirrored->separated_until, contact->separated_until);
+  EXPECT_EQ(mirrored->contact_time, contact->contact_time);
+  if (contact->contact_time) {
+    EXPECT_LE(Rational(*contact->contact_time) - Rational(contact->separated_until),
+              Rational(options.max_time_error));
+  }
+  return *std::move(contact);
+}
+
+// True if no sample contradicts the answer, exactly: separated up to separated_until, and if there
+// is no contact, to the end.
+testing::AssertionResult AgreesWithSamples(const OwnMoving& a, const OwnMoving& b,
+                                           const FirstContact& contact, int samples) {
+  for (int i = 0; i <= samples; ++i) {
+    const Rational t(i, samples);
+    if (contact.relation != Relation::kSeparated && t > Rational(contact.separated_until)) break;
+    if (contact.contact_time == 0) break;
+    if (oracle::RelationAt(a.ForOracle(), b.ForOracle(), t) != oracle::Relation::kSeparated) {
+      return testing::AssertionFailure() << "contact at the sample " << t;
+    }
+  }
+  return testing::AssertionSuccess();
+}
+
+Pose RandomPose(Random& random, double length) {
+  Pose pose;
+  for (double& component : pose.q) component = random.Real(-1, 1);
+  for (int i = 0; i < 3; ++i) pose.t[i] = random.Real(-length, length);
+  return pose;
+}
+
+// The same rotation at the end, on the shorter path.
+Motion Between(const Pose& start, Pose end) {
+  double dot = 0;
+  for (int i = 0; i < 4; ++i) dot += start.q[i] * end.q[i];
+  if (dot < 0) {
+    for (double& component : end.q) component = -component;
+  }
+  return {start, end};
+}
+
+TEST(Turning, RandomMotionsAgreeWithSamples) {
+  Random random(TestSeed(1));
+  std::array<int, 4> relations = {};
+  for (int round = 0; round < 60; ++round) {
+    SCOPED_TRACE(round);
+    const OwnMoving a(RandomInBall(random, random.Between(1, 6), 1),
+                      Between(RandomPose(random, 0.2), RandomPose(random, 1)));
+    const OwnMoving b(RandomInBall(random, random.Between(2, 6), 1),
+                      Between(RandomPose(random, 2.5), RandomPose(random, 2.5)));
+    const FirstContact contact = Find(a, b);
+    ASSERT_NE(contact.relation, Relation::kWithinTolerance);
+    ASSERT_TRUE(AgreesWithSamples(a, b, contact, 16));
+    ++relations[static_cast<size_t>(contact.relation)];
+  }
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 10);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
+}
+
+// The corner of a square that turns about z reaches sqrt(2) after an eighth of a turn.
+TEST(Turning, ACornerMeetsAWallOnTime) {
+  const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  for (const double distance : {1.1, 1.25, 1.4}) {
+    SCOPED_TRACE(distance);
+    const OwnMoving wall(Box(0.5, 5, 5), AtRest({distance + 0.5, 0, 0}));
+    const FirstContact contact = Find(box, wall);
+    ASSERT_TRUE(contact.contact_time.has_value());
+    // cos(45 degrees - angle) sqrt(2) = distance; t from (1 - t, 0, 0, 0) + t q1.
+    const double angle = M_PI / 4 - std::acos(distance / std::sqrt(2.0));
+    const double tangent = std::tan(angle / 2);
+    const double time = tangent / (std::sin(M_PI / 4) - tangent * (std::cos(M_PI / 4) - 1));
+    EXPECT_NEAR(*contact.contact_time, time, 1e-8);
+    EXPECT_TRUE(AgreesWithSamples(box, wall, contact, 64));
+  }
+}
+
+TEST(Turning, GrazesAreNeitherMissedNorInvented) {
+  const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  const double reach = std::sqrt(2.0);
+  const auto relation_at = [&](double distance) {
+    return Find(box, OwnMoving(Box(0.5, 5, 5), AtRest({distance + 0.5, 0, 0}))).relation;
+  };
+  EXPECT_EQ(relation_at(reach * (1 + 1e-6)), Relation::kSeparated);
+  EXPECT_EQ(relation_at(reach * (1 + 1e-8)), Relation::kSeparated);
+  EXPECT_EQ(relation_at(reach * (1 - 1e-6)), Relation::kOverlapping);
+  EXPECT_EQ(relation_at(reach * (1 - 1e-8)), Relation::kOverlapping);
+  EXPECT_EQ(relation_at(reach), Relation::kWithinTolerance);
+}
+
+TEST(Turning, AFinerResolutionSeparatesNearerMisses) {
+  const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  const OwnMoving wall(Box(0.5, 5, 5), AtRest({std::sqrt(2.0) + 1e-4 + 0.5, 0, 0}));
+  MotionOptions options;
+  options.resolution = 1e-3;
+  const FirstContact coarse = Find(box, wall, options);
+  EXPECT_EQ(coarse.relation, Relation::kWithinTolerance);
+  EXPECT_FALSE(coarse.contact_time.has_value());
+  EXPECT_LT(coarse.separated_until, 1);
+  options.resolution = 1e-6;
+  EXPECT_EQ(Find(box, wall, options).relation, Relation::kSeparated);
+}
+
+TEST(Turning, TheBracketIsAsNarrowAsRequested) {
+  const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  const OwnMoving wall(Box(0.5, 5, 5), AtRest({1.25 + 0.5, 0, 0}));
+  for (const double error : {1.0, 0x1p-10, 0x1p-30, 0x1p-38}) {
+    SCOPED_TRACE(error);
+    MotionOptions options;
+    options.max_time_error = error;
+    EXPECT_EQ(Find(box, wall, options).relation, Relation::kOverlapping);
+  }
+}
+
+TEST(Turning, ContactAtTheEndsIsExact) {
+  const OwnMoving floor(Box(5, 5, 1), AtRest());
+  // Lands flat on the floor, exactly at the end: a turn of 90 degrees about x with q1 = (1, 1, 0,
+  // 0).
+  const OwnMoving lands(Box(1, 1, 1), {{{1, 0, 0, 0}, {0, 0, 6}}, {{1, 1, 0, 0}, {0, 0, 2}}});
+  const FirstContact end = Find(floor, lands);
+  EXPECT_EQ(end.relation, Relation::kTouching);
+  EXPECT_EQ(end.contact_time, 1);
+  const OwnMoving leaves(Box(1, 1, 1), {{{1, 1, 0, 0}, {0, 0, 2}}, {{1, 0, 0, 0}, {0, 0, 6}}});
+  const FirstContact start = Find(floor, leaves);
+  EXPECT_EQ(start.relation, Relation::kTouching);
+  EXPECT_EQ(start.contact_time, 0);
+  EXPECT_EQ(start.separated_until, 0);
+}
+
+TEST(Turning, FlatShapesPointsAndSegmentsMeet) {
+  const OwnMoving needle({{-1, 0, 0}, {1, 0, 0}}, Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  const OwnMoving other({{0.5, 0.5, -1}, {0.5, 0.5, 1}}, AtRest());
+  const FirstContact crossing = Find(needle, other);
+  // Two segments only touch, at an irrational time, so that no double shows the contact.
+  EXPECT_EQ(crossing.relation, Relation::kWithinTolerance);
+  const OwnMoving slab(Box(0.1, 0.1, 1), AtRest({0.5, 0.5, 0}));
+  const FirstContact cut = Find(needle, slab);
+  EXPECT_EQ(cut.relation, Relation::kOverlapping);
+  EXPECT_TRUE(AgreesWithSamples(needle, slab, cut, 64));
+  const OwnMoving point({{1, 0, 0}}, Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+  EXPECT_EQ(Find(point, slab).relation, Relation::kSeparated);
+}
+
+TEST(Turning, LongRotationsAreCovered) {
+  const OwnMoving blade(Box(2, 0.1, 0.1), Spinning(1.9 * M_PI / 2 * 2, {0, 0, 0}, {0, 0, 0}));
+  const OwnMoving beyond(Box(0.1, 0.1, 0.1), AtRest({0, -2.5, 0}));
+  EXPECT_EQ(Find(blade, beyond).relation, Relation::kSeparated);
+  const OwnMoving hit(Box(0.1, 0.1, 0.1), AtRest({-1, -1, 0}));
+  EXPECT_EQ(Find(blade, hit).relation, Relation::kOverlapping);
+}
+
+TEST(Turning, ExtremeScalesKeepTheRelation) {
+  for (const double scale : {1e-150, 1e-60, 1e60, 1e150}) {
+    SCOPED_TRACE(scale);
+    const OwnMoving box(Scaled(Box(1, 1, 1), scale), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
+    const OwnMoving near(Scaled(Box(0.5, 5, 5), scale), AtRest({1.75 * scale, 0, 0}));
+    const FirstContact contact = Find(box, near);
+    EXPECT_EQ(contact.relation, Relation::kOverlapping);
+    const OwnMoving far(Scaled(Box(0.5, 5, 5), scale), AtRest({2 * scale, 0, 0}));
+    EXPECT_EQ(Find(box, far).relation, Relation::kSeparated);
+  }
+}
+
+TEST(Turning, RotationsThatNearlyVanishAreRefusedOrDecided) {
+  // Half a turn within 1e-16 of the time.
+  const Motion flip = {{{1, 0, 0, 0}, {0, 0, 0}}, {{-1, 1e-16, 0, 0}, {0, 0, 0}}};
+  ASSERT_TRUE(ValidateMotion(flip).ok());
+  const OwnMoving a(Box(1, 2, 3), flip);
+  const OwnMoving b(Box(1, 1, 1), AtRest({0, 0, 4.5}));
+  const absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving());
+  if (!contact.ok()) {
+    EXPECT_EQ(contact.status().code(), absl::StatusCode::kInvalidArgument);
+  }
+}
+
+}  // namespace turning_test
+}  // namespace hulld
