@@ -78,8 +78,9 @@ struct FirstContact {
   double separated_until = 1;
   // If the pair meets: it is in contact at some time of [separated_until, contact_time], and at
   // contact_time itself unless the contact of two translations ends before the next double. The
-  // two times are equal or adjacent doubles for translations; otherwise they are at most
-  // max_time_error apart, or adjacent.
+  // two times are equal or adjacent doubles for translations. Otherwise they are adjacent or at
+  // most max_time_error apart; farther only if for that long before the contact, the separation is
+  // less than kLeastRelativeResolution can tell from 0.
   std::optional<double> contact_time;
   // If requested: consecutive intervals from 0 to separated_until, none if that is 0. Empty if a
   // hull is empty.

@@ -60,10 +60,13 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
     separated_ = step->until;
     if (options_.want_certificate) intervals_.push_back({separated_, *n, step->offset});
     if (separated_ == 1) return WithoutContact(Relation::kSeparated);
-    if (const double latest = LatestContactTime(); step->failed <= latest) {
-      const absl::StatusOr<Relation> relation = RelationAt(latest);
+    // Contact is likely where the plane fails, and after it.
+    const double latest = LatestContactTime();
+    for (const double time : {step->failed, latest}) {
+      if (step->failed > latest) break;
+      const absl::StatusOr<Relation> relation = RelationAt(time);
       if (!relation.ok()) return relation.status();
-      if (*relation != Relation::kSeparated) return Contact(latest);
+      if (*relation != Relation::kSeparated) return Contact(time);
     }
     if (may_tolerate && step->gap_after <= resolution_) {
       const absl::StatusOr<bool> tolerable = RemainsTolerable(*n);
@@ -179,7 +182,7 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
 absl::StatusOr<double> TurningSearch::FindLateContact() const {
   double apart = separated_;
   double contact = 2;
-  for (double length = options_.max_time_error; contact > 1; length *= kGrowth) {
+  for (double length = kShortestStep; contact > 1; length *= kGrowth) {
     const double time = std::min(1.0, separated_ + length);
     const absl::StatusOr<Relation> relation = RelationAt(time);
     if (!relation.ok()) return relation.status();
