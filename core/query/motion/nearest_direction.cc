@@ -4,23 +4,25 @@
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/floating/float_distance.h"
-#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 namespace {
 
-// The relative width of the bounds of the distance at which the walk ends: the share of the gap that
-// the direction may lose. A choice.
+// The relative width of the bounds of the distance at which the walk ends: the share of the gap
+// that the direction may lose. A choice.
 constexpr double kRelativeWidth = 0x1p-10;
 
 }  // namespace
 
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
-                                        const std::function<bool()>& should_stop) {
+                                        const std::function<bool()>& should_stop,
+                                        FloatCombination* point) {
   if (pair.usable()) {
     SeparationGoal goal;
     goal.relative_error = kRelativeWidth;
-    return BoundDistance(pair, first, goal).direction;
+    const SeparationBounds bounds = BoundDistance(pair, first, goal);
+    if (point != nullptr) *point = bounds.point;
+    return bounds.direction;
   }
   const absl::StatusOr<IntegerVector> n = ExactNearestDirection(pair, should_stop);
   if (!n.ok()) return n.status();

@@ -12,6 +12,7 @@
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/exact/exact_nearest.h"
+#include "core/query/exact/exact_search.h"
 #include "core/query/ladder.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/sweep.h"
@@ -89,6 +90,7 @@ TranslationSearch::Middle& TranslationSearch::middle() {
 
 absl::StatusOr<FirstContact> TranslationSearch::Run() {
   if (absl::Status s = AdvanceInFloatingPoint(); !s.ok()) return s;
+  if (absl::Status s = TryFacet(); !s.ok()) return s;
   if (absl::Status s = Narrow(); !s.ok()) return s;
   return Conclude();
 }
@@ -103,7 +105,7 @@ absl::Status TranslationSearch::AdvanceInFloatingPoint() {
     if (step == 0) toward = -Vector(start.pair().CenterDifference());
     if (toward.isZero(0)) return absl::OkStatus();
     const absl::StatusOr<Vector> found =
-        NearestDirection(start.pair(), toward, options_.should_stop);
+        NearestDirection(start.pair(), toward, options_.should_stop, &nearest_);
     if (!found.ok()) return found.status();
     const Vector& n = *found;
     if (n.isZero(0)) return absl::OkStatus();
@@ -127,6 +129,38 @@ absl::Status TranslationSearch::AdvanceInFloatingPoint() {
     intervals_.push_back({lower_, n, std::nullopt});
     toward = n;
   }
+  return absl::OkStatus();
+}
+
+// Finds the time exactly if the origin enters a solid C through the inside of the nearest triangle.
+absl::Status TranslationSearch::TryFacet() {
+  if (upper_state_ != Upper::kUnknown || nearest_.count != 3) return absl::OkStatus();
+  ExactPair& pair = middle().pair;
+  const IntegerVector& half = middle().half;
+  const IntegerVector p = pair.Difference(nearest_.pairs[0]);
+  const IntegerVector q = pair.Difference(nearest_.pairs[1]);
+  const IntegerVector r = pair.Difference(nearest_.pairs[2]);
+  // The sides of the path on which the edges pass.
+  const int side = Sign(Dot(half, Cross(p, q)));
+  if (side == 0 || Sign(Dot(half, Cross(q, r))) != side || Sign(Dot(half, Cross(r, p))) != side) {
+    return absl::OkStatus();
+  }
+  IntegerVector n = Cross(q - p, r - p);
+  if (Sign(Dot(n, half)) > 0) n = -n;
+  const Integer speed = Dot(n, half);
+  const Integer reach = Dot(n, p);
+  const bool is_facet = Dot(n, pair.Farthest(n).w) == reach && SpanOf(pair).dimension == 3;
+  if (pair.stopped()) return MotionStopped();
+  // Before time 0 or at the end, the other steps decide.
+  if (!is_facet || speed.is_zero() || Sign(-reach - speed) < 0) return absl::OkStatus();
+  const FloorTime entry = RoundDown(-reach - speed, -2 * speed);
+  if (entry.value == 1) return absl::OkStatus();
+  lower_ = entry.value;
+  lower_excluded_ = !entry.exact;
+  intervals_ = {{lower_, std::move(n), std::nullopt}};
+  upper_ = entry.exact ? lower_ : std::nextafter(lower_, 1.0);
+  upper_state_ = Upper::kContact;
+  relation_ = Relation::kOverlapping;
   return absl::OkStatus();
 }
 
@@ -257,16 +291,17 @@ FirstContact TranslationSearch::Separated() {
 
 absl::Status TranslationSearch::AddCertificate(FirstContact& contact) {
   if (lower_ > 0) contact.intervals = std::move(intervals_);
-  if (upper_state_ == Upper::kSeparatedAfter) {
+  const PairAt at(a_, b_, upper_);
+  const absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
+  if (!decision.ok()) return decision.status();
+  if (decision->relation == Relation::kSeparated) {
+    // The contact has ended.
     absl::StatusOr<ExactNearest> nearest =
         FindNearestExactly(middle().pair, {}, options_.should_stop, &middle().half);
     if (!nearest.ok()) return nearest.status();
     contact.certificate = Certificate{{}, std::move(nearest->point.pairs)};
     return absl::OkStatus();
   }
-  const PairAt at(a_, b_, upper_);
-  const absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
-  if (!decision.ok()) return decision.status();
   absl::StatusOr<Certificate> certificate = at.Certify(*decision, options_.should_stop);
   if (!certificate.ok()) return certificate.status();
   contact.certificate = *std::move(certificate);

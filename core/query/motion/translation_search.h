@@ -14,6 +14,7 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/motion/pair_at.h"
 #include "core/query/terms/relation.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 
@@ -23,10 +24,11 @@ namespace hulld {
 // which the plane reaches the origin, a rational number; otherwise at all times after t.
 //
 // Directions come from floating point while they advance, each proven at both ends of its interval,
-// and then from exact queries at doubles. These close in on the first contact from both sides: each
-// moves either the time before which the pair is separated, or the earliest time known to be in
-// contact or after it, until the two are adjacent doubles. A contact between adjacent doubles that
-// none of them shows is found by one exact query of the swept pair.
+// which usually ends at the triangle of C that the origin enters; one exact test of it then gives
+// the time. Otherwise, directions come from exact queries at doubles. These close in on the first
+// contact from both sides: each moves either the time before which the pair is separated, or the
+// earliest time known to be in contact or after it, until the two are adjacent doubles. A contact
+// between adjacent doubles that none of them shows is found by one exact query of the swept pair.
 class TranslationSearch {
  public:
   // All arguments must outlive the search. Requires: neither hull is empty, and both motions are
@@ -52,6 +54,7 @@ class TranslationSearch {
   enum class Upper { kUnknown, kContact, kSeparatedAfter };
 
   absl::Status AdvanceInFloatingPoint();
+  absl::Status TryFacet();
   absl::Status Narrow();
   absl::Status RaiseToNearest();
   double NextTime() const;
@@ -69,6 +72,8 @@ class TranslationSearch {
   StopPoll poll_;
   // Built on demand.
   std::optional<Middle> middle_;
+  // The point of C that was nearest at the end of floating point.
+  FloatCombination nearest_;
 
   // The pair is separated at all times before lower_, as the intervals prove, and at lower_ itself
   // if lower_excluded_.
