@@ -237,6 +237,11 @@ inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 // + |c|). Proven.
 inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
 
+// The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
+// with a radius errs by u more. The margins r |n| of the plane above enter its bound like c.
+// Proven.
+inline constexpr double kUnitLengthRoundUp = 1 + 16 * kUnitRoundoff;
+
 // The sign of det[p, q, r], p . ((q - p) x (r - p)), for computed Minkowski vertices in a unit with
 // S < 2: a vertex errs by 256 u per component and is at most 2 sqrt(3), an edge by 520 u and is at
 // most 4 sqrt(3), because translations cancel in it. The normal, at most 96, therefore errs by 2 *

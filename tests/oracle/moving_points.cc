@@ -1,6 +1,7 @@
 #include "tests/oracle/moving_points.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -180,6 +181,16 @@ std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterv
   return values;
 }
 
+// Returns the interval with its offset moved by a radius times |n|, in the direction of `sign`.
+SeparatedInterval Moved(SeparatedInterval interval, double radius, int sign) {
+  if (radius == 0 || !interval.offset) return interval;
+  // A rational number above the length: a tangent of the square root.
+  const Rational squared = Product(interval.direction, interval.direction);
+  const Rational guess(std::sqrt(static_cast<double>(squared)));
+  *interval.offset += sign * Rational(radius) * (guess + squared / guess) / 2;
+  return interval;
+}
+
 // Returns the Bernstein coefficients of the cubic with these values at 0, 1/3, 2/3, and 1.
 std::array<Rational, 4> Bernstein(const Rational& f0, const Rational& f1, const Rational& f2,
                                   const Rational& f3) {
@@ -219,8 +230,8 @@ std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
   for (const SeparatedInterval& interval : intervals) {
     if (interval.until <= from) return "an interval is empty";
     if (interval.offset) {
-      if (!HasSign(a, interval, from, -1)) return "a point of A is beyond the plane";
-      if (!HasSign(b, interval, from, 1)) return "a point of B is before the plane";
+      if (!HasSign(a, Moved(interval, a.radius, -1), from, -1)) return "A is beyond the plane";
+      if (!HasSign(b, Moved(interval, b.radius, 1), from, 1)) return "B is before the plane";
     } else {
       if (Gap(a, b, interval, from) <= 0) return "no gap at the start of an interval";
       const bool is_last = &interval == &intervals.back();

@@ -23,15 +23,16 @@ struct Motion {
   Placement end;
 };
 
-// Points and their motion.
+// Points, their motion, and the radius of a ball around each.
 struct MovingPoints {
   std::span<const Point> points;
   Motion motion;
+  double radius = 0;
 };
 
 // Returns both point sets at a time, directly from the definition.
 WorldPoints PlaceInWorldAt(const MovingPoints& a, const MovingPoints& b, const Rational& time);
-// Returns the relation of their hulls at a time.
+// Returns the relation of their hulls, without radii, at a time.
 Relation RelationAt(const MovingPoints& a, const MovingPoints& b, const Rational& time);
 
 // The first contact of two translations, and the strongest relation over all times.
@@ -54,8 +55,9 @@ struct SeparatedInterval {
 
 // Returns the defect of intervals that should prove separation from 0 to `until`, or an empty
 // string. With an offset: the Bernstein coefficients of |q(t)|^2 (n.p(t) - offset) of every point,
-// by interpolation at four times. Without one: n.(b - a) at both ends, where 0 is allowed at the
-// last end if the pair meets.
+// by interpolation at four times, with the offset moved by the radius times |n|, rounded up.
+// Without one, and without radii: n.(b - a) at both ends, where 0 is allowed at the last end if the
+// pair meets.
 std::string FaultOf(const MovingPoints& a, const MovingPoints& b,
                     std::span<const SeparatedInterval> intervals, const Rational& until,
                     bool meets);

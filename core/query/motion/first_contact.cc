@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "core/numeric/exponent_limits.h"
 #include "core/query/motion/translation_search.h"
 #include "core/query/motion/turning_search.h"
 
@@ -57,8 +58,9 @@ absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
   if (!status.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": ", status.message()));
   }
-  if (moving.radius != 0) {
-    return absl::UnimplementedError(absl::StrCat(name, ": motions of hulls with a radius"));
+  if (!(moving.radius >= 0 && moving.radius <= kLargestDouble)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": radius is ", moving.radius, "; it must be finite and at least 0"));
   }
   return absl::OkStatus();
 }
@@ -88,7 +90,11 @@ absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingH
     if (contact.ok()) contact = Mirrored(*std::move(contact));
     return contact;
   }
-  if (IsTranslation(a.X_WH) && IsTranslation(b.X_WH)) return TranslationSearch(a, b, options).Run();
+  // With radii, the time of a translation is irrational in general.
+  const bool rounded = a.radius > 0 || b.radius > 0;
+  if (!rounded && IsTranslation(a.X_WH) && IsTranslation(b.X_WH)) {
+    return TranslationSearch(a, b, options).Run();
+  }
   return TurningSearch(a, b, options).Run();
 }
 

@@ -26,7 +26,7 @@ struct MovingHull {
 };
 
 struct MotionOptions {
-  // The largest width of the bracket of a contact, in (0, 1]. Translations ignore it.
+  // The largest width of the bracket of a contact, in (0, 1]. Translations without radii ignore it.
   double max_time_error = 0x1p-30;
   // >= 0, length. If the pair rotates and its least separation is within this of 0, the relation
   // may be kWithinTolerance. Absent: kDefaultRelativeResolution times the sizes of the hulls. Less
@@ -38,7 +38,7 @@ struct MotionOptions {
 };
 
 // Default of MotionOptions::resolution, relative to the largest absolute coordinates of the two
-// hulls, added.
+// hulls and their radii, added.
 inline constexpr double kDefaultRelativeResolution = 1e-9;
 
 // The least MotionOptions::resolution, relative to the largest absolute coordinates of the hulls
@@ -78,9 +78,9 @@ struct FirstContact {
   double separated_until = 1;
   // If the pair meets: it is in contact at some time of [separated_until, contact_time], and at
   // contact_time itself unless the contact of two translations ends before the next double. The
-  // two times are equal or adjacent doubles for translations. Otherwise they are adjacent or at
-  // most max_time_error apart; farther only if for that long before the contact, the separation is
-  // less than kLeastRelativeResolution can tell from 0.
+  // two times are equal or adjacent doubles for translations without radii. Otherwise they are
+  // adjacent or at most max_time_error apart, and farther only if the separation is below
+  // kLeastRelativeResolution for that long before the contact.
   std::optional<double> contact_time;
   // If requested: consecutive intervals from 0 to separated_until, none if that is 0. Empty if a
   // hull is empty.
@@ -95,12 +95,14 @@ struct FirstContact {
 };
 
 // Finds the first contact of two hulls in motion. Exact if both motions are translations
-// (IsTranslation), grazes included: the time is rational, and the bracket has no double inside.
-// Otherwise never a miss and never a false contact; the bracket is as narrow as requested, and the
-// relation is kWithinTolerance only within the resolution. Swapping A and B mirrors the answer.
-// Empty hulls are separated from everything.
+// (IsTranslation) and both radii 0, grazes included: the time is rational, and the bracket has no
+// double inside. Otherwise never a miss and never a false contact; the bracket is as narrow as
+// requested, and the relation is kWithinTolerance only within the resolution. Swapping A and B
+// mirrors the answer. Empty hulls are separated from everything.
 //
-// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions. CANCELLED: should_stop returned true.
+// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; no
+// plane can be proven because a rotation nearly vanishes, or sizes are beyond kMotionMinSize and
+// kMotionMaxSize. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});
 

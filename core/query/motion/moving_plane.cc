@@ -44,7 +44,7 @@ PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVect
 
 // Returns the largest n.v over the points of a hull, within kSupportBlurFactor times its largest
 // coordinate times a bound of n.
-double Reach(const QueryHull& hull, const PlainVector& n) {
+double ReachAlong(const QueryHull& hull, const PlainVector& n) {
   // Too short to matter in kMotionPlaneErrorFactor.
   if (LargestComponent(n) < kDirectionMin) return 0;
   if (IsFilterSize(hull.max_abs_coordinate())) return hull.Farthest(n).value;
@@ -79,13 +79,13 @@ struct MovingPlane::Bounds {
 };
 
 MovingPlane::MovingPlane(const MovingHull& a, const MovingHull& b)
-    : a_(SideOf(a)), b_(SideOf(b)), size_(a_.size + b_.size) {}
+    : a_(SideOf(a)), b_(SideOf(b)), size_((a_.size + a_.radius) + (b_.size + b_.radius)) {}
 
 MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   HULLD_DCHECK(!moving.hull.empty());
   const Pose& start = moving.X_WH.start;
   const Pose& end = moving.X_WH.end;
-  Side side{&moving.hull, start.q, end.q, start.t, end.t, 0};
+  Side side{&moving.hull, start.q, end.q, start.t, end.t, 0, 0};
   int exponent = 0;
   std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
   for (int i = 0; i < 4; ++i) {
@@ -94,6 +94,7 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   }
   side.size = moving.hull.max_abs_coordinate() +
               std::max(start.t.cwiseAbs().maxCoeff(), end.t.cwiseAbs().maxCoeff());
+  side.radius = moving.radius * kUnitLengthRoundUp;
   return side;
 }
 
@@ -126,8 +127,8 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, dou
   };
   const Cubic moved = Product(norms, along(start), along(end));
   for (int i = 0; i < 4; ++i) {
-    bounds.most[i] = Reach(*side.hull, turned[i]) + moved[i];
-    bounds.least[i] = moved[i] - Reach(*side.hull, -turned[i]);
+    bounds.most[i] = ReachAlong(*side.hull, turned[i]) + moved[i];
+    bounds.least[i] = moved[i] - ReachAlong(*side.hull, -turned[i]);
   }
   bounds.error = kMotionPlaneErrorFactor * bounds.weight * LargestComponent(n) * side.size;
   return bounds;
@@ -146,17 +147,20 @@ MovingPlane::Result MovingPlane::Try(const Vector& n, double start, double end,
     low = std::max(low, a.most[i] / a.weights[i]);
     high = std::min(high, b.least[i] / b.weights[i]);
   }
+  low += a_.radius;
+  high -= b_.radius;
   result.offset = low / 2 + high / 2;
   result.gap = high - low;
-  const double offset_error =
-      kMotionPlaneErrorFactor * (std::abs(result.offset) + std::abs(margin));
-  const double error_a = a.error + offset_error * a.weight;
-  const double error_b = b.error + offset_error * b.weight;
+  const double margin_a = a_.radius + margin;
+  const double margin_b = b_.radius + margin;
+  const double sizes = std::abs(result.offset) + std::abs(margin) + (a_.radius + b_.radius);
+  const double error_a = a.error + kMotionPlaneErrorFactor * a.weight * sizes;
+  const double error_b = b.error + kMotionPlaneErrorFactor * b.weight * sizes;
   result.proven = true;
   for (int i = 0; i < 4; ++i) {
     result.proven = result.proven &&
-                    a.most[i] + error_a < (result.offset - margin) * a.weights[i] &&
-                    b.least[i] - error_b > (result.offset + margin) * b.weights[i];
+                    a.most[i] + error_a < (result.offset - margin_a) * a.weights[i] &&
+                    b.least[i] - error_b > (result.offset + margin_b) * b.weights[i];
   }
   return result;
 }

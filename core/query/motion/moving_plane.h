@@ -23,16 +23,16 @@ class MovingPlane {
   MovingPlane(const MovingHull& a, const MovingHull& b);
 
   // The size of the pair: the largest absolute coordinates of the hulls and of their translations,
-  // added.
+  // and the radii, added.
   double size() const { return size_; }
 
   struct Result {
-    // True if the plane at `offset` has A and B, without their radii, farther than `margin` on its
-    // two sides at all times of the interval.
+    // True if the plane at `offset` has A and B, with their radii, farther than `margin` on its two
+    // sides at all times of the interval.
     bool proven = false;
     double offset = 0;
-    // Width of the range of offsets, before rounding errors; not above the least separation along
-    // n. -infinity if a hull turns too far for a statement.
+    // Width of the range of such offsets, up to rounding; a lower bound of the least separation.
+    // -infinity if a hull turns too far for a statement.
     double gap = 0;
   };
   // Tries the direction n (world frame, from A toward B, of unit length up to rounding) from time
@@ -49,6 +49,8 @@ class MovingPlane {
     Vector x1;
     // Sum of the largest absolute coordinates of the hull and of its translations.
     double size;
+    // At least the radius times the length of a direction.
+    double radius;
   };
   struct Bounds;
 

@@ -1,7 +1,7 @@
 #include "core/query/motion/pair_at.h"
 
-#include "core/query/certification.h"
-#include "core/query/exact/exact_pair.h"
+#include "core/query/collision.h"
+#include "core/query/terms/query_options.h"
 
 namespace hulld {
 namespace {
@@ -14,12 +14,12 @@ bool IsAtRest(const Motion& motion) {
 void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& product,
              std::optional<PlacedHull>& placed) {
   if (time == 0 || IsAtRest(moving.X_WH)) {
-    placed.emplace(moving.hull, moving.X_WH.start);
+    placed.emplace(moving.hull, moving.X_WH.start, moving.radius);
   } else if (time == 1) {
-    placed.emplace(moving.hull, moving.X_WH.end);
+    placed.emplace(moving.hull, moving.X_WH.end, moving.radius);
   } else {
     product.emplace(moving.X_WH, time);
-    placed.emplace(moving.hull, *product);
+    placed.emplace(moving.hull, *product, moving.radius);
   }
 }
 
@@ -31,20 +31,20 @@ PairAt::PairAt(const MovingHull& a, const MovingHull& b, double time) {
   pair_.emplace(*placed_a_, *placed_b_);
 }
 
-absl::StatusOr<Decision> PairAt::Decide(const std::function<bool()>& should_stop) const {
+absl::StatusOr<Decision> PairAt::DecideCores(const std::function<bool()>& should_stop) const {
   absl::StatusOr<Decision> decision(absl::in_place);
-  if (absl::Status s =
-          hulld::Decide(*pair_, 0, nullptr, Purpose::kEvidence, should_stop, *decision);
-      !s.ok()) {
-    return s;
-  }
+  const absl::Status status =
+      Decide(*pair_, 0, nullptr, Purpose::kEvidence, should_stop, *decision);
+  if (!status.ok()) decision = status;
   return decision;
 }
 
-absl::StatusOr<Certificate> PairAt::Certify(const Decision& decision,
-                                            const std::function<bool()>& should_stop) const {
-  ExactPair exact(*pair_, should_stop);
-  return MakeCertificate(exact, decision, should_stop);
+absl::StatusOr<Answer> PairAt::Check(bool want_certificate,
+                                     const std::function<bool()>& should_stop) const {
+  QueryOptions options;
+  options.want_certificate = want_certificate;
+  options.should_stop = should_stop;
+  return CheckCollision(*placed_a_, *placed_b_, options);
 }
 
 }  // namespace hulld

@@ -11,7 +11,7 @@
 #include "core/query/ladder.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/placed/placed_hull.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/answer.h"
 #include "core/query/terms/pose_product.h"
 
 namespace hulld {
@@ -28,12 +28,13 @@ class PairAt {
 
   const FloatPair& pair() const { return *pair_; }
 
-  // Decides the relation at the time, exactly. CANCELLED: should_stop, which may be empty, returned
-  // true.
-  absl::StatusOr<Decision> Decide(const std::function<bool()>& should_stop) const;
-  // Returns the proof of a decision at the time. Errors: as Decide.
-  absl::StatusOr<Certificate> Certify(const Decision& decision,
-                                      const std::function<bool()>& should_stop) const;
+  // Decides the relation of the hulls without their radii, exactly. CANCELLED: should_stop, which
+  // may be empty, returned true.
+  absl::StatusOr<Decision> DecideCores(const std::function<bool()>& should_stop) const;
+  // Returns the relation of the rounded hulls, exactly, with its proof if requested. Errors: as
+  // above.
+  absl::StatusOr<Answer> Check(bool want_certificate,
+                               const std::function<bool()>& should_stop) const;
 
  private:
   std::optional<PoseProduct> product_a_;

@@ -204,7 +204,7 @@ absl::Status TranslationSearch::QueryAt(double time) {
   if (poll_.Step()) return MotionStopped();
   stride_ = std::min<int64_t>(stride_ * kStrideFactor, OrdinalOf(1.0));
   const PairAt at(a_, b_, time);
-  absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
+  absl::StatusOr<Decision> decision = at.DecideCores(options_.should_stop);
   if (!decision.ok()) return decision.status();
   if (decision->relation != Relation::kSeparated) {
     upper_ = time;
@@ -291,20 +291,18 @@ FirstContact TranslationSearch::Separated() {
 
 absl::Status TranslationSearch::AddCertificate(FirstContact& contact) {
   if (lower_ > 0) contact.intervals = std::move(intervals_);
-  const PairAt at(a_, b_, upper_);
-  const absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
-  if (!decision.ok()) return decision.status();
-  if (decision->relation == Relation::kSeparated) {
-    // The contact has ended.
-    absl::StatusOr<ExactNearest> nearest =
-        FindNearestExactly(middle().pair, {}, options_.should_stop, &middle().half);
-    if (!nearest.ok()) return nearest.status();
-    contact.certificate = Certificate{{}, std::move(nearest->point.pairs)};
+  absl::StatusOr<Answer> answer =
+      PairAt(a_, b_, upper_).Check(/*want_certificate=*/true, options_.should_stop);
+  if (!answer.ok()) return answer.status();
+  if (answer->relation != Relation::kSeparated) {
+    contact.certificate = std::move(answer->certificate);
     return absl::OkStatus();
   }
-  absl::StatusOr<Certificate> certificate = at.Certify(*decision, options_.should_stop);
-  if (!certificate.ok()) return certificate.status();
-  contact.certificate = *std::move(certificate);
+  // The contact has ended.
+  absl::StatusOr<ExactNearest> nearest =
+      FindNearestExactly(middle().pair, {}, options_.should_stop, &middle().half);
+  if (!nearest.ok()) return nearest.status();
+  contact.certificate = Certificate{{}, std::move(nearest->point.pairs)};
   return absl::OkStatus();
 }
 

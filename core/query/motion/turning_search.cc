@@ -8,9 +8,9 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/expansion.h"
-#include "core/query/ladder.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/pair_at.h"
+#include "core/query/terms/answer.h"
 
 namespace hulld {
 namespace {
@@ -39,7 +39,8 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap)
 
 TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const MotionOptions& options)
     : a_(a), b_(b), options_(options), poll_(options.should_stop, 1), plane_(a, b) {
-  const double sizes = a.hull.max_abs_coordinate() + b.hull.max_abs_coordinate();
+  const double sizes =
+      (a.hull.max_abs_coordinate() + a.radius) + (b.hull.max_abs_coordinate() + b.radius);
   resolution_ = std::max(options.resolution.value_or(kDefaultRelativeResolution * sizes),
                          kLeastRelativeResolution * plane_.size());
 }
@@ -82,9 +83,10 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
 }
 
 absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
-  const absl::StatusOr<Decision> decision = PairAt(a_, b_, time).Decide(options_.should_stop);
-  if (!decision.ok()) return decision.status();
-  return decision->relation;
+  const absl::StatusOr<Answer> answer =
+      PairAt(a_, b_, time).Check(/*want_certificate=*/false, options_.should_stop);
+  if (!answer.ok()) return answer.status();
+  return answer->relation;
 }
 
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) const {
@@ -201,15 +203,12 @@ absl::StatusOr<double> TurningSearch::FindLateContact() const {
 }
 
 absl::StatusOr<FirstContact> TurningSearch::Contact(double time) {
-  const PairAt at(a_, b_, time);
-  const absl::StatusOr<Decision> decision = at.Decide(options_.should_stop);
-  if (!decision.ok()) return decision.status();
-  FirstContact contact = WithoutContact(decision->relation);
+  absl::StatusOr<Answer> answer =
+      PairAt(a_, b_, time).Check(options_.want_certificate, options_.should_stop);
+  if (!answer.ok()) return answer.status();
+  FirstContact contact = WithoutContact(answer->relation);
   contact.contact_time = time;
-  if (!options_.want_certificate) return contact;
-  absl::StatusOr<Certificate> certificate = at.Certify(*decision, options_.should_stop);
-  if (!certificate.ok()) return certificate.status();
-  contact.certificate = *std::move(certificate);
+  contact.certificate = std::move(answer->certificate);
   return contact;
 }
 

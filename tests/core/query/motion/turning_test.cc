@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/query/motion/first_contact.h"
+#include "core/query/motion/pair_at.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/motion/motion_check.h"
 
@@ -93,6 +94,34 @@ TEST(Turning, RandomMotionsAgreeWithSamples) {
   }
   EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 10);
   EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
+}
+
+// Lattice shapes and half turns, so that many pairs touch.
+TEST(Turning, PairsAtATimeHaveTheExactRelation) {
+  Random random(TestSeed(2));
+  std::array<int, 3> relations = {};
+  const auto lattice_pose = [&](int most) {
+    Pose pose;
+    for (double& component : pose.q) component = random.Between(0, 2);
+    pose.q[0] += 1;
+    for (int i = 0; i < 3; ++i) pose.t[i] = random.Between(-most, most);
+    return pose;
+  };
+  for (int round = 0; round < 80; ++round) {
+    SCOPED_TRACE(round);
+    const OwnMoving a(RandomLatticePoints(random, 4, 3), {lattice_pose(1), lattice_pose(1)});
+    const OwnMoving b(RandomLatticePoints(random, 4, 3), {lattice_pose(3), lattice_pose(3)});
+    for (const double time : {0.5, 1 / 3.0, 0x1p-60}) {
+      const Relation expected =
+          FromOracle(oracle::RelationAt(a.ForOracle(), b.ForOracle(), Rational(time)));
+      const absl::StatusOr<Answer> answer =
+          PairAt(a.moving(), b.moving(), time).Check(/*want_certificate=*/false, {});
+      ASSERT_TRUE(answer.ok());
+      ASSERT_EQ(answer->relation, expected);
+      ++relations[static_cast<size_t>(expected)];
+    }
+  }
+  for (const int count : relations) EXPECT_GT(count, 0);
 }
 
 // The corner of a square that turns about z reaches sqrt(2) after an eighth of a turn.
@@ -188,6 +217,28 @@ TEST(Turning, LongRotationsAreCovered) {
   EXPECT_EQ(Find(blade, beyond).relation, Relation::kSeparated);
   const OwnMoving hit(Box(0.1, 0.1, 0.1), AtRest({-1, -1, 0}));
   EXPECT_EQ(Find(blade, hit).relation, Relation::kOverlapping);
+}
+
+TEST(Turning, RadiiBringTheContactForward) {
+  // A sphere that moves along x meets a sphere at rest when their centers are 2 apart.
+  const std::vector<Vector> center = {{0, 0, 0}};
+  const OwnMoving sphere(center, {{{1, 0, 0, 0}, {6, 0, 0}}, {{1, 0, 0, 0}, {0, 0, 0}}}, 1.5);
+  const FirstContact spheres = Find(OwnMoving(center, AtRest(), 0.5), sphere);
+  EXPECT_EQ(spheres.relation, Relation::kOverlapping);
+  EXPECT_NEAR(*spheres.contact_time, 2.0 / 3, 1e-9);
+  // Beside it at the distance of the radii, it grazes; a little farther, it passes.
+  const auto beside = [&](double y) {
+    return Find(OwnMoving(center, AtRest({0, y, 0}), 0.5), sphere).relation;
+  };
+  EXPECT_EQ(beside(1.999), Relation::kOverlapping);
+  EXPECT_EQ(beside(2.001), Relation::kSeparated);
+  // A turning box with rounded corners reaches farther by its radius.
+  const OwnMoving rounded(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}), 0.25);
+  const auto relation_at = [&](double distance) {
+    return Find(rounded, OwnMoving(Box(0.5, 5, 5), AtRest({distance + 0.5, 0, 0}))).relation;
+  };
+  EXPECT_EQ(relation_at(std::sqrt(2.0) + 0.2499), Relation::kOverlapping);
+  EXPECT_EQ(relation_at(std::sqrt(2.0) + 0.2501), Relation::kSeparated);
 }
 
 TEST(Turning, ExtremeScalesKeepTheRelation) {
