@@ -113,8 +113,9 @@ inline constexpr double kProductUnderflow = 0x1p-600;
 inline constexpr double kInterpolationLeastRemainder = 0x1p-40;
 
 // Planes of pairs in motion (see kMotionPlaneErrorFactor): the largest absolute coordinate of a
-// hull plus that of its translations is between these. The bound is then at least 2^-825, far above
-// what products lose by underflow, and nothing overflows. Proven.
+// hull plus that of its translations is at most the maximum, so that nothing overflows. A smaller
+// one than the minimum counts as the minimum in the bound, which is then at least 2^-825, far above
+// what products lose by underflow. Proven.
 inline constexpr double kMotionMinSize = 0x1p-700;
 inline constexpr double kMotionMaxSize = 0x1p900;
 

@@ -101,8 +101,8 @@ struct FirstContact {
 // mirrors the answer. Empty hulls are separated from everything.
 //
 // INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; no
-// plane can be proven because a rotation nearly vanishes, or sizes are beyond kMotionMinSize and
-// kMotionMaxSize. CANCELLED: should_stop returned true.
+// plane can be proven because a rotation nearly vanishes, or sizes are out of the range of
+// kMotionMinSize and kMotionMaxSize. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});
 

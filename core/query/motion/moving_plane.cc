@@ -101,7 +101,7 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
 MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, double start,
                                           double end) {
   Bounds bounds;
-  if (!(side.size >= kMotionMinSize && side.size <= kMotionMaxSize)) return bounds;
+  if (!(side.size <= kMotionMaxSize)) return bounds;
   const Quaternion p = At(side.q0, side.q1, start);
   const Quaternion q = At(side.q0, side.q1, end);
   if (std::min(LargestOf(p), LargestOf(q)) < kInterpolationLeastRemainder) return bounds;
@@ -130,7 +130,8 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, dou
     bounds.most[i] = ReachAlong(*side.hull, turned[i]) + moved[i];
     bounds.least[i] = moved[i] - ReachAlong(*side.hull, -turned[i]);
   }
-  bounds.error = kMotionPlaneErrorFactor * bounds.weight * LargestComponent(n) * side.size;
+  bounds.error = kMotionPlaneErrorFactor * bounds.weight * LargestComponent(n) *
+                 std::max(side.size, kMotionMinSize);
   return bounds;
 }
 
