@@ -19,7 +19,9 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
                                         FloatCombination* point) {
   if (pair.usable()) {
     SeparationGoal goal;
-    goal.relative_error = kRelativeWidth;
+    // With radii, the gap may be any share of the distance.
+    const bool rounded = pair.a().is_rounded() || pair.b().is_rounded();
+    goal.relative_error = rounded ? 0 : kRelativeWidth;
     const SeparationBounds bounds = BoundDistance(pair, first, goal);
     if (point != nullptr) *point = bounds.point;
     return bounds.direction;
