@@ -107,9 +107,9 @@ inline constexpr double kProductMaxTranslation = 0x1p400;
 inline constexpr double kProductLeastComponent = 0x1p-130;
 inline constexpr double kProductUnderflow = 0x1p-600;
 
-// The quaternion of a motion at a time, (1 - t) q0 + t q1 with components up to 1, in double-double
-// arithmetic (Interpolated), which errs by at most 18 u^2. If the largest component of the result
-// is at least this, the error is below 2^-8 u of it. Proven.
+// The interpolated quaternion of a motion, (1 - t) q0 + t q1 with components up to 1, in
+// double-double arithmetic (Interpolated), which errs by at most 18 u^2. If the largest component
+// of the result is at least this, the error is below 2^-8 u of it. Proven.
 inline constexpr double kInterpolationLeastRemainder = 0x1p-40;
 
 // Planes of pairs in motion (see kMotionPlaneErrorFactor): the largest absolute coordinate of a
