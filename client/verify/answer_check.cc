@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/verify/certificate_check.h"
+#include "client/verify/motion_check.h"
 #include "client/verify/piece_check.h"
 
 namespace hulld {
@@ -43,6 +44,26 @@ std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement
 Verification FromStatus(const absl::Status& checked) {
   if (checked.ok()) return Verification{Verdict::kValid, ""};
   return Verification{Verdict::kInvalid, std::string(checked.message())};
+}
+
+bool IsMoving(const v1::Placement& a, const v1::Placement& b) {
+  return a.has_end_pose() || b.has_end_pose();
+}
+
+MovingVertices Moving(const PlacedVertices& hull, const v1::Placement& placement) {
+  return {hull, placement.has_end_pose() ? placement.end_pose() : placement.pose()};
+}
+
+absl::Status CheckProof(const CheckedAnswer& answer, const PlacedVertices& a,
+                        const PlacedVertices& b) {
+  if (!IsMoving(answer.a, answer.b)) {
+    return CheckCertificate(answer.relation, answer.certificate, a, b);
+  }
+  if (answer.first_contact == nullptr) {
+    return ProofFails("the answer is about a motion, but has no first contact");
+  }
+  return CheckFirstContact(answer.relation, *answer.first_contact, answer.certificate,
+                           Moving(a, answer.a), Moving(b, answer.b), answer.max_time_error);
 }
 
 // Returns true if the deciding pieces named in the answer are proven to be in its relation.
@@ -178,7 +199,7 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
   const auto b = FetchHull(answer.b, answer.hull_b, &verification);
   if (!b.ok()) return b.status();
   if (!b->has_value()) return verification;
-  return FromStatus(CheckCertificate(answer.relation, answer.certificate, **a, **b));
+  return FromStatus(CheckProof(answer, **a, **b));
 }
 
 absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionRequest& request,
@@ -195,13 +216,18 @@ absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionReques
     return Verification{Verdict::kCannotCheck, "the answer about bodies has no certificates"};
   }
   return Check(CheckedAnswer{request.a(), request.b(), response.relation(), response.certificate(),
-                             response.hull_a(), response.hull_b()});
+                             response.hull_a(), response.hull_b(),
+                             response.has_first_contact() ? &response.first_contact() : nullptr,
+                             MaxTimeError(request.wanted())});
 }
 
 absl::StatusOr<Verification> AnswerChecker::Check(const CheckedBodies& answer) {
   if (const auto precluded =
           Precluded(answer.relation, answer.a, answer.hull_a, answer.b, answer.hull_b)) {
     return *precluded;
+  }
+  if (IsMoving(answer.a, answer.b)) {
+    return Verification{Verdict::kCannotCheck, "the motion of a body has no certificate"};
   }
   Verification verification;
   const auto a = FetchPieces(answer.a, answer.hull_a, answer.piece_a.has_value(),

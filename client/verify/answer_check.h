@@ -42,6 +42,10 @@ struct CheckedAnswer {
   const v1::Certificate& certificate;
   const v1::HullVersion& hull_a;
   const v1::HullVersion& hull_b;
+  // For a pair in motion; null if the answer has none.
+  const v1::FirstContact* first_contact = nullptr;
+  // Requested width of its bracket.
+  double max_time_error = 0;
 };
 
 // Revisions of hulls, by ID.

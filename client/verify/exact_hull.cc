@@ -34,32 +34,16 @@ absl::Status CheckPose(const v1::Pose& pose) {
   return absl::FailedPreconditionError("a rotation is zero");
 }
 
-// R(q) and |q|^2.
-struct BigRotation {
-  BigVector rows[3];
-  BigInteger scale;
-};
-
-BigRotation ToIntegers(const std::array<double, 4>& q) {
-  CommonExponent quaternion;
-  quaternion.Include(q);
-  const BigInteger w = quaternion.ToInteger(q[0]);
-  const BigInteger x = quaternion.ToInteger(q[1]);
-  const BigInteger y = quaternion.ToInteger(q[2]);
-  const BigInteger z = quaternion.ToInteger(q[3]);
-  return {{{w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
-           {2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
-           {2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}},
-          w * w + x * x + y * y + z * z};
-}
-
 BigVector ToIntegers(const std::array<double, 3>& t, const CommonExponent& lengths) {
   return {lengths.ToInteger(t[0]), lengths.ToInteger(t[1]), lengths.ToInteger(t[2])};
 }
 
-// n^T M.
-BigVector Combination(const BigVector& n, const BigVector (&rows)[3]) {
-  return n[0] * rows[0] + n[1] * rows[1] + n[2] * rows[2];
+// R(q) and |q|^2.
+BigRotation ExactRotation(const v1::Pose& pose) {
+  CommonExponent quaternion;
+  IncludeRotation(pose, &quaternion);
+  const BigQuaternion q = RotationIn(pose, quaternion);
+  return RotationForm(q, q);
 }
 
 BigVector Product(const BigVector (&rows)[3], const BigVector& p) {
@@ -67,6 +51,39 @@ BigVector Product(const BigVector (&rows)[3], const BigVector& p) {
 }
 
 }  // namespace
+
+// Every entry of R(q) and |q|^2 is a sum of products of two components. A product x y becomes
+// (x y' + x' y) / 2; R(q) holds off its diagonal only doubled products of different components.
+BigRotation RotationForm(const BigQuaternion& a, const BigQuaternion& b) {
+  const auto square = [&](int i) -> BigInteger { return a[i] * b[i]; };
+  const auto twice = [&](int i, int j) -> BigInteger { return a[i] * b[j] + a[j] * b[i]; };
+  const BigInteger ww = square(0);
+  const BigInteger xx = square(1);
+  const BigInteger yy = square(2);
+  const BigInteger zz = square(3);
+  return {{{ww + xx - yy - zz, twice(1, 2) - twice(0, 3), twice(1, 3) + twice(0, 2)},
+           {twice(1, 2) + twice(0, 3), ww - xx + yy - zz, twice(2, 3) - twice(0, 1)},
+           {twice(1, 3) - twice(0, 2), twice(2, 3) + twice(0, 1), ww - xx - yy + zz}},
+          ww + xx + yy + zz};
+}
+
+BigQuaternion RotationIn(const v1::Pose& pose, const CommonExponent& quaternions) {
+  const std::array<double, 4> q = Rotation(pose);
+  return {quaternions.ToInteger(q[0]), quaternions.ToInteger(q[1]), quaternions.ToInteger(q[2]),
+          quaternions.ToInteger(q[3])};
+}
+
+BigVector TranslationIn(const v1::Pose& pose, const CommonExponent& lengths) {
+  return ToIntegers(Translation(pose), lengths);
+}
+
+void IncludeRotation(const v1::Pose& pose, CommonExponent* quaternions) {
+  quaternions->Include(Rotation(pose));
+}
+
+BigVector Combination(const BigVector& n, const BigVector (&rows)[3]) {
+  return n[0] * rows[0] + n[1] * rows[1] + n[2] * rows[2];
+}
 
 bool AreFinite(std::span<const double> numbers) {
   return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
@@ -103,19 +120,28 @@ ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const Common
     : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   radius = lengths.ToInteger(hull.radii[0]) + lengths.ToInteger(hull.radii[1]);
-  const BigRotation outer = ToIntegers(Rotation(hull.pose));
-  const BigVector t = ToIntegers(Translation(hull.pose), lengths);
+  const BigRotation outer = ExactRotation(hull.pose);
+  const BigVector t = TranslationIn(hull.pose, lengths);
   if (hull.in_body == nullptr) {
     std::copy(outer.rows, outer.rows + 3, rows);
     scale = outer.scale;
     shift = scale * t;
     return;
   }
-  const BigRotation inner = ToIntegers(Rotation(*hull.in_body));
-  const BigVector t_P = ToIntegers(Translation(*hull.in_body), lengths);
+  const BigRotation inner = ExactRotation(*hull.in_body);
+  const BigVector t_P = TranslationIn(*hull.in_body, lengths);
   for (int i = 0; i < 3; ++i) rows[i] = Combination(outer.rows[i], inner.rows);
   scale = outer.scale * inner.scale;
   shift = inner.scale * Product(outer.rows, t_P) + scale * t;
+}
+
+ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const BigRotation& rotation,
+                     const BigVector& translation, const BigInteger& divisor)
+    : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
+  HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
+  for (int i = 0; i < 3; ++i) rows[i] = divisor * rotation.rows[i];
+  scale = divisor * rotation.scale;
+  shift = rotation.scale * translation;
 }
 
 BigVector ExactHull::World(size_t i) const { return Product(rows, (*vertices)[i]) + shift; }

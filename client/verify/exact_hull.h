@@ -43,6 +43,25 @@ void IncludeLengths(const PlacedVertices& hull, CommonExponent* lengths);
 using BigVertices = std::shared_ptr<const std::vector<BigVector>>;
 BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& lengths);
 
+using BigQuaternion = std::array<BigInteger, 4>;
+
+// R(q) and |q|^2, or both as symmetric bilinear forms of two quaternions.
+struct BigRotation {
+  BigVector rows[3];
+  BigInteger scale;
+};
+// The forms of a and b; R(q) and |q|^2 if both are q.
+BigRotation RotationForm(const BigQuaternion& a, const BigQuaternion& b);
+
+BigQuaternion RotationIn(const v1::Pose& pose, const CommonExponent& quaternions);
+BigVector TranslationIn(const v1::Pose& pose, const CommonExponent& lengths);
+
+// Widens the exponent to cover the rotation of a pose. Requires a finite one.
+void IncludeRotation(const v1::Pose& pose, CommonExponent* quaternions);
+
+// n^T M.
+BigVector Combination(const BigVector& n, const BigVector (&rows)[3]);
+
 // An exact hull in the world: p_W = (rows p + shift) / scale in integers, all lengths at one power
 // of two. The power of two of a quaternion cancels.
 struct ExactHull {
@@ -50,6 +69,10 @@ struct ExactHull {
   // that exponent. (The number of vertices is checked. Their values are not, as that would repeat
   // the conversion.)
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
+
+  // p_W = rotation(p) + translation / divisor. Requires divisor > 0.
+  ExactHull(const PlacedVertices& hull, BigVertices vertices, const BigRotation& rotation,
+            const BigVector& translation, const BigInteger& divisor);
 
   // Returns scale p_W of vertex i.
   BigVector World(size_t i) const;

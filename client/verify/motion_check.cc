@@ -1,0 +1,324 @@
+#include "client/verify/motion_check.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/verify/certificate_check.h"
+
+namespace hulld {
+namespace {
+
+// A time t, as the weights (1 - t) and t of the two ends of a motion, times a common divisor.
+struct Moment {
+  BigInteger of_start;
+  BigInteger of_end;
+  // A power of two.
+  BigInteger divisor;
+};
+
+// Returns the moments of times in [0, 1], all with one divisor.
+template <size_t count>
+std::array<Moment, count> MomentsOf(const std::array<double, count>& times) {
+  CommonExponent exponent;
+  exponent.Include(1);
+  exponent.Include(times);
+  const BigInteger one = exponent.ToInteger(1);
+  std::array<Moment, count> moments;
+  for (size_t i = 0; i < count; ++i) {
+    const BigInteger t = exponent.ToInteger(times[i]);
+    moments[i] = {one - t, t, one};
+  }
+  return moments;
+}
+
+template <size_t count>
+std::array<BigInteger, count> Between(const std::array<BigInteger, count>& start,
+                                      const std::array<BigInteger, count>& end,
+                                      const Moment& moment) {
+  std::array<BigInteger, count> between;
+  for (size_t i = 0; i < count; ++i) {
+    between[i] = moment.of_start * start[i] + moment.of_end * end[i];
+  }
+  return between;
+}
+
+// A motion in integers: all lengths at one power of two; the rotations of both ends at another,
+// because their relative length matters.
+class ExactMotion {
+ public:
+  // Requires CheckPlacement of both ends, and an exponent that covers the lengths of both.
+  ExactMotion(const MovingVertices& moving, const CommonExponent& lengths)
+      : given_(moving.start), vertices_(ToIntegers(moving.start.xyz, lengths)) {
+    CommonExponent quaternions;
+    IncludeRotation(moving.start.pose, &quaternions);
+    IncludeRotation(moving.end, &quaternions);
+    q_ = {RotationIn(moving.start.pose, quaternions), RotationIn(moving.end, quaternions)};
+    x_ = {TranslationIn(moving.start.pose, lengths), TranslationIn(moving.end, lengths)};
+  }
+
+  const std::vector<BigVector>& vertices() const { return *vertices_; }
+  // Rotation and translation at a moment, times its divisor.
+  BigQuaternion RotationAt(const Moment& moment) const { return Between(q_[0], q_[1], moment); }
+  BigVector TranslationAt(const Moment& moment) const { return Between(x_[0], x_[1], moment); }
+
+  ExactHull HullAt(double time) const {
+    const Moment moment = MomentsOf<1>({time})[0];
+    const BigQuaternion q = RotationAt(moment);
+    return ExactHull(given_, vertices_, RotationForm(q, q), TranslationAt(moment), moment.divisor);
+  }
+
+  // True if the rotation is the same at all times: one quaternion is a positive multiple of the
+  // other.
+  bool KeepsRotation() const {
+    BigInteger cosine = 0;
+    for (int i = 0; i < 4; ++i) {
+      cosine += q_[0][i] * q_[1][i];
+      for (int j = 0; j < i; ++j) {
+        if (q_[0][i] * q_[1][j] != q_[0][j] * q_[1][i]) return false;
+      }
+    }
+    return cosine > 0;
+  }
+
+ private:
+  PlacedVertices given_;
+  BigVertices vertices_;
+  std::array<BigQuaternion, 2> q_;
+  std::array<BigVector, 2> x_;
+};
+
+// A quadratic polynomial by its Bernstein coefficients over an interval, and three times those of a
+// cubic one.
+template <typename Number>
+using Quadratic = std::array<Number, 3>;
+template <typename Number>
+using Cubic = std::array<Number, 4>;
+
+// Source: Farouki, "The Bernstein polynomial basis: a centennial retrospective", 2012: elevation of
+// the degree, and products.
+template <typename Number>
+Cubic<Number> Elevated(const Quadratic<Number>& of) {
+  const BigInteger two = 2;
+  const BigInteger three = 3;
+  return {three * of[0], of[0] + two * of[1], two * of[1] + of[2], three * of[2]};
+}
+
+Cubic<BigInteger> Product(const Quadratic<BigInteger>& of, const std::array<BigInteger, 2>& line) {
+  return {3 * of[0] * line[0], of[0] * line[1] + 2 * of[1] * line[0],
+          2 * of[1] * line[1] + of[2] * line[0], 3 * of[2] * line[1]};
+}
+
+// The half space n.p <= offset, all lengths at one power of two.
+struct HalfSpace {
+  BigVector n;
+  BigInteger offset;
+
+  HalfSpace Opposite() const { return {BigInteger(-1) * n, -offset}; }
+};
+
+BigInteger Greatest(const BigVector& n, const std::vector<BigVector>& points) {
+  BigInteger greatest = Dot(n, points.front());
+  for (const BigVector& point : points) greatest = std::max(greatest, Dot(n, point));
+  return greatest;
+}
+
+// For each vertex p, |q|^2 (n.p - offset) is a cubic polynomial of time. Returns the greatest of
+// each Bernstein coefficient over all vertices; all are times one positive number.
+Cubic<BigInteger> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space,
+                                  const std::array<Moment, 2>& interval) {
+  const BigQuaternion q[2] = {hull.RotationAt(interval[0]), hull.RotationAt(interval[1])};
+  const BigRotation forms[3] = {RotationForm(q[0], q[0]), RotationForm(q[0], q[1]),
+                                RotationForm(q[1], q[1])};
+  const BigInteger& divisor = interval[0].divisor;
+  Quadratic<BigVector> turned;
+  Quadratic<BigInteger> scale;
+  for (int i = 0; i < 3; ++i) {
+    turned[i] = divisor * Combination(half_space.n, forms[i].rows);
+    scale[i] = forms[i].scale;
+  }
+  std::array<BigInteger, 2> shift;
+  for (int i = 0; i < 2; ++i) {
+    shift[i] = Dot(half_space.n, hull.TranslationAt(interval[i])) - divisor * half_space.offset;
+  }
+  Cubic<BigInteger> heights = Product(scale, shift);
+  const Cubic<BigVector> directions = Elevated(turned);
+  for (int i = 0; i < 4; ++i) heights[i] += Greatest(directions[i], hull.vertices());
+  return heights;
+}
+
+// Returns true if the hull is in the interior of the half space over the interval, or, if
+// `may_end`, on its boundary at the end. A polynomial is negative on the interval if no Bernstein
+// coefficient is positive and the outer ones, its values at both ends, are negative.
+bool IsBelow(const ExactMotion& hull, const HalfSpace& half_space,
+             const std::array<Moment, 2>& interval, bool may_end) {
+  const Cubic<BigInteger> heights = GreatestHeights(hull, half_space, interval);
+  return heights[0] < 0 && heights[1] <= 0 && heights[2] <= 0 &&
+         (heights[3] < 0 || (may_end && heights[3] == 0));
+}
+
+v1::Certificate DirectionOf(const v1::SeparatedInterval& interval) {
+  v1::Certificate direction;
+  if (interval.has_direction()) *direction.mutable_direction() = interval.direction();
+  if (interval.has_integer_direction()) {
+    *direction.mutable_integer_direction() = interval.integer_direction();
+  }
+  return direction;
+}
+
+// A pair in motion.
+struct MovingPair {
+  const ExactMotion& a;
+  const ExactMotion& b;
+  const CommonExponent& lengths;
+
+  bool IsTranslation() const { return a.KeepsRotation() && b.KeepsRotation(); }
+  int GapSignAt(const BigVector& n, double time) const {
+    return GapSign(a.HullAt(time), b.HullAt(time), n);
+  }
+};
+
+absl::Status CheckPlane(const MovingPair& pair, const BigVector& n, int exponent, double offset,
+                        const std::array<double, 2>& times, bool may_end) {
+  if (!std::isfinite(offset)) return ProofFails("the offset is not finite");
+  CommonExponent of_offset;
+  of_offset.Include(offset);
+  const int of_heights = exponent + pair.lengths.exponent();
+  const int common = std::min(of_heights, of_offset.exponent());
+  const HalfSpace of_a = {(BigInteger(1) << (of_heights - common)) * n,
+                          of_offset.ToInteger(offset) << (of_offset.exponent() - common)};
+  const std::array<Moment, 2> interval = MomentsOf(times);
+  if (!IsBelow(pair.a, of_a, interval, may_end)) {
+    return ProofFails("A does not stay on its side of the plane");
+  }
+  if (IsBelow(pair.b, of_a.Opposite(), interval, may_end)) return absl::OkStatus();
+  return ProofFails("B does not stay on its side of the plane");
+}
+
+// n.(b - a) is linear in time for each pair of vertices, so its signs at both ends suffice.
+absl::Status CheckTranslation(const MovingPair& pair, const BigVector& n,
+                              const std::array<double, 2>& times, bool may_end) {
+  if (!pair.IsTranslation()) {
+    return ProofFails("there is no offset, which only translations do without");
+  }
+  const int at_end = pair.GapSignAt(n, times[1]);
+  if (pair.GapSignAt(n, times[0]) > 0 && (at_end > 0 || (may_end && at_end == 0))) {
+    return absl::OkStatus();
+  }
+  return ProofFails("the direction does not separate at both ends: max n.A >= min n.B");
+}
+
+absl::Status CheckInterval(const MovingPair& pair, const v1::SeparatedInterval& interval,
+                           double begin, bool may_end) {
+  BigVector n;
+  int exponent = 0;
+  if (absl::Status s = ReadDirection(DirectionOf(interval), &n, &exponent); !s.ok()) return s;
+  const std::array<double, 2> times = {begin, interval.until()};
+  if (!interval.has_offset()) return CheckTranslation(pair, n, times, may_end);
+  return CheckPlane(pair, n, exponent, interval.offset(), times, may_end);
+}
+
+absl::Status CheckIntervals(const MovingPair& pair, const v1::FirstContact& contact) {
+  double begin = 0;
+  for (int i = 0; i < contact.intervals_size(); ++i) {
+    const v1::SeparatedInterval& interval = contact.intervals(i);
+    const std::string name = absl::StrCat("intervals[", i, "]");
+    // A comparison with NaN is false.
+    if (!(begin < interval.until() && interval.until() <= contact.separated_until())) {
+      return ProofFails(absl::StrCat(name, " ends at ", interval.until(), ", not between ", begin,
+                                     " and ", contact.separated_until()));
+    }
+    const bool ends_at_contact =
+        contact.has_contact_time() && interval.until() == contact.separated_until();
+    const absl::Status checked = CheckInterval(pair, interval, begin, ends_at_contact);
+    if (!checked.ok()) return ProofFails(absl::StrCat(name, ": ", checked.message()));
+    begin = interval.until();
+  }
+  if (begin == contact.separated_until()) return absl::OkStatus();
+  return ProofFails(absl::StrCat("the intervals end at ", begin, ", before separated_until, ",
+                                 contact.separated_until()));
+}
+
+// Returns true if first <= second <= first + most, or if no double is between them.
+bool IsBracket(double first, double second, double most) {
+  if (first > second) return false;
+  if (second <= std::nextafter(first, 2)) return true;
+  CommonExponent exponent;
+  exponent.Include(std::array{first, second, most});
+  return exponent.ToInteger(second) - exponent.ToInteger(first) <= exponent.ToInteger(most);
+}
+
+absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact, double most) {
+  const double until = contact.separated_until();
+  if (!(until >= 0 && until <= 1)) {
+    return ProofFails(absl::StrCat("separated_until is ", until, ", not in [0, 1]"));
+  }
+  if (relation == v1::RELATION_SEPARATED) {
+    if (until == 1 && !contact.has_contact_time()) return absl::OkStatus();
+    return ProofFails("the pair is SEPARATED, but not until 1, or it has a contact_time");
+  }
+  if (!contact.has_contact_time()) return ProofFails("the contact has no contact_time");
+  const double time = contact.contact_time();
+  if (time >= 0 && time <= 1 && IsBracket(until, time, most)) return absl::OkStatus();
+  return ProofFails(absl::StrCat("contact_time is ", time, ", not from separated_until, ", until,
+                                 ", to at most ", most, " later"));
+}
+
+// A translation that grazes: the direction of its contact keeps the insides apart to the end.
+absl::Status CheckGraze(const MovingPair& pair, const v1::Certificate& certificate) {
+  BigVector n;
+  if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
+  if (pair.GapSignAt(n, 1) >= 0) return absl::OkStatus();
+  return ProofFails("the direction of the contact does not show that the hulls never overlap");
+}
+
+absl::Status CheckContact(v1::Relation relation, const MovingPair& pair, double time,
+                          const v1::Certificate& certificate) {
+  const bool has_direction = certificate.has_direction() || certificate.has_integer_direction();
+  v1::Relation at_contact = relation;
+  if (relation == v1::RELATION_OVERLAPPING && pair.IsTranslation() && has_direction) {
+    at_contact = v1::RELATION_TOUCHING;
+  }
+  const absl::Status checked =
+      CheckExactly(at_contact, certificate, pair.a.HullAt(time), pair.b.HullAt(time));
+  if (!checked.ok()) return ProofFails(absl::StrCat("at contact_time: ", checked.message()));
+  const bool grazes = relation == v1::RELATION_TOUCHING && pair.IsTranslation();
+  return grazes ? CheckGraze(pair, certificate) : absl::OkStatus();
+}
+
+}  // namespace
+
+double MaxTimeError(const v1::Wanted& wanted) {
+  return wanted.has_max_time_error() ? wanted.max_time_error() : 0x1p-30;
+}
+
+absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
+                               const v1::Certificate& at_contact, const MovingVertices& a,
+                               const MovingVertices& b, double max_time_error) {
+  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  if (absl::Status s = CheckTimes(relation, contact, max_time_error); !s.ok()) return s;
+  if (a.start.xyz.empty() || b.start.xyz.empty()) {
+    if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
+    return ProofFails("a hull is empty, and so separated from everything");
+  }
+  CommonExponent lengths;
+  for (const MovingVertices* hull : {&a, &b}) {
+    for (const PlacedVertices& end : {hull->start, PlacedVertices{{}, hull->end}}) {
+      if (absl::Status s = CheckPlacement(end); !s.ok()) return s;
+      IncludeLengths(end, &lengths);
+    }
+  }
+  const ExactMotion motion_a(a, lengths);
+  const ExactMotion motion_b(b, lengths);
+  const MovingPair pair = {motion_a, motion_b, lengths};
+  if (absl::Status s = CheckIntervals(pair, contact); !s.ok()) return s;
+  if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
+  return CheckContact(relation, pair, contact.contact_time(), at_contact);
+}
+
+}  // namespace hulld

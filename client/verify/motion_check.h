@@ -1,0 +1,38 @@
+#ifndef HULLD_CLIENT_VERIFY_MOTION_CHECK_H_
+#define HULLD_CLIENT_VERIFY_MOTION_CHECK_H_
+
+#include <absl/status/status.h>
+
+#include "client/verify/exact_hull.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// A hull in motion. `end` equals start.pose if it is at rest. start.in_body is null: the contract
+// has no proof of the motion of a body.
+struct MovingVertices {
+  PlacedVertices start;
+  const v1::Pose& end;
+};
+
+// Wanted.max_time_error, or its default.
+double MaxTimeError(const v1::Wanted& wanted);
+
+// Returns OK if the intervals prove that A and B are separated up to contact.separated_until, and
+// the certificate proves their contact at contact.contact_time, at most max_time_error later; for
+// SEPARATED, if the intervals cover the motion. Otherwise FAILED_PRECONDITION with the missing
+// proof. Exact, from the definitions in the proto files alone, as CheckCertificate.
+//
+// Of a translation, the certificate proves contact, and if TOUCHING also that the hulls never
+// overlap. If OVERLAPPING, it may prove that they touch at contact_time; that they overlap later is
+// not part of the proof.
+//
+// Cost: O(vertices) operations on integers of any length per interval: some microseconds per
+// vertex.
+absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
+                               const v1::Certificate& at_contact, const MovingVertices& a,
+                               const MovingVertices& b, double max_time_error);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_VERIFY_MOTION_CHECK_H_
