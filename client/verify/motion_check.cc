@@ -269,26 +269,33 @@ absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact, 
                                  ", to at most ", most, " later"));
 }
 
-// A translation that grazes: the direction of its contact keeps the insides apart to the end.
-absl::Status CheckGraze(const MovingPair& pair, const v1::Certificate& certificate) {
-  BigVector n;
-  if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
-  if (pair.GapSignAt(n, 1) >= 0) return absl::OkStatus();
-  return ProofFails("the direction of the contact does not show that the hulls never overlap");
+// Contact of a translation between two times. All differences of vertices move alike, so their
+// hulls at these times span all hulls in between; one of them holds 0 if the span does.
+absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& contact,
+                               const v1::Certificate& certificate) {
+  std::vector<BigVector> span;
+  for (const double time : {contact.separated_until(), contact.contact_time()}) {
+    const auto differences =
+        DifferencesOf(certificate, kMostTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time));
+    if (!differences.ok()) return differences.status();
+    span.insert(span.end(), differences->begin(), differences->end());
+  }
+  if (HoldsOriginInside(span) || HoldsOriginOnBoundary(span)) return absl::OkStatus();
+  return ProofFails("the vertex pairs show no common point up to contact_time");
 }
 
-absl::Status CheckContact(v1::Relation relation, const MovingPair& pair, double time,
-                          const v1::Certificate& certificate) {
+absl::Status CheckContact(v1::Relation relation, const MovingPair& pair,
+                          const v1::FirstContact& contact, const v1::Certificate& certificate) {
+  const auto check = [&](v1::Relation at_contact) {
+    const double time = contact.contact_time();
+    return CheckExactly(at_contact, certificate, pair.a.HullAt(time), pair.b.HullAt(time));
+  };
+  if (!pair.IsTranslation()) return check(relation);
   const bool has_direction = certificate.has_direction() || certificate.has_integer_direction();
-  v1::Relation at_contact = relation;
-  if (relation == v1::RELATION_OVERLAPPING && pair.IsTranslation() && has_direction) {
-    at_contact = v1::RELATION_TOUCHING;
-  }
-  const absl::Status checked =
-      CheckExactly(at_contact, certificate, pair.a.HullAt(time), pair.b.HullAt(time));
-  if (!checked.ok()) return ProofFails(absl::StrCat("at contact_time: ", checked.message()));
-  const bool grazes = relation == v1::RELATION_TOUCHING && pair.IsTranslation();
-  return grazes ? CheckGraze(pair, certificate) : absl::OkStatus();
+  if (has_direction) return check(v1::RELATION_TOUCHING);
+  if (!check(v1::RELATION_OVERLAPPING).ok()) return CheckBriefContact(pair, contact, certificate);
+  if (relation == v1::RELATION_OVERLAPPING) return absl::OkStatus();
+  return ProofFails("the hulls overlap, so they do not only touch");
 }
 
 }  // namespace
@@ -318,7 +325,8 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
   const MovingPair pair = {motion_a, motion_b, lengths};
   if (absl::Status s = CheckIntervals(pair, contact); !s.ok()) return s;
   if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
-  return CheckContact(relation, pair, contact.contact_time(), at_contact);
+  const absl::Status checked = CheckContact(relation, pair, contact, at_contact);
+  return checked.ok() ? checked : ProofFails(absl::StrCat("contact: ", checked.message()));
 }
 
 }  // namespace hulld

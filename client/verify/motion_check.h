@@ -23,9 +23,9 @@ double MaxTimeError(const v1::Wanted& wanted);
 // SEPARATED, if the intervals cover the motion. Otherwise FAILED_PRECONDITION with the missing
 // proof. Exact, from the definitions in the proto files alone, as CheckCertificate.
 //
-// Of a translation, the certificate proves contact, and if TOUCHING also that the hulls never
-// overlap. If OVERLAPPING, it may prove that they touch at contact_time; that they overlap later is
-// not part of the proof.
+// Of a translation, the certificate proves contact at contact_time, or between separated_until and
+// contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING pair which touches at
+// contact_time overlaps later, is not part of the proof.
 //
 // Cost: O(vertices) operations on integers of any length per interval: some microseconds per
 // vertex.
