@@ -54,6 +54,10 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       }
       body.hull_ids.push_back(piece.hull_id());
     }
+    if (piece.has_end_pose()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("pieces[", i, "].end_pose is set; a piece is at rest in its body"));
+    }
     const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
     if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());
     const absl::Status radius = ValidateRadius(piece.radius());

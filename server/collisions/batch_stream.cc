@@ -65,6 +65,10 @@ absl::Status BatchStream::Validate() {
                            call().caller(), registry().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
+  if (table_.has_motions()) {
+    if (absl::Status s = ValidateForMotions(options_); !s.ok()) return s;
+    motion_options_ = MakeMotionOptions(request().wanted(), options_);
+  }
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
   // Each placement is used at most twice on average: placing it again costs less than the memory
   // for all of them.
@@ -118,7 +122,7 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
   RungCounts counts;
   absl::Status status;
   uint64_t pairs = 0;
-  const bool looks_each_time = is_textbook || table_.has_bodies();
+  const bool looks_each_time = is_textbook || table_.has_bodies() || table_.has_motions();
   do {
     status = is_textbook ? AnswerByTextbook(piece, end, &columns, &counts)
                          : Answer(piece, &columns, &counts);
@@ -142,6 +146,7 @@ absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungC
     return absl::OkStatus();
   }
   if (is_plain_) return AnswerRelation(piece, columns, counts);
+  if (table_.has_motions()) return AnswerMotion(piece, columns);
   return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
 }
 
@@ -161,6 +166,17 @@ absl::Status BatchStream::AnswerRelation(PairsPiece& piece, BatchColumns* column
   ++piece.next;
   counts->Add(answer->rung);
   columns->Add([&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });
+  return absl::OkStatus();
+}
+
+absl::Status BatchStream::AnswerMotion(PairsPiece& piece, BatchColumns* columns) {
+  const PlacedPair pair = PairAt(piece.next);
+  const absl::StatusOr<FirstContact> contact = AskMoving(table_, pair.a, pair.b, motion_options_);
+  if (absl::IsCancelled(contact.status())) return contact.status();
+  columns->Add([&](v1::AnswerColumns* to) {
+    return AddMovingAnswer(table_, pair.a, pair.b, contact, request().wanted(), to);
+  });
+  ++piece.next;
   return absl::OkStatus();
 }
 

@@ -11,6 +11,7 @@
 
 #include "core/query/batch.h"
 #include "core/query/collision.h"
+#include "core/query/motion/first_contact.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
@@ -64,6 +65,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // Answers the next pair of the piece; by the textbook, at least a part of it. CANCELLED.
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerRelation(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
+  absl::Status AnswerMotion(PairsPiece& piece, BatchColumns* columns);
   absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
                                 RungCounts* counts);
   absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
@@ -73,8 +75,10 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   uint64_t pair_count_ = 0;
   Freshness freshness_;
   QueryOptions options_;
+  // If a placement moves.
+  MotionOptions motion_options_;
   PlacementTable table_;
-  // All pairs are of hulls, and only relations are wanted: AnswerRelation.
+  // All pairs are of hulls at rest, and only relations are wanted: AnswerRelation.
   bool is_plain_ = false;
 
   // Guarded by the mutex. The next row of the table of hulls to send, and the last part of the

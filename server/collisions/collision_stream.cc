@@ -162,6 +162,9 @@ absl::Status CollisionStream::HandleOpen() {
       DecodeFreshness(open.freshness(), registry_.store(), call().message_arrival());
   if (!freshness.ok()) return Prefixed("open: ", freshness.status());
   freshness_ = *freshness;
+  const absl::Status resting =
+      RefuseMotions(open.placements(), open.packed_placements(), "a stream");
+  if (!resting.ok()) return Prefixed("open: ", resting);
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the stream");

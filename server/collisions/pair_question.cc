@@ -133,6 +133,9 @@ absl::Status PairQuestion::ReadRequest() {
   if (absl::Status s = ReadPlacement(1, request.has_b(), request.b()); !s.ok()) {
     return Prefixed("b", s);
   }
+  if (request.a().has_end_pose() || request.b().has_end_pose()) {
+    if (absl::Status s = ReadMotion(); !s.ok()) return s;
+  }
   const absl::StatusOr<Freshness> freshness =
       DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
   if (!freshness.ok()) return freshness.status();
@@ -164,6 +167,18 @@ absl::Status PairQuestion::ReadPlacement(size_t side, bool present,
   return absl::OkStatus();
 }
 
+// Requires valid poses.
+absl::Status PairQuestion::ReadMotion() {
+  const v1::CheckCollisionRequest& request = call_->request();
+  if (absl::Status s = ValidateForMotions(options_); !s.ok()) return s;
+  const absl::StatusOr<Motion> a = DecodeMotion(X_W_[0], request.a());
+  if (!a.ok()) return Prefixed("a.", a.status());
+  const absl::StatusOr<Motion> b = DecodeMotion(X_W_[1], request.b());
+  if (!b.ok()) return Prefixed("b.", b.status());
+  motion_ = MotionQuestion{{*a, *b}, MakeMotionOptions(request.wanted(), options_), {}};
+  return absl::OkStatus();
+}
+
 void PairQuestion::Answer(absl::StatusOr<Resolved> resolved, TaskPool& pool) {
   absl::Status status = FirstProblem(resolved);
   if (status.ok()) status = Place(*std::move(resolved));
@@ -180,6 +195,7 @@ absl::Status PairQuestion::Place(Resolved resolved) {
   HullView& b = *resolved.hulls[subjects_[1] + (request.b().has_points() ? ids_.size() : 0)];
   has_body_ = a.body != nullptr || b.body != nullptr;
   if (has_body_) {
+    if (motion_.has_value()) return BodyInMotion();
     if (absl::Status s = ValidateForBodies(options_); !s.ok()) return s;
   }
   v1::CheckCollisionResponse& response = call_->response();
@@ -193,7 +209,7 @@ absl::Status PairQuestion::Place(Resolved resolved) {
 
 // True if the answer may be found on a thread of gRPC.
 bool PairQuestion::IsQuick() const {
-  return !has_body_ && !is_textbook() && options_.WantsRelationOnly() &&
+  return !has_body_ && !motion_.has_value() && !is_textbook() && options_.WantsRelationOnly() &&
          IsQuickToRelate(a_->hull().query_hull()) && IsQuickToRelate(b_->hull().query_hull());
 }
 
@@ -209,10 +225,20 @@ void PairQuestion::RunSlice(TaskPool& pool) {
 
 absl::StatusOr<bool> PairQuestion::Advance(std::chrono::steady_clock::time_point end) {
   if (has_body_) return AdvanceBodies(end);
+  if (motion_.has_value()) return AdvanceMotion();
   if (is_textbook()) return AdvanceTextbook(end);
   absl::StatusOr<hulld::Answer> found = CheckCollision(a_->hull(), b_->hull(), options_);
   if (!found.ok()) return NameQueryLimit(found.status(), options_);
   answer_.answer = *std::move(found);
+  return true;
+}
+
+absl::StatusOr<bool> PairQuestion::AdvanceMotion() {
+  absl::StatusOr<FirstContact> found =
+      FindFirstContact({a_->hull().query_hull(), motion_->X_W[0]},
+                       {b_->hull().query_hull(), motion_->X_W[1]}, motion_->options);
+  if (!found.ok()) return found.status();
+  motion_->contact = *std::move(found);
   return true;
 }
 
@@ -249,7 +275,21 @@ absl::StatusOr<bool> PairQuestion::AdvanceBodies(std::chrono::steady_clock::time
   return false;
 }
 
+void PairQuestion::EncodeMotion() {
+  const FirstContact& contact = motion_->contact;
+  v1::CheckCollisionResponse& response = call_->response();
+  response.set_relation(EncodeRelation(contact.relation));
+  EncodeFirstContact(contact, response.mutable_first_contact());
+  if (!contact.certificate.has_value()) return;
+  EncodeCertificate(*contact.certificate, a_->hull().query_hull().hull(),
+                    b_->hull().query_hull().hull(), response.mutable_certificate());
+}
+
 absl::Status PairQuestion::Encode() {
+  if (motion_.has_value()) {
+    EncodeMotion();
+    return absl::OkStatus();
+  }
   RungCounts counts;
   counts.Add(answer_.answer.rung);
   call_->call().metrics().CountPairs(counts);

@@ -16,6 +16,7 @@
 #include "core/query/body/body_search.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/collision.h"
+#include "core/query/motion/first_contact.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/unary_call.h"
@@ -52,6 +53,13 @@ class PairSide {
   std::optional<PlacedBody> body_;
 };
 
+// Motions of A and B, and their first contact.
+struct MotionQuestion {
+  std::array<Motion, 2> X_W;
+  MotionOptions options;
+  FirstContact contact;
+};
+
 // A CheckCollision call about two placements, each a hull or a body. It is answered in slices, so
 // that other calls get their turn. A query of two hulls takes one slice, of some milliseconds at
 // most; the textbook's test and a search of bodies take as many as they need. Used by one thread at
@@ -76,6 +84,7 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 
   absl::Status ReadRequest();
   absl::Status ReadPlacement(size_t side, bool present, const v1::Placement& placement);
+  absl::Status ReadMotion();
   absl::Status Place(Resolved resolved);
   bool is_textbook() const { return options_.method == Method::kTextbookSat; }
   bool IsQuick() const;
@@ -84,8 +93,10 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   absl::StatusOr<bool> Advance(std::chrono::steady_clock::time_point end);
   absl::StatusOr<bool> AdvanceTextbook(std::chrono::steady_clock::time_point end);
   absl::StatusOr<bool> AdvanceBodies(std::chrono::steady_clock::time_point end);
-  // Fills the response.
+  absl::StatusOr<bool> AdvanceMotion();
+  // Fill the response.
   absl::Status Encode();
+  void EncodeMotion();
 
   Registry& registry_;
   CheckCall* const call_;
@@ -101,6 +112,8 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   std::optional<PairSide> a_;
   std::optional<PairSide> b_;
   bool has_body_ = false;
+  // If A or B has an end pose.
+  std::optional<MotionQuestion> motion_;
   // State between slices, and its charge.
   std::optional<TextbookCheck> check_;
   std::optional<BodySearch> search_;

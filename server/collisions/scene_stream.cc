@@ -80,6 +80,9 @@ absl::Status SceneStream::Validate() {
       DecodeFreshness(request().freshness(), registry().store(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
+  const absl::Status resting =
+      RefuseMotions(request().placements(), request().packed_placements(), "FindCollisions");
+  if (!resting.ok()) return resting;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
                            call().caller(), registry().limits().max_placements, "the scene");

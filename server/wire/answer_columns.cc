@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "core/query/terms/answer.h"
 #include "server/contract/error_info.h"
@@ -90,6 +91,30 @@ size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted,
                  (size_t{wanted.axis()} + size_t{wanted.analysis()} + size_t{wanted.certificate()});
 }
 
+size_t AddTimes(double separated_until, double contact_time, v1::AnswerColumns* columns) {
+  columns->add_separated_until(separated_until);
+  columns->add_contact_times(contact_time);
+  return 2 * sizeof(double);
+}
+
+// Adds the intervals of the last row.
+size_t AddMotionProof(const std::vector<SeparatedInterval>& intervals, v1::AnswerColumns* columns) {
+  if (intervals.empty()) return 0;
+  v1::MotionProof* const proof = columns->add_motion_proofs();
+  proof->set_row(static_cast<uint64_t>(columns->relations_size()) - 1);
+  EncodeIntervals(intervals, proof->mutable_intervals());
+  return proof->ByteSizeLong() + kElementOverhead;
+}
+
+// Encodes the certificate of the last row.
+size_t SetCertificate(const Certificate& found, const QueryHull& a, const QueryHull& b,
+                      v1::AnswerColumns* columns) {
+  v1::Certificate* const certificate =
+      columns->mutable_certificates(columns->certificates_size() - 1);
+  EncodeCertificate(found, a.hull(), b.hull(), certificate);
+  return certificate->ByteSizeLong();
+}
+
 }  // namespace
 
 size_t FullMessageBytes(const v1::Wanted& wanted) {
@@ -97,7 +122,8 @@ size_t FullMessageBytes(const v1::Wanted& wanted) {
 }
 
 bool NamesRows(const v1::AnswerColumns& columns) {
-  return columns.pair_problems_size() > 0 || columns.piece_proofs_size() > 0;
+  return columns.pair_problems_size() > 0 || columns.piece_proofs_size() > 0 ||
+         columns.motion_proofs_size() > 0;
 }
 
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
@@ -126,13 +152,28 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const
     bytes += analysis->ByteSizeLong();
   }
   if (wanted.certificate() && answer->certificate.has_value()) {
-    v1::Certificate* const certificate =
-        columns->mutable_certificates(columns->certificates_size() - 1);
-    EncodeCertificate(*answer->certificate, a.hull(), b.hull(), certificate);
-    bytes += certificate->ByteSizeLong();
+    bytes += SetCertificate(*answer->certificate, a, b, columns);
   }
   if (wanted.axis() && answer->axis.has_value()) {
     bytes += AddAxis(*answer->axis, a.hull(), b.hull(), columns);
+  }
+  return bytes;
+}
+
+size_t AddNoTimes(v1::AnswerColumns* columns) { return AddTimes(kNone, kNone, columns); }
+
+size_t AddFirstContact(const absl::StatusOr<FirstContact>& contact, const QueryHull& a,
+                       const QueryHull& b, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
+  if (!contact.ok()) {
+    const size_t bytes = AddUnanswered(wanted, columns) + AddNoTimes(columns);
+    return bytes + AddProblem(contact.status(), columns);
+  }
+  size_t bytes =
+      AddRow(EncodeRelation(contact->relation), v1::RUNG_UNSPECIFIED, wanted, columns) +
+      AddTimes(contact->separated_until, contact->contact_time.value_or(kNone), columns) +
+      AddMotionProof(contact->intervals, columns);
+  if (contact->certificate.has_value()) {
+    bytes += SetCertificate(*contact->certificate, a, b, columns);
   }
   return bytes;
 }

@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "core/query/collision.h"
+#include "core/query/motion/first_contact.h"
 #include "core/query/placed/query_hull.h"
 #include "hulld/v1/collision.pb.h"
 
@@ -26,6 +27,12 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const
 
 // As AddAnswer if only the relation is wanted.
 size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns);
+
+// As AddAnswer for a call with motions.
+size_t AddFirstContact(const absl::StatusOr<FirstContact>& contact, const QueryHull& a,
+                       const QueryHull& b, const v1::Wanted& wanted, v1::AnswerColumns* columns);
+// Adds the times of the last row if it has no answer.
+size_t AddNoTimes(v1::AnswerColumns* columns);
 
 // True if an entry refers to a row by index, so that the columns cannot be appended to other
 // columns.

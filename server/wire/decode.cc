@@ -158,6 +158,21 @@ absl::Status ValidateRadius(double radius) {
                                                  "; it must be a finite length of at least 0"));
 }
 
+absl::Status ValidateEnd(const Motion& motion) {
+  if (!IsValidPose(motion.end)) return ValidatePose(motion.end);
+  if (ValidateMotion(motion).ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "rotation is opposite to the rotation of pose, so that the rotation vanishes during the "
+      "motion; negate its components for the shorter path");
+}
+
+absl::StatusOr<Motion> DecodeMotion(const Pose& pose, const v1::Placement& placement) {
+  if (!placement.has_end_pose()) return Motion{pose, pose};
+  const Motion motion = {pose, ReadPose(placement.end_pose())};
+  if (absl::Status s = ValidateEnd(motion); !s.ok()) return Prefixed("end_pose.", s);
+  return motion;
+}
+
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
                                           SteadyClock::time_point began) {
   Freshness freshness;

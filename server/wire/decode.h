@@ -11,6 +11,7 @@
 
 #include "core/hull/hull.h"
 #include "core/query/collision.h"
+#include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/freshness.pb.h"
@@ -47,6 +48,12 @@ Pose ReadPose(const v1::Pose& message);
 inline bool IsValidRadius(double radius) { return radius >= 0 && radius < kInfinity; }
 // Returns OK, or INVALID_ARGUMENT " is NaN; it must be ...", to follow the name of the field.
 absl::Status ValidateRadius(double radius);
+// OK, or INVALID_ARGUMENT about the end of a motion with a valid start, naming the coordinate: it
+// is malformed, or the rotation vanishes on the way.
+absl::Status ValidateEnd(const Motion& motion);
+// Decodes the motion of a placement with this valid pose; without end_pose it is at rest.
+// INVALID_ARGUMENT: ValidateEnd.
+absl::StatusOr<Motion> DecodeMotion(const Pose& pose, const v1::Placement& placement);
 
 // Packed poses have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;

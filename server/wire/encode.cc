@@ -50,6 +50,18 @@ void EncodeSize(const Hull& hull, v1::HullSize* message) {
   message->set_facets(hull.facet_count());
 }
 
+// Direction: a variant that may hold a Vector or IntegerVector. Message: with an exact_direction.
+template <typename Direction, typename Message>
+void EncodeDirection(const Direction& direction, Message* message) {
+  if (const Vector* n = std::get_if<Vector>(&direction)) {
+    EncodeVector(*n, message->mutable_direction());
+  } else if (const auto* integers = std::get_if<IntegerVector>(&direction)) {
+    message->mutable_integer_direction()->set_x(Decimal(integers->x));
+    message->mutable_integer_direction()->set_y(Decimal(integers->y));
+    message->mutable_integer_direction()->set_z(Decimal(integers->z));
+  }
+}
+
 }  // namespace
 
 void EncodeVector(const Vector& vector, v1::Vector3* message) {
@@ -194,13 +206,7 @@ void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::
 
 void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
                        v1::Certificate* message) {
-  if (const Vector* n = std::get_if<Vector>(&certificate.direction)) {
-    EncodeVector(*n, message->mutable_direction());
-  } else if (const auto* integers = std::get_if<IntegerVector>(&certificate.direction)) {
-    message->mutable_integer_direction()->set_x(Decimal(integers->x));
-    message->mutable_integer_direction()->set_y(Decimal(integers->y));
-    message->mutable_integer_direction()->set_z(Decimal(integers->z));
-  }
+  EncodeDirection(certificate.direction, message);
   for (const VertexPair& pair : certificate.pairs) {
     v1::VertexPair* const encoded = message->add_pairs();
     encoded->set_index_a(pair.a);
@@ -216,6 +222,22 @@ void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, 
   message->set_piece_b(certificate.pieces.b);
   message->set_relation(EncodeRelation(certificate.relation));
   EncodeCertificate(certificate.certificate, a, b, message->mutable_certificate());
+}
+
+void EncodeFirstContact(const FirstContact& contact, v1::FirstContact* message) {
+  message->set_separated_until(contact.separated_until);
+  if (contact.contact_time.has_value()) message->set_contact_time(*contact.contact_time);
+  EncodeIntervals(contact.intervals, message->mutable_intervals());
+}
+
+void EncodeIntervals(const std::vector<SeparatedInterval>& intervals,
+                     google::protobuf::RepeatedPtrField<v1::SeparatedInterval>* messages) {
+  for (const SeparatedInterval& interval : intervals) {
+    v1::SeparatedInterval* const message = messages->Add();
+    message->set_until(interval.until);
+    EncodeDirection(interval.direction, message);
+    if (interval.offset.has_value()) message->set_offset(*interval.offset);
+  }
 }
 
 void EncodeSeparation(const Separation& separation, v1::Separation* message) {

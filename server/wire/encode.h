@@ -2,13 +2,16 @@
 #define HULLD_SERVER_WIRE_ENCODE_H_
 
 #include <absl/status/status.h>
+#include <google/protobuf/repeated_field.h>
 
 #include <chrono>
+#include <vector>
 
 #include "core/hull/hull.h"
 #include "core/hull/properties.h"
 #include "core/query/body/piece_certification.h"
 #include "core/query/collision.h"
+#include "core/query/motion/first_contact.h"
 #include "google/protobuf/duration.pb.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/geometry.pb.h"
@@ -43,6 +46,10 @@ void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull
 // a, b: the hulls of its pieces.
 void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, const Hull& b,
                             v1::PieceCertificate* message);
+void EncodeIntervals(const std::vector<SeparatedInterval>& intervals,
+                     google::protobuf::RepeatedPtrField<v1::SeparatedInterval>* messages);
+// Encodes times and intervals; the certificate has a field elsewhere.
+void EncodeFirstContact(const FirstContact& contact, v1::FirstContact* message);
 void EncodeSeparation(const Separation& separation, v1::Separation* message);
 void EncodeWitness(const Witness& witness, v1::Witness* message);
 void EncodeNormal(const Normal& normal, v1::Normal* message);

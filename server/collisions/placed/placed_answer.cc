@@ -92,6 +92,21 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
   return {std::move(found->answer), PiecesAnswer(*std::move(found))};
 }
 
+absl::StatusOr<FirstContact> AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
+                                       const MotionOptions& options) {
+  if (table.is_body(a) || table.is_body(b)) return BodyInMotion();
+  return FindFirstContact({table.HullAt(a), table.MotionAt(a)},
+                          {table.HullAt(b), table.MotionAt(b)}, options);
+}
+
+size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const absl::StatusOr<FirstContact>& contact, const v1::Wanted& wanted,
+                       v1::AnswerColumns* columns) {
+  const size_t bytes = AddFirstContact(contact, table.HullAt(a), table.HullAt(b), wanted, columns);
+  if (!table.has_bodies()) return bytes;
+  return bytes + AddPieces(table, a, b, std::nullopt, columns);
+}
+
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
@@ -111,7 +126,8 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 
 size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
                          v1::AnswerColumns* columns) {
-  const size_t bytes = AddUnanswered(wanted, columns);
+  size_t bytes = AddUnanswered(wanted, columns);
+  if (table.has_motions()) bytes += AddNoTimes(columns);
   if (!table.has_bodies()) return bytes;
   return bytes + AddPieces(table, 0, 0, std::nullopt, columns);
 }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/query/body/body_search.h"
+#include "core/query/motion/first_contact.h"
 #include "core/query/terms/answer.h"
 #include "core/query/terms/pair_cache.h"
 #include "core/query/terms/query_options.h"
@@ -28,6 +29,11 @@ struct PlacedAnswer {
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
+// Finds the first contact of two placements of a call with motions. INVALID_ARGUMENT: one of them
+// is a body. Requires that both are answerable.
+absl::StatusOr<FirstContact> AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
+                                       const MotionOptions& options);
+
 // True if the query takes about as long as many pairs of hulls, so that the clock must be checked
 // after it.
 inline bool IsLongToAsk(const PlacementTable& table, uint32_t a, uint32_t b) {
@@ -42,6 +48,9 @@ absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
 // certificates exceed Config::kMaxRowProofBytes.
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
+                       v1::AnswerColumns* columns);
+size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const absl::StatusOr<FirstContact>& contact, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns);
 size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
                          v1::AnswerColumns* columns);

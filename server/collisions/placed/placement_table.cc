@@ -83,6 +83,11 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
         absl::StrCat("packed_placements.radii holds ", packed.radii_size(), " numbers for ",
                      packed.hulls_size(), " placements; give one for each, or none"));
   }
+  if (!packed.end_poses().empty() && packed.end_poses_size() != packed.poses_size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packed_placements.end_poses holds ", packed.end_poses_size(), " numbers for ",
+                     packed.hulls_size(), " placements; set seven for each, or none"));
+  }
   const auto shapes = static_cast<uint32_t>(packed.shape_sizes_size());
   const uint32_t hulls = static_cast<uint32_t>(packed.hull_ids_size()) + shapes;
   for (int i = 0; i < packed.hulls_size(); ++i) {
@@ -169,6 +174,7 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
   hull_of_.reserve(count);
   poses_.Swap(packed.mutable_poses());
   radii_.Swap(packed.mutable_radii());
+  end_poses_.Swap(packed.mutable_end_poses());
   for (size_t i = 0; i < count; ++i) {
     const uint32_t named = packed.hulls(static_cast<int>(i));
     hull_of_.push_back(hulls[named]);
@@ -176,6 +182,7 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
       malformed_.emplace(i, malformed[named]);
     } else if (IsValidRadius(RadiusAt(i))) {
       CheckPose(i, "packed_placements.poses[", "].");
+      if (has_motions()) CheckEnd(i, "packed_placements.end_poses[", "].");
     } else {
       hull_of_[i] = kNoHull;
       malformed_.emplace(i, Prefixed(absl::StrCat("packed_placements.radii[", i, "]"),
@@ -193,6 +200,9 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   const size_t count = placements.size();
   hull_of_.resize(count, kNoHull);
   poses_.Resize(static_cast<int>(count) * kPoseNumbers, 0);
+  if (std::ranges::any_of(placements, &v1::Placement::has_end_pose)) {
+    end_poses_.Resize(poses_.size(), 0);
+  }
   for (size_t i = 0; i < count; ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
     const auto known = index_of.find(placement.hull_id());
@@ -218,6 +228,10 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
     }
     WritePose(ReadPose(placement.pose()), i, &poses_);
     CheckPose(i, "placements[", "].pose.");
+    if (!has_motions()) continue;
+    WritePose(placement.has_end_pose() ? ReadPose(placement.end_pose()) : PoseAt(i), i,
+              &end_poses_);
+    CheckEnd(i, "placements[", "].end_pose.");
   }
   shape_count_ = shaped.size();
   for (size_t k = 0; k < shape_count_; ++k) {
@@ -230,6 +244,12 @@ void PlacementTable::CheckPose(size_t i, const char* of, const char* after) {
   const Pose pose = PoseAt(i);
   if (IsValidPose(pose)) return;
   malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), ValidatePose(pose)));
+}
+
+void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
+  if (IsMalformed(i)) return;
+  const absl::Status valid = ValidateEnd(MotionAt(i));
+  if (!valid.ok()) malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), valid));
 }
 
 size_t PlacementTable::MemoryBytes() const {
@@ -246,7 +266,8 @@ size_t PlacementTable::MemoryBytes() const {
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
   const size_t each = 2 * sizeof(uint32_t) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
   const size_t of_poses =
-      static_cast<size_t>(poses_.Capacity() + radii_.Capacity()) * sizeof(double);
+      (static_cast<size_t>(poses_.Capacity()) + end_poses_.Capacity() + radii_.Capacity()) *
+      sizeof(double);
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() * (sizeof(std::string) + KnownHulls::kBytesEach) +
          hull_count() * (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) +
@@ -520,6 +541,19 @@ absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
   if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
   if (placement.hull_id().empty()) return DecodeShape(placement.points(), shapes);
   return absl::InvalidArgumentError("hull_id and points are both set; set one of them");
+}
+
+absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                           const v1::PackedPlacements& packed, const char* what) {
+  const auto moving = std::ranges::find_if(placements, &v1::Placement::has_end_pose);
+  if (moving == placements.end() && packed.end_poses().empty()) return absl::OkStatus();
+  const std::string field =
+      moving == placements.end()
+          ? "packed_placements.end_poses"
+          : absl::StrCat("placements[", moving - placements.begin(), "].end_pose");
+  return absl::InvalidArgumentError(
+      absl::StrCat(field, " is set, but ", what,
+                   " takes no motions; use CheckCollision or BatchCheckCollisions"));
 }
 
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,

@@ -20,6 +20,7 @@
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
+#include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
@@ -79,7 +80,11 @@ class PlacementTable {
   bool has_bodies() const { return !bodies_.empty(); }
   std::span<const PlacedBody> bodies() const { return bodies_; }
   bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
-  // Bounding box of a placement, world frame: BoundingBox.
+  // True if the request gives an end pose to a placement, which may equal its pose.
+  bool has_motions() const { return !end_poses_.empty(); }
+  // Motion of a placement. Requires has_motions().
+  Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
+  // Bounding box of a placement at its pose, world frame: BoundingBox.
   Box BoxOf(size_t i) const {
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
@@ -178,6 +183,8 @@ class PlacementTable {
   bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
   void CheckPose(size_t i, const char* of, const char* after);
+  // As CheckPose, for the end pose.
+  void CheckEnd(size_t i, const char* of, const char* after);
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
   double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
@@ -196,6 +203,8 @@ class PlacementTable {
   // its pose, packed.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
+  // In the form of poses_; empty if no placement moves.
+  google::protobuf::RepeatedField<double> end_poses_;
   // The radius of each placement; empty if all are 0.
   google::protobuf::RepeatedField<double> radii_;
   // Errors of malformed IDs, inline shapes, radii, and poses, by placement.
@@ -246,6 +255,11 @@ class PlacementTable {
 // hull and carries points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
 absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
                           InlineShapes* shapes);
+
+// INVALID_ARGUMENT, naming the first field with an end pose: the call takes no motions. `what`: its
+// subject, as in "a stream".
+absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                           const v1::PackedPlacements& packed, const char* what);
 
 // Validates an update of a stream with `count` placements: the new pose of each of `placements`, as
 // read by ReadPose. INVALID_ARGUMENT: the lists do not match, an index is out of range or repeated,

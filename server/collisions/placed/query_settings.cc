@@ -2,9 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <utility>
+
 #include "core/query/body/body_search.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {
@@ -44,6 +47,10 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
     return absl::InvalidArgumentError(absl::StrCat("wanted.clearance is ", wanted.clearance(),
                                                    "; it must be a length of at least 0"));
   }
+  if (wanted.has_max_time_error() || wanted.has_resolution()) {
+    const absl::Status valid = ValidateMotionOptions(MakeMotionOptions(wanted, options));
+    if (!valid.ok()) return Prefixed("wanted.", valid);
+  }
   options.max_textbook_axes = limits.max_textbook_axes;
   // A thread computes one query at a time, so a query may use the whole budget of a request.
   options.max_depth_bytes = limits.request_memory;
@@ -54,6 +61,40 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 
 absl::Status ValidateForBodies(const QueryOptions& options) {
   return ValidateBodyOptions(options, kFieldNames);
+}
+
+MotionOptions MakeMotionOptions(const v1::Wanted& wanted, const QueryOptions& options) {
+  MotionOptions motion;
+  if (wanted.has_max_time_error()) motion.max_time_error = wanted.max_time_error();
+  if (wanted.has_resolution()) motion.resolution = wanted.resolution();
+  motion.want_certificate = options.want_certificate;
+  motion.should_stop = options.should_stop;
+  return motion;
+}
+
+absl::Status ValidateForMotions(const QueryOptions& options) {
+  const std::pair<bool, const char*> excluded[] = {
+      {options.method == Method::kTextbookSat, "METHOD_TEXTBOOK_SAT"},
+      {options.tolerance > 0, "tolerance"},
+      {options.want_axis, "wanted.axis"},
+      {options.want_analysis, "wanted.analysis"},
+      {options.want_separation, "wanted.separation"},
+      {options.want_witness, "wanted.witness"},
+      {options.want_normal, "wanted.normal"},
+      {options.clearance.has_value(), "wanted.clearance"},
+  };
+  for (const auto& [is_set, name] : excluded) {
+    if (!is_set) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, " excludes end_pose; ask for the first contact alone, then at its pose"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status BodyInMotion() {
+  return absl::InvalidArgumentError(
+      "the pair has an end_pose and a body, and the first contact of a body is not supported; ask "
+      "for the motions of its pieces");
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {

@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include "core/query/collision.h"
+#include "core/query/motion/first_contact.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/call_lifetime.h"
 #include "server/collisions/placed/placement_table.h"
@@ -21,10 +22,19 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 // INVALID_ARGUMENT, naming the field: an option restricted to pairs of hulls.
 absl::Status ValidateForBodies(const QueryOptions& options);
 
-// True if only relations are wanted and all placements are hulls: the most frequent call, which has
-// a separate path.
+// Returns core's options for motions of a request with these valid options.
+MotionOptions MakeMotionOptions(const v1::Wanted& wanted, const QueryOptions& options);
+
+// INVALID_ARGUMENT, naming the field: an option that motions exclude.
+absl::Status ValidateForMotions(const QueryOptions& options);
+
+// INVALID_ARGUMENT: the error of a pair with a motion and a body.
+absl::Status BodyInMotion();
+
+// True if only relations are wanted and all placements are hulls at rest: the most frequent call,
+// which has a separate path.
 inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
-  return options.WantsRelationOnly() && !table.has_bodies();
+  return options.WantsRelationOnly() && !table.has_bodies() && !table.has_motions();
 }
 
 // True if the relation of two such hulls takes no longer than moving the bytes of request and

@@ -138,6 +138,9 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
   if (!options.ok()) return options.status();
+  const absl::Status resting =
+      RefuseMotions(open.placements(), open.packed_placements(), "a watch");
+  if (!resting.ok()) return resting;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            limits.max_placements, "the watch");
