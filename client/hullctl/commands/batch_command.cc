@@ -14,6 +14,7 @@
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/scene/scene_file.h"
 #include "client/verify/answer_check.h"
+#include "client/verify/motion_check.h"
 
 namespace hulld {
 namespace {
@@ -186,7 +187,9 @@ class BatchRun {
     const v1::Placement at_a = scene_.PlacementOf(pairs_[2 * pair]);
     const v1::Placement at_b = scene_.PlacementOf(pairs_[2 * pair + 1]);
     if (row.proof == nullptr) {
-      return checker_.Check(CheckedAnswer{at_a, at_b, row.relation, *row.certificate, a, b});
+      return checker_.Check(CheckedAnswer{at_a, at_b, row.relation, *row.certificate, a, b,
+                                          row.first_contact ? &*row.first_contact : nullptr,
+                                          MaxTimeError(base_.wanted())});
     }
     const auto [piece_a, piece_b] = row.pieces.value_or(std::pair(-1, -1));
     const auto index = [](int32_t piece) {

@@ -1,4 +1,8 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,6 +29,9 @@ struct PairArguments {
   v1::CheckCollisionRequest request;
   QueryDetails details;
   std::string record;
+  // End poses of motions, as parsed.
+  std::optional<v1::Pose> to_a;
+  std::optional<v1::Pose> to_b;
 };
 
 std::string VersionText(const v1::HullVersion& hull) {
@@ -56,6 +63,12 @@ void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
 
 // Returns the proof of the relation. For bodies it is a list intended for programs.
 std::string ProofText(const v1::CheckCollisionResponse& response) {
+  if (response.has_first_contact()) {
+    const auto count = static_cast<uint64_t>(response.first_contact().intervals_size());
+    const std::string separated = Counted(count, "interval");
+    if (!response.has_certificate()) return separated;
+    return separated + "; contact: " + CertificateText(response.certificate());
+  }
   if (response.piece_hulls().empty()) return CertificateText(response.certificate());
   const int count = response.piece_certificates_size();
   const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
@@ -117,6 +130,13 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
   }
 }
 
+void AddFirstContact(const v1::FirstContact& contact, Table* table) {
+  table->Row({"separated until", ShortestText(contact.separated_until())});
+  if (contact.has_contact_time()) {
+    table->Row({"first contact", ShortestText(contact.contact_time())});
+  }
+}
+
 void PrintAnswerTable(const Invocation& run, const PairArguments& arguments,
                       const v1::CheckCollisionRequest& request,
                       const v1::CheckCollisionResponse& response,
@@ -124,8 +144,12 @@ void PrintAnswerTable(const Invocation& run, const PairArguments& arguments,
   Table table;
   table.Row({"relation", PaintedRelation(response.relation(), run.paint)})
       .Row({"A", WithRadius(SideText(request.a(), response.hull_a(), arguments.a), request.a())})
-      .Row({"B", WithRadius(SideText(request.b(), response.hull_b(), arguments.b), request.b())})
-      .Row({"decided by", RungText(response.rung())});
+      .Row({"B", WithRadius(SideText(request.b(), response.hull_b(), arguments.b), request.b())});
+  if (response.has_first_contact()) {
+    AddFirstContact(response.first_contact(), &table);
+  } else {
+    table.Row({"decided by", RungText(response.rung())});
+  }
   AddPieces(response, &table);
   AddMeasures(request, response, &table);
   if (request.wanted().axis()) AddAxis(response, &table);
@@ -169,8 +193,46 @@ void PrintAnswer(const Invocation& run, const PairArguments& arguments,
   }
 }
 
+v1::Quaternion RotationOf(const v1::Pose& pose) {
+  if (pose.has_rotation()) return pose.rotation();
+  v1::Quaternion none;
+  none.set_w(1);
+  return none;
+}
+
+// Makes the largest component 1, so that products do not overflow.
+v1::Quaternion Scaled(v1::Quaternion q) {
+  const double largest =
+      std::max({std::abs(q.w()), std::abs(q.x()), std::abs(q.y()), std::abs(q.z())});
+  q.set_w(q.w() / largest);
+  q.set_x(q.x() / largest);
+  q.set_y(q.y() / largest);
+  q.set_z(q.z() / largest);
+  return q;
+}
+
+// Moves a placement to `end`, on the shorter of the two paths between the rotations.
+void SetMotion(const v1::Pose& end, v1::Placement* placement) {
+  const v1::Quaternion start = RotationOf(placement->pose());
+  v1::Quaternion q = end.has_rotation() ? end.rotation() : start;
+  const v1::Quaternion from = Scaled(start);
+  const v1::Quaternion to = Scaled(q);
+  const bool is_longer =
+      from.w() * to.w() + from.x() * to.x() + from.y() * to.y() + from.z() * to.z() < 0;
+  if (is_longer) {
+    q.set_w(-q.w());
+    q.set_x(-q.x());
+    q.set_y(-q.y());
+    q.set_z(-q.z());
+  }
+  *placement->mutable_end_pose() = end;
+  *placement->mutable_end_pose()->mutable_rotation() = q;
+}
+
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
+  if (arguments.to_a) SetMotion(*arguments.to_a, request.mutable_a());
+  if (arguments.to_b) SetMotion(*arguments.to_b, request.mutable_b());
   for (const auto& [argument, placement] : {std::pair(&arguments.a, request.mutable_a()),
                                             std::pair(&arguments.b, request.mutable_b())}) {
     placement->set_hull_id(*argument);
@@ -206,17 +268,46 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }
 
-void AddPoseOption(Command command, const std::string& name, v1::Placement* placement) {
+void AddPoseOption(Command command, const std::string& name, const char* help,
+                   const std::function<void(const v1::Pose&)>& take) {
   command
       .AddParsed(
           name,
-          [placement](const std::string& text) {
+          [take](const std::string& text) {
             const auto pose = ParsePose(text);
-            if (pose.ok()) *placement->mutable_pose() = *pose;
+            if (pose.ok()) take(*pose);
             return pose.status();
           },
-          "Pose: quaternion and translation, or translation alone (default: no motion)")
+          help)
       .ValueName("[w,x,y,z,]tx,ty,tz");
+}
+
+void AddPoseOptions(Command command, PairArguments* arguments) {
+  v1::CheckCollisionRequest* const request = &arguments->request;
+  constexpr char kPoseHelp[] =
+      "Pose: quaternion and translation, or translation alone (default: no motion)";
+  AddPoseOption(command, "--pose-a", kPoseHelp,
+                [=](const v1::Pose& pose) { *request->mutable_a()->mutable_pose() = pose; });
+  AddPoseOption(command, "--pose-b", kPoseHelp,
+                [=](const v1::Pose& pose) { *request->mutable_b()->mutable_pose() = pose; });
+  constexpr char kEndHelp[] =
+      "Move to this pose, and find the first contact; a translation alone keeps the rotation";
+  AddPoseOption(command, "--to-a", kEndHelp, [=](const v1::Pose& pose) { arguments->to_a = pose; });
+  AddPoseOption(command, "--to-b", kEndHelp, [=](const v1::Pose& pose) { arguments->to_b = pose; });
+}
+
+void AddMotionOptions(Command command, v1::Wanted* wanted) {
+  command
+      .AddLength(
+          "--max-time-error",
+          "Maximum width of the bracket of a first contact; a motion lasts 1 (default 2^-30)",
+          [wanted](double width) { wanted->set_max_time_error(width); })
+      .ValueName("TIME");
+  command.AddLength(
+      "--resolution",
+      "Allow the answer WITHIN_TOLERANCE if a rotating motion comes this close without proven "
+      "contact (default 1e-9 of the sizes)",
+      [wanted](double length) { wanted->set_resolution(length); });
 }
 
 }  // namespace
@@ -228,13 +319,13 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   constexpr char kSideHelp[] = "ID of a hull or body, or a file with points";
   command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kPlaced);
   command.AddText("B", &arguments->b, kSideHelp).Required().Completes(ValueKind::kPlaced);
-  AddPoseOption(command, "--pose-a", request->mutable_a());
-  AddPoseOption(command, "--pose-b", request->mutable_b());
+  AddPoseOptions(command, arguments.get());
   command.AddLength("--radius-a", "Grow A by a ball of this radius: a point becomes a sphere",
                     [request](double radius) { request->mutable_a()->set_radius(radius); });
   command.AddLength("--radius-b", "Grow B by a ball of this radius",
                     [request](double radius) { request->mutable_b()->set_radius(radius); });
   AddQueryOptions(command, &arguments->details);
+  AddMotionOptions(command, &arguments->details.wanted);
   AddFreshnessOptions(command, invocation);
   PairArguments* const checked = arguments.get();
   command
@@ -253,7 +344,11 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       "append'. A file without an extension needs a path, such as ./part. Lengths are in the unit\n"
       "of the points. For a body ('hullctl body --help'), the answer names the deciding pieces,\n"
       "and its certificate has one part for each pair of pieces that boxes do not decide;\n"
-      "--output json shows them. --textbook takes no bodies and no radii.");
+      "--output json shows them. --textbook takes no bodies and no radii.\n"
+      "\n"
+      "--to-a and --to-b give a motion, from time 0 to time 1, with quaternion and translation\n"
+      "linear in time. Of the two quaternions of the end's rotation, hullctl takes the one with\n"
+      "the shorter path. The relation holds over all times, and contact is never missed.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
@@ -262,6 +357,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"With a margin of 2 mm about the arm", "hullctl check arm box --radius-a 0.002"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},
+       {"When do they meet?", "hullctl check arm box --pose-b 2,0,0 --to-b 0.5,0,0"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});

@@ -4,8 +4,10 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/printing/answer_text.h"
 
 namespace hulld {
@@ -22,6 +24,33 @@ v1::Vector3 VectorOf(const double* xyz) {
   return vector;
 }
 
+// Returns the entry of row i in a list of proofs with ascending rows, or null.
+template <typename Proof>
+const Proof* ProofOf(const google::protobuf::RepeatedPtrField<Proof>& proofs, int i) {
+  const auto row = static_cast<uint64_t>(i);
+  const auto found =
+      std::lower_bound(proofs.begin(), proofs.end(), row,
+                       [](const Proof& proof, uint64_t number) { return proof.row() < number; });
+  return found != proofs.end() && found->row() == row ? &*found : nullptr;
+}
+
+v1::FirstContact ContactAt(const v1::AnswerColumns& columns, int i) {
+  v1::FirstContact contact;
+  contact.set_separated_until(columns.separated_until(i));
+  const double time = columns.contact_times(i);
+  if (!std::isnan(time)) contact.set_contact_time(time);
+  const v1::MotionProof* const proof = ProofOf(columns.motion_proofs(), i);
+  if (proof != nullptr) *contact.mutable_intervals() = proof->intervals();
+  return contact;
+}
+
+std::string ContactText(const v1::FirstContact& contact) {
+  if (contact.has_contact_time()) {
+    return absl::StrCat("contact at ", ShortestText(contact.contact_time()));
+  }
+  return absl::StrCat("separated until ", ShortestText(contact.separated_until()));
+}
+
 }  // namespace
 
 bool AreParallel(const v1::AnswerColumns& columns, size_t count) {
@@ -36,6 +65,8 @@ bool AreParallel(const v1::AnswerColumns& columns, size_t count) {
          columns.witness_xyz_size() == kWitnessNumbers * columns.witness_errors_size() &&
          fits(columns.normal_xyz_size(), kNormalNumbers) &&
          columns.normal_xyz_size() == kNormalNumbers * columns.normal_angle_bounds_size() &&
+         fits(columns.separated_until_size()) &&
+         columns.separated_until_size() == columns.contact_times_size() &&
          fits(columns.within_clearance_size()) && fits(columns.pieces_size(), 2);
 }
 
@@ -46,12 +77,7 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   if (columns.axes_size() > 0) row.axis = &columns.axes(i);
   if (columns.analyses_size() > 0) row.analysis = &columns.analyses(i);
   if (columns.certificates_size() > 0) row.certificate = &columns.certificates(i);
-  const auto proof = std::lower_bound(
-      columns.piece_proofs().begin(), columns.piece_proofs().end(), static_cast<uint64_t>(i),
-      [](const v1::PieceProof& of, uint64_t number) { return of.row() < number; });
-  const bool is_proven =
-      proof != columns.piece_proofs().end() && proof->row() == static_cast<uint64_t>(i);
-  if (is_proven) row.proof = &*proof;
+  row.proof = ProofOf(columns.piece_proofs(), i);
   if (columns.separations_size() > 0) {
     row.separation.emplace();
     row.separation->set_value(columns.separations(i));
@@ -70,6 +96,8 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
         VectorOf(columns.normal_xyz().data() + ptrdiff_t{kNormalNumbers} * i);
     row.normal->set_angle_bound(columns.normal_angle_bounds(i));
   }
+  const bool moves = columns.separated_until_size() > 0 && !std::isnan(columns.separated_until(i));
+  if (moves) row.first_contact = ContactAt(columns, i);
   if (columns.within_clearance_size() > 0) row.within_clearance = columns.within_clearance(i);
   if (columns.pieces_size() > 0) row.pieces = {columns.pieces(2 * i), columns.pieces(2 * i + 1)};
   return row;
@@ -87,6 +115,7 @@ std::string PiecesText(std::pair<int32_t, int32_t> pieces,
 std::string RowText(const AnswerRow& row, const Painter& paint,
                     const std::array<std::string, 2>& piece_names) {
   std::vector<std::string> cells = {PaintedRelation(row.relation, paint)};
+  if (row.first_contact) cells.push_back(ContactText(*row.first_contact));
   if (row.separation) cells.push_back(SeparationText(*row.separation));
   if (row.witness) {
     cells.push_back(VectorText(row.witness->point_a()));
@@ -118,6 +147,7 @@ std::string RowText(const AnswerRow& row, const Painter& paint,
 void AddRow(const AnswerRow& row, JsonObject* object) {
   object->Add("relation", v1::Relation_Name(row.relation));
   object->Add("rung", v1::Rung_Name(row.rung));
+  if (row.first_contact) object->AddJson("firstContact", MessageJson(*row.first_contact));
   if (row.separation) object->AddJson("separation", MessageJson(*row.separation));
   if (row.witness) object->AddJson("witness", MessageJson(*row.witness));
   if (row.normal) object->AddJson("normal", MessageJson(*row.normal));

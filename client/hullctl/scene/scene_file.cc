@@ -245,6 +245,21 @@ class GroupRule {
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
 };
 
+// Unpacks the pose of a placement.
+void SetPose(const google::protobuf::RepeatedField<double>& poses, uint32_t placement,
+             v1::Pose* pose) {
+  const double* const numbers = poses.data() + ptrdiff_t{kPoseNumbers} * placement;
+  v1::Quaternion& rotation = *pose->mutable_rotation();
+  rotation.set_w(numbers[0]);
+  rotation.set_x(numbers[1]);
+  rotation.set_y(numbers[2]);
+  rotation.set_z(numbers[3]);
+  v1::Vector3& translation = *pose->mutable_translation();
+  translation.set_x(numbers[4]);
+  translation.set_y(numbers[5]);
+  translation.set_z(numbers[6]);
+}
+
 }  // namespace
 
 uint32_t Scene::size() const {
@@ -278,16 +293,10 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
         packed.shape_points().xyz().data() + 3 * std::accumulate(sizes, sizes + shape, uint64_t{0});
     result.mutable_points()->mutable_xyz()->Add(points, points + 3 * size_t{sizes[shape]});
   }
-  const double* const pose = packed.poses().data() + ptrdiff_t{kPoseNumbers} * placement;
-  v1::Quaternion& rotation = *result.mutable_pose()->mutable_rotation();
-  rotation.set_w(pose[0]);
-  rotation.set_x(pose[1]);
-  rotation.set_y(pose[2]);
-  rotation.set_z(pose[3]);
-  v1::Vector3& translation = *result.mutable_pose()->mutable_translation();
-  translation.set_x(pose[4]);
-  translation.set_y(pose[5]);
-  translation.set_z(pose[6]);
+  SetPose(packed.poses(), placement, result.mutable_pose());
+  if (!packed.end_poses().empty()) {
+    SetPose(packed.end_poses(), placement, result.mutable_end_pose());
+  }
   if (packed.radii_size() > 0) result.set_radius(packed.radii(static_cast<int>(placement)));
   return result;
 }

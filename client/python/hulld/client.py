@@ -36,9 +36,16 @@ from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
 from hulld.connection import PathLike
 from hulld.errors import HulldError, read_answer
-from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, all_pairs, as_pairs
+from hulld.geometry.placements import (
+    PlacementLike,
+    Placements,
+    PlacementsLike,
+    all_pairs,
+    as_moving,
+    as_pairs,
+)
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
-from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE
+from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, PoseLike
 from hulld.watches import CollisionWatch, HullWatch
 from hulld.wire import MessageWriter
 
@@ -366,6 +373,8 @@ class Client(ClientBase):
         a: PlacementLike,
         b: PlacementLike,
         *,
+        to_a: PoseLike = None,
+        to_b: PoseLike = None,
         axis: bool = False,
         analysis: bool = False,
         certificate: bool = False,
@@ -374,6 +383,8 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        max_time_error: float | None = None,
+        resolution: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         method: Method = Method.UNSPECIFIED,
@@ -392,12 +403,29 @@ class Client(ClientBase):
         (time, sizes, axes tested). tolerance: allows WITHIN_TOLERANCE if |separation| is at most
         this; faster, never wrong. Lengths are in the caller's unit.
 
+        to_a, to_b: end poses of motions (hulld.Placement); the answer then has first_contact, and
+        takes none of the options above but certificate. max_time_error: the largest width of its
+        bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating motion is
+        at most this.
+
         NotFoundError: no such hull. InvalidArgumentError: options that exclude each other.
         """
         wanted = Wanted(
-            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+            axis,
+            analysis,
+            certificate,
+            separation,
+            max_error,
+            witness,
+            clearance,
+            normal,
+            max_time_error,
+            resolution,
         )
-        pair = Placements.of([a, b], orthogonality_tolerance=orthogonality_tolerance)
+        pair = Placements.of(
+            [as_moving(a, to_a), as_moving(b, to_b)],
+            orthogonality_tolerance=orthogonality_tolerance,
+        )
         call = requests.check_collision(pair, wanted, tolerance, method, self._viewer)
         return self._unary(call, timeout, freshness)
 
@@ -414,6 +442,8 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        max_time_error: float | None = None,
+        resolution: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         method: Method = Method.UNSPECIFIED,
@@ -423,14 +453,23 @@ class Client(ClientBase):
         """The relations of many pairs, in parallel (BatchCheckCollisions).
 
         placements: hulld.Placements, or a list of placements as in check_collision. pairs: m x 2
-        indices of placements; None: all pairs. The rest as in check_collision. A pair without an
-        answer does not fail the call: its relation is UNSPECIFIED, and Batch.problem has the
-        reason.
+        indices of placements; None: all pairs. The rest as in check_collision; if a placement has
+        an end pose, the answers have contact_times and separated_until. A pair without an answer
+        does not fail the call: its relation is UNSPECIFIED, and Batch.problem has the reason.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(
-            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+            axis,
+            analysis,
+            certificate,
+            separation,
+            max_error,
+            witness,
+            clearance,
+            normal,
+            max_time_error,
+            resolution,
         )
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._whole(call, lambda: BatchAssembly(asked, wanted), timeout, freshness)
@@ -448,6 +487,8 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        max_time_error: float | None = None,
+        resolution: float | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         method: Method = Method.UNSPECIFIED,
@@ -459,7 +500,16 @@ class Client(ClientBase):
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(
-            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+            axis,
+            analysis,
+            certificate,
+            separation,
+            max_error,
+            witness,
+            clearance,
+            normal,
+            max_time_error,
+            resolution,
         )
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._parts(call, self._seconds(timeout), freshness)

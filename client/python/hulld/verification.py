@@ -21,20 +21,31 @@ from hulld.answers.collisions import (
     Batch,
     Certificate,
     Collision,
+    FirstContact,
     HullVersion,
     PieceCertificate,
     Relation,
     Scene,
+    SeparatedInterval,
     StreamAnswer,
 )
 from hulld.answers.hulls import HullMesh
 from hulld.errors import NotFoundError
-from hulld.geometry.placements import Placement, PlacementLike, Placements, PlacementsLike
+from hulld.geometry.placements import (
+    Placement,
+    PlacementLike,
+    Placements,
+    PlacementsLike,
+    as_moving,
+)
 from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, pack_pose
 
 _Point = tuple[Fraction, Fraction, Fraction]
+_Quaternion = tuple[Fraction, Fraction, Fraction, Fraction]
 _ORIGIN: _Point = (Fraction(0), Fraction(0), Fraction(0))
 Rows = Union[Batch, Scene, StreamAnswer]
+#: Of Wanted.max_time_error in the contract.
+DEFAULT_MAX_TIME_ERROR = 2.0**-30
 
 
 class VerificationError(Exception):
@@ -72,25 +83,40 @@ def _point(numbers: Sequence[float] | npt.NDArray[np.float64]) -> _Point:
     return (Fraction(float(numbers[0])), Fraction(float(numbers[1])), Fraction(float(numbers[2])))
 
 
+def _parts(pose: PoseLike) -> tuple[_Quaternion, _Point]:
+    """The rotation and translation of a pose."""
+    w, x, y, z, *translation = (Fraction(float(number)) for number in pack_pose(pose))
+    return (w, x, y, z), (translation[0], translation[1], translation[2])
+
+
+def _form(a: _Quaternion, b: _Quaternion) -> tuple[tuple[_Point, _Point, _Point], Fraction]:
+    """R(q) times |q|^2, and |q|^2, if both are q; otherwise these as symmetric bilinear forms."""
+    ww, xx, yy, zz = (p * q for p, q in zip(a, b))
+
+    def twice(i: int, j: int) -> Fraction:
+        return a[i] * b[j] + a[j] * b[i]
+
+    rows = (
+        (ww + xx - yy - zz, twice(1, 2) - twice(0, 3), twice(1, 3) + twice(0, 2)),
+        (twice(1, 2) + twice(0, 3), ww - xx + yy - zz, twice(2, 3) - twice(0, 1)),
+        (twice(1, 3) - twice(0, 2), twice(2, 3) + twice(0, 1), ww - xx - yy + zz),
+    )
+    return rows, ww + xx + yy + zz
+
+
 class _Motion:
     """A pose, exactly."""
 
-    def __init__(self, pose: PoseLike) -> None:
-        numbers = [Fraction(float(number)) for number in pack_pose(pose)]
-        w, x, y, z = numbers[:4]
-        norm = w * w + x * x + y * y + z * z
-        self._rows = (
-            ((w * w + x * x - y * y - z * z) / norm, 2 * (x * y - w * z) / norm,
-             2 * (x * z + w * y) / norm),
-            (2 * (x * y + w * z) / norm, (w * w - x * x + y * y - z * z) / norm,
-             2 * (y * z - w * x) / norm),
-            (2 * (x * z - w * y) / norm, 2 * (y * z + w * x) / norm,
-             (w * w - x * x - y * y + z * z) / norm),
-        )  # fmt: skip
-        self._translation = (numbers[4], numbers[5], numbers[6])
+    def __init__(self, rotation: _Quaternion, translation: _Point) -> None:
+        self._rows, self._norm = _form(rotation, rotation)
+        self._translation = translation
+
+    @classmethod
+    def of(cls, pose: PoseLike) -> _Motion:
+        return cls(*_parts(pose))
 
     def __call__(self, point: _Point) -> _Point:
-        x, y, z = (_dot(row, point) for row in self._rows)
+        x, y, z = (_dot(row, point) / self._norm for row in self._rows)
         t = self._translation
         return (x + t[0], y + t[1], z + t[2])
 
@@ -148,7 +174,7 @@ class _Piece:
 
 
 def _holds_origin(points: Sequence[_Point]) -> bool:
-    """True if the convex hull of at most four points holds 0 (Caratheodory: some simplex does)."""
+    """True if the convex hull of the points holds 0 (Caratheodory: some simplex does)."""
     if any(p == _ORIGIN for p in points):
         return True
     for p, q in combinations(points, 2):
@@ -230,13 +256,26 @@ def _check_nearness(relation: Relation, differences: Sequence[_Point], radius: F
         raise VerificationError("the vertex pairs are too far apart for the radii")
 
 
+def _direction(given: Sequence[float] | Sequence[int] | None) -> _Point:
+    if given is None:
+        raise VerificationError("the certificate has no direction")
+    return (Fraction(given[0]), Fraction(given[1]), Fraction(given[2]))
+
+
+def _differences(certificate: Certificate, a: _Piece, b: _Piece) -> list[_Point]:
+    return [
+        _minus(a.moved(pair.index_a, pair.vertex_a), b.moved(pair.index_b, pair.vertex_b))
+        for pair in certificate.pairs
+    ]
+
+
+def _gap(n: _Point, a: _Piece, b: _Piece) -> Fraction:
+    return min(_dot(n, p) for p in b.points) - max(_dot(n, p) for p in a.points)
+
+
 def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -> None:
     """Checks that the certificate proves the relation of two hulls."""
-    differences = []
-    for pair in certificate.pairs:
-        differences.append(
-            _minus(a.moved(pair.index_a, pair.vertex_a), b.moved(pair.index_b, pair.vertex_b))
-        )
+    differences = _differences(certificate, a, b)
     radius = a.radius + b.radius
     if relation == Relation.OVERLAPPING:
         if radius > 0:
@@ -244,16 +283,10 @@ def _check(relation: Relation, certificate: Certificate, a: _Piece, b: _Piece) -
         elif not _surrounds_origin(differences):
             raise VerificationError("the differences of the vertex pairs do not surround 0")
         return
-    if certificate.direction is None:
-        raise VerificationError("the certificate has no direction")
-    n = (
-        Fraction(certificate.direction[0]),
-        Fraction(certificate.direction[1]),
-        Fraction(certificate.direction[2]),
-    )
+    n = _direction(certificate.direction)
     if not a.points or not b.points:
         raise VerificationError("a hull is empty, and needs no certificate")
-    gap = min(_dot(n, p) for p in b.points) - max(_dot(n, p) for p in a.points)
+    gap = _gap(n, a, b)
     if radius > 0:
         _check_gap(relation, n, gap, radius)
         if relation == Relation.TOUCHING:
@@ -314,6 +347,162 @@ def _check_pieces(
                 )
 
 
+class _MovingPiece:
+    """A hull in motion."""
+
+    def __init__(self, placement: Placement, vertices: npt.NDArray[np.float64]) -> None:
+        self._vertices = vertices
+        self._in_any_order = placement.shape is not None
+        end = placement.pose if placement.end_pose is None else placement.end_pose
+        self._ends = (_parts(placement.pose), _parts(end))
+
+    def is_empty(self) -> bool:
+        return len(self._vertices) == 0
+
+    def _parts_at(self, time: Fraction) -> tuple[_Quaternion, _Point]:
+        """The rotation and translation at a time."""
+        (q0, x0), (q1, x1) = self._ends
+        w, x, y, z = ((1 - time) * p + time * q for p, q in zip(q0, q1))
+        tx, ty, tz = ((1 - time) * p + time * q for p, q in zip(x0, x1))
+        return (w, x, y, z), (tx, ty, tz)
+
+    def at(self, time: float) -> _Piece:
+        motion = _Motion(*self._parts_at(Fraction(time)))
+        return _Piece(self._vertices, [motion], self._in_any_order)
+
+    def keeps_rotation(self) -> bool:
+        """True if one quaternion is a positive multiple of the other."""
+        q0, q1 = self._ends[0][0], self._ends[1][0]
+        parallel = all(q0[i] * q1[j] == q0[j] * q1[i] for i, j in combinations(range(4), 2))
+        return parallel and sum(p * q for p, q in zip(q0, q1)) > 0
+
+    def is_below(
+        self, n: _Point, offset: Fraction, begin: float, until: float, may_end: bool
+    ) -> bool:
+        """True if n.p < offset for all points p over the interval; if may_end, they may be equal at
+        its end. For a vertex p, |q(t)|^2 (n.p - offset) is a cubic polynomial in t. It is negative
+        if no Bernstein coefficient is positive and the outer ones are negative."""
+        (q0, x0), (q1, x1) = self._parts_at(Fraction(begin)), self._parts_at(Fraction(until))
+        lines = _dot(n, x0) - offset, _dot(n, x1) - offset
+        forms = _form(q0, q0), _form(q0, q1), _form(q1, q1)
+        s = [norm for _, norm in forms]
+        constants = (
+            3 * s[0] * lines[0],
+            s[0] * lines[1] + 2 * s[1] * lines[0],
+            2 * s[1] * lines[1] + s[2] * lines[0],
+            3 * s[2] * lines[1],
+        )
+        turned = [
+            [_dot(n, (rows[0][k], rows[1][k], rows[2][k])) for rows, _ in forms] for k in range(3)
+        ]
+        directions = [
+            tuple(sum(w * f for w, f in zip(weights, of_axis)) for of_axis in turned)
+            for weights in ((3, 0, 0), (1, 2, 0), (0, 2, 1), (0, 0, 3))
+        ]
+        points = [_point(vertex) for vertex in self._vertices]
+        b = [
+            constant + max(sum(d * x for d, x in zip(direction, point)) for point in points)
+            for constant, direction in zip(constants, directions)
+        ]
+        return b[0] < 0 and b[1] <= 0 and b[2] <= 0 and (b[3] < 0 or (may_end and b[3] == 0))
+
+
+def _check_interval(
+    interval: SeparatedInterval, begin: float, a: _MovingPiece, b: _MovingPiece, may_end: bool
+) -> None:
+    n = _direction(interval.direction)
+    if n == _ORIGIN:
+        raise VerificationError("the direction is zero")
+    until = interval.until
+    if interval.offset is None:
+        if not (a.keeps_rotation() and b.keeps_rotation()):
+            raise VerificationError("there is no offset, which only translations do without")
+        at_end = _gap(n, a.at(until), b.at(until))
+        if _gap(n, a.at(begin), b.at(begin)) <= 0 or at_end < 0 or (at_end == 0 and not may_end):
+            raise VerificationError("the direction does not separate at both ends")
+        return
+    if not np.isfinite(interval.offset):
+        raise VerificationError("the offset is not finite")
+    offset = Fraction(interval.offset)
+    if not a.is_below(n, offset, begin, until, may_end):
+        raise VerificationError("A does not stay on its side of the plane")
+    if not b.is_below(_minus(_ORIGIN, n), -offset, begin, until, may_end):
+        raise VerificationError("B does not stay on its side of the plane")
+
+
+def _check_times(relation: Relation, contact: FirstContact, max_time_error: float) -> None:
+    until, time = contact.separated_until, contact.contact_time
+    if relation == Relation.SEPARATED:
+        if until != 1 or time is not None:
+            raise VerificationError("the pair is SEPARATED, but not until 1, or it has a contact")
+        return
+    if time is None or not 0 <= until <= time <= 1:
+        raise VerificationError(f"the bracket of the contact is {until} to {time}")
+    widest = Fraction(until) + Fraction(max_time_error)
+    if Fraction(time) > widest and time > np.nextafter(until, 2):
+        raise VerificationError(f"the bracket {until} to {time} is wider than {max_time_error}")
+
+
+def _check_contact(
+    relation: Relation,
+    contact: FirstContact,
+    certificate: Certificate | None,
+    a: _MovingPiece,
+    b: _MovingPiece,
+) -> None:
+    """Checks that the pair is in contact at contact_time, or, for translations, by then."""
+    if certificate is None or contact.contact_time is None:
+        raise VerificationError("the answer has no certificate of the contact")
+    places = a.at(contact.contact_time), b.at(contact.contact_time)
+    if not (a.keeps_rotation() and b.keeps_rotation()):
+        _check(relation, certificate, *places)
+        return
+    if certificate.direction is not None:
+        _check(Relation.TOUCHING, certificate, *places)
+        return
+    differences = _differences(certificate, *places)
+    if len(differences) <= 6 and _surrounds_origin(differences):
+        if relation == Relation.TOUCHING:
+            raise VerificationError("the hulls overlap, so they do not only touch")
+        return
+    # All differences of vertices move alike: their hulls at both times span those in between.
+    until = contact.separated_until
+    differences += _differences(certificate, a.at(until), b.at(until))
+    if len(certificate.pairs) > 4 or not _holds_origin(differences):
+        raise VerificationError("the vertex pairs show no common point up to contact_time")
+
+
+def _check_first_contact(
+    relation: Relation,
+    contact: FirstContact | None,
+    certificate: Certificate | None,
+    a: _MovingPiece,
+    b: _MovingPiece,
+    max_time_error: float,
+) -> None:
+    if contact is None:
+        raise VerificationError("the answer is about a motion, but has no first contact")
+    _check_times(relation, contact, max_time_error)
+    if a.is_empty() or b.is_empty():
+        if relation != Relation.SEPARATED:
+            raise VerificationError("a hull is empty, and so separated from everything")
+        return
+    begin = 0.0
+    for index, interval in enumerate(contact.intervals):
+        if not begin < interval.until <= contact.separated_until:
+            raise VerificationError(f"interval {index} ends at {interval.until}")
+        may_end = relation != Relation.SEPARATED and interval.until == contact.separated_until
+        try:
+            _check_interval(interval, begin, a, b, may_end)
+        except VerificationError as error:
+            raise VerificationError(f"interval {index}: {error}") from None
+        begin = interval.until
+    if begin != contact.separated_until:
+        raise VerificationError(f"the intervals end at {begin}, before separated_until")
+    if relation != Relation.SEPARATED:
+        _check_contact(relation, contact, certificate, a, b)
+
+
 class Verifier:
     """Checks answers with certificates against hulls and bodies, which a client fetches and keeps.
     Cost: about 0.2 milliseconds for each vertex of each hull or piece that is placed, and some
@@ -330,11 +519,18 @@ class Verifier:
         b: PlacementLike,
         answer: Collision,
         *,
+        to_a: PoseLike = None,
+        to_b: PoseLike = None,
+        max_time_error: float = DEFAULT_MAX_TIME_ERROR,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
         """Checks that the certificate of check_collision(a, b, certificate=True) proves its
-        relation. VerificationError: it does not, or cannot be checked."""
-        pair = Placements.of([a, b], orthogonality_tolerance=orthogonality_tolerance)
+        relation; of a motion, also when the pair meets first, within max_time_error.
+        VerificationError: it does not, or cannot be checked."""
+        pair = Placements.of(
+            [as_moving(a, to_a), as_moving(b, to_b)],
+            orthogonality_tolerance=orthogonality_tolerance,
+        )
         self._check(
             pair[0],
             pair[1],
@@ -343,6 +539,8 @@ class Verifier:
             (answer.hull_a, answer.hull_b),
             answer.piece_certificates if answer.piece_hulls else None,
             answer.piece_hulls,
+            answer.first_contact,
+            max_time_error,
         )
 
     def check_row(
@@ -351,6 +549,7 @@ class Verifier:
         found: Rows,
         row: int,
         *,
+        max_time_error: float = DEFAULT_MAX_TIME_ERROR,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
         """Checks row `row` of a batch, a scene, or a step of a stream about these placements with
@@ -375,6 +574,8 @@ class Verifier:
             (versions[0], versions[1]),
             answers.piece_proofs.get(row),
             found.piece_hulls,
+            answers[row].first_contact,
+            max_time_error,
         )
 
     def _check(
@@ -386,11 +587,19 @@ class Verifier:
         versions: tuple[HullVersion, HullVersion],
         proof: Sequence[PieceCertificate] | None,
         piece_hulls: Mapping[str, HullVersion],
+        contact: FirstContact | None,
+        max_time_error: float,
     ) -> None:
         if relation not in _STRENGTH:
             raise VerificationError(f"{relation.name} has no certificate")
         if (a.id or "", b.id or "") != (versions[0].hull_id, versions[1].hull_id):
             raise VerificationError("the answer is about different hulls")
+        if a.end_pose is not None or b.end_pose is not None:
+            if proof is not None:
+                raise VerificationError("the motion of a body has no certificate")
+            moving = (self._moving(a, versions[0]), self._moving(b, versions[1]))
+            _check_first_contact(relation, contact, certificate, *moving, max_time_error)
+            return
         if proof is None:
             if certificate is None:
                 raise VerificationError("the answer has no certificate")
@@ -403,12 +612,18 @@ class Verifier:
             self._pieces(b, versions[1], piece_hulls),
         )
 
-    def _hull(self, placement: Placement, version: HullVersion) -> _Piece:
-        motions = [_Motion(placement.pose)]
-        radii = [placement.radius]
+    def _points(self, placement: Placement, version: HullVersion) -> npt.NDArray[np.float64]:
         if placement.shape is None:
-            return _Piece(self._vertices(version), motions, radii)
-        return _Piece(placement.shape.astype(np.float64), motions, radii, in_any_order=True)
+            return self._vertices(version)
+        return placement.shape.astype(np.float64)
+
+    def _hull(self, placement: Placement, version: HullVersion) -> _Piece:
+        motions = [_Motion.of(placement.pose)]
+        in_any_order = placement.shape is not None
+        return _Piece(self._points(placement, version), motions, [placement.radius], in_any_order)
+
+    def _moving(self, placement: Placement, version: HullVersion) -> _MovingPiece:
+        return _MovingPiece(placement, self._points(placement, version))
 
     def _pieces(
         self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
@@ -417,7 +632,7 @@ class Verifier:
         if body is None:
             return [self._hull(placement, version)]
         pieces = []
-        outer = _Motion(placement.pose)
+        outer = _Motion.of(placement.pose)
         for index in range(len(body.pieces)):
             piece = body.pieces[index]
             if piece.id is None or piece.id not in piece_hulls:
@@ -425,7 +640,7 @@ class Verifier:
                     f"piece {index} of body {placement.id} is hull {piece.id}, whose revision "
                     "the answer does not state"
                 )
-            inner = _Motion(Pose() if piece.pose is None else piece.pose)
+            inner = _Motion.of(Pose() if piece.pose is None else piece.pose)
             vertices = self._vertices(piece_hulls[piece.id])
             pieces.append(_Piece(vertices, [inner, outer], [placement.radius, piece.radius]))
         return pieces

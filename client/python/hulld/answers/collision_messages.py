@@ -23,6 +23,7 @@ from hulld.answers.collisions import (
     CollisionEventKind,
     DecidingPiece,
     Feature,
+    FirstContact,
     HullSize,
     HullVersion,
     Normal,
@@ -32,6 +33,7 @@ from hulld.answers.collisions import (
     Rung,
     ScenePart,
     SceneTotals,
+    SeparatedInterval,
     Separation,
     VertexPair,
     Witness,
@@ -84,19 +86,44 @@ def _axis_of(message: Any) -> Axis:
     )
 
 
+def _direction_of(
+    message: Any,
+) -> tuple[float, float, float] | tuple[int, int, int] | None:
+    kind = message.WhichOneof("exact_direction")
+    if kind == "direction":
+        n = message.direction
+        return (n.x, n.y, n.z)
+    if kind == "integer_direction":
+        m = message.integer_direction
+        return (int(m.x), int(m.y), int(m.z))
+    return None
+
+
 def _certificate_of(message: Any) -> Certificate:
     pairs = tuple(
         VertexPair(pair.index_a, pair.index_b, _vector(pair.vertex_a), _vector(pair.vertex_b))
         for pair in message.pairs
     )
-    kind = message.WhichOneof("exact_direction")
-    if kind == "direction":
-        n = message.direction
-        return Certificate((n.x, n.y, n.z), pairs)
-    if kind == "integer_direction":
-        m = message.integer_direction
-        return Certificate((int(m.x), int(m.y), int(m.z)), pairs)
-    return Certificate(None, pairs)
+    return Certificate(_direction_of(message), pairs)
+
+
+def _intervals_of(messages: Iterable[Any]) -> tuple[SeparatedInterval, ...]:
+    return tuple(
+        SeparatedInterval(
+            message.until,
+            _direction_of(message),
+            message.offset if message.HasField("offset") else None,
+        )
+        for message in messages
+    )
+
+
+def _contact_of(message: Any) -> FirstContact:
+    return FirstContact(
+        message.separated_until,
+        message.contact_time if message.HasField("contact_time") else None,
+        _intervals_of(message.intervals),
+    )
 
 
 def _piece_certificates_of(messages: Iterable[Any]) -> tuple[PieceCertificate, ...]:
@@ -149,6 +176,7 @@ def decode_collision(data: bytes, question: Placements, viewer: Viewer | None) -
         _piece_certificates_of(message.piece_certificates),
         {hull.hull_id: version_of(hull) for hull in message.piece_hulls},
         part("normal", lambda m: Normal(_vector(m.direction), m.angle_bound)),
+        part("first_contact", _contact_of),
         question,
         viewer,
     )
@@ -177,6 +205,9 @@ class ColumnReader:
     pieces: list[Unsigned] = field(default_factory=list)
     problems: dict[int, Problem] = field(default_factory=dict)
     piece_proofs: dict[int, tuple[PieceCertificate, ...]] = field(default_factory=dict)
+    separated_until: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    contact_times: list[npt.NDArray[np.float64]] = field(default_factory=list)
+    motion_proofs: dict[int, tuple[SeparatedInterval, ...]] = field(default_factory=dict)
     rows: int = 0
 
     def read(self, data: memoryview) -> None:
@@ -193,6 +224,8 @@ class ColumnReader:
             12: (self.pieces, packed_varints),
             14: (self.normal_xyz, packed_doubles),
             15: (self.normal_angle_bounds, packed_doubles),
+            16: (self.separated_until, packed_doubles),
+            17: (self.contact_times, packed_doubles),
         }
         for number, _, value in read_fields(data):
             if number in arrays:
@@ -218,6 +251,9 @@ class ColumnReader:
             elif number == 13:
                 of_row = collision_pb2.PieceProof.FromString(bytes(value))
                 self.piece_proofs[first + of_row.row] = _piece_certificates_of(of_row.certificates)
+            elif number == 18:
+                motion = collision_pb2.MotionProof.FromString(bytes(value))
+                self.motion_proofs[first + motion.row] = _intervals_of(motion.intervals)
 
     def finish(self) -> Answers:
         """ValueError: the columns do not fit each other."""
@@ -286,6 +322,9 @@ class ColumnReader:
             self.piece_proofs,
             doubles(wanted.normal, self.normal_xyz, (3,), "normal_xyz"),
             doubles(wanted.normal, self.normal_angle_bounds, (), "normal_angle_bounds"),
+            doubles(bool(self.separated_until), self.separated_until, (), "separated_until"),
+            doubles(bool(self.separated_until), self.contact_times, (), "contact_times"),
+            self.motion_proofs,
         )
 
 

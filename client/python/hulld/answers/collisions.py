@@ -175,6 +175,36 @@ class Certificate:
 
 
 @dataclass(frozen=True)
+class SeparatedInterval:
+    """Proof that a pair in motion is separated from the end of the previous interval, or 0, up to
+    `until`.
+
+    direction: as in Certificate. offset: n.p < offset for all points p of A, and n.p > offset for
+    all points p of B, at all these times. None: neither placement rotates, and max n.A < min n.B at
+    both ends; equality is allowed at a contact.
+    """
+
+    until: float
+    direction: tuple[float, float, float] | tuple[int, int, int] | None
+    offset: float | None
+
+
+@dataclass(frozen=True)
+class FirstContact:
+    """The first contact of a pair in motion, over times from 0 to 1.
+
+    separated_until: the pair is separated (proven) at all times before; 1 when SEPARATED.
+    contact_time: it is in contact at this time; equal to separated_until if a double is the exact
+    time, and None when SEPARATED or WITHIN_TOLERANCE. intervals: the proof of the separation, if a
+    certificate was wanted; the certificate of the answer holds at contact_time.
+    """
+
+    separated_until: float
+    contact_time: float | None
+    intervals: Sequence[SeparatedInterval] = ()
+
+
+@dataclass(frozen=True)
 class PieceCertificate:
     """A proof of the relation of a piece of A and a piece of B, by index, 0 for a hull; each at the
     product of the pose of its placement and its pose in the body."""
@@ -227,7 +257,8 @@ class Collision:
     revisions. piece_a, piece_b: of a body, the piece that decided; axis, analysis, witness, and
     normal are of its hull. None for a hull, and if no pair of pieces decided alone.
     piece_certificates: with a body, the proof in place of the certificate; piece_hulls: then the
-    hulls of all pieces, by ID.
+    hulls of all pieces, by ID. first_contact: of a motion, when the pair meets; the relation is
+    then SEPARATED if it never does. None without an end pose.
     """
 
     relation: Relation
@@ -246,6 +277,7 @@ class Collision:
     piece_certificates: Sequence[PieceCertificate] = ()
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
     normal: Normal | None = None
+    first_contact: FirstContact | None = None
     _question: Placements | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
@@ -266,6 +298,7 @@ class Collision:
         """For notebooks: the viewer's page of both current hulls, if hullctl is found, and a
         table."""
         separation, witness, normal = self.separation, self.witness, self.normal
+        contact = self.first_contact
         rows = [
             ("relation", self.relation.name),
             ("decided by", self.rung.name),
@@ -277,6 +310,8 @@ class Collision:
             ("point of A", witness and witness.point_a),
             ("point of B", witness and witness.point_b),
             ("normal", normal and f"{normal.direction} within {normal.angle_bound!r} rad"),
+            ("separated until", contact and repr(contact.separated_until)),
+            ("first contact", contact and contact.contact_time),
             ("within clearance", self.within_clearance),
             ("axis", self.axis and self.axis.direction),
         ]
@@ -296,6 +331,8 @@ def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:
                 parts.append(value.name)
         elif isinstance(value, Separation):
             parts.append(f"separation={value.value!r}")
+        elif isinstance(value, FirstContact):
+            parts.append(f"contact_time={value.contact_time!r}")
         elif isinstance(value, (bool, tuple, Problem)) and value != ():
             parts.append(f"{part.name}={value!r}")
         elif isinstance(value, (Witness, Normal, Axis, Certificate, Analysis)):
@@ -334,6 +371,7 @@ class AnswerRow:
     pieces: tuple[int, int] | None
     problem: Problem | None
     normal: Normal | None = None
+    first_contact: FirstContact | None = None
 
     @property
     def colliding(self) -> bool:
@@ -361,7 +399,9 @@ class Answers:
     missing answer that is not in placement_problems. pieces: m x 2, of bodies the pieces that
     decided, by index; -1 for a hull, and if no pair of pieces decided alone; None without bodies.
     piece_proofs: by row, for a pair with a body, the certificates of pairs of pieces; its entry of
-    `certificates` is None.
+    `certificates` is None. separated_until, contact_times: m, of motions, as in FirstContact; a
+    contact time is NaN if there is none; None without motions. motion_proofs: by row, the intervals
+    of FirstContact.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -379,6 +419,9 @@ class Answers:
     piece_proofs: Mapping[int, Sequence[PieceCertificate]] = field(default_factory=dict)
     normals: npt.NDArray[np.float64] | None = None
     normal_angle_bounds: npt.NDArray[np.float64] | None = None
+    separated_until: npt.NDArray[np.float64] | None = None
+    contact_times: npt.NDArray[np.float64] | None = None
+    motion_proofs: Mapping[int, Sequence[SeparatedInterval]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.relations)
@@ -420,7 +463,17 @@ class Answers:
             pieces,
             self.problems.get(row),
             normal,
+            self._first_contact(row),
         )
+
+    def _first_contact(self, row: int) -> FirstContact | None:
+        if self.separated_until is None or self.contact_times is None:
+            return None
+        until, time = float(self.separated_until[row]), float(self.contact_times[row])
+        if np.isnan(until):
+            return None
+        proof = self.motion_proofs.get(row, ())
+        return FirstContact(until, None if np.isnan(time) else time, proof)
 
     def __iter__(self) -> Iterator[AnswerRow]:
         return (self[row] for row in range(len(self)))

@@ -39,6 +39,7 @@ class WatchedPlacements:
             placements.indices,
             shapes=placements.shapes,
             radii=placements.radii,
+            end_poses=placements.end_poses,
         )
         self.clearance = clearance
         self.orthogonality_tolerance = orthogonality_tolerance

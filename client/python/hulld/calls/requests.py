@@ -175,6 +175,13 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
     )
 
 
+def _put_pose(target: Any, numbers: npt.NDArray[np.float64]) -> None:
+    """Fills a Pose of the contract."""
+    w, x, y, z, tx, ty, tz = numbers.tolist()
+    target.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
+    target.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
+
+
 def _put_placement(target: Any, placements: Placements, index: int) -> None:
     """Fills a Placement of the contract."""
     subject = placements.subject(index)
@@ -183,10 +190,9 @@ def _put_placement(target: Any, placements: Placements, index: int) -> None:
     else:
         target.points.MergeFromString(point_block(subject).finish())
     target.radius = placements.radius(index)
-    pose = placements.poses[index]
-    w, x, y, z, tx, ty, tz = pose.tolist()
-    target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
-    target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
+    _put_pose(target.pose, placements.poses[index])
+    if placements.end_poses is not None:
+        _put_pose(target.end_pose, placements.end_poses[index])
 
 
 def put_body(body_id: str, pieces: Placements, if_revision: int | None) -> Call[ReplacedBody]:

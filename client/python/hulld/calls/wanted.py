@@ -21,6 +21,8 @@ class Wanted:
     witness: bool = False
     clearance: float | None = None
     normal: bool = False
+    max_time_error: float | None = None
+    resolution: float | None = None
 
     def message(self) -> Any:
         return collision_pb2.Wanted(
@@ -32,4 +34,6 @@ class Wanted:
             witness=self.witness,
             clearance=arguments.optional_length(self.clearance, "clearance"),
             normal=self.normal,
+            max_time_error=arguments.optional_length(self.max_time_error, "max_time_error"),
+            resolution=arguments.optional_length(self.resolution, "resolution"),
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Union
 
 import numpy as np
@@ -20,11 +20,12 @@ from hulld.geometry.poses import (
     QuaternionOrder,
     pack_pose,
     pack_poses,
+    shorter_path,
 )
 from hulld.wire import MessageWriter
 
 # Fields of PackedPlacements.
-_HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS, _RADII = 1, 2, 3, 4, 5, 6
+_HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS, _RADII, _END_POSES = range(1, 8)
 #: The most points of an inline shape.
 _MOST_SHAPE_POINTS = 4096
 
@@ -36,14 +37,17 @@ class Placement:
 
     points: 1 to 4096, n x 3. They mean the same as a registered hull of these points, and are not
     stored. radius: grows the shape, or each piece of the body, by a closed ball: a point becomes a
-    sphere, a segment a capsule. ValueError: a malformed ID, shape, or radius, or not exactly one of
-    ID and points.
+    sphere, a segment a capsule. end_pose: of a motion, at time 1; None: the placement is at rest. At
+    time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1, exactly; of
+    q1 and -q1, the same rotation, the one with the shorter path is taken. ValueError: a malformed
+    ID, shape, or radius, or not exactly one of ID and points.
     """
 
     id: str | None = None
     pose: PoseLike = None
     points: PointsLike | None = None
     radius: float = 0.0
+    end_pose: PoseLike = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radius", arguments.number(self.radius, "radius", least=0))
@@ -94,6 +98,12 @@ def as_placement(placement: PlacementLike) -> Placement:
     )
 
 
+def as_moving(placement: PlacementLike, end_pose: PoseLike) -> Placement:
+    """The placement, with this end pose unless it is None. Errors as in as_placement."""
+    given = as_placement(placement)
+    return given if end_pose is None else replace(given, end_pose=end_pose)
+
+
 class Placements:
     """Many placements of few hulls, bodies, or inline shapes: each once, the poses as one array.
 
@@ -101,7 +111,9 @@ class Placements:
     indices: for each placement, the index of its ID or, from the number of IDs on, of its shape;
     None: each is placed once, or a single one as often as there are poses. shapes: inline shapes,
     the points of each as in Placement. radii: of each placement, or one for all, as in Placement;
-    None: 0. orthogonality_tolerance, quaternion_order: as in pack_poses.
+    None: 0. end_poses: of motions, for each placement, as in Placement.end_pose; one that is at rest
+    has its pose again. None: all are at rest. orthogonality_tolerance, quaternion_order: as in
+    pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses
@@ -119,6 +131,7 @@ class Placements:
         *,
         shapes: Sequence[PointsLike] = (),
         radii: npt.ArrayLike | None = None,
+        end_poses: PosesLike | None = None,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         quaternion_order: QuaternionOrder = "wxyz",
     ) -> None:
@@ -129,13 +142,15 @@ class Placements:
             as_shape(points, f"shapes[{index}]") for index, points in enumerate(shapes)
         ]
         count = len(self.ids) + len(self.shapes)
-        packed: PackedPoses | None = None
-        if poses is not None:
-            packed = pack_poses(
-                poses,
+
+        def pack(given: PosesLike) -> PackedPoses:
+            return pack_poses(
+                given,
                 orthogonality_tolerance=orthogonality_tolerance,
                 quaternion_order=quaternion_order,
             )
+
+        packed = None if poses is None else pack(poses)
         if indices is None:
             many = count == 1 and packed is not None
             chosen = (
@@ -153,6 +168,12 @@ class Placements:
         self.poses: PackedPoses = packed
         #: None if all are 0.
         self.radii: npt.NDArray[np.float64] | None = as_radii(radii, len(chosen))
+        self.end_poses: PackedPoses | None = None
+        if end_poses is not None:
+            ends = pack(end_poses)
+            if len(ends) != len(chosen):
+                raise ValueError(f"there are {len(ends)} end poses for {len(chosen)} placements")
+            self.end_poses = shorter_path(packed, ends)
 
     @classmethod
     def of(
@@ -183,12 +204,18 @@ class Placements:
             shapes[key] = placement.shape
             indices.append(len(places) + shape_places.setdefault(key, len(shape_places)))
         rows = [placement.pose for placement in single]
+        moves = any(placement.end_pose is not None for placement in single)
+        ends = [
+            placement.pose if placement.end_pose is None else placement.end_pose
+            for placement in single
+        ]
         return cls(
             list(places),
             rows,
             np.array(indices, np.uint32),
             shapes=list(shapes.values()),
             radii=[placement.radius for placement in single],
+            end_poses=ends if moves else None,
             orthogonality_tolerance=orthogonality_tolerance,
         )
 
@@ -197,11 +224,12 @@ class Placements:
 
     def __getitem__(self, index: int) -> Placement:
         pose = Pose.from_packed(self.poses[index])
+        end = None if self.end_poses is None else Pose.from_packed(self.end_poses[index])
         one = self.subject(index)
         radius = self.radius(index)
         if isinstance(one, str):
-            return Placement(one, pose, radius=radius)
-        return Placement(pose=pose, points=one, radius=radius)
+            return Placement(one, pose, radius=radius, end_pose=end)
+        return Placement(pose=pose, points=one, radius=radius, end_pose=end)
 
     def __repr__(self) -> str:
         shapes = f" and {len(self.shapes)} shapes" if self.shapes else ""
@@ -229,6 +257,8 @@ class Placements:
             message.message(_SHAPE_POINTS, point_block(np.concatenate(self.shapes)))
         if self.radii is not None:
             message.doubles(_RADII, self.radii)
+        if self.end_poses is not None:
+            message.doubles(_END_POSES, self.end_poses)
         return message
 
 

@@ -163,6 +163,21 @@ def pack_poses(
     return np.stack(rows)
 
 
+def shorter_path(starts: PackedPoses, ends: PackedPoses) -> PackedPoses:
+    """The end poses of motions, n x 7, each with the sign of its quaternion that makes the path
+    from the start shorter: with a scalar product of at least 0. Both signs are the same rotation."""
+
+    def scaled(poses: PackedPoses) -> PackedPoses:
+        rotations = poses[:, :4]
+        largest_is_one: PackedPoses = rotations / np.abs(rotations).max(axis=1, keepdims=True)
+        return largest_is_one
+
+    longer = (scaled(starts) * scaled(ends)).sum(axis=1) < 0
+    shorter = ends.copy()
+    shorter[longer, :4] *= -1
+    return shorter
+
+
 def _pack_array(
     array: npt.NDArray[np.float64], tolerance: float, order: QuaternionOrder
 ) -> PackedPoses:
