@@ -109,6 +109,11 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
         absl::StrCat("packedPlacements.radii holds ", packed.radii_size(), " numbers for ",
                      packed.hulls_size(), " placements; give one for each, or none"));
   }
+  if (packed.end_poses_size() > 0 && packed.end_poses_size() != packed.poses_size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packedPlacements.endPoses holds ", packed.end_poses_size(), " numbers for ",
+                     packed.hulls_size(), " placements; give seven for each, or none"));
+  }
   const int count = packed.hull_ids_size() + packed.shape_sizes_size();
   for (const uint32_t hull : packed.hulls()) {
     if (hull < static_cast<uint32_t>(count)) continue;

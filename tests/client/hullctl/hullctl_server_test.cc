@@ -24,6 +24,7 @@ namespace hullctl_server_test {
 using ::google::protobuf::Struct;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class HullctlQuestions : public HullctlOnServer {
  protected:
@@ -82,6 +83,72 @@ TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   ran = Ask({"verify", valid.path()});
   EXPECT_EQ(ran.code, 6);
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
+}
+
+TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
+  Put("cube", server::Cube());
+  const std::vector<std::string> meets = {"check", "cube",   "cube",  "--pose-b",
+                                          "3,0,0", "--to-b", "-1,0,0"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), meets.begin(), meets.end());
+    return more;
+  };
+  Ran ran = Ask(meets);
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("relation         OVERLAPPING\n"));
+  EXPECT_THAT(ran.out, HasSubstr("separated until  0.5\nfirst contact    0.5\n"));
+  EXPECT_THAT(Ask(with({"--verify"})).out, HasSubstr("verified         valid"));
+  EXPECT_EQ(Ask(with({"--output", "name"})).out, "OVERLAPPING\n");
+  EXPECT_THAT(AskJson(meets).out,
+              HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"contactTime\":0.5}"));
+  ran = Ask(with({"--separation"}));
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("wanted.separation excludes end_pose"));
+
+  ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
+  EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
+  EXPECT_THAT(ran.out, HasSubstr("separated until  1\n"));
+  EXPECT_THAT(ran.out, Not(HasSubstr("first contact")));
+}
+
+TEST_F(HullctlQuestions, MotionsTakeTheShorterPath) {
+  Put("cube", server::Cube());
+  const auto end_of = [this](const std::string& from, const std::string& to) {
+    const Ran ran = Ask({"check", "cube", "cube", "--pose-a", from, "--to-a", to, "--record", "-"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    v1::CheckCollisionRequest request;
+    EXPECT_TRUE(ParseMember(ran.out, "request", &request).ok());
+    const v1::Quaternion& q = request.a().end_pose().rotation();
+    return std::vector<double>{q.w(), q.x(), q.y(), q.z()};
+  };
+  using Numbers = std::vector<double>;
+  EXPECT_EQ(end_of("1,0,0,0,0,0,0", "-1,0,0,1,0,0,0"), (Numbers{1, 0, 0, -1}));
+  EXPECT_EQ(end_of("1,0,0,0,0,0,0", "1,0,0,-1,0,0,0"), (Numbers{1, 0, 0, -1}));
+  EXPECT_EQ(end_of("1e200,0,0,-1e200,0,0,0", "1e200,0,0,2e200,0,0,0"),
+            (Numbers{-1e200, 0, 0, -2e200}));
+  // A translation alone keeps the rotation.
+  EXPECT_EQ(end_of("3,0,0,4,0,0,0", "5,0,0"), (Numbers{3, 0, 0, 4}));
+}
+
+TEST_F(HullctlQuestions, RecordedMotionsAreVerified) {
+  Put("cube", server::Cube());
+  const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", "3,0.25,0.5", "--to-b",
+                            "1,0,0,1,-1,0,0", "--max-time-error", "0.001", "--record", "-"});
+  ASSERT_EQ(recorded.code, 0) << recorded.err;
+  const TempFile valid("motion.json", recorded.out);
+  EXPECT_EQ(Ask({"verify", valid.path()}).out, "OVERLAPPING: valid\n");
+  v1::CheckCollisionRequest request;
+  v1::CheckCollisionResponse response;
+  ASSERT_TRUE(ParseMember(recorded.out, "request", &request).ok());
+  ASSERT_TRUE(ParseMember(recorded.out, "response", &response).ok());
+  request.mutable_b()->mutable_end_pose()->mutable_translation()->set_x(-2);
+  const TempFile other("other.json", Recorded(request, response));
+  EXPECT_EQ(Ask({"verify", other.path()}).code, 5);
+  response.clear_first_contact();
+  const TempFile none("none.json", Recorded(request, response));
+  const Ran ran = Ask({"verify", none.path()});
+  EXPECT_EQ(ran.code, 5);
+  EXPECT_THAT(ran.err, HasSubstr("has no first contact"));
 }
 
 TEST_F(HullctlQuestions, VerifyRefusesOtherFiles) {

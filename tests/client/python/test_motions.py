@@ -1,0 +1,154 @@
+"""First contacts of motions."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hulld
+from conftest import CUBE
+
+AWAY = (3, 0, 0)
+
+
+@pytest.fixture
+def cube(client: hulld.Client, name: str) -> str:
+    client.append_points(f"{name}/cube", CUBE, create=True)
+    return f"{name}/cube"
+
+
+@pytest.mark.parametrize(
+    ("to", "relation", "time"),
+    [
+        ((-1, 0, 0), hulld.Relation.OVERLAPPING, 0.5),
+        ((1, 0, 0), hulld.Relation.TOUCHING, 1.0),
+        ((1.5, 0, 0), hulld.Relation.SEPARATED, None),
+    ],
+)
+def test_translations_meet_at_exact_times(
+    client: hulld.Client,
+    cube: str,
+    to: tuple[float, float, float],
+    relation: hulld.Relation,
+    time: float | None,
+) -> None:
+    answer = client.check_collision(cube, (cube, AWAY), to_b=to, certificate=True)
+    assert answer.relation is relation
+    assert answer.first_contact is not None
+    assert answer.first_contact.contact_time == time
+    assert answer.first_contact.separated_until == (1 if time is None else time)
+    verifier = hulld.Verifier(client)
+    verifier.check(cube, (cube, AWAY), answer, to_b=to)
+    with pytest.raises(hulld.VerificationError):
+        verifier.check(cube, (cube, AWAY), answer, to_b=(-3, 0, 0))
+    for other in {hulld.Relation.SEPARATED, hulld.Relation.OVERLAPPING} - {relation}:
+        if relation is hulld.Relation.TOUCHING and other is hulld.Relation.OVERLAPPING:
+            continue  # That a translation overlaps after it touches is no part of the proof.
+        with pytest.raises(hulld.VerificationError):
+            forged = dataclasses.replace(answer, relation=other)
+            verifier.check(cube, (cube, AWAY), forged, to_b=to)
+    assert client.check_collision(cube, (cube, AWAY)).first_contact is None
+
+
+def test_each_part_of_a_proof_is_checked(client: hulld.Client, cube: str) -> None:
+    a, b, to = cube, (cube, (3, 0.25, 0.5)), hulld.Pose((1, 0, 0.25, 1), (-1, 0, 0))
+    answer = client.check_collision(a, b, to_b=to, certificate=True)
+    contact = answer.first_contact
+    assert contact is not None and contact.contact_time is not None and contact.intervals
+    verifier = hulld.Verifier(client)
+    verifier.check(a, b, answer, to_b=to)
+
+    def expect(message: str, **changes: object) -> None:
+        forged = dataclasses.replace(contact, **changes)  # type: ignore[type-var, arg-type]
+        with pytest.raises(hulld.VerificationError, match=message):
+            verifier.check(a, b, dataclasses.replace(answer, first_contact=forged), to_b=to)
+
+    first, *rest = contact.intervals
+    assert first.offset is not None
+    expect("the bracket", contact_time=contact.separated_until / 2)
+    expect("the bracket", separated_until=contact.separated_until / 2)
+    expect("the bracket", contact_time=None)
+    expect("before separated_until", intervals=())
+    expect("stay", intervals=(dataclasses.replace(first, offset=first.offset + 9), *rest))
+    expect("stay", intervals=(dataclasses.replace(first, offset=first.offset - 9), *rest))
+    expect("no offset", intervals=(dataclasses.replace(first, offset=None), *rest))
+    expect("not finite", intervals=(dataclasses.replace(first, offset=np.inf), *rest))
+    expect("direction is zero", intervals=(dataclasses.replace(first, direction=(0, 0, 0)), *rest))
+    expect("no direction", intervals=(dataclasses.replace(first, direction=None), *rest))
+    expect("interval 0 ends", intervals=(dataclasses.replace(first, until=0.0), *rest))
+    with pytest.raises(hulld.VerificationError, match="has no first contact"):
+        verifier.check(a, b, dataclasses.replace(answer, first_contact=None), to_b=to)
+    with pytest.raises(hulld.VerificationError, match="no certificate of the contact"):
+        verifier.check(a, b, dataclasses.replace(answer, certificate=None), to_b=to)
+
+
+def test_batches_answer_as_single_calls(client: hulld.Client, cube: str) -> None:
+    rng = np.random.default_rng(31)
+    starts = np.hstack([rng.normal(size=(12, 4)), rng.uniform(-2, 2, size=(12, 3))])
+    ends = np.hstack([rng.normal(size=(12, 4)), rng.uniform(-2, 2, size=(12, 3))])
+    placements = hulld.Placements(cube, starts, end_poses=ends)
+    assert placements.end_poses is not None
+    assert ((placements.poses[:, :4] * placements.end_poses[:, :4]).sum(axis=1) >= 0).all()
+    found = client.check_collisions(placements, certificate=True)
+    verifier = hulld.Verifier(client)
+    for row, (a, b) in enumerate(found.pairs):
+        single = client.check_collision(placements[a], placements[b], certificate=True)
+        answer = found[row]
+        assert answer.relation is single.relation
+        assert answer.first_contact == single.first_contact
+        verifier.check_row(placements, found, row)
+        verifier.check(placements[a], placements[b], single)
+    assert found.answers.contact_times is not None
+    assert np.isnan(found.answers.contact_times).sum() == (
+        found.answers.relations == hulld.Relation.SEPARATED
+    ).sum()
+    assert found.answers.separated_until is not None
+    assert client.check_collisions([cube, cube]).answers.contact_times is None
+
+
+def test_rotations_take_the_shorter_path(client: hulld.Client, cube: str) -> None:
+    turned = hulld.Placement(cube, (1, 0, 0, 0, 0, 0, 0), end_pose=(-1, 0, 0, 0.5, 9, 0, 0))
+    packed = hulld.Placements.of([turned, cube])
+    assert packed.end_poses is not None
+    assert packed.end_poses[:, :4].tolist() == [[1, 0, 0, -0.5], [1, 0, 0, 0]]
+    assert packed[0].end_pose == hulld.Pose((1, 0, 0, -0.5), (9, 0, 0))
+    huge = hulld.Placement(cube, (1e200, 0, 0, 0, 0, 0, 0), end_pose=(-1e200, 0, 0, 0, 9, 0, 0))
+    assert hulld.Placements.of([huge]).end_poses[0, 0] == 1e200  # type: ignore[index]
+
+
+def test_options_bound_the_bracket(client: hulld.Client, cube: str) -> None:
+    a, b, to = cube, (cube, (3, 0.25, 0.5)), (1, 0, 0.25, 1, -1, 0, 0)
+    answer = client.check_collision(a, b, to_b=to, max_time_error=1e-3, certificate=True)
+    contact = answer.first_contact
+    assert contact is not None and contact.contact_time is not None
+    assert 0 <= contact.contact_time - contact.separated_until <= 1e-3
+    hulld.Verifier(client).check(a, b, answer, to_b=to, max_time_error=1e-3)
+    with pytest.raises(hulld.InvalidArgumentError, match="wanted.max_time_error"):
+        client.check_collision(a, b, to_b=to, max_time_error=2)
+    with pytest.raises(hulld.InvalidArgumentError, match="wanted.witness excludes end_pose"):
+        client.check_collision(a, b, to_b=to, witness=True)
+
+
+def test_other_calls_refuse_motions(client: hulld.Client, cube: str) -> None:
+    moving = [cube, hulld.Placement(cube, AWAY, end_pose=(1, 0, 0))]
+    with pytest.raises(hulld.InvalidArgumentError, match="end_poses is set, but FindCollisions"):
+        client.find_collisions(moving)
+    with pytest.raises(hulld.InvalidArgumentError, match="end_poses is set, but a stream"):
+        with client.stream_collisions(moving):
+            pass
+    with pytest.raises(hulld.InvalidArgumentError, match="end_poses is set, but a watch"):
+        with client.watch_collisions(moving) as watch:
+            next(iter(watch))
+    with pytest.raises(ValueError, match="1 end poses for 2 placements"):
+        hulld.Placements(cube, [AWAY, AWAY], end_poses=[AWAY])
+
+
+def test_inline_shapes_move(client: hulld.Client) -> None:
+    points = np.vstack([CUBE[::-1], [[0.5, 0.5, 0.5]]])
+    answer = client.check_collision(points, (points, AWAY), to_b=(-1, 0, 0), certificate=True)
+    assert answer.first_contact is not None and answer.first_contact.contact_time == 0.5
+    hulld.Verifier(client).check(points, (points, AWAY), answer, to_b=(-1, 0, 0))
+    assert "contact_time=0.5" in repr(answer)
+    assert "first contact" in answer._repr_html_()

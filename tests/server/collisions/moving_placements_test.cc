@@ -1,0 +1,402 @@
+// Placements with an end pose.
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/client.h"
+#include "client/verify/answer_check.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace moving_placements_test {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr v1::Relation kSeparated = v1::RELATION_SEPARATED;
+constexpr v1::Relation kTouching = v1::RELATION_TOUCHING;
+constexpr v1::Relation kOverlapping = v1::RELATION_OVERLAPPING;
+
+void Turn(double w, double x, double y, double z, v1::Pose* pose) {
+  pose->mutable_rotation()->set_w(w);
+  pose->mutable_rotation()->set_x(x);
+  pose->mutable_rotation()->set_y(y);
+  pose->mutable_rotation()->set_z(z);
+}
+
+v1::Placement MovingTo(v1::Placement placement, double x, double y = 0, double z = 0) {
+  v1::Vector3* const translation = placement.mutable_end_pose()->mutable_translation();
+  translation->set_x(x);
+  translation->set_y(y);
+  translation->set_z(z);
+  return placement;
+}
+
+v1::Placement Shape(const std::vector<double>& xyz) {
+  v1::Placement placement;
+  placement.mutable_points()->mutable_xyz()->Assign(xyz.begin(), xyz.end());
+  return placement;
+}
+
+v1::CheckCollisionRequest Pair(const v1::Placement& a, const v1::Placement& b) {
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = a;
+  *request.mutable_b() = b;
+  return request;
+}
+
+v1::BatchCheckCollisionsRequest Batch(const std::vector<v1::Placement>& placements,
+                                      const std::vector<uint32_t>& pairs) {
+  v1::BatchCheckCollisionsRequest request;
+  for (const v1::Placement& placement : placements) *request.add_placements() = placement;
+  request.mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  return request;
+}
+
+// A rod that turns by 90 degrees about z, and a box that it meets at half time, in (3, 4, 0).
+v1::Placement TurningRod() {
+  v1::Placement rod = Shape({0, 0, 0, 5, 0, 0});
+  Turn(1, 0, 0, 1, rod.mutable_end_pose());
+  return rod;
+}
+v1::Placement Ceiling() { return Shape({0, 4, -1, 6, 4, -1, 0, 4, 1, 6, 4, 1, 3, 5, 0}); }
+
+class MovingPlacements : public ServerTest {
+ protected:
+  Client client() const {
+    ClientOptions options;
+    options.retry.max_attempts = 1;
+    return Client(options, channel_);
+  }
+
+  // Expects an answer whose certificate the client verifies; returns it.
+  v1::CheckCollisionResponse Proven(v1::CheckCollisionRequest request) {
+    request.mutable_wanted()->set_certificate(true);
+    const auto verified = CheckCollisionVerified(client(), request);
+    if (!verified.ok()) {
+      ADD_FAILURE() << verified.status();
+      return {};
+    }
+    EXPECT_EQ(verified->verification.verdict, Verdict::kValid)
+        << verified->verification.reason << "\n"
+        << verified->response.ShortDebugString();
+    return verified->response;
+  }
+
+  // Expects that the pair meets at this time, and that this is proven.
+  void ExpectMeets(const v1::Placement& a, const v1::Placement& b, v1::Relation relation,
+                   double time) {
+    const v1::CheckCollisionResponse response = Check(Pair(a, b));
+    EXPECT_EQ(response.relation(), relation);
+    EXPECT_EQ(response.first_contact().contact_time(), time);
+    EXPECT_FALSE(response.has_certificate());
+    EXPECT_TRUE(response.first_contact().intervals().empty());
+    EXPECT_EQ(Proven(Pair(a, b)).first_contact().contact_time(), time);
+  }
+
+  void ExpectRefused(const v1::CheckCollisionRequest& request, const std::string& message) {
+    const grpc::Status status = CheckError(request);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(status.error_message(), StartsWith(message));
+  }
+
+  absl::StatusOr<v1::BatchCheckCollisionsResponse> Ask(
+      const v1::BatchCheckCollisionsRequest& request) {
+    v1::BatchCheckCollisionsResponse whole;
+    const absl::Status status =
+        client().BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
+          whole.MergeFrom(part);
+          return absl::OkStatus();
+        });
+    if (!status.ok()) return status;
+    return whole;
+  }
+};
+
+TEST_F(MovingPlacements, TranslationsMeetAtExactTimes) {
+  Put("cube", Cube());
+  const v1::Placement cube = PlacementOf("cube");
+  ExpectMeets(cube, MovingTo(PlacementOf("cube", 3), -1), kOverlapping, 0.5);
+  ExpectMeets(cube, MovingTo(PlacementOf("cube", 3), 1), kTouching, 1);
+  ExpectMeets(cube, MovingTo(PlacementOf("cube", -3, 1), 1, 1), kTouching, 0.5);
+  ExpectMeets(cube, MovingTo(PlacementOf("cube", 0.5), 9), kOverlapping, 0);
+  ExpectMeets(MovingTo(PlacementOf("cube"), 2), MovingTo(PlacementOf("cube", 4), 0), kOverlapping,
+              0.5);
+  // A third of the time is no double.
+  ExpectMeets(cube, MovingTo(PlacementOf("cube", 2), -1), kOverlapping, std::nextafter(1.0 / 3, 1));
+}
+
+TEST_F(MovingPlacements, SeparatedMeansAtAllTimes) {
+  Put("cube", Cube());
+  const v1::Placement cube = PlacementOf("cube");
+  const double beyond = std::nextafter(1.0, 2);
+  for (const v1::Placement& b : {MovingTo(PlacementOf("cube", 3), beyond),
+                                 MovingTo(PlacementOf("cube", -3, beyond), 3, beyond)}) {
+    const v1::CheckCollisionResponse response = Proven(Pair(cube, b));
+    EXPECT_EQ(response.relation(), kSeparated);
+    EXPECT_EQ(response.first_contact().separated_until(), 1);
+    EXPECT_FALSE(response.first_contact().has_contact_time());
+    EXPECT_FALSE(response.first_contact().intervals().empty());
+  }
+}
+
+TEST_F(MovingPlacements, RotationsMeetWithinTheRequestedBracket) {
+  for (const double width : {0x1p-10, 0x1p-30, 0x1p-45}) {
+    v1::CheckCollisionRequest request = Pair(Ceiling(), TurningRod());
+    request.mutable_wanted()->set_max_time_error(width);
+    // Its tip is at y = 4 at half time. Deeper, so that a contact can be proven.
+    *request.mutable_a() = Shape({0, 3.5, -1, 6, 3.5, -1, 0, 3.5, 1, 6, 3.5, 1, 3, 5, 0});
+    const v1::CheckCollisionResponse response = Proven(request);
+    EXPECT_EQ(response.relation(), kOverlapping);
+    const v1::FirstContact& contact = response.first_contact();
+    EXPECT_LE(contact.contact_time() - contact.separated_until(), width);
+    // 10 t / (1 + t^2) = 3.5
+    const double exact = (10 - std::sqrt(51)) / 7;
+    EXPECT_LE(contact.separated_until(), exact + 1e-15);
+    EXPECT_GE(contact.contact_time(), exact - 1e-15);
+  }
+  v1::CheckCollisionRequest apart = Pair(Shape({0, 5.5, 0, 6, 5.5, 0}), TurningRod());
+  EXPECT_EQ(Proven(apart).relation(), kSeparated);
+}
+
+TEST_F(MovingPlacements, RandomMotionsAreProven) {
+  Put("cube", Cube());
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> number(-2, 2);
+  int counts[v1::Relation_ARRAYSIZE] = {};
+  for (int i = 0; i < 40; ++i) {
+    v1::Placement b = MovingTo(PlacementOf("cube", number(random), number(random), number(random)),
+                               number(random), number(random), number(random));
+    Turn(2, number(random), number(random), number(random), b.mutable_pose());
+    Turn(2, number(random), number(random), number(random), b.mutable_end_pose());
+    v1::Placement a = PlacementOf("cube", 2);
+    if (i % 2 == 0) Turn(2, number(random), 0, number(random), a.mutable_end_pose());
+    ++counts[Proven(Pair(a, b)).relation()];
+  }
+  EXPECT_GT(counts[kSeparated], 3);
+  EXPECT_GT(counts[kOverlapping], 3);
+}
+
+TEST_F(MovingPlacements, ABatchAnswersAsSingleCalls) {
+  Put("cube", Cube());
+  std::vector<v1::Placement> placements = {PlacementOf("cube"), PlacementOf("nothing"),
+                                           TurningRod(), Ceiling()};
+  for (int i = 0; i < 20; ++i) {
+    placements.push_back(MovingTo(PlacementOf("cube", 3, i / 8.0), i % 5 - 1.5, i % 3));
+  }
+  std::vector<uint32_t> pairs = {0, 1, 2, 3};
+  for (uint32_t i = 4; i < placements.size(); ++i) pairs.insert(pairs.end(), {0, i});
+  v1::BatchCheckCollisionsRequest request = Batch(placements, pairs);
+  request.mutable_wanted()->set_certificate(true);
+  const auto batch = Ask(request);
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  const v1::AnswerColumns& columns = batch->columns();
+  const int rows = static_cast<int>(pairs.size()) / 2;
+  ASSERT_EQ(columns.relations_size(), rows);
+  ASSERT_EQ(columns.separated_until_size(), rows);
+  ASSERT_EQ(columns.contact_times_size(), rows);
+  ASSERT_EQ(columns.certificates_size(), rows);
+  EXPECT_EQ(columns.relations(0), v1::RELATION_UNSPECIFIED);
+  EXPECT_TRUE(std::isnan(columns.separated_until(0)));
+  EXPECT_TRUE(std::isnan(columns.contact_times(0)));
+  int proof = 0;
+  for (int i = 1; i < rows; ++i) {
+    const v1::CheckCollisionResponse single =
+        Proven(Pair(placements[pairs[2 * i]], placements[pairs[2 * i + 1]]));
+    const v1::FirstContact& contact = single.first_contact();
+    EXPECT_EQ(columns.relations(i), single.relation());
+    EXPECT_EQ(columns.separated_until(i), contact.separated_until());
+    EXPECT_EQ(std::isnan(columns.contact_times(i)), !contact.has_contact_time());
+    if (contact.has_contact_time()) EXPECT_EQ(columns.contact_times(i), contact.contact_time());
+    EXPECT_EQ(columns.certificates(i).ShortDebugString(), single.certificate().ShortDebugString());
+    if (contact.intervals().empty()) continue;
+    ASSERT_LT(proof, columns.motion_proofs_size());
+    EXPECT_EQ(columns.motion_proofs(proof).row(), static_cast<uint64_t>(i));
+    EXPECT_EQ(columns.motion_proofs(proof).intervals_size(), contact.intervals_size());
+    ++proof;
+  }
+  EXPECT_EQ(proof, columns.motion_proofs_size());
+}
+
+TEST_F(MovingPlacements, PackedMotionsAnswerAsListed) {
+  Put("cube", Cube());
+  const std::vector<v1::Placement> placements = {PlacementOf("cube"),
+                                                 MovingTo(PlacementOf("cube", 3), -1)};
+  v1::BatchCheckCollisionsRequest packed = Batch({}, {0, 1});
+  v1::PackedPlacements& list = *packed.mutable_packed_placements();
+  list.add_hull_ids("cube");
+  for (const double x : {0, 3}) {
+    list.add_hulls(0);
+    for (const double number : {1.0, 0.0, 0.0, 0.0, x, 0.0, 0.0}) list.add_poses(number);
+  }
+  for (const double x : {0, -1}) {
+    for (const double number : {1.0, 0.0, 0.0, 0.0, x, 0.0, 0.0}) list.add_end_poses(number);
+  }
+  const auto listed = Ask(Batch(placements, {0, 1}));
+  const auto answer = Ask(packed);
+  ASSERT_TRUE(listed.ok() && answer.ok()) << listed.status() << answer.status();
+  EXPECT_THAT(answer->columns().contact_times(), ElementsAre(0.5));
+  EXPECT_EQ(answer->columns().ShortDebugString(), listed->columns().ShortDebugString());
+
+  list.mutable_end_poses()->RemoveLast();
+  EXPECT_THAT(Ask(packed).status().message(),
+              HasSubstr("packed_placements.end_poses holds 13 numbers for 2 placements"));
+}
+
+TEST_F(MovingPlacements, AnswersAtRestHaveNoTimes) {
+  Put("cube", Cube());
+  EXPECT_FALSE(Check(Pair(PlacementOf("cube"), PlacementOf("cube"))).has_first_contact());
+  const auto batch = Ask(Batch({PlacementOf("cube"), PlacementOf("cube")}, {0, 1}));
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  EXPECT_TRUE(batch->columns().separated_until().empty());
+  EXPECT_TRUE(batch->columns().contact_times().empty());
+}
+
+TEST_F(MovingPlacements, MalformedEndPosesAreRefusedByName) {
+  Put("cube", Cube());
+  const v1::Placement cube = PlacementOf("cube");
+  const auto expect = [&](const v1::Placement& bad, const std::string& message) {
+    ExpectRefused(Pair(bad, cube), absl::StrCat("a.end_pose.", message));
+    ExpectRefused(Pair(cube, bad), absl::StrCat("b.end_pose.", message));
+    const auto batch = Ask(Batch({cube, bad}, {0, 1}));
+    ASSERT_TRUE(batch.ok()) << batch.status();
+    ASSERT_EQ(batch->placement_problems_size(), 1);
+    EXPECT_EQ(batch->placement_problems(0).placement(), 1u);
+    EXPECT_EQ(batch->placement_problems(0).code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(batch->placement_problems(0).message(),
+                StartsWith(absl::StrCat("placements[1].end_pose.", message)));
+  };
+  expect(MovingTo(cube, kNaN), "translation.x is NaN");
+  expect(MovingTo(cube, 0, HUGE_VAL), "translation.y is infinite");
+  v1::Placement bad = MovingTo(cube, 1);
+  Turn(0, 0, 0, 0, bad.mutable_end_pose());
+  expect(bad, "rotation is zero");
+  Turn(1, kNaN, 0, 0, bad.mutable_end_pose());
+  expect(bad, "rotation.x is NaN");
+  // The rotation vanishes at a third of the time.
+  Turn(-2, 0, 0, 0, bad.mutable_end_pose());
+  expect(bad, "rotation is opposite");
+  Turn(-2, 0, 0, 1e-300, bad.mutable_end_pose());
+  EXPECT_TRUE(Check(Pair(bad, PlacementOf("cube", 9))).has_first_contact());
+}
+
+TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
+  Put("cube", Cube());
+  const v1::CheckCollisionRequest moving =
+      Pair(PlacementOf("cube"), MovingTo(PlacementOf("cube", 3), 1));
+  const std::vector<std::pair<std::string, std::function<void(v1::CheckCollisionRequest*)>>>
+      excluded = {
+          {"METHOD_TEXTBOOK_SAT", [](auto* r) { r->set_method(v1::METHOD_TEXTBOOK_SAT); }},
+          {"tolerance", [](auto* r) { r->set_tolerance(0.5); }},
+          {"wanted.axis", [](auto* r) { r->mutable_wanted()->set_axis(true); }},
+          {"wanted.analysis", [](auto* r) { r->mutable_wanted()->set_analysis(true); }},
+          {"wanted.separation", [](auto* r) { r->mutable_wanted()->set_separation(true); }},
+          {"wanted.witness", [](auto* r) { r->mutable_wanted()->set_witness(true); }},
+          {"wanted.normal", [](auto* r) { r->mutable_wanted()->set_normal(true); }},
+          {"wanted.clearance", [](auto* r) { r->mutable_wanted()->set_clearance(0); }},
+      };
+  for (const auto& [name, set] : excluded) {
+    v1::CheckCollisionRequest request = moving;
+    set(&request);
+    ExpectRefused(request, absl::StrCat(name, " excludes end_pose"));
+    v1::BatchCheckCollisionsRequest batch = Batch({request.a(), request.b()}, {0, 1});
+    batch.set_method(request.method());
+    batch.set_tolerance(request.tolerance());
+    *batch.mutable_wanted() = request.wanted();
+    EXPECT_THAT(Ask(batch).status().message(), StartsWith(absl::StrCat(name, " excludes")));
+  }
+  for (const double bad : {0.0, -1.0, 1.5, kNaN}) {
+    v1::CheckCollisionRequest request = moving;
+    request.mutable_wanted()->set_max_time_error(bad);
+    ExpectRefused(request, "wanted.max_time_error is ");
+  }
+  for (const double bad : {-1.0, kNaN}) {
+    v1::CheckCollisionRequest request = moving;
+    request.mutable_wanted()->set_resolution(bad);
+    ExpectRefused(request, "wanted.resolution is ");
+  }
+}
+
+TEST_F(MovingPlacements, BodiesDoNotMoveYet) {
+  Put("cube", Cube());
+  v1::PutBodyRequest body;
+  body.set_body_id("body");
+  *body.add_pieces() = PlacementOf("cube");
+  ASSERT_TRUE(client().PutBody(body).ok());
+  ExpectRefused(Pair(MovingTo(PlacementOf("body"), 1), PlacementOf("cube")), "the pair has");
+  ExpectRefused(Pair(PlacementOf("body"), MovingTo(PlacementOf("cube"), 1)), "the pair has");
+  const auto batch =
+      Ask(Batch({PlacementOf("body"), MovingTo(PlacementOf("cube", 3), -1), PlacementOf("cube")},
+                {0, 1, 1, 2}));
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  EXPECT_THAT(batch->columns().relations(), ElementsAre(v1::RELATION_UNSPECIFIED, kOverlapping));
+  EXPECT_THAT(batch->columns().pieces(), ElementsAre(-1, -1, -1, -1));
+  ASSERT_EQ(batch->columns().pair_problems_size(), 1);
+  EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith("the pair has"));
+
+  *body.add_pieces() = MovingTo(PlacementOf("cube"), 1);
+  EXPECT_THAT(client().PutBody(body).status().message(),
+              StartsWith("pieces[1].end_pose is set; a piece is at rest"));
+}
+
+TEST_F(MovingPlacements, StreamsWatchesAndScenesRefuseThem) {
+  Put("cube", Cube());
+  v1::CollisionStreamOpen listed;
+  *listed.add_placements() = PlacementOf("cube");
+  *listed.add_placements() = MovingTo(PlacementOf("cube"), 1);
+  v1::CollisionStreamOpen packed;
+  v1::PackedPlacements& list = *packed.mutable_packed_placements();
+  list.add_hull_ids("cube");
+  list.add_hulls(0);
+  for (const double number : {1, 0, 0, 0, 5, 0, 0}) {
+    list.add_poses(number);
+    list.add_end_poses(number);
+  }
+  for (const auto& [open, field] :
+       {std::pair(listed, "placements[1].end_pose"), {packed, "packed_placements.end_poses"}}) {
+    const std::string expected = absl::StrCat(field, " is set, but ");
+    const auto stream = client().OpenCollisionStream()->Open(open);
+    EXPECT_EQ(stream.status().message(),
+              absl::StrCat("open: ", expected,
+                           "a stream takes no motions; use CheckCollision or "
+                           "BatchCheckCollisions"));
+    v1::FindCollisionsRequest scene;
+    *scene.mutable_placements() = open.placements();
+    *scene.mutable_packed_placements() = open.packed_placements();
+    const absl::Status found = client().FindCollisions(
+        scene, [](const v1::FindCollisionsResponse&) { return absl::OkStatus(); });
+    EXPECT_EQ(found.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(found.message(), StartsWith(expected + "FindCollisions takes no motions"));
+    grpc::ClientContext context;
+    const auto watch = collisions_->WatchCollisions(&context);
+    v1::WatchCollisionsRequest first;
+    *first.mutable_open()->mutable_placements() = open.placements();
+    *first.mutable_open()->mutable_packed_placements() = open.packed_placements();
+    watch->Write(first);
+    const grpc::Status watched = watch->Finish();
+    EXPECT_EQ(watched.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_THAT(watched.error_message(), HasSubstr(expected + "a watch takes no motions"));
+  }
+}
+
+TEST_F(MovingPlacements, EmptyHullsNeverMeet) {
+  Create("empty");
+  const v1::CheckCollisionResponse response =
+      Proven(Pair(PlacementOf("empty"), MovingTo(PlacementOf("empty"), 1)));
+  EXPECT_EQ(response.relation(), kSeparated);
+  EXPECT_EQ(response.first_contact().separated_until(), 1);
+}
+
+}  // namespace moving_placements_test
+}  // namespace hulld::server
