@@ -21,6 +21,13 @@ void AddShape(const v1::PointBlock& points, v1::PackedPlacements* packed) {
   packed->add_shape_sizes(static_cast<uint32_t>(points.xyz_size() + points.xyz_float_size()) / 3);
 }
 
+void AddPose(const v1::Pose& pose, google::protobuf::RepeatedField<double>* poses) {
+  const v1::Quaternion& q = pose.rotation();
+  const v1::Vector3& t = pose.translation();
+  poses->Add(pose.has_rotation() ? q.w() : 1);
+  for (const double number : {q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) poses->Add(number);
+}
+
 }  // namespace
 
 v1::PackedPlacements PackPlacements(
@@ -33,6 +40,8 @@ v1::PackedPlacements PackPlacements(
   absl::flat_hash_map<std::string, uint32_t> shape_of;
   // Placements with an inline shape, and its index.
   std::vector<std::pair<int, uint32_t>> shaped;
+  const bool moves = std::any_of(placements.begin(), placements.end(),
+                                 [](const v1::Placement& one) { return one.has_end_pose(); });
   for (const v1::Placement& placement : placements) {
     if (placement.has_points()) {
       const auto [known, is_new] = shape_of.emplace(
@@ -46,11 +55,11 @@ v1::PackedPlacements PackPlacements(
       if (is_new) packed.add_hull_ids(placement.hull_id());
       packed.add_hulls(known->second);
     }
-    const v1::Quaternion& q = placement.pose().rotation();
-    const v1::Vector3& t = placement.pose().translation();
-    packed.add_poses(placement.pose().has_rotation() ? q.w() : 1);
-    for (const double number : {q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) packed.add_poses(number);
+    AddPose(placement.pose(), packed.mutable_poses());
     packed.add_radii(placement.radius());
+    if (!moves) continue;
+    AddPose(placement.has_end_pose() ? placement.end_pose() : placement.pose(),
+            packed.mutable_end_poses());
   }
   const auto is_zero = [](double radius) { return radius == 0; };
   if (std::all_of(packed.radii().begin(), packed.radii().end(), is_zero)) packed.clear_radii();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/packed_placements.h"
 #include "client/verify/answer_check.h"
 #include "tests/server/harness/test_server.h"
 
@@ -235,14 +236,7 @@ TEST_F(MovingPlacements, PackedMotionsAnswerAsListed) {
                                                  MovingTo(PlacementOf("cube", 3), -1)};
   v1::BatchCheckCollisionsRequest packed = Batch({}, {0, 1});
   v1::PackedPlacements& list = *packed.mutable_packed_placements();
-  list.add_hull_ids("cube");
-  for (const double x : {0, 3}) {
-    list.add_hulls(0);
-    for (const double number : {1.0, 0.0, 0.0, 0.0, x, 0.0, 0.0}) list.add_poses(number);
-  }
-  for (const double x : {0, -1}) {
-    for (const double number : {1.0, 0.0, 0.0, 0.0, x, 0.0, 0.0}) list.add_end_poses(number);
-  }
+  list = PackPlacements(Batch(placements, {}).placements());
   const auto listed = Ask(Batch(placements, {0, 1}));
   const auto answer = Ask(packed);
   ASSERT_TRUE(listed.ok() && answer.ok()) << listed.status() << answer.status();
