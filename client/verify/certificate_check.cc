@@ -118,14 +118,6 @@ BigInteger RadiiOf(const ExactHull& a, const ExactHull& b) {
   return (a.radius + b.radius) * a.scale * b.scale;
 }
 
-// Returns the sign of min n.B - max n.A - r |n|, r the sum of the radii. Requires: r > 0.
-int RoundedGapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
-  const BigInteger gap = b.Extent(n).first * a.scale - a.Extent(n).second * b.scale;
-  if (gap < 0) return -1;
-  const BigInteger r = RadiiOf(a, b);
-  return BigInteger(gap * gap - r * r * Dot(n, n)).sign();
-}
-
 // CheckExactly for hulls with radii, not both 0.
 absl::Status CheckRounded(v1::Relation relation, const v1::Certificate& certificate,
                           const ExactHull& a, const ExactHull& b) {
@@ -134,7 +126,7 @@ absl::Status CheckRounded(v1::Relation relation, const v1::Certificate& certific
   if (is_separated || is_touching) {
     BigVector n;
     if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
-    if (RoundedGapSign(a, b, n) < (is_separated ? 1 : 0)) {
+    if (GapSign(a, b, n) < (is_separated ? 1 : 0)) {
       return ProofFails(
           "the gap between the hulls along the direction is too small for their radii");
     }
@@ -180,7 +172,10 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n, int
 }
 
 int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n) {
-  return (b.Extent(n).first * a.scale - a.Extent(n).second * b.scale).sign();
+  const BigInteger gap = b.Extent(n).first * a.scale - a.Extent(n).second * b.scale;
+  const BigInteger r = RadiiOf(a, b);
+  if (r == 0 || gap < 0) return gap.sign();
+  return BigInteger(gap * gap - r * r * Dot(n, n)).sign();
 }
 
 absl::Status ProofFails(const std::string& reason) { return absl::FailedPreconditionError(reason); }

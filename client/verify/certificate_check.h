@@ -41,7 +41,7 @@ inline constexpr int kMostTouchingPairs = 4;
 absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& certificate, int most,
                                                      const ExactHull& a, const ExactHull& b);
 
-// Returns the sign of min n.B - max n.A.
+// Returns the sign of min n.B - max n.A - r |n|, r the sum of the radii.
 int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n);
 
 // Returns FAILED_PRECONDITION with the reason for the failed proof.

@@ -135,9 +135,13 @@ ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const Common
   shift = inner.scale * Product(outer.rows, t_P) + scale * t;
 }
 
-ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const BigRotation& rotation,
-                     const BigVector& translation, const BigInteger& divisor)
-    : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
+ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths,
+                     const BigRotation& rotation, const BigVector& translation,
+                     const BigInteger& divisor)
+    : xyz(hull.xyz),
+      in_any_order(hull.in_any_order),
+      vertices(std::move(given)),
+      radius(lengths.ToInteger(hull.radii[0])) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   for (int i = 0; i < 3; ++i) rows[i] = divisor * rotation.rows[i];
   scale = divisor * rotation.scale;

@@ -70,9 +70,9 @@ struct ExactHull {
   // the conversion.)
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
 
-  // p_W = rotation(p) + translation / divisor. Requires divisor > 0.
-  ExactHull(const PlacedVertices& hull, BigVertices vertices, const BigRotation& rotation,
-            const BigVector& translation, const BigInteger& divisor);
+  // p_W = rotation(p) + translation / divisor. Requires divisor > 0, and no piece of a body.
+  ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths,
+            const BigRotation& rotation, const BigVector& translation, const BigInteger& divisor);
 
   // Returns scale p_W of vertex i.
   BigVector World(size_t i) const;

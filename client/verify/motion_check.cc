@@ -52,9 +52,13 @@ std::array<BigInteger, count> Between(const std::array<BigInteger, count>& start
 // because their relative length matters.
 class ExactMotion {
  public:
-  // Requires CheckPlacement of both ends, and an exponent that covers the lengths of both.
+  // Requires CheckPlacement of both ends, and an exponent that covers the lengths of both and
+  // outlives this object.
   ExactMotion(const MovingVertices& moving, const CommonExponent& lengths)
-      : given_(moving.start), vertices_(ToIntegers(moving.start.xyz, lengths)) {
+      : given_(moving.start),
+        lengths_(lengths),
+        vertices_(ToIntegers(moving.start.xyz, lengths)),
+        radius_(lengths.ToInteger(moving.start.radii[0])) {
     CommonExponent quaternions;
     IncludeRotation(moving.start.pose, &quaternions);
     IncludeRotation(moving.end, &quaternions);
@@ -63,6 +67,7 @@ class ExactMotion {
   }
 
   const std::vector<BigVector>& vertices() const { return *vertices_; }
+  const BigInteger& radius() const { return radius_; }
   // Rotation and translation at a moment, times its divisor.
   BigQuaternion RotationAt(const Moment& moment) const { return Between(q_[0], q_[1], moment); }
   BigVector TranslationAt(const Moment& moment) const { return Between(x_[0], x_[1], moment); }
@@ -70,7 +75,8 @@ class ExactMotion {
   ExactHull HullAt(double time) const {
     const Moment moment = MomentsOf<1>({time})[0];
     const BigQuaternion q = RotationAt(moment);
-    return ExactHull(given_, vertices_, RotationForm(q, q), TranslationAt(moment), moment.divisor);
+    return ExactHull(given_, vertices_, lengths_, RotationForm(q, q), TranslationAt(moment),
+                     moment.divisor);
   }
 
   // True if the rotation is the same at all times: one quaternion is a positive multiple of the
@@ -88,7 +94,9 @@ class ExactMotion {
 
  private:
   PlacedVertices given_;
+  const CommonExponent& lengths_;
   BigVertices vertices_;
+  BigInteger radius_;
   std::array<BigQuaternion, 2> q_;
   std::array<BigVector, 2> x_;
 };
@@ -114,7 +122,7 @@ Cubic<BigInteger> Product(const Quadratic<BigInteger>& of, const std::array<BigI
           2 * of[1] * line[1] + of[2] * line[0], 3 * of[2] * line[1]};
 }
 
-// The half space n.p <= offset, all lengths at one power of two.
+// The half space n.p <= offset, with n not zero; all lengths at one power of two.
 struct HalfSpace {
   BigVector n;
   BigInteger offset;
@@ -128,10 +136,25 @@ BigInteger Greatest(const BigVector& n, const std::vector<BigVector>& points) {
   return greatest;
 }
 
-// For each vertex p, |q|^2 (n.p - offset) is a cubic polynomial of time. Returns the greatest of
-// each Bernstein coefficient over all vertices; all are times one positive number.
-Cubic<BigInteger> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space,
-                                  const std::array<Moment, 2>& interval) {
+// The sum a + b sqrt(c).
+struct Surd {
+  BigInteger a;
+  BigInteger b;
+};
+
+// Requires c > 0.
+int SignOf(const Surd& number, const BigInteger& c) {
+  const int sign = number.a.sign();
+  if (number.b == 0 || sign == number.b.sign()) return sign;
+  if (sign == 0) return number.b.sign();
+  return sign * BigInteger(number.a * number.a - number.b * number.b * c).sign();
+}
+
+// For each vertex p, |q|^2 (n.p + radius |n| - offset) is a cubic polynomial of time. Returns the
+// greatest of each Bernstein coefficient over all vertices, as sums a + b |n|; all are times one
+// positive number.
+Cubic<Surd> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space,
+                            const std::array<Moment, 2>& interval) {
   const BigQuaternion q[2] = {hull.RotationAt(interval[0]), hull.RotationAt(interval[1])};
   const BigRotation forms[3] = {RotationForm(q[0], q[0]), RotationForm(q[0], q[1]),
                                 RotationForm(q[1], q[1])};
@@ -146,9 +169,14 @@ Cubic<BigInteger> GreatestHeights(const ExactMotion& hull, const HalfSpace& half
   for (int i = 0; i < 2; ++i) {
     shift[i] = Dot(half_space.n, hull.TranslationAt(interval[i])) - divisor * half_space.offset;
   }
-  Cubic<BigInteger> heights = Product(scale, shift);
+  const Cubic<BigInteger> shifts = Product(scale, shift);
+  const Cubic<BigInteger> scales = Elevated(scale);
   const Cubic<BigVector> directions = Elevated(turned);
-  for (int i = 0; i < 4; ++i) heights[i] += Greatest(directions[i], hull.vertices());
+  Cubic<Surd> heights;
+  for (int i = 0; i < 4; ++i) {
+    heights[i] = {shifts[i] + Greatest(directions[i], hull.vertices()),
+                  divisor * hull.radius() * scales[i]};
+  }
   return heights;
 }
 
@@ -157,9 +185,12 @@ Cubic<BigInteger> GreatestHeights(const ExactMotion& hull, const HalfSpace& half
 // coefficient is positive and the outer ones, its values at both ends, are negative.
 bool IsBelow(const ExactMotion& hull, const HalfSpace& half_space,
              const std::array<Moment, 2>& interval, bool may_end) {
-  const Cubic<BigInteger> heights = GreatestHeights(hull, half_space, interval);
-  return heights[0] < 0 && heights[1] <= 0 && heights[2] <= 0 &&
-         (heights[3] < 0 || (may_end && heights[3] == 0));
+  const BigInteger n_squared = Dot(half_space.n, half_space.n);
+  std::array<int, 4> signs;
+  std::ranges::transform(GreatestHeights(hull, half_space, interval), signs.begin(),
+                         [&](const Surd& height) { return SignOf(height, n_squared); });
+  return signs[0] < 0 && signs[1] <= 0 && signs[2] <= 0 &&
+         (signs[3] < 0 || (may_end && signs[3] == 0));
 }
 
 v1::Certificate DirectionOf(const v1::SeparatedInterval& interval) {
@@ -279,6 +310,9 @@ absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& c
         DifferencesOf(certificate, kMostTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time));
     if (!differences.ok()) return differences.status();
     span.insert(span.end(), differences->begin(), differences->end());
+  }
+  if (pair.a.radius() + pair.b.radius() > 0) {
+    return ProofFails("without a direction, the hulls would have to overlap");
   }
   if (HoldsOriginInside(span) || HoldsOriginOnBoundary(span)) return absl::OkStatus();
   return ProofFails("the vertex pairs show no common point up to contact_time");

@@ -353,6 +353,7 @@ class _MovingPiece:
     def __init__(self, placement: Placement, vertices: npt.NDArray[np.float64]) -> None:
         self._vertices = vertices
         self._in_any_order = placement.shape is not None
+        self.radius = Fraction(placement.radius)
         end = placement.pose if placement.end_pose is None else placement.end_pose
         self._ends = (_parts(placement.pose), _parts(end))
 
@@ -368,7 +369,7 @@ class _MovingPiece:
 
     def at(self, time: float) -> _Piece:
         motion = _Motion(*self._parts_at(Fraction(time)))
-        return _Piece(self._vertices, [motion], self._in_any_order)
+        return _Piece(self._vertices, [motion], [float(self.radius)], self._in_any_order)
 
     def keeps_rotation(self) -> bool:
         """True if one quaternion is a positive multiple of the other."""
@@ -379,9 +380,9 @@ class _MovingPiece:
     def is_below(
         self, n: _Point, offset: Fraction, begin: float, until: float, may_end: bool
     ) -> bool:
-        """True if n.p < offset for all points p over the interval; if may_end, they may be equal at
-        its end. For a vertex p, |q(t)|^2 (n.p - offset) is a cubic polynomial in t. It is negative
-        if no Bernstein coefficient is positive and the outer ones are negative."""
+        """True if n.p + radius |n| < offset for all vertices p over the interval; if may_end, they
+        may be equal at its end. |q(t)|^2 times the difference is a cubic polynomial in t. It is
+        negative if no Bernstein coefficient is positive and the outer ones are negative."""
         (q0, x0), (q1, x1) = self._parts_at(Fraction(begin)), self._parts_at(Fraction(until))
         lines = _dot(n, x0) - offset, _dot(n, x1) - offset
         forms = _form(q0, q0), _form(q0, q1), _form(q1, q1)
@@ -404,7 +405,28 @@ class _MovingPiece:
             constant + max(sum(d * x for d, x in zip(direction, point)) for point in points)
             for constant, direction in zip(constants, directions)
         ]
-        return b[0] < 0 and b[1] <= 0 and b[2] <= 0 and (b[3] < 0 or (may_end and b[3] == 0))
+        grown = (3 * s[0], s[0] + 2 * s[1], 2 * s[1] + s[2], 3 * s[2])
+        signs = [
+            _sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)
+        ]
+        end_is_right = signs[3] < 0 or (may_end and signs[3] == 0)
+        return signs[0] < 0 and signs[1] <= 0 and signs[2] <= 0 and end_is_right
+
+
+def _sign(a: Fraction, b: Fraction, c: Fraction) -> int:
+    """The sign of a + b sqrt(c); c is not negative."""
+
+    def sign(number: Fraction) -> int:
+        return (number > 0) - (number < 0)
+
+    if b == 0 or sign(a) == sign(b):
+        return sign(a)
+    return sign(b) if a == 0 else sign(a) * sign(a * a - b * b * c)
+
+
+def _gap_sign(n: _Point, a: _Piece, b: _Piece) -> int:
+    """The sign of min n.B - max n.A - r |n|, r the sum of the radii."""
+    return _sign(_gap(n, a, b), -(a.radius + b.radius), _dot(n, n))
 
 
 def _check_interval(
@@ -417,8 +439,9 @@ def _check_interval(
     if interval.offset is None:
         if not (a.keeps_rotation() and b.keeps_rotation()):
             raise VerificationError("there is no offset, which only translations do without")
-        at_end = _gap(n, a.at(until), b.at(until))
-        if _gap(n, a.at(begin), b.at(begin)) <= 0 or at_end < 0 or (at_end == 0 and not may_end):
+        at_end = _gap_sign(n, a.at(until), b.at(until))
+        at_begin = _gap_sign(n, a.at(begin), b.at(begin))
+        if at_begin <= 0 or at_end < 0 or (at_end == 0 and not may_end):
             raise VerificationError("the direction does not separate at both ends")
         return
     if not np.isfinite(interval.offset):
@@ -460,11 +483,18 @@ def _check_contact(
     if certificate.direction is not None:
         _check(Relation.TOUCHING, certificate, *places)
         return
-    differences = _differences(certificate, *places)
-    if len(differences) <= 6 and _surrounds_origin(differences):
+    try:
+        _check(Relation.OVERLAPPING, certificate, *places)
+        overlaps = True
+    except VerificationError:
+        overlaps = False
+    if overlaps:
         if relation == Relation.TOUCHING:
             raise VerificationError("the hulls overlap, so they do not only touch")
         return
+    if a.radius + b.radius > 0:
+        raise VerificationError("without a direction, the hulls would have to overlap")
+    differences = _differences(certificate, *places)
     # All differences of vertices move alike: their hulls at both times span those in between.
     until = contact.separated_until
     differences += _differences(certificate, a.at(until), b.at(until))

@@ -95,8 +95,12 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
 absl::StatusOr<FirstContact> AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
                                        const MotionOptions& options) {
   if (table.is_body(a) || table.is_body(b)) return BodyInMotion();
-  return FindFirstContact({table.HullAt(a), table.MotionAt(a)},
-                          {table.HullAt(b), table.MotionAt(b)}, options);
+  const auto moving = [&table](uint32_t i) {
+    return MovingHull{table.HullAt(i), table.MotionAt(i), table.RadiusAt(i)};
+  };
+  absl::StatusOr<FirstContact> found = FindFirstContact(moving(a), moving(b), options);
+  if (!found.ok()) return NameMotionError(found.status());
+  return found;
 }
 
 size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,

@@ -84,6 +84,7 @@ class PlacementTable {
   bool has_motions() const { return !end_poses_.empty(); }
   // Motion of a placement. Requires has_motions().
   Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
+  double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
   // Bounding box of a placement at its pose, world frame: BoundingBox.
   Box BoxOf(size_t i) const {
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
@@ -186,7 +187,6 @@ class PlacementTable {
   // As CheckPose, for the end pose.
   void CheckEnd(size_t i, const char* of, const char* after);
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
-  double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
   void TakeBodies();

@@ -46,12 +46,17 @@ struct Moving {
   Numbers xyz;
   v1::Pose start;
   v1::Pose end;
+  double radius = 0;
 };
 
 Moving Shifted(Numbers xyz, const Numbers& from, const Numbers& to) {
   return {std::move(xyz), PoseOf(kNoTurn, from), PoseOf(kNoTurn, to)};
 }
 Moving Resting(Numbers xyz) { return Shifted(std::move(xyz), {0, 0, 0}, {0, 0, 0}); }
+Moving Rounded(Moving moving, double radius) {
+  moving.radius = radius;
+  return moving;
+}
 Moving Turned(Numbers xyz, const Numbers& from, const Numbers& to) {
   return {std::move(xyz), PoseOf(from, {0, 0, 0}), PoseOf(to, {0, 0, 0})};
 }
@@ -118,8 +123,11 @@ Claim Touches() { return {kTouching}; }
 Claim Overlaps() { return {kOverlapping}; }
 
 absl::Status Check(const Claim& claim, const Moving& a, const Moving& b) {
-  return CheckFirstContact(claim.relation, claim.contact, claim.certificate,
-                           {{a.xyz, a.start}, a.end}, {{b.xyz, b.start}, b.end}, claim.width);
+  const auto moving = [](const Moving& of) -> MovingVertices {
+    return {{of.xyz, of.start, nullptr, false, {of.radius}}, of.end};
+  };
+  return CheckFirstContact(claim.relation, claim.contact, claim.certificate, moving(a), moving(b),
+                           claim.width);
 }
 
 void ExpectValid(const Claim& claim, const Moving& a, const Moving& b) {
@@ -332,6 +340,65 @@ TEST(MotionCheck, AnOffsetServesTranslationsAsWell) {
   ExpectInvalid(Separated().Until(1, {1, 0, 0}, 1), both[0], both[1], "A does not stay");
   ExpectInvalid(Claim(meets).Until(0.5, {1, 0, 0}, 2).Until(1, {1, 0, 0}, 1), both[0], both[1],
                 "intervals[0]: B does not stay");
+}
+
+// |n| = 5, so that the radii keep the planes rational.
+TEST(MotionCheck, RadiiAreExactInTranslations) {
+  const Moving a = Rounded(Resting({0, 0, 0}), 1);
+  // Its center comes from (6, 8, 0) to (3, 4, 0): at a distance of 5 at the end.
+  const auto b = [](double radius) {
+    return Rounded(Shifted({0, 0, 0}, {6, 8, 0}, {3, 4, 0}), radius);
+  };
+  const Claim apart = Separated().Until(1, {3, 4, 0});
+  ExpectValid(apart, a, b(std::nextafter(4.0, 0.0)));
+  ExpectInvalid(apart, a, b(4), "separate at both ends");
+  const Claim touches = Touches().Until(1, {3, 4, 0}).Touching(1, {3, 4, 0}, 0, 0);
+  ExpectValid(touches, a, b(4));
+  ExpectInvalid(touches, a, b(std::nextafter(4.0, 0.0)), "contact: ");
+  ExpectInvalid(touches, a, b(std::nextafter(4.0, 5.0)), "separate at both ends");
+  // Without a direction, the vertex pair shows an overlap.
+  const Claim overlaps = Overlaps().Until(0.5, {3, 4, 0}).Contact(0.75).Pairs({{0, 0}});
+  Claim wide = overlaps;
+  wide.width = 0.5;
+  ExpectValid(wide, a, b(6));
+  ExpectInvalid(overlaps, a, b(6), "contact_time is 0.75");
+  ExpectInvalid(wide, a, b(5), "contact: without a direction");
+}
+
+TEST(MotionCheck, RadiiAreExactWithPlanes) {
+  const Moving a = Rounded(Resting({0, 0, 0}), 1);
+  const Moving b = Rounded(Shifted({0, 0, 0}, {6, 8, 0}, {3, 4, 0}), 2);
+  // n.p + |n| = 5 for A, and n.p - 2 |n| >= 15 for B.
+  ExpectValid(Separated().Until(1, {3, 4, 0}, std::nextafter(5.0, 6.0)), a, b);
+  ExpectValid(Separated().Until(1, {3, 4, 0}, std::nextafter(15.0, 6.0)), a, b);
+  ExpectInvalid(Separated().Until(1, {3, 4, 0}, 5), a, b, "A does not stay");
+  ExpectInvalid(Separated().Until(1, {3, 4, 0}, 15), a, b, "B does not stay");
+  // The length of (1, 1, 0) is irrational.
+  const Moving c = Rounded(Shifted({0, 0, 0}, {9, 0, 0}, {3, 0, 0}), 0);
+  const double root = std::sqrt(2);
+  ExpectValid(Separated().Until(1, {1, 1, 0}, std::nextafter(root, 2.0)), a, c);
+  ExpectInvalid(Separated().Until(1, {1, 1, 0}, std::nextafter(root, 1.0)), a, c, "A does not");
+}
+
+TEST(MotionCheck, RadiiAreExactInRotations) {
+  Claim claim = RodMeets();
+  claim.contact.clear_contact_time();
+  claim.contact.mutable_intervals()->RemoveLast();
+  claim.relation = kSeparated;
+  claim.Until(0.4375, {0, -1, 0}, -3.75);
+  // The tip of the rod is at y = 3.671 at the end: within a radius of 0.25 of the plane.
+  const auto check = [&](double radius) {
+    Claim whole = claim;
+    whole.relation = kTouching;
+    whole.Contact(0.4375);
+    return Check(whole, kCeiling, Rounded(kTurningRod, radius));
+  };
+  EXPECT_THAT(std::string(check(0.0625).message()), HasSubstr("contact: "));
+  EXPECT_THAT(std::string(check(0.25).message()), HasSubstr("intervals[1]: B does not stay"));
+}
+
+TEST(MotionCheck, NegativeRadiiAreRefused) {
+  ExpectInvalid(Separated().Until(1, {1, 0, 0}), Rounded(kCube, -1), Coming(3, 2), "negative");
 }
 
 TEST(MotionCheck, IntervalsCoverTheTime) {

@@ -344,6 +344,20 @@ TEST_F(MovingPlacements, BodiesDoNotMoveYet) {
               StartsWith("pieces[1].end_pose is set; a piece is at rest"));
 }
 
+TEST_F(MovingPlacements, RoundedShapesDoNotMoveYet) {
+  Put("cube", Cube());
+  v1::Placement rounded = PlacementOf("cube");
+  rounded.set_radius(0.5);
+  const v1::Placement moving = MovingTo(PlacementOf("cube", 3), -1);
+  const std::string expected = "the pair has an end_pose and a radius";
+  ExpectRefused(Pair(rounded, moving), expected);
+  ExpectRefused(Pair(moving, rounded), expected);
+  const auto batch = Ask(Batch({rounded, moving}, {0, 1}));
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  ASSERT_EQ(batch->columns().pair_problems_size(), 1);
+  EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith(expected));
+}
+
 TEST_F(MovingPlacements, StreamsWatchesAndScenesRefuseThem) {
   Put("cube", Cube());
   v1::CollisionStreamOpen listed;
