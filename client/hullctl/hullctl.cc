@@ -88,6 +88,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddViewCommand(program, invocation);
   program.BeginGroup("Check for collision");
   AddCheckCommand(program, invocation);
+  AddCastCommand(program, invocation);
   AddBatchCommand(program, invocation);
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);

@@ -19,6 +19,7 @@ void AddGetCommand(Command program, Invocation* invocation);
 void AddMeshCommand(Command program, Invocation* invocation);
 void AddViewCommand(Command program, Invocation* invocation);
 void AddCheckCommand(Command program, Invocation* invocation);
+void AddCastCommand(Command program, Invocation* invocation);
 void AddBatchCommand(Command program, Invocation* invocation);
 void AddSceneCommand(Command program, Invocation* invocation);
 void AddStreamCommand(Command program, Invocation* invocation);

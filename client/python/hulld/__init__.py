@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         VertexPair,
         Witness,
     )
+    from hulld.answers.hits import Hits
     from hulld.answers.hulls import (
         Audit,
         BoundedValue,
@@ -162,6 +163,7 @@ __all__ = [
     "FirstContact",
     "Freshness",
     "Header",
+    "Hits",
     "Hull",
     "HullChanges",
     "HullEvent",
@@ -235,6 +237,7 @@ __all__ = [
 _MODULES = (
     "answers.bodies",
     "answers.collisions",
+    "answers.hits",
     "answers.hulls",
     "answers.status",
     "appender",

@@ -11,6 +11,7 @@ from hulld import arguments
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
 from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
+from hulld.answers.hits import Hits, hits_of
 from hulld.answers.hulls import (
     CreatedHull,
     Header,
@@ -36,6 +37,7 @@ from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
 from hulld.connection import PathLike
 from hulld.errors import HulldError, read_answer
+from hulld.errors import from_status
 from hulld.geometry.placements import (
     PlacementLike,
     Placements,
@@ -46,6 +48,7 @@ from hulld.geometry.placements import (
 )
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
 from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, PoseLike
+from hulld.geometry.rays import ray_ends, with_rays
 from hulld.watches import CollisionWatch, HullWatch
 from hulld.wire import MessageWriter
 
@@ -513,6 +516,35 @@ class Client(ClientBase):
         )
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._parts(call, self._seconds(timeout), freshness)
+
+    def cast(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        placements: PlacementsLike,
+        *,
+        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
+    ) -> Hits:
+        """The hits of rays: exact, grazes included. A ray is a point that moves from its origin to
+        origin + direction, so give directions as long as the rays.
+
+        origins, directions: n x 3, or one of them 3 for all rays. placements: as in
+        check_collisions; not bodies. All rays are asked with all placements, in one batch.
+
+        HulldError: a placement has no answer, such as a hull that does not exist.
+        """
+        targets = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
+        starts, ends = ray_ends(origins, directions)
+        asked, pairs = with_rays(targets, starts, ends)
+        wanted = Wanted(certificate=True)
+        call = requests.check_collisions(asked, pairs, wanted, 0.0, Method.UNSPECIFIED)
+        batch = self._whole(call, lambda: BatchAssembly(pairs, wanted), timeout, freshness)
+        problem = batch.first_problem()
+        if problem is not None:
+            raise from_status(problem.code, problem.message, None)
+        return hits_of(batch.answers, starts, ends)
 
     def find_collisions(
         self,

@@ -100,7 +100,8 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
   EXPECT_THAT(Ask(with({"--verify"})).out, HasSubstr("verified         valid"));
   EXPECT_EQ(Ask(with({"--output", "name"})).out, "OVERLAPPING\n");
   EXPECT_THAT(AskJson(meets).out,
-              HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"contactTime\":0.5}"));
+              HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"contactTime\":0.5,"
+                        "\"intervals\":[]}"));
   ran = Ask(with({"--separation"}));
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("wanted.separation excludes end_pose"));
@@ -149,6 +150,34 @@ TEST_F(HullctlQuestions, RecordedMotionsAreVerified) {
   const Ran ran = Ask({"verify", none.path()});
   EXPECT_EQ(ran.code, 5);
   EXPECT_THAT(ran.err, HasSubstr("has no first contact"));
+}
+
+TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
+  Put("near/cube", server::Cube());
+  Put("far/wall", {4, -1, -1, 4, 2, -1, 4, -1, 2, 4, 2, 2});
+  Put("far/behind", {-9, 0, 0});
+  Put("near/point", {3, 0.5, 0.5});
+  const std::string origin = "-1,0.5,0.5";
+  Ran ran = Ask({"cast", origin, "8,0,0"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "HULL        TIME   POINT        NORMAL\n"
+            "near/cube   0.125  0 0.5 0.5    -1 0 0\n"
+            "near/point  0.5    3 0.5 0.5    -1 0 0\n"
+            "far/wall    0.625  4 0.5 0.5    -1 0 0\n");
+  EXPECT_EQ(Ask({"cast", origin, "4,0,0", "--output", "name"}).out, "near/cube\nnear/point\n");
+  EXPECT_EQ(Ask({"cast", origin, "8,0,0", "far/", "--output", "name"}).out, "far/wall\n");
+  EXPECT_EQ(AskJson({"cast", origin, "8,0,0", "near/c"}).out,
+            "{\"hullId\":\"near/cube\",\"time\":0.125,\"point\":[0,0.5,0.5],"
+            "\"normal\":[-1,0,0]}\n");
+  // A ray that starts in a hull meets no facet of it; one along an edge grazes it.
+  EXPECT_THAT(Ask({"cast", "0.5,0.5,0.5", "0,0,1", "near/c"}).out,
+              HasSubstr("near/cube  0     0.5 0.5 0.5  -\n"));
+  EXPECT_THAT(Ask({"cast", "-1,1,1", "8,0,0", "near/c"}).out, HasSubstr("near/cube  0.125"));
+  EXPECT_EQ(Ask({"cast", "-1,1,1.0000000000000002", "8,0,0", "near/c", "--output", "name"}).out,
+            "");
+  EXPECT_EQ(Ask({"cast", "1,2", "8,0,0"}).code, 2);
+  EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 
 TEST_F(HullctlQuestions, VerifyRefusesOtherFiles) {

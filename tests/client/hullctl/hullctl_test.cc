@@ -164,11 +164,12 @@ TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
   }
   EXPECT_THAT(help, testing::Not(HasSubstr("__")));
   for (const char* command :
-       {"create",      "append",      "replace",     "delete",      "list",        "get",
-        "mesh",        "check",       "batch",       "scene",       "stream",      "verify",
-        "status",      "bench load",  "generate",    "completion",  "backup save", "backup restore",
-        "token new",   "context add", "context use", "robot check", "robot acm",   "cover",
-        "scene apply", "scene check", "scene diff",  "scene delete"}) {
+       {"create",      "append",      "replace",        "delete",     "list",
+        "get",         "mesh",        "check",          "batch",      "scene",
+        "stream",      "verify",      "status",         "bench load", "generate",
+        "completion",  "backup save", "backup restore", "token new",  "context add",
+        "context use", "robot check", "robot acm",      "cover",      "scene apply",
+        "scene check", "scene diff",  "scene delete",   "cast"}) {
     std::vector<std::string> words = {"help"};
     std::istringstream names(command);
     for (std::string word; names >> word;) words.push_back(word);

@@ -152,3 +152,41 @@ def test_inline_shapes_move(client: hulld.Client) -> None:
     hulld.Verifier(client).check(points, (points, AWAY), answer, to_b=(-1, 0, 0))
     assert "contact_time=0.5" in repr(answer)
     assert "first contact" in answer._repr_html_()
+
+
+def test_rays_hit_in_order(client: hulld.Client, cube: str) -> None:
+    row = hulld.Placements(cube, [(4, 0, 0), (0, 0, 0), (0, 5, 0)])
+    origins = [(-1, 0.5, 0.5), (0.5, 0.5, 0.5), (-1, 3, 0.5), (-1, 1, 1)]
+    hits = client.cast(origins, (8, 0, 0), row)
+    assert hits.rays.tolist() == [0, 0, 1, 1, 3, 3]
+    assert hits.placements.tolist() == [1, 0, 1, 0, 1, 0]
+    assert hits.times.tolist() == [0.125, 0.625, 0, 0.4375, 0.125, 0.625]
+    assert hits.points[1].tolist() == [4, 0.5, 0.5]
+    assert hits.normals[0].tolist() == [-1, 0, 0]
+    assert np.isnan(hits.normals[2]).all()
+    assert hits.first().times.tolist() == [0.125, 0, 0.125]
+    assert repr(hits) == "Hits(6 of 3 rays)"
+    assert len(client.cast([(-1, 0.5, 0.5)], [(0.5, 0, 0)], row)) == 0
+    assert len(client.cast(np.empty((0, 3)), (1, 0, 0), row)) == 0
+    with pytest.raises(ValueError, match="3 origins and 2 directions"):
+        client.cast(np.zeros((3, 3)), np.zeros((2, 3)), row)
+    with pytest.raises(ValueError, match="origins has the shape"):
+        client.cast([1, 2], (1, 0, 0), row)
+    with pytest.raises(hulld.NotFoundError, match="nothing"):
+        client.cast((0, 0, 0), (1, 0, 0), [cube, "nothing"])
+
+
+def test_random_rays_agree_with_the_box(client: hulld.Client, cube: str) -> None:
+    rng = np.random.default_rng(8)
+    origins, directions = rng.uniform(-3, 3, (200, 3)), rng.uniform(-6, 6, (200, 3))
+    hits = client.cast(origins, directions, [cube])
+    with np.errstate(divide="ignore"):
+        low, high = (0 - origins) / directions, (1 - origins) / directions
+    enters = np.minimum(low, high).max(axis=1).clip(0)
+    leaves = np.maximum(low, high).min(axis=1).clip(max=1)
+    expected = np.flatnonzero(enters <= leaves)
+    assert hits.rays.tolist() == expected.tolist()
+    assert 20 < len(hits) < 200
+    np.testing.assert_allclose(hits.times, enters[expected], rtol=1e-13, atol=1e-15)
+    faces = np.abs(hits.normals).max(axis=1)
+    np.testing.assert_allclose(faces[~np.isnan(faces)], 1, rtol=1e-12)

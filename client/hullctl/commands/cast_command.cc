@@ -1,0 +1,235 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/freshness_options.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+using Triple = std::array<double, 3>;
+
+struct CastArguments {
+  Triple origin = {};
+  Triple direction = {};
+  std::string prefix;
+};
+
+// A hull that the ray meets.
+struct Hit {
+  std::string hull_id;
+  double time = 0;
+  Triple point = {};
+  // Unit length, out of the hull; absent if the ray starts in contact.
+  std::optional<Triple> normal;
+};
+
+// The integer's leading digits, without the last `dropped` ones.
+double Leading(const std::string& digits, size_t dropped) {
+  return digits.size() <= dropped
+             ? 0
+             : std::strtod(digits.substr(0, digits.size() - dropped).c_str(), nullptr);
+}
+
+Triple NumbersOf(const v1::SeparatedInterval& interval) {
+  if (!interval.has_integer_direction()) {
+    const v1::Vector3& n = interval.direction();
+    return {n.x(), n.y(), n.z()};
+  }
+  // A double holds 308 digits.
+  constexpr size_t kMostDigits = 300;
+  const v1::IntegerDirection& n = interval.integer_direction();
+  const size_t longest = std::max({n.x().size(), n.y().size(), n.z().size()});
+  const size_t dropped = longest > kMostDigits ? longest - kMostDigits : 0;
+  return {Leading(n.x(), dropped), Leading(n.y(), dropped), Leading(n.z(), dropped)};
+}
+
+// The plane that separates the ray from the hull until they meet is that of the facet.
+std::optional<Triple> NormalOf(const v1::FirstContact& contact) {
+  if (contact.intervals().empty()) return std::nullopt;
+  Triple n = NumbersOf(*contact.intervals().rbegin());
+  const double largest = std::max({std::abs(n[0]), std::abs(n[1]), std::abs(n[2])});
+  for (double& x : n) x /= largest;
+  const double length = std::hypot(n[0], n[1], n[2]);
+  // From the ray to the hull. Adding 0 makes -0 positive.
+  for (double& x : n) x = -x / length + 0.0;
+  return n;
+}
+
+// A ray is a point that moves from its origin to its end.
+class Ray {
+ public:
+  explicit Ray(const CastArguments& arguments) : origin_(arguments.origin) {
+    for (int i = 0; i < 3; ++i) end_[i] = origin_[i] + arguments.direction[i];
+  }
+
+  Triple PointAt(double time) const {
+    Triple point;
+    for (int i = 0; i < 3; ++i) point[i] = std::lerp(origin_[i], end_[i], time);
+    return point;
+  }
+
+  // The question for these hulls, each with the ray.
+  v1::BatchCheckCollisionsRequest RequestFor(const v1::ListHullsResponse& list) const {
+    v1::BatchCheckCollisionsRequest request;
+    request.mutable_wanted()->set_certificate(true);
+    v1::PackedPlacements& packed = *request.mutable_packed_placements();
+    const auto count = static_cast<uint32_t>(list.hulls_size());
+    for (uint32_t i = 0; i < count; ++i) {
+      packed.add_hull_ids(list.hulls(static_cast<int>(i)).hull_id());
+      Add(i, {}, {}, &packed);
+      request.add_pairs(count);
+      request.add_pairs(i);
+    }
+    packed.add_shape_sizes(1);
+    packed.mutable_shape_points()->mutable_xyz()->Resize(3, 0);
+    Add(count, origin_, end_, &packed);
+    return request;
+  }
+
+ private:
+  static void Add(uint32_t hull, const Triple& start, const Triple& end,
+                  v1::PackedPlacements* packed) {
+    packed->add_hulls(hull);
+    for (const auto& [translation, poses] : {std::pair(&start, packed->mutable_poses()),
+                                             std::pair(&end, packed->mutable_end_poses())}) {
+      for (const double number : {1.0, 0.0, 0.0, 0.0}) poses->Add(number);
+      poses->Add(translation->begin(), translation->end());
+    }
+  }
+
+  Triple origin_;
+  Triple end_ = {};
+};
+
+// Hits in ascending order of time, and the number of hulls without an answer.
+struct Hits {
+  std::vector<Hit> hits;
+  uint64_t failed = 0;
+};
+
+absl::StatusOr<Hits> Cast(const Client& client, const Ray& ray, const v1::ListHullsResponse& list) {
+  Hits found;
+  const auto take = [&](const v1::BatchCheckCollisionsResponse& part) {
+    const int count = part.columns().relations_size();
+    if (!AreParallel(part.columns(), static_cast<size_t>(count)) ||
+        part.first_pair() + static_cast<uint64_t>(count) >
+            static_cast<uint64_t>(list.hulls_size())) {
+      return absl::InternalError("the answers are out of order");
+    }
+    for (int i = 0; i < count; ++i) {
+      const AnswerRow row = RowAt(part.columns(), i);
+      if (row.relation == v1::RELATION_UNSPECIFIED) ++found.failed;
+      if (!row.first_contact || !row.first_contact->has_contact_time()) continue;
+      const double time = row.first_contact->contact_time();
+      found.hits.push_back({list.hulls(static_cast<int>(part.first_pair()) + i).hull_id(), time,
+                            ray.PointAt(time), NormalOf(*row.first_contact)});
+    }
+    return absl::OkStatus();
+  };
+  const absl::Status status = client.BatchCheckCollisions(ray.RequestFor(list), take);
+  if (!status.ok()) return status;
+  std::ranges::stable_sort(found.hits, {}, &Hit::time);
+  return found;
+}
+
+std::string NumbersText(const Triple& numbers, const char* separator) {
+  return absl::StrJoin(numbers, separator, [](std::string* out, double number) {
+    absl::StrAppend(out, ShortestText(number));
+  });
+}
+
+void Print(const Invocation& run, const Hits& found) {
+  if (run.names()) {
+    for (const Hit& hit : found.hits) run.out << hit.hull_id << "\n";
+    return;
+  }
+  if (run.json()) {
+    for (const Hit& hit : found.hits) {
+      JsonObject object;
+      object.Add("hullId", hit.hull_id)
+          .AddJson("time", ShortestText(hit.time))
+          .AddJson("point", "[" + NumbersText(hit.point, ",") + "]");
+      if (hit.normal) object.AddJson("normal", "[" + NumbersText(*hit.normal, ",") + "]");
+      run.out << object.Close() << "\n";
+    }
+    return;
+  }
+  Table table;
+  std::vector<std::string> head = {"HULL", "TIME", "POINT", "NORMAL"};
+  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
+  table.Row(head);
+  for (const Hit& hit : found.hits) {
+    table.Row({hit.hull_id, ShortestText(hit.time), NumbersText(hit.point, " "),
+               hit.normal ? NumbersText(*hit.normal, " ") : "-"});
+  }
+  table.Print(run.out);
+}
+
+ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
+  const Client client = run.MakeClient();
+  const auto list = client.ListAllHulls(arguments.prefix);
+  if (!list.ok()) return run.Fail(list.status());
+  const auto found = Cast(client, Ray(arguments), *list);
+  if (!found.ok()) return run.Fail(found.status());
+  Print(run, *found);
+  if (found->failed == 0) return ExitCode::kDone;
+  run.err << "hullctl: " << found->failed << " of " << Counted(list->hulls_size(), "hull")
+          << " have no answer; they were deleted during the command, so repeat it\n";
+  return ExitCode::kSomeFailed;
+}
+
+void AddTriple(Command command, const std::string& name, Triple* triple, const std::string& help) {
+  command
+      .AddParsed(
+          name,
+          [triple](const std::string& text) {
+            const auto parsed = ParseTriple(text);
+            if (parsed.ok()) *triple = *parsed;
+            return parsed.status();
+          },
+          help)
+      .Required();
+}
+
+}  // namespace
+
+void AddCastCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<CastArguments>();
+  Command command = program.AddCommand("cast", "Find the hulls that a ray meets");
+  AddTriple(command, "ORIGIN", &arguments->origin, "Start of the ray, x,y,z");
+  AddTriple(command, "DIRECTION", &arguments->direction,
+            "From the start of the ray to its end, x,y,z");
+  command.AddText("PREFIX", &arguments->prefix, "Only hulls whose IDs start with this")
+      .Completes(ValueKind::kHull);
+  AddFreshnessOptions(command, invocation);
+  command.SetDetails(
+      "The ray ends at ORIGIN + DIRECTION, so give a direction as long as the ray. Hits ascend "
+      "with\n"
+      "time, from 0 at the start to 1 at the end, and are exact: a ray that grazes a corner meets\n"
+      "the hull. A time that no double represents becomes the next double. Each hull is at its "
+      "own\n"
+      "frame's place. NORMAL points out of the facet that is met; it is - if the ray starts in "
+      "the\n"
+      "hull. Bodies are not searched.");
+  command.SetExamples({{"What is below the origin?", "hullctl cast 0,0,0 0,0,-100"},
+                       {"", "hullctl cast 0,0,0 100,0,0 robot/ --output name"}});
+  command.OnGiven([=] { invocation->action = [=] { return CastRay(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,57 @@
+"""Rays: points that move from an origin to an end."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld import arguments
+from hulld.geometry.placements import Placements
+
+Vectors = npt.NDArray[np.float64]
+
+
+def _vectors(values: npt.ArrayLike, name: str) -> Vectors:
+    array = arguments.as_floats(arguments.as_array(values, name), name).astype(np.float64)
+    if array.ndim not in (1, 2) or array.shape[-1] != 3:
+        raise ValueError(f"{name} has the shape {array.shape}; it takes (n, 3), or (3,)")
+    return np.atleast_2d(array)
+
+
+def ray_ends(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Vectors, Vectors]:
+    """The origins and ends of rays, n x 3 each; one origin or direction serves all rays.
+    ValueError: other shapes."""
+    starts, along = _vectors(origins, "origins"), _vectors(directions, "directions")
+    if len(starts) != len(along) and 1 not in (len(starts), len(along)):
+        raise ValueError(f"there are {len(starts)} origins and {len(along)} directions")
+    starts, along = np.broadcast_arrays(starts, along)
+    return starts, starts + along
+
+
+def with_rays(
+    targets: Placements, starts: Vectors, ends: Vectors
+) -> tuple[Placements, npt.NDArray[np.uint32]]:
+    """The targets, then the rays, and all pairs of a ray and a target, ray by ray."""
+
+    def poses(translations: Vectors) -> npt.NDArray[np.float64]:
+        rows = np.zeros((len(translations), 7))
+        rows[:, 0] = 1
+        rows[:, 4:] = translations
+        return rows
+
+    shape = len(targets.ids) + len(targets.shapes)
+    radii = np.zeros(len(targets)) if targets.radii is None else targets.radii
+    at_end = targets.poses if targets.end_poses is None else targets.end_poses
+    placements = Placements(
+        targets.ids,
+        np.vstack([targets.poses, poses(starts)]),
+        np.concatenate([targets.indices, np.full(len(starts), shape, np.uint32)]),
+        shapes=[*targets.shapes, np.zeros((1, 3))],
+        radii=np.concatenate([radii, np.zeros(len(starts))]),
+        end_poses=np.vstack([at_end, poses(ends)]),
+    )
+    rays = np.arange(len(targets), len(placements))
+    pairs = np.stack(
+        [np.repeat(rays, len(targets)), np.tile(np.arange(len(targets)), len(starts))], axis=1
+    )
+    return placements, pairs.astype(np.uint32)
