@@ -146,7 +146,9 @@ absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungC
     return absl::OkStatus();
   }
   if (is_plain_) return AnswerRelation(piece, columns, counts);
-  if (table_.has_motions()) return AnswerMotion(piece, columns);
+  if (table_.has_motions()) {
+    return Add(AskMoving(table_, pair.a, pair.b, motion_options_), piece, columns, counts);
+  }
   return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
 }
 
@@ -166,17 +168,6 @@ absl::Status BatchStream::AnswerRelation(PairsPiece& piece, BatchColumns* column
   ++piece.next;
   counts->Add(answer->rung);
   columns->Add([&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });
-  return absl::OkStatus();
-}
-
-absl::Status BatchStream::AnswerMotion(PairsPiece& piece, BatchColumns* columns) {
-  const PlacedPair pair = PairAt(piece.next);
-  const absl::StatusOr<FirstContact> contact = AskMoving(table_, pair.a, pair.b, motion_options_);
-  if (absl::IsCancelled(contact.status())) return contact.status();
-  columns->Add([&](v1::AnswerColumns* to) {
-    return AddMovingAnswer(table_, pair.a, pair.b, contact, request().wanted(), to);
-  });
-  ++piece.next;
   return absl::OkStatus();
 }
 
@@ -208,7 +199,7 @@ absl::Status BatchStream::Add(PlacedAnswer answer, PairsPiece& piece, BatchColum
   if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
   const PlacedPair pair = PairAt(piece.next++);
   if (answer.answer.ok()) {
-    counts->Add(answer.answer->rung);
+    if (!answer.contact.has_value()) counts->Add(answer.answer->rung);
   } else {
     answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
     call().CountLimit(answer.answer.status());

@@ -65,7 +65,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // Answers the next pair of the piece; by the textbook, at least a part of it. CANCELLED.
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerRelation(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
-  absl::Status AnswerMotion(PairsPiece& piece, BatchColumns* columns);
   absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
                                 RungCounts* counts);
   absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,

@@ -80,14 +80,15 @@ absl::Status SceneStream::Validate() {
       DecodeFreshness(request().freshness(), registry().store(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
-  const absl::Status resting =
-      RefuseMotions(request().placements(), request().packed_placements(), "FindCollisions");
-  if (!resting.ok()) return resting;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
                            call().caller(), registry().limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
+  if (table_.has_motions()) {
+    if (absl::Status s = ValidateForMotions(*options); !s.ok()) return s;
+    motion_options_ = MakeMotionOptions(request().wanted(), *options);
+  }
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
   ignored_groups_ = IgnoredGroups(request());
   options_.ignored_groups = ignored_groups_;
@@ -139,7 +140,7 @@ bool SceneStream::QueueHead() {
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   v1::FindCollisionsResponse reply;
   size_t reply_bytes = 0;
-  const uint64_t steps_per_look = table_.has_bodies() ? 1 : kStepsPerPoll;
+  const uint64_t steps_per_look = table_.has_bodies() || table_.has_motions() ? 1 : kStepsPerPoll;
   for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
     if (piece.next == piece.end) break;
     const auto a = static_cast<uint32_t>(piece.next);
@@ -155,13 +156,17 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       continue;
     }
     PlacedAnswer answer;
-    answer.answer = search_->Ask(a, *b, &answer.of_body);
+    if (table_.has_motions()) {
+      answer = AskMoving(table_, a, *b, motion_options_);
+    } else {
+      answer.answer = search_->Ask(a, *b, &answer.of_body);
+    }
     if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
     if (!answer.answer.ok()) {
       answer.answer = NameLimit(table_, a, *b, answer.answer.status(), options_.query);
     }
     piece.totals.set_candidates(piece.totals.candidates() + 1);
-    if (answer.answer.ok()) piece.rungs.Add(answer.answer->rung);
+    if (answer.answer.ok() && !answer.contact.has_value()) piece.rungs.Add(answer.answer->rung);
     if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
     reply_bytes += AddFound(a, *b, answer, piece, &reply);
     if (reply_bytes < FullMessageBytes(request().wanted())) continue;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
@@ -66,6 +67,8 @@ class SceneStream
 
   // Written before the first piece.
   SceneOptions options_;
+  // If a placement moves.
+  MotionOptions motion_options_;
   Freshness freshness_;
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;

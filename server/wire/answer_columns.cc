@@ -162,20 +162,14 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const
 
 size_t AddNoTimes(v1::AnswerColumns* columns) { return AddTimes(kNone, kNone, columns); }
 
-size_t AddFirstContact(const absl::StatusOr<FirstContact>& contact, const QueryHull& a,
-                       const QueryHull& b, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
-  if (!contact.ok()) {
-    const size_t bytes = AddUnanswered(wanted, columns) + AddNoTimes(columns);
-    return bytes + AddProblem(contact.status(), columns);
-  }
-  size_t bytes =
-      AddRow(EncodeRelation(contact->relation), v1::RUNG_UNSPECIFIED, wanted, columns) +
-      AddTimes(contact->separated_until, contact->contact_time.value_or(kNone), columns) +
-      AddMotionProof(contact->intervals, columns);
-  if (contact->certificate.has_value()) {
-    bytes += SetCertificate(*contact->certificate, a, b, columns);
-  }
-  return bytes;
+size_t AddFirstContact(const FirstContact& contact, const QueryHull& a, const QueryHull& b,
+                       const v1::Wanted& wanted, v1::AnswerColumns* columns) {
+  const size_t bytes =
+      AddRow(EncodeRelation(contact.relation), v1::RUNG_UNSPECIFIED, wanted, columns) +
+      AddTimes(contact.separated_until, contact.contact_time.value_or(kNone), columns) +
+      AddMotionProof(contact.intervals, columns);
+  if (!contact.certificate.has_value()) return bytes;
+  return bytes + SetCertificate(*contact.certificate, a, b, columns);
 }
 
 }  // namespace hulld::server

@@ -29,8 +29,8 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const
 size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns);
 
 // As AddAnswer for a call with motions.
-size_t AddFirstContact(const absl::StatusOr<FirstContact>& contact, const QueryHull& a,
-                       const QueryHull& b, const v1::Wanted& wanted, v1::AnswerColumns* columns);
+size_t AddFirstContact(const FirstContact& contact, const QueryHull& a, const QueryHull& b,
+                       const v1::Wanted& wanted, v1::AnswerColumns* columns);
 // Adds the times of the last row if it has no answer.
 size_t AddNoTimes(v1::AnswerColumns* columns);
 

@@ -84,21 +84,19 @@ class Ray {
     return point;
   }
 
-  // The question for these hulls, each with the ray.
-  v1::BatchCheckCollisionsRequest RequestFor(const v1::ListHullsResponse& list) const {
-    v1::BatchCheckCollisionsRequest request;
+  // A scene of the ray, and then these hulls.
+  v1::FindCollisionsRequest RequestFor(const v1::ListHullsResponse& list) const {
+    v1::FindCollisionsRequest request;
     request.mutable_wanted()->set_certificate(true);
+    request.set_movers(1);
     v1::PackedPlacements& packed = *request.mutable_packed_placements();
-    const auto count = static_cast<uint32_t>(list.hulls_size());
-    for (uint32_t i = 0; i < count; ++i) {
-      packed.add_hull_ids(list.hulls(static_cast<int>(i)).hull_id());
-      Add(i, {}, {}, &packed);
-      request.add_pairs(count);
-      request.add_pairs(i);
-    }
     packed.add_shape_sizes(1);
     packed.mutable_shape_points()->mutable_xyz()->Resize(3, 0);
-    Add(count, origin_, end_, &packed);
+    Add(static_cast<uint32_t>(list.hulls_size()), origin_, end_, &packed);
+    for (int i = 0; i < list.hulls_size(); ++i) {
+      packed.add_hull_ids(list.hulls(i).hull_id());
+      Add(static_cast<uint32_t>(i), {}, {}, &packed);
+    }
     return request;
   }
 
@@ -125,24 +123,31 @@ struct Hits {
 
 absl::StatusOr<Hits> Cast(const Client& client, const Ray& ray, const v1::ListHullsResponse& list) {
   Hits found;
-  const auto take = [&](const v1::BatchCheckCollisionsResponse& part) {
+  const auto take = [&](const v1::FindCollisionsResponse& part) {
+    found.failed += static_cast<uint64_t>(part.placement_problems_size());
     const int count = part.columns().relations_size();
-    if (!AreParallel(part.columns(), static_cast<size_t>(count)) ||
-        part.first_pair() + static_cast<uint64_t>(count) >
-            static_cast<uint64_t>(list.hulls_size())) {
-      return absl::InternalError("the answers are out of order");
+    if (part.pairs_size() != 2 * count ||
+        !AreParallel(part.columns(), static_cast<size_t>(count))) {
+      return absl::InternalError("the answers lack pairs or entries of columns");
     }
     for (int i = 0; i < count; ++i) {
+      // Placement 0 is the ray.
+      const int hull = static_cast<int>(part.pairs(2 * i + 1)) - 1;
+      if (hull < 0 || hull >= list.hulls_size()) {
+        return absl::InternalError("an answer is about a placement that the request does not have");
+      }
       const AnswerRow row = RowAt(part.columns(), i);
-      if (row.relation == v1::RELATION_UNSPECIFIED) ++found.failed;
-      if (!row.first_contact || !row.first_contact->has_contact_time()) continue;
+      if (!row.first_contact || !row.first_contact->has_contact_time()) {
+        ++found.failed;
+        continue;
+      }
       const double time = row.first_contact->contact_time();
-      found.hits.push_back({list.hulls(static_cast<int>(part.first_pair()) + i).hull_id(), time,
-                            ray.PointAt(time), NormalOf(*row.first_contact)});
+      found.hits.push_back(
+          {list.hulls(hull).hull_id(), time, ray.PointAt(time), NormalOf(*row.first_contact)});
     }
     return absl::OkStatus();
   };
-  const absl::Status status = client.BatchCheckCollisions(ray.RequestFor(list), take);
+  const absl::Status status = client.FindCollisions(ray.RequestFor(list), take);
   if (!status.ok()) return status;
   std::ranges::stable_sort(found.hits, {}, &Hit::time);
   return found;

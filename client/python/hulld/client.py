@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Literal, cast
 
+import numpy as np
 import numpy.typing as npt
 
 from hulld import arguments
@@ -36,8 +37,7 @@ from hulld.calls.wanted import Wanted
 from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
 from hulld.connection import PathLike
-from hulld.errors import HulldError, read_answer
-from hulld.errors import from_status
+from hulld.errors import HulldError, error_class, read_answer
 from hulld.geometry.placements import (
     PlacementLike,
     Placements,
@@ -531,20 +531,24 @@ class Client(ClientBase):
         origin + direction, so give directions as long as the rays.
 
         origins, directions: n x 3, or one of them 3 for all rays. placements: as in
-        check_collisions; not bodies. All rays are asked with all placements, in one batch.
+        check_collisions; not bodies. Pairs far apart are skipped in groups, as in find_collisions.
 
         HulldError: a placement has no answer, such as a hull that does not exist.
         """
         targets = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         starts, ends = ray_ends(origins, directions)
-        asked, pairs = with_rays(targets, starts, ends)
+        groups = np.repeat([0, 1], [len(starts), len(targets)])
+        among_rays = SceneFilter(groups, False, [(0, 0)], len(starts))
         wanted = Wanted(certificate=True)
-        call = requests.check_collisions(asked, pairs, wanted, 0.0, Method.UNSPECIFIED)
-        batch = self._whole(call, lambda: BatchAssembly(pairs, wanted), timeout, freshness)
-        problem = batch.first_problem()
-        if problem is not None:
-            raise from_status(problem.code, problem.message, None)
-        return hits_of(batch.answers, starts, ends)
+        call = requests.find_collisions(
+            with_rays(targets, starts, ends), among_rays, wanted, 0.0
+        )
+        found = self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
+        for problem in (*found.placement_problems.values(), *found.answers.problems.values()):
+            raise error_class(problem.code)(
+                problem.message, code=problem.code, reason=problem.reason
+            )
+        return hits_of(found, starts, ends)
 
     def find_collisions(
         self,

@@ -71,6 +71,20 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
          AddPieces(table, a, b, is_answered ? answer.of_body.pieces : std::nullopt, columns);
 }
 
+// Adds the row of an answer in a call with motions.
+size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const PlacedAnswer& answer, const v1::Wanted& wanted,
+                       v1::AnswerColumns* columns) {
+  const QueryHull& hull_a = table.HullAt(a);
+  const QueryHull& hull_b = table.HullAt(b);
+  const size_t bytes =
+      answer.contact.has_value()
+          ? AddFirstContact(*answer.contact, hull_a, hull_b, wanted, columns)
+          : AddAnswer(answer.answer, hull_a, hull_b, wanted, columns) + AddNoTimes(columns);
+  if (!table.has_bodies()) return bytes;
+  return bytes + AddPieces(table, a, b, std::nullopt, columns);
+}
+
 }  // namespace
 
 absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
@@ -92,28 +106,21 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
   return {std::move(found->answer), PiecesAnswer(*std::move(found))};
 }
 
-absl::StatusOr<FirstContact> AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
-                                       const MotionOptions& options) {
-  if (table.is_body(a) || table.is_body(b)) return BodyInMotion();
-  const auto moving = [&table](uint32_t i) {
-    return MovingHull{table.HullAt(i), table.MotionAt(i), table.RadiusAt(i)};
-  };
-  absl::StatusOr<FirstContact> found = FindFirstContact(moving(a), moving(b), options);
-  if (!found.ok()) return NameMotionError(found.status());
-  return found;
-}
-
-size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const absl::StatusOr<FirstContact>& contact, const v1::Wanted& wanted,
-                       v1::AnswerColumns* columns) {
-  const size_t bytes = AddFirstContact(contact, table.HullAt(a), table.HullAt(b), wanted, columns);
-  if (!table.has_bodies()) return bytes;
-  return bytes + AddPieces(table, a, b, std::nullopt, columns);
+PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const MotionOptions& options) {
+  if (table.is_body(a) || table.is_body(b)) return {BodyInMotion()};
+  absl::StatusOr<FirstContact> found =
+      FindFirstContact(table.MovingAt(a), table.MovingAt(b), options);
+  if (!found.ok()) return {NameMotionError(found.status())};
+  Answer answer;
+  answer.relation = found->relation;
+  return {std::move(answer), {}, *std::move(found)};
 }
 
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
+  if (table.has_motions()) return AddMovingAnswer(table, a, b, answer, wanted, columns);
   if (!table.has_bodies()) {
     return AddAnswer(answer.answer, table.HullAt(a), table.HullAt(b), wanted, columns);
   }

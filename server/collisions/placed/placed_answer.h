@@ -21,6 +21,8 @@ namespace hulld::server {
 struct PlacedAnswer {
   absl::StatusOr<Answer> answer;
   PiecesAnswer of_body = {};
+  // In a call with motions; the answer is then its relation.
+  std::optional<FirstContact> contact = {};
 };
 
 // Queries a pair of placements. A pair with a body gets an error for queries restricted to hulls,
@@ -29,10 +31,9 @@ struct PlacedAnswer {
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// Finds the first contact of two placements of a call with motions. INVALID_ARGUMENT: one of them
-// is a body. Requires that both are answerable.
-absl::StatusOr<FirstContact> AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
-                                       const MotionOptions& options);
+// As AskPlaced for a call with motions. A pair with a body gets an error.
+PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const MotionOptions& options);
 
 // True if the query takes about as long as many pairs of hulls, so that the clock must be checked
 // after it.
@@ -48,9 +49,6 @@ absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
 // certificates exceed Config::kMaxRowProofBytes.
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
-                       v1::AnswerColumns* columns);
-size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const absl::StatusOr<FirstContact>& contact, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns);
 size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
                          v1::AnswerColumns* columns);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/query/motion/swept_box.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -250,6 +251,15 @@ void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
   if (IsMalformed(i)) return;
   const absl::Status valid = ValidateEnd(MotionAt(i));
   if (!valid.ok()) malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), valid));
+}
+
+// A body in motion is refused by the query, so its box meets all others.
+Box PlacementTable::SweptBoxOf(size_t i) const {
+  if (!is_body(i)) return SweptBox(MovingAt(i));
+  const Motion motion = MotionAt(i);
+  const bool is_at_rest = motion.start.q == motion.end.q && motion.start.t == motion.end.t;
+  if (is_at_rest) return BoundingBox(bodies_[i]);
+  return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
 }
 
 size_t PlacementTable::MemoryBytes() const {
@@ -551,9 +561,9 @@ absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placemen
       moving == placements.end()
           ? "packed_placements.end_poses"
           : absl::StrCat("placements[", moving - placements.begin(), "].end_pose");
-  return absl::InvalidArgumentError(
-      absl::StrCat(field, " is set, but ", what,
-                   " takes no motions; use CheckCollision or BatchCheckCollisions"));
+  return absl::InvalidArgumentError(absl::StrCat(
+      field, " is set, but ", what,
+      " takes no motions; use CheckCollision, BatchCheckCollisions, or FindCollisions"));
 }
 
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,

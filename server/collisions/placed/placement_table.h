@@ -19,6 +19,7 @@
 #include "core/base/check.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
+#include "core/query/motion/first_contact.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
@@ -82,11 +83,11 @@ class PlacementTable {
   bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
   // True if the request gives an end pose to a placement, which may equal its pose.
   bool has_motions() const { return !end_poses_.empty(); }
-  // Motion of a placement. Requires has_motions().
-  Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
-  double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
-  // Bounding box of a placement at its pose, world frame: BoundingBox.
+  // A placement of such a request in motion; an empty hull for a body.
+  MovingHull MovingAt(size_t i) const { return {HullAt(i), MotionAt(i), RadiusAt(i)}; }
+  // Bounding box of a placement, world frame: BoundingBox; with motions, SweptBox.
   Box BoxOf(size_t i) const {
+    if (has_motions()) return SweptBoxOf(i);
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
   // The hull of a placement; empty for a body, or if it is not answerable.
@@ -186,6 +187,9 @@ class PlacementTable {
   void CheckPose(size_t i, const char* of, const char* after);
   // As CheckPose, for the end pose.
   void CheckEnd(size_t i, const char* of, const char* after);
+  Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
+  double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
+  Box SweptBoxOf(size_t i) const;
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);

@@ -131,10 +131,11 @@ def test_options_bound_the_bracket(client: hulld.Client, cube: str) -> None:
         client.check_collision(a, b, to_b=to, witness=True)
 
 
-def test_other_calls_refuse_motions(client: hulld.Client, cube: str) -> None:
+def test_scenes_take_motions_and_streams_refuse_them(client: hulld.Client, cube: str) -> None:
     moving = [cube, hulld.Placement(cube, AWAY, end_pose=(1, 0, 0))]
-    with pytest.raises(hulld.InvalidArgumentError, match="end_poses is set, but FindCollisions"):
-        client.find_collisions(moving)
+    found = client.find_collisions(moving)
+    assert found.pairs.tolist() == [[0, 1]]
+    assert found[0].first_contact is not None and found[0].first_contact.contact_time == 1
     with pytest.raises(hulld.InvalidArgumentError, match="end_poses is set, but a stream"):
         with client.stream_collisions(moving):
             pass

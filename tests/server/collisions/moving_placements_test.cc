@@ -257,6 +257,51 @@ TEST_F(MovingPlacements, AnswersAtRestHaveNoTimes) {
   EXPECT_TRUE(batch->columns().contact_times().empty());
 }
 
+TEST_F(MovingPlacements, TheColumnsOfASceneAreThoseOfABatch) {
+  Put("cube", Cube());
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> number(-6, 6);
+  v1::FindCollisionsRequest request;
+  for (int i = 0; i < 60; ++i) {
+    v1::Placement one = PlacementOf("cube", number(random), number(random), number(random));
+    if (i % 3 != 0) one = MovingTo(one, number(random), number(random), number(random));
+    if (i % 3 == 2) Turn(1, number(random), 0, number(random), one.mutable_end_pose());
+    *request.add_placements() = one;
+  }
+  v1::BatchCheckCollisionsRequest pairs;
+  *pairs.mutable_placements() = request.placements();
+  for (uint32_t a = 0; a < 60; ++a) {
+    for (uint32_t b = a + 1; b < 60; ++b) {
+      pairs.add_pairs(a);
+      pairs.add_pairs(b);
+    }
+  }
+  const auto batch = Ask(pairs);
+  ASSERT_TRUE(batch.ok()) << batch.status();
+  v1::FindCollisionsResponse scene;
+  const absl::Status status =
+      client().FindCollisions(request, [&](const v1::FindCollisionsResponse& part) {
+        scene.MergeFrom(part);
+        return absl::OkStatus();
+      });
+  ASSERT_TRUE(status.ok()) << status;
+  int row = 0;
+  for (int i = 0; i < batch->columns().relations_size(); ++i) {
+    if (batch->columns().relations(i) == kSeparated) continue;
+    ASSERT_LT(row, scene.columns().relations_size());
+    EXPECT_EQ(scene.pairs(2 * row), pairs.pairs(2 * i));
+    EXPECT_EQ(scene.pairs(2 * row + 1), pairs.pairs(2 * i + 1));
+    EXPECT_EQ(scene.columns().relations(row), batch->columns().relations(i));
+    EXPECT_EQ(scene.columns().contact_times(row), batch->columns().contact_times(i));
+    EXPECT_EQ(scene.columns().separated_until(row), batch->columns().separated_until(i));
+    ++row;
+  }
+  EXPECT_EQ(row, scene.columns().relations_size());
+  EXPECT_EQ(scene.totals().overlapping() + scene.totals().touching(), static_cast<uint64_t>(row));
+  EXPECT_GT(row, 20);
+  EXPECT_LT(scene.totals().candidates(), scene.totals().pairs());
+}
+
 TEST_F(MovingPlacements, MalformedEndPosesAreRefusedByName) {
   Put("cube", Cube());
   const v1::Placement cube = PlacementOf("cube");
@@ -309,6 +354,15 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
     batch.set_tolerance(request.tolerance());
     *batch.mutable_wanted() = request.wanted();
     EXPECT_THAT(Ask(batch).status().message(), StartsWith(absl::StrCat(name, " excludes")));
+    if (request.method() != v1::METHOD_UNSPECIFIED) continue;
+    v1::FindCollisionsRequest scene;
+    *scene.mutable_placements() = batch.placements();
+    scene.set_tolerance(request.tolerance());
+    *scene.mutable_wanted() = request.wanted();
+    const absl::Status found = client().FindCollisions(
+        scene, [](const v1::FindCollisionsResponse&) { return absl::OkStatus(); });
+    EXPECT_EQ(found.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(found.message(), StartsWith(absl::StrCat(name, " excludes")));
   }
   for (const double bad : {0.0, -1.0, 1.5, kNaN}) {
     v1::CheckCollisionRequest request = moving;
@@ -358,7 +412,7 @@ TEST_F(MovingPlacements, RoundedShapesDoNotMoveYet) {
   EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith(expected));
 }
 
-TEST_F(MovingPlacements, StreamsWatchesAndScenesRefuseThem) {
+TEST_F(MovingPlacements, StreamsAndWatchesRefuseThem) {
   Put("cube", Cube());
   v1::CollisionStreamOpen listed;
   *listed.add_placements() = PlacementOf("cube");
@@ -377,15 +431,8 @@ TEST_F(MovingPlacements, StreamsWatchesAndScenesRefuseThem) {
     const auto stream = client().OpenCollisionStream()->Open(open);
     EXPECT_EQ(stream.status().message(),
               absl::StrCat("open: ", expected,
-                           "a stream takes no motions; use CheckCollision or "
-                           "BatchCheckCollisions"));
-    v1::FindCollisionsRequest scene;
-    *scene.mutable_placements() = open.placements();
-    *scene.mutable_packed_placements() = open.packed_placements();
-    const absl::Status found = client().FindCollisions(
-        scene, [](const v1::FindCollisionsResponse&) { return absl::OkStatus(); });
-    EXPECT_EQ(found.code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_THAT(found.message(), StartsWith(expected + "FindCollisions takes no motions"));
+                           "a stream takes no motions; use CheckCollision, "
+                           "BatchCheckCollisions, or FindCollisions"));
     grpc::ClientContext context;
     const auto watch = collisions_->WatchCollisions(&context);
     v1::WatchCollisionsRequest first;

@@ -529,11 +529,6 @@ class _Rows:
     def __repr__(self) -> str:
         return f"{type(self).__name__}({_counted(self.answers)})"
 
-    def first_problem(self) -> Problem | None:
-        """Why the first pair without an answer has none; None: every pair has one."""
-        rows = np.flatnonzero(self.answers.relations == Relation.UNSPECIFIED)
-        return self.problem(int(rows[0])) if rows.size else None
-
     def problem(self, row: int) -> Problem | None:
         """Why pairs[row] has no answer; None: it has one."""
         row = range(len(self))[row]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hulld.answers.collisions import Answers, SeparatedInterval
+from hulld.answers.collisions import Scene, SeparatedInterval
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,19 @@ def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
 
 
 def hits_of(
-    answers: Answers, origins: npt.NDArray[np.float64], ends: npt.NDArray[np.float64]
+    found: Scene, origins: npt.NDArray[np.float64], ends: npt.NDArray[np.float64]
 ) -> Hits:
-    """The hits among the answers of all rays with all placements, row by row."""
-    count = len(answers) // len(origins) if len(origins) else 0
-    empty = np.empty(0)
-    all_times = answers.contact_times if answers.contact_times is not None else empty
-    rows = np.flatnonzero(~np.isnan(all_times))
-    rows = rows[np.lexsort((all_times[rows], rows // max(count, 1)))]
-    rays, placements, times = rows // max(count, 1), rows % max(count, 1), all_times[rows]
+    """The hits in a scene of rays, and then other placements."""
+    answers = found.answers
+    all_times = np.empty(0) if answers.contact_times is None else answers.contact_times
+    rows = np.lexsort((all_times, found.pairs[:, 0]))
+    rays, times = found.pairs[rows, 0], all_times[rows]
     along = times[:, np.newaxis]
-    proofs = [answers.motion_proofs.get(int(row), ()) for row in rows]
+    normals = [_normal(answers.motion_proofs.get(int(row), ())) for row in rows]
     return Hits(
-        rays.astype(np.uint32),
-        placements.astype(np.uint32),
+        rays,
+        found.pairs[rows, 1] - np.uint32(len(origins)),
         times,
         (1 - along) * origins[rays] + along * ends[rays],
-        np.array([_normal(proof) for proof in proofs]).reshape(-1, 3),
+        np.array(normals).reshape(-1, 3),
     )

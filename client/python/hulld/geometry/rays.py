@@ -28,10 +28,8 @@ def ray_ends(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Vectors
     return starts, starts + along
 
 
-def with_rays(
-    targets: Placements, starts: Vectors, ends: Vectors
-) -> tuple[Placements, npt.NDArray[np.uint32]]:
-    """The targets, then the rays, and all pairs of a ray and a target, ray by ray."""
+def with_rays(targets: Placements, starts: Vectors, ends: Vectors) -> Placements:
+    """The rays, and then the targets."""
 
     def poses(translations: Vectors) -> npt.NDArray[np.float64]:
         rows = np.zeros((len(translations), 7))
@@ -42,16 +40,11 @@ def with_rays(
     shape = len(targets.ids) + len(targets.shapes)
     radii = np.zeros(len(targets)) if targets.radii is None else targets.radii
     at_end = targets.poses if targets.end_poses is None else targets.end_poses
-    placements = Placements(
+    return Placements(
         targets.ids,
-        np.vstack([targets.poses, poses(starts)]),
-        np.concatenate([targets.indices, np.full(len(starts), shape, np.uint32)]),
+        np.vstack([poses(starts), targets.poses]),
+        np.concatenate([np.full(len(starts), shape, np.uint32), targets.indices]),
         shapes=[*targets.shapes, np.zeros((1, 3))],
-        radii=np.concatenate([radii, np.zeros(len(starts))]),
-        end_poses=np.vstack([at_end, poses(ends)]),
+        radii=np.concatenate([np.zeros(len(starts)), radii]),
+        end_poses=np.vstack([poses(ends), at_end]),
     )
-    rays = np.arange(len(targets), len(placements))
-    pairs = np.stack(
-        [np.repeat(rays, len(targets)), np.tile(np.arange(len(targets)), len(starts))], axis=1
-    )
-    return placements, pairs.astype(np.uint32)
