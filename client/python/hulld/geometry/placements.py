@@ -37,10 +37,10 @@ class Placement:
 
     points: 1 to 4096, n x 3. They mean the same as a registered hull of these points, and are not
     stored. radius: grows the shape, or each piece of the body, by a closed ball: a point becomes a
-    sphere, a segment a capsule. end_pose: of a motion, at time 1; None: the placement is at rest. At
-    time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1, exactly; of
-    q1 and -q1, the same rotation, the one with the shorter path is taken. ValueError: a malformed
-    ID, shape, or radius, or not exactly one of ID and points.
+    sphere, a segment a capsule. end_pose: of a motion, at time 1; None: the placement is at rest.
+    At time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1, exactly;
+    of q1 and -q1, the same rotation, the one with the shorter path is taken. ValueError: a
+    malformed ID, shape, or radius, or not exactly one of ID and points.
     """
 
     id: str | None = None
@@ -111,9 +111,9 @@ class Placements:
     indices: for each placement, the index of its ID or, from the number of IDs on, of its shape;
     None: each is placed once, or a single one as often as there are poses. shapes: inline shapes,
     the points of each as in Placement. radii: of each placement, or one for all, as in Placement;
-    None: 0. end_poses: of motions, for each placement, as in Placement.end_pose; one that is at rest
-    has its pose again. None: all are at rest. orthogonality_tolerance, quaternion_order: as in
-    pack_poses.
+    None: 0. end_poses: of motions, for each placement, as in Placement.end_pose; one that is at
+    rest has its pose again. None: all are at rest. orthogonality_tolerance, quaternion_order: as
+    in pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses

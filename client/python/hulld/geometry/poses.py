@@ -165,7 +165,7 @@ def pack_poses(
 
 def shorter_path(starts: PackedPoses, ends: PackedPoses) -> PackedPoses:
     """The end poses of motions, n x 7, each with the sign of its quaternion that makes the path
-    from the start shorter: with a scalar product of at least 0. Both signs are the same rotation."""
+    from the start shorter: their scalar product is at least 0. Both signs are one rotation."""
 
     def scaled(poses: PackedPoses) -> PackedPoses:
         rotations = poses[:, :4]
