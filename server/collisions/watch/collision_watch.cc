@@ -321,7 +321,8 @@ absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
     pair.is_within_clearance = false;
     return absl::OkStatus();
   }
-  const auto [answer, of_body] = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
+  const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
+  const absl::StatusOr<Answer>& answer = found.answer;
   if (!answer.ok()) return answer.status();
   rungs_.Add(answer->rung);
   const v1::Relation relation = EncodeRelation(answer->relation);
@@ -329,7 +330,7 @@ absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
   const v1::CollisionEventKind kind = KindOf(pair, relation, is_within);
   pair.relation = relation;
   pair.is_within_clearance = is_within;
-  if (kind != v1::COLLISION_EVENT_KIND_UNSPECIFIED) AddEvent(kind, pair, of_body.pieces);
+  if (kind != v1::COLLISION_EVENT_KIND_UNSPECIFIED) AddEvent(kind, pair, found.of_body.pieces);
   return absl::OkStatus();
 }
 
