@@ -179,7 +179,8 @@ def test_rays_hit_in_order(client: hulld.Client, cube: str) -> None:
 
 def test_random_rays_agree_with_the_box(client: hulld.Client, cube: str) -> None:
     rng = np.random.default_rng(8)
-    origins, directions = rng.uniform(-3, 3, (200, 3)), rng.uniform(-6, 6, (200, 3))
+    origins = rng.uniform(-3, 3, (200, 3))
+    directions = 1.5 * (rng.uniform(-0.5, 1.5, (200, 3)) - origins)
     hits = client.cast(origins, directions, [cube])
     with np.errstate(divide="ignore"):
         low, high = (0 - origins) / directions, (1 - origins) / directions
