@@ -43,6 +43,9 @@ std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement
 
 Verification FromStatus(const absl::Status& checked) {
   if (checked.ok()) return Verification{Verdict::kValid, ""};
+  if (absl::IsOutOfRange(checked)) {
+    return Verification{Verdict::kCannotCheck, std::string(checked.message())};
+  }
   return Verification{Verdict::kInvalid, std::string(checked.message())};
 }
 

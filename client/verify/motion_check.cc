@@ -275,16 +275,7 @@ absl::Status CheckIntervals(const MovingPair& pair, const v1::FirstContact& cont
                                  contact.separated_until()));
 }
 
-// Returns true if first <= second <= first + most, or if no double is between them.
-bool IsBracket(double first, double second, double most) {
-  if (first > second) return false;
-  if (second <= std::nextafter(first, 2)) return true;
-  CommonExponent exponent;
-  exponent.Include(std::array{first, second, most});
-  return exponent.ToInteger(second) - exponent.ToInteger(first) <= exponent.ToInteger(most);
-}
-
-absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact, double most) {
+absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact) {
   const double until = contact.separated_until();
   if (!(until >= 0 && until <= 1)) {
     return ProofFails(absl::StrCat("separated_until is ", until, ", not in [0, 1]"));
@@ -295,9 +286,23 @@ absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact, 
   }
   if (!contact.has_contact_time()) return ProofFails("the contact has no contact_time");
   const double time = contact.contact_time();
-  if (time >= 0 && time <= 1 && IsBracket(until, time, most)) return absl::OkStatus();
-  return ProofFails(absl::StrCat("contact_time is ", time, ", not from separated_until, ", until,
-                                 ", to at most ", most, " later"));
+  if (time >= until && time <= 1) return absl::OkStatus();
+  return ProofFails(
+      absl::StrCat("contact_time is ", time, ", not between separated_until, ", until, ", and 1"));
+}
+
+// Accepts a width of at most `most`, and adjacent doubles.
+absl::Status CheckWidth(const v1::FirstContact& contact, double most) {
+  const double until = contact.separated_until();
+  const double time = contact.contact_time();
+  CommonExponent exponent;
+  exponent.Include(std::array{until, time, most});
+  const bool is_narrow =
+      exponent.ToInteger(time) - exponent.ToInteger(until) <= exponent.ToInteger(most);
+  if (is_narrow || time <= std::nextafter(until, 2)) return absl::OkStatus();
+  return absl::OutOfRangeError(absl::StrCat("the first contact is proven to be between ", until,
+                                            " and ", time, ", which are more than ", most,
+                                            " apart"));
 }
 
 // Contact of a translation between two times. All differences of vertices move alike, so their
@@ -342,7 +347,7 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error) {
   if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
-  if (absl::Status s = CheckTimes(relation, contact, max_time_error); !s.ok()) return s;
+  if (absl::Status s = CheckTimes(relation, contact); !s.ok()) return s;
   if (a.start.xyz.empty() || b.start.xyz.empty()) {
     if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
     return ProofFails("a hull is empty, and so separated from everything");
@@ -360,7 +365,8 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
   if (absl::Status s = CheckIntervals(pair, contact); !s.ok()) return s;
   if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
   const absl::Status checked = CheckContact(relation, pair, contact, at_contact);
-  return checked.ok() ? checked : ProofFails(absl::StrCat("contact: ", checked.message()));
+  if (!checked.ok()) return ProofFails(absl::StrCat("contact: ", checked.message()));
+  return CheckWidth(contact, max_time_error);
 }
 
 }  // namespace hulld
