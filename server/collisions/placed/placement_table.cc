@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "core/query/motion/swept_box.h"
+#include "core/query/scene/swept_box.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"

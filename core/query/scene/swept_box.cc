@@ -1,4 +1,4 @@
-#include "core/query/motion/swept_box.h"
+#include "core/query/scene/swept_box.h"
 
 #include <cmath>
 #include <limits>

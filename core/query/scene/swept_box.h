@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_QUERY_MOTION_SWEPT_BOX_H_
-#define HULLD_CORE_QUERY_MOTION_SWEPT_BOX_H_
+#ifndef HULLD_CORE_QUERY_SCENE_SWEPT_BOX_H_
+#define HULLD_CORE_QUERY_SCENE_SWEPT_BOX_H_
 
 #include "core/query/box_tree.h"
 #include "core/query/motion/first_contact.h"
@@ -13,4 +13,4 @@ Box SweptBox(const MovingHull& moving);
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_QUERY_MOTION_SWEPT_BOX_H_
+#endif  // HULLD_CORE_QUERY_SCENE_SWEPT_BOX_H_
