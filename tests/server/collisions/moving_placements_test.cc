@@ -73,6 +73,8 @@ v1::Placement TurningRod() {
 }
 v1::Placement Ceiling() { return Shape({0, 4, -1, 6, 4, -1, 0, 4, 1, 6, 4, 1, 3, 5, 0}); }
 
+std::string MessageOf(const absl::Status& status) { return std::string(status.message()); }
+
 class MovingPlacements : public ServerTest {
  protected:
   Client client() const {
@@ -219,7 +221,9 @@ TEST_F(MovingPlacements, ABatchAnswersAsSingleCalls) {
     EXPECT_EQ(columns.relations(i), single.relation());
     EXPECT_EQ(columns.separated_until(i), contact.separated_until());
     EXPECT_EQ(std::isnan(columns.contact_times(i)), !contact.has_contact_time());
-    if (contact.has_contact_time()) EXPECT_EQ(columns.contact_times(i), contact.contact_time());
+    if (contact.has_contact_time()) {
+      EXPECT_EQ(columns.contact_times(i), contact.contact_time());
+    }
     EXPECT_EQ(columns.certificates(i).ShortDebugString(), single.certificate().ShortDebugString());
     if (contact.intervals().empty()) continue;
     ASSERT_LT(proof, columns.motion_proofs_size());
@@ -353,7 +357,7 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
     batch.set_method(request.method());
     batch.set_tolerance(request.tolerance());
     *batch.mutable_wanted() = request.wanted();
-    EXPECT_THAT(Ask(batch).status().message(), StartsWith(absl::StrCat(name, " excludes")));
+    EXPECT_THAT(MessageOf(Ask(batch).status()), StartsWith(absl::StrCat(name, " excludes")));
     if (request.method() != v1::METHOD_UNSPECIFIED) continue;
     v1::FindCollisionsRequest scene;
     *scene.mutable_placements() = batch.placements();
@@ -362,7 +366,7 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
     const absl::Status found = client().FindCollisions(
         scene, [](const v1::FindCollisionsResponse&) { return absl::OkStatus(); });
     EXPECT_EQ(found.code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_THAT(found.message(), StartsWith(absl::StrCat(name, " excludes")));
+    EXPECT_THAT(MessageOf(found), StartsWith(absl::StrCat(name, " excludes")));
   }
   for (const double bad : {0.0, -1.0, 1.5, kNaN}) {
     v1::CheckCollisionRequest request = moving;
@@ -394,7 +398,7 @@ TEST_F(MovingPlacements, BodiesDoNotMoveYet) {
   EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith("the pair has"));
 
   *body.add_pieces() = MovingTo(PlacementOf("cube"), 1);
-  EXPECT_THAT(client().PutBody(body).status().message(),
+  EXPECT_THAT(MessageOf(client().PutBody(body).status()),
               StartsWith("pieces[1].end_pose is set; a piece is at rest"));
 }
 
