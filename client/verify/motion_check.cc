@@ -316,9 +316,6 @@ absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& c
     if (!differences.ok()) return differences.status();
     span.insert(span.end(), differences->begin(), differences->end());
   }
-  if (pair.a.radius() + pair.b.radius() > 0) {
-    return ProofFails("without a direction, the hulls would have to overlap");
-  }
   if (HoldsOriginInside(span) || HoldsOriginOnBoundary(span)) return absl::OkStatus();
   return ProofFails("the vertex pairs show no common point up to contact_time");
 }
@@ -329,7 +326,9 @@ absl::Status CheckContact(v1::Relation relation, const MovingPair& pair,
     const double time = contact.contact_time();
     return CheckExactly(at_contact, certificate, pair.a.HullAt(time), pair.b.HullAt(time));
   };
-  if (!pair.IsTranslation()) return check(relation);
+  // With radii, the time of a translation is irrational in general.
+  const bool is_rounded = pair.a.radius() + pair.b.radius() > 0;
+  if (is_rounded || !pair.IsTranslation()) return check(relation);
   const bool has_direction = certificate.has_direction() || certificate.has_integer_direction();
   if (has_direction) return check(v1::RELATION_TOUCHING);
   if (!check(v1::RELATION_OVERLAPPING).ok()) return CheckBriefContact(pair, contact, certificate);

@@ -22,11 +22,12 @@ double MaxTimeError(const v1::Wanted& wanted);
 // the certificate proves their contact at contact.contact_time; for SEPARATED, if the intervals
 // cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: all is
 // proven, but the two times are more than max_time_error apart, which the contract allows if the
-// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, as CheckCertificate.
+// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, as
+// CheckCertificate.
 //
-// Of a translation, the certificate proves contact at contact_time, or between separated_until and
-// contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING pair which touches at
-// contact_time overlaps later, is not part of the proof.
+// Of a translation without radii, the certificate proves contact at contact_time, or between
+// separated_until and contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING
+// pair which touches at contact_time overlaps later, is not part of the proof.
 //
 // Cost: O(vertices) operations on integers of any length per interval: some microseconds per
 // vertex.

@@ -237,7 +237,7 @@ absl::StatusOr<bool> PairQuestion::AdvanceMotion() {
   absl::StatusOr<FirstContact> found =
       FindFirstContact({a_->hull().query_hull(), motion_->X_W[0], radii_[0]},
                        {b_->hull().query_hull(), motion_->X_W[1], radii_[1]}, motion_->options);
-  if (!found.ok()) return NameMotionError(found.status());
+  if (!found.ok()) return found.status();
   motion_->contact = *std::move(found);
   return true;
 }

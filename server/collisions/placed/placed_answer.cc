@@ -111,7 +111,7 @@ PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
   if (table.is_body(a) || table.is_body(b)) return {BodyInMotion()};
   absl::StatusOr<FirstContact> found =
       FindFirstContact(table.MovingAt(a), table.MovingAt(b), options);
-  if (!found.ok()) return {NameMotionError(found.status())};
+  if (!found.ok()) return {found.status()};
   Answer answer;
   answer.relation = found->relation;
   return {std::move(answer), {}, *std::move(found)};

@@ -97,13 +97,6 @@ absl::Status BodyInMotion() {
       "for the motions of its pieces");
 }
 
-absl::Status NameMotionError(const absl::Status& status) {
-  if (!absl::IsUnimplemented(status)) return status;
-  return absl::InvalidArgumentError(
-      "the pair has an end_pose and a radius, and the first contact of a rounded shape is not "
-      "supported; leave out one of them");
-}
-
 bool IsQuickToRelate(const QueryHull& hull) {
   // **Observed**: exact contact of hulls of 10000 vertices takes 60 us
   // (tests/bench/results/query_relation_*.csv). The first few queries of an unprepared hull scan

@@ -30,8 +30,6 @@ absl::Status ValidateForMotions(const QueryOptions& options);
 
 // INVALID_ARGUMENT: the error of a pair with a motion and a body.
 absl::Status BodyInMotion();
-// Returns the server's error for an error of core about a motion.
-absl::Status NameMotionError(const absl::Status& status);
 
 // True if only relations are wanted and all placements are hulls at rest: the most frequent call,
 // which has a separate path.

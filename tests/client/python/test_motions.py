@@ -146,6 +146,19 @@ def test_scenes_take_motions_and_streams_refuse_them(client: hulld.Client, cube:
         hulld.Placements(cube, [AWAY, AWAY], end_poses=[AWAY])
 
 
+def test_radii_count_at_all_times(client: hulld.Client) -> None:
+    origin = np.zeros((1, 3))
+    a = hulld.Placement(points=origin, radius=1)
+    b = hulld.Placement(points=origin, pose=(6, 8, 0), radius=2, end_pose=(-6, -8, 0))
+    answer = client.check_collision(a, b, certificate=True)
+    assert answer.first_contact is not None and answer.first_contact.contact_time is not None
+    assert abs(answer.first_contact.contact_time - 0.35) < 1e-9
+    hulld.Verifier(client).check(a, b, answer)
+    smaller = dataclasses.replace(b, radius=1.5)
+    with pytest.raises(hulld.VerificationError):
+        hulld.Verifier(client).check(a, smaller, answer)
+
+
 def test_inline_shapes_move(client: hulld.Client) -> None:
     points = np.vstack([CUBE[::-1], [[0.5, 0.5, 0.5]]])
     answer = client.check_collision(points, (points, AWAY), to_b=(-1, 0, 0), certificate=True)

@@ -362,7 +362,7 @@ TEST(MotionCheck, RadiiAreExactInTranslations) {
   wide.width = 0.5;
   ExpectValid(wide, a, b(6));
   EXPECT_EQ(Check(overlaps, a, b(6)).code(), absl::StatusCode::kOutOfRange);
-  ExpectInvalid(wide, a, b(5), "contact: without a direction");
+  ExpectInvalid(wide, a, b(5), "contact: the hull of the differences");
 }
 
 TEST(MotionCheck, RadiiAreExactWithPlanes) {

@@ -402,18 +402,18 @@ TEST_F(MovingPlacements, BodiesDoNotMoveYet) {
               StartsWith("pieces[1].end_pose is set; a piece is at rest"));
 }
 
-TEST_F(MovingPlacements, RoundedShapesDoNotMoveYet) {
-  Put("cube", Cube());
-  v1::Placement rounded = PlacementOf("cube");
-  rounded.set_radius(0.5);
-  const v1::Placement moving = MovingTo(PlacementOf("cube", 3), -1);
-  const std::string expected = "the pair has an end_pose and a radius";
-  ExpectRefused(Pair(rounded, moving), expected);
-  ExpectRefused(Pair(moving, rounded), expected);
-  const auto batch = Ask(Batch({rounded, moving}, {0, 1}));
-  ASSERT_TRUE(batch.ok()) << batch.status();
-  ASSERT_EQ(batch->columns().pair_problems_size(), 1);
-  EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith(expected));
+TEST_F(MovingPlacements, RadiiCountAtAllTimes) {
+  v1::Placement a = Shape({0, 0, 0});
+  a.set_radius(1);
+  v1::Placement b = Shape({0, 0, 0});
+  b.set_radius(2);
+  b.mutable_pose()->mutable_translation()->set_x(6);
+  b.mutable_pose()->mutable_translation()->set_y(8);
+  // The distance of the centers is 10 at the start, and falls to 3 at a time of 0.35.
+  const v1::FirstContact contact = Proven(Pair(a, MovingTo(b, -6, -8))).first_contact();
+  EXPECT_NEAR(contact.contact_time(), 0.35, 0x1p-29);
+  EXPECT_LE(contact.contact_time() - contact.separated_until(), 0x1p-30);
+  EXPECT_EQ(Proven(Pair(a, MovingTo(b, -6, 10))).relation(), kSeparated);
 }
 
 TEST_F(MovingPlacements, StreamsAndWatchesRefuseThem) {
