@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         VertexPair,
         Witness,
     )
+    from hulld.answers.containment import Containment
     from hulld.answers.hulls import (
         Audit,
         BoundedValue,
@@ -150,6 +151,7 @@ __all__ = [
     "CollisionEventKind",
     "CollisionStream",
     "CollisionWatch",
+    "Containment",
     "CreatedHull",
     "DataLossError",
     "DeadlineExceededError",
@@ -231,6 +233,7 @@ __all__ = [
 _MODULES = (
     "answers.bodies",
     "answers.collisions",
+    "answers.containment",
     "answers.hulls",
     "answers.status",
     "appender",
