@@ -1,3 +1,5 @@
+#include <absl/strings/str_cat.h>
+
 #include <memory>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/local/file_shape.h"
+#include "client/hullctl/pairs/point_check.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -25,6 +28,8 @@ struct PairArguments {
   v1::CheckCollisionRequest request;
   QueryDetails details;
   std::string record;
+  // A file with points that takes the place of B.
+  std::string points;
 };
 
 std::string VersionText(const v1::HullVersion& hull) {
@@ -164,15 +169,49 @@ void PrintAnswer(const Invocation& run, const PairArguments& arguments,
   }
 }
 
+// Makes an ID or a file the shape of a placement.
+absl::Status SetSide(const Invocation& run, const std::string& argument, v1::Placement* placement) {
+  placement->set_hull_id(argument);
+  return IsShapeFile(argument) ? SetShape(run, argument, placement) : absl::OkStatus();
+}
+
+// INVALID_ARGUMENT: an option that only a pair takes, beside --points.
+absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
+  const v1::Wanted& wanted = arguments.details.wanted;
+  const std::pair<bool, const char*> given[] = {
+      {!arguments.b.empty(), "B"},
+      {arguments.request.b().has_pose(), "--pose-b"},
+      {arguments.details.verify, "--verify"},
+      {!arguments.record.empty(), "--record"},
+      {wanted.axis(), "--axis"},
+      {wanted.analysis(), "--report"},
+      {wanted.certificate(), "--certificate"},
+      {wanted.witness(), "--witness"},
+      {wanted.normal(), "--normal"},
+      {wanted.has_clearance(), "--clearance"},
+      {arguments.details.tolerance.has_value(), "--tolerance"},
+      {arguments.details.method != v1::METHOD_UNSPECIFIED, "--textbook"}};
+  for (const auto& [is_given, name] : given) {
+    if (!is_given) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("--points takes --pose-a, --separation, and --max-error; remove ", name));
+  }
+  return absl::OkStatus();
+}
+
+ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments) {
+  absl::Status status = RefuseOptionsOfPairs(arguments);
+  v1::Placement hull = arguments.request.a();
+  if (status.ok()) status = SetSide(run, arguments.a, &hull);
+  if (!status.ok()) return run.FailUsage(status);
+  return CheckPoints(run, hull, arguments.points, arguments.details.wanted);
+}
+
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
-  for (const auto& [argument, placement] : {std::pair(&arguments.a, request.mutable_a()),
-                                            std::pair(&arguments.b, request.mutable_b())}) {
-    placement->set_hull_id(*argument);
-    if (!IsShapeFile(*argument)) continue;
-    const absl::Status set = SetShape(run, *argument, placement);
-    if (!set.ok()) return run.FailUsage(set);
-  }
+  absl::Status status = SetSide(run, arguments.a, request.mutable_a());
+  if (status.ok()) status = SetSide(run, arguments.b, request.mutable_b());
+  if (!status.ok()) return run.FailUsage(status);
   double tolerance = 0;
   arguments.details.Apply(request.mutable_wanted(), &tolerance);
   request.set_tolerance(tolerance);
@@ -201,6 +240,13 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }
 
+ExitCode Check(const Invocation& run, const PairArguments& arguments) {
+  if (!arguments.points.empty()) return CheckPointsOfFile(run, arguments);
+  if (!arguments.b.empty()) return CheckPair(run, arguments);
+  return run.FailUsage(absl::InvalidArgumentError(
+      "B is required: 'hullctl check A B', or 'hullctl check A --points FILE'"));
+}
+
 void AddPoseOption(Command command, const std::string& name, v1::Placement* placement) {
   command
       .AddParsed(
@@ -222,9 +268,15 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("check", "Check two hulls, bodies, or files for collision");
   constexpr char kSideHelp[] = "ID of a hull or body, or a file with points";
   command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kPlaced);
-  command.AddText("B", &arguments->b, kSideHelp).Required().Completes(ValueKind::kPlaced);
+  command.AddText("B", &arguments->b, kSideHelp).Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
+  command
+      .AddText("--points", &arguments->points,
+               "Show which points of a file are inside A, on its boundary, or outside, instead of "
+               "a pair; - is standard input")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   AddQueryOptions(command, &arguments->details);
   AddFreshnessOptions(command, invocation);
   PairArguments* const checked = arguments.get();
@@ -252,10 +304,12 @@ void AddCheckCommand(Command program, Invocation* invocation) {
        {"Which way out is the shortest?", "hullctl check arm box --separation --normal"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},
+       {"Which points of a cloud are inside, and how deep?",
+        "hullctl check arm --points cloud.ply --separation"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});
-  command.OnGiven([=] { invocation->action = [=] { return CheckPair(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld
