@@ -244,12 +244,12 @@ class JudgeRun {
 };
 
 ExitCode JudgeTable(const Invocation& run, const JudgeArguments& arguments) {
-  std::vector<std::string> others;
-  const auto answers = ReadJudgedTable(arguments.file, &others);
+  std::vector<std::string> ignored;
+  const auto answers = ReadJudgedTable(arguments.file, &ignored);
   if (!answers.ok()) return run.FailUsage(answers.status());
-  if (!others.empty()) {
-    run.err << "hullctl: " << arguments.file << ": ignored columns: " << absl::StrJoin(others, ", ")
-            << "\n";
+  if (!ignored.empty()) {
+    run.err << "hullctl: " << arguments.file
+            << ": ignored columns: " << absl::StrJoin(ignored, ", ") << "\n";
   }
   JudgedHulls hulls;
   if (absl::Status resolved = hulls.Resolve(run, *answers); !resolved.ok()) {

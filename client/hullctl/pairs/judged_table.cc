@@ -116,7 +116,7 @@ class TableReader {
  public:
   // INVALID_ARGUMENT: a column is missing or repeated.
   absl::Status ReadHeader(const std::vector<std::string_view>& cells,
-                          std::vector<std::string>* others) {
+                          std::vector<std::string>* ignored) {
     static const auto* const kReaders = new auto(MakeReaders());
     for (const std::string_view cell : cells) {
       const std::string name = absl::AsciiStrToLower(cell);
@@ -127,7 +127,7 @@ class TableReader {
       columns_.push_back(name);
       const auto reader = kReaders->find(name);
       readers_.push_back(reader == kReaders->end() ? nullptr : &reader->second);
-      if (readers_.back() == nullptr) others->push_back(name);
+      if (readers_.back() == nullptr) ignored->push_back(name);
     }
     for (const char* name : {"a", "b"}) {
       if (!Has(name)) {
@@ -214,7 +214,7 @@ std::optional<Fault> FaultOfRelation(const JudgedAnswer& answer, v1::Relation tr
 }  // namespace
 
 absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
-                                                          std::vector<std::string>* others) {
+                                                          std::vector<std::string>* ignored) {
   const auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
   TableReader reader;
@@ -225,7 +225,7 @@ absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& pat
     const std::vector<std::string_view> cells = CellsOf(line);
     if (cells.empty()) continue;
     if (!std::exchange(has_header, true)) {
-      const absl::Status read = reader.ReadHeader(cells, others);
+      const absl::Status read = reader.ReadHeader(cells, ignored);
       if (!read.ok()) return (*source)->ErrorAtLine(std::string(read.message()));
       continue;
     }

@@ -32,10 +32,10 @@ struct JudgedAnswer {
 // Reads a table: a header of column names, then a row for each answer, separated by commas,
 // semicolons, tabs, or spaces. Columns: a and b; for each of them a pose, as in a_x a_y a_z a_qw
 // a_qx a_qy a_qz (default: identity); and at least one of relation, colliding, distance, and depth,
-// with empty cells for answers that are not given. `others` receives the names of other columns,
-// which are ignored. INVALID_ARGUMENT names the line and the column.
+// with empty cells for answers that are not given. `ignored` receives the names of other columns.
+// INVALID_ARGUMENT names the line and the column.
 absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
-                                                          std::vector<std::string>* others);
+                                                          std::vector<std::string>* ignored);
 
 enum class Fault {
   // Separated hulls are said to collide.

@@ -110,6 +110,7 @@ if TYPE_CHECKING:
     )
     from hulld.geometry.points import PointsLike, as_points
     from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
+    from hulld.judging import Fault, Judged, WrongAnswer, judge
     from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
@@ -158,6 +159,7 @@ __all__ = [
     "DecidingPiece",
     "Durability",
     "FailedPreconditionError",
+    "Fault",
     "Feature",
     "Freshness",
     "Header",
@@ -174,6 +176,7 @@ __all__ = [
     "HulldError",
     "InternalError",
     "InvalidArgumentError",
+    "Judged",
     "Limits",
     "Local",
     "LocalServer",
@@ -219,11 +222,13 @@ __all__ = [
     "Verifier",
     "VertexPair",
     "Witness",
+    "WrongAnswer",
     "__version__",
     "all_pairs",
     "as_points",
     "check",
     "find_program",
+    "judge",
     "local",
     "pack_poses",
     "read_token_file",
@@ -247,6 +252,7 @@ _MODULES = (
     "geometry.placements",
     "geometry.points",
     "geometry.poses",
+    "judging",
     "local_server",
     "programs",
     "retry",

@@ -21,7 +21,7 @@ _ORIGIN = np.zeros((1, 3))
 
 @dataclass(frozen=True, repr=False)
 class Containment:
-    """Where n points lie, as in `points[found.inside]`.
+    """The positions of n points, as in `points[found.inside]`.
 
     relations: of each point with the hull, as Relation in uint8. separations, separation_bounds: if
     requested, the distance from the hull, or minus the depth below its surface, 0 on it, each with
@@ -68,7 +68,7 @@ class PointQuestion:
 
     def __init__(self, hull: Placement, orthogonality_tolerance: float) -> None:
         self._ids = [] if hull.id is None else [hull.id]
-        self._shapes = [_ORIGIN] if hull.shape is None else [hull.shape, _ORIGIN]
+        self._shapes: list[Points] = [_ORIGIN] if hull.shape is None else [hull.shape, _ORIGIN]
         self._pose = pack_pose(hull.pose, orthogonality_tolerance=orthogonality_tolerance)
 
     def pairs(self, points: Points) -> tuple[Placements, npt.NDArray[np.uint32]]:
