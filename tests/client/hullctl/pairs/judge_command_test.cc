@@ -16,7 +16,7 @@
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
-namespace judge_test {
+namespace judge_command_test {
 
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
@@ -188,5 +188,5 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
   error("a,b,b_qw,b_qx,b_qy,b_qz,depth\ncube,cube,0,0,0,0,1\n", "are all 0");
 }
 
-}  // namespace judge_test
+}  // namespace judge_command_test
 }  // namespace hulld
