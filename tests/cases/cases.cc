@@ -22,7 +22,7 @@ constexpr std::array<double, 4> kTurned = {7, 1, 2, 3};
 // 2^-n.
 double Bit(int n) { return std::ldexp(1.0, -n); }
 
-Points Box(const Vec& low, const Vec& high) {
+Points Cuboid(const Vec& low, const Vec& high) {
   Points points;
   for (int corner = 0; corner < 8; ++corner) {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -78,46 +78,47 @@ Points Repeated(const Points& points, int times) {
 }
 
 void AddBoxes(std::vector<Case>* cases) {
-  const Points cube = Box({0, 0, 0}, {1, 1, 1});
-  const Points plate = Box({-64, -64, -0.5}, {64, 64, 0});
+  const Points cube = Cuboid({0, 0, 0}, {1, 1, 1});
+  const Points plate = Cuboid({-64, -64, -0.5}, {64, 64, 0});
   cases->push_back({"google-deepmind/mujoco#3476", cube,
-                    Box({0.25, 0.125, 1 - Bit(14)}, {1.25, 1.125, 2 - Bit(14)}), kOverlapping,
+                    Cuboid({0.25, 0.125, 1 - Bit(14)}, {1.25, 1.125, 2 - Bit(14)}), kOverlapping,
                     -Bit(14)});
-  cases->push_back({"google-deepmind/mujoco_warp#1526", Box({-0.25, -0.25, 0}, {0.25, 0.25, 0.5}),
-                    Box({-0.125, -0.125, 0.5 - Bit(12)}, {0.125, 0.125, 0.75}), kOverlapping,
-                    -Bit(12)});
-  cases->push_back({"google-deepmind/mujoco_warp#1430", plate,
-                    Box({20, -8, -Bit(13)}, {20.25, -7.75, 0.25}), kOverlapping, -Bit(13)});
-  cases->push_back({"newton-physics/newton#3248", Box({-16, -12, -0.25}, {16, 12, 0.25}),
-                    Box({15.5, 11.5, 0.25 - Bit(8)}, {15.75, 11.75, 0.5}), kOverlapping, -Bit(8)});
-  cases->push_back({"danfis/libccd#25", Box({-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}),
-                    Box({-1.5, -1.5, 1.375}, {1.5, 1.5, 4.375}), kOverlapping, -0.125});
   cases->push_back(
-      {"flexible-collision-library/fcl#508", cube, Box({0, 0, 5}, {1, 1, 6}), kSeparated, 4});
-  cases->push_back({"flexible-collision-library/fcl#545", Box({-1, -1, -1}, {1, 1, 1}),
-                    Box({0.75, 0.75, 0.75}, {1, 1, 1}), kOverlapping, -0.25});
-  cases->push_back({"flexible-collision-library/fcl#493", cube, Box({1 + Bit(52), 0, 0}, {2, 1, 1}),
-                    kSeparated, Bit(52), 0, kTurned});
-  cases->push_back({"flexible-collision-library/fcl#495", cube, Box({1, 0.25, 0.5}, {2, 1, 1}),
+      {"google-deepmind/mujoco_warp#1526", Cuboid({-0.25, -0.25, 0}, {0.25, 0.25, 0.5}),
+       Cuboid({-0.125, -0.125, 0.5 - Bit(12)}, {0.125, 0.125, 0.75}), kOverlapping, -Bit(12)});
+  cases->push_back({"google-deepmind/mujoco_warp#1430", plate,
+                    Cuboid({20, -8, -Bit(13)}, {20.25, -7.75, 0.25}), kOverlapping, -Bit(13)});
+  cases->push_back({"newton-physics/newton#3248", Cuboid({-16, -12, -0.25}, {16, 12, 0.25}),
+                    Cuboid({15.5, 11.5, 0.25 - Bit(8)}, {15.75, 11.75, 0.5}), kOverlapping,
+                    -Bit(8)});
+  cases->push_back({"danfis/libccd#25", Cuboid({-1.5, -1.5, -1.5}, {1.5, 1.5, 1.5}),
+                    Cuboid({-1.5, -1.5, 1.375}, {1.5, 1.5, 4.375}), kOverlapping, -0.125});
+  cases->push_back(
+      {"flexible-collision-library/fcl#508", cube, Cuboid({0, 0, 5}, {1, 1, 6}), kSeparated, 4});
+  cases->push_back({"flexible-collision-library/fcl#545", Cuboid({-1, -1, -1}, {1, 1, 1}),
+                    Cuboid({0.75, 0.75, 0.75}, {1, 1, 1}), kOverlapping, -0.25});
+  cases->push_back({"flexible-collision-library/fcl#493", cube,
+                    Cuboid({1 + Bit(52), 0, 0}, {2, 1, 1}), kSeparated, Bit(52), 0, kTurned});
+  cases->push_back({"flexible-collision-library/fcl#495", cube, Cuboid({1, 0.25, 0.5}, {2, 1, 1}),
                     kTouching, 0, 0, kTurned});
   cases->push_back({"flexible-collision-library/fcl#395",
-                    Box({-0.5, -0.5, -Bit(8)}, {0.5, 0.5, Bit(8)}), Octahedron({0, 0, 0.25}, 0.25),
-                    kOverlapping, -Bit(8)});
+                    Cuboid({-0.5, -0.5, -Bit(8)}, {0.5, 0.5, Bit(8)}),
+                    Octahedron({0, 0, 0.25}, 0.25), kOverlapping, -Bit(8)});
   cases->push_back({"MattiaMontanari/openGJK#13", cube,
-                    Box({0.25, 0.125, 0.0625}, {1.25, 1.125, 1.0625}), kOverlapping, -0.75, 0,
+                    Cuboid({0.25, 0.125, 0.0625}, {1.25, 1.125, 1.0625}), kOverlapping, -0.75, 0,
                     kTurned});
-  cases->push_back({"bulletphysics/bullet3#1703", Box({-128, -0.5, -128}, {128, 0.5, 128}),
-                    Box({90, 0.5 - Bit(6), 31}, {91, 1.5, 32}), kOverlapping, -Bit(6)});
-  cases->push_back({"dimforge/parry#430", Box({-512, -1, -512}, {512, 0, 512}),
+  cases->push_back({"bulletphysics/bullet3#1703", Cuboid({-128, -0.5, -128}, {128, 0.5, 128}),
+                    Cuboid({90, 0.5 - Bit(6), 31}, {91, 1.5, 32}), kOverlapping, -Bit(6)});
+  cases->push_back({"dimforge/parry#430", Cuboid({-512, -1, -512}, {512, 0, 512}),
                     Octahedron({300, 0.5 + Bit(10), -411}, 0.5), kSeparated, Bit(10)});
-  cases->push_back({"jrouwe/JoltPhysics#671", Box({-5, -1, -5}, {5, 0, 5}),
-                    Box({1, Bit(11), 2}, {2, 1, 3}), kSeparated, Bit(11), 0, kTurned});
+  cases->push_back({"jrouwe/JoltPhysics#671", Cuboid({-5, -1, -5}, {5, 0, 5}),
+                    Cuboid({1, Bit(11), 2}, {2, 1, 3}), kSeparated, Bit(11), 0, kTurned});
 }
 
 void AddHulls(std::vector<Case>* cases) {
   const auto [left, right] = FacingHulls(0.125);
   cases->push_back({"google-deepmind/mujoco#3383", left, right, kSeparated, 0.125, 0, kTurned});
-  const Points off_center = Box({0.25, 0.125, -0.5}, {0.375, 0.25, -Bit(9)});
+  const Points off_center = Cuboid({0.25, 0.125, -0.5}, {0.375, 0.25, -Bit(9)});
   cases->push_back({"newton-physics/newton#2622",
                     {0.125, 0, 0, 0.5, 0.125, 0, 0.25, 0.5, 0},
                     off_center,
@@ -131,7 +132,7 @@ void AddHulls(std::vector<Case>* cases) {
   cases->push_back(
       {"bepu/bepuphysics2#417", Prism(0, 0, -2, 2), Prism(2.5, 0.5, -2, 2), kOverlapping, -1.5});
   cases->push_back({"NVIDIA-Omniverse/PhysX#126", Octahedron({0, 0, 0}, 1),
-                    Box({1, -0.5, -0.5}, {2, 0.5, 0.5}), kTouching, 0});
+                    Cuboid({1, -0.5, -0.5}, {2, 0.5, 0.5}), kTouching, 0});
   cases->push_back({"coal-library/coal#325",
                     {0, 0, 0, -1, 0, 0, -1, 1, 0, -1, 0, 1},
                     {0, 0, 0, 1, 0, 0, 1, 2, 0, 1, 0, 2},

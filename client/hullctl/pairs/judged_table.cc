@@ -30,7 +30,8 @@ absl::StatusOr<double> NumberOf(std::string_view cell) {
 absl::Status ReadFinite(std::string_view cell, double* number) {
   const auto read = NumberOf(cell);
   if (!read.ok()) return read.status();
-  if (std::isinf(*read)) return absl::InvalidArgumentError(absl::StrCat(cell, " is not finite"));
+  if (std::isinf(*read))
+    return absl::InvalidArgumentError(absl::StrCat(std::string(cell), " is not finite"));
   *number = *read;
   return absl::OkStatus();
 }
@@ -44,7 +45,7 @@ absl::Status ReadRelation(std::string_view cell, std::optional<v1::Relation>* re
   for (const v1::Relation one :
        {v1::RELATION_SEPARATED, v1::RELATION_TOUCHING, v1::RELATION_OVERLAPPING}) {
     const std::string name = v1::Relation_Name(one).substr(std::string_view("RELATION_").size());
-    if (absl::AsciiStrToUpper(cell) != name) continue;
+    if (absl::AsciiStrToUpper(std::string(cell)) != name) continue;
     *relation = one;
     return absl::OkStatus();
   }
@@ -53,7 +54,7 @@ absl::Status ReadRelation(std::string_view cell, std::optional<v1::Relation>* re
 }
 
 absl::Status ReadColliding(std::string_view cell, std::optional<bool>* colliding) {
-  const std::string word = absl::AsciiStrToLower(cell);
+  const std::string word = absl::AsciiStrToLower(std::string(cell));
   const bool is_true = word == "1" || word == "true";
   if (!is_true && word != "0" && word != "false") {
     return absl::InvalidArgumentError(absl::StrCat(Quoted(cell), " is none of 0, 1, false, true"));
@@ -72,8 +73,8 @@ absl::Status ReadDepth(std::string_view cell, std::optional<double>* depth) {
   const auto read = NumberOf(cell);
   if (!read.ok()) return read.status();
   if (*read < 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(cell, " is no depth, a length of at least 0; leave the cell empty"));
+    return absl::InvalidArgumentError(absl::StrCat(
+        std::string(cell), " is no depth, a length of at least 0; leave the cell empty"));
   }
   *depth = *read;
   return absl::OkStatus();
@@ -119,7 +120,7 @@ class TableReader {
                           std::vector<std::string>* ignored) {
     static const auto* const kReaders = new auto(MakeReaders());
     for (const std::string_view cell : cells) {
-      const std::string name = absl::AsciiStrToLower(cell);
+      const std::string name = absl::AsciiStrToLower(std::string(cell));
       if (std::find(columns_.begin(), columns_.end(), name) != columns_.end()) {
         return absl::InvalidArgumentError(
             absl::StrCat("the header names ", Quoted(name), " twice"));
