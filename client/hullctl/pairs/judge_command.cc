@@ -79,7 +79,7 @@ class JudgedHulls {
   v1::PackedPlacements packed_;
 };
 
-// A wrong answer, and the proof.
+// An answer with faults.
 struct WrongAnswer {
   const JudgedAnswer* answer;
   Judgement judgement;
@@ -153,10 +153,12 @@ class JudgeRun {
     if (!judgement.faults.empty()) wrong_.push_back({&answer, std::move(judgement)});
   }
 
-  // Asks again, with a certificate, and prints the wrong answer.
+  // Asks again, with a certificate and the nearest double of the separation, and prints the wrong
+  // answer.
   absl::Status Prove(const WrongAnswer& wrong) {
     v1::CheckCollisionRequest request;
     request.mutable_wanted()->set_separation(true);
+    request.mutable_wanted()->set_max_error(0);
     request.mutable_wanted()->set_certificate(true);
     for (const size_t side : {size_t{0}, size_t{1}}) {
       v1::Placement& placement = side == 0 ? *request.mutable_a() : *request.mutable_b();
@@ -169,7 +171,10 @@ class JudgeRun {
     const auto verified = CheckCollisionVerified(client_, request);
     if (!verified.ok()) return verified.status();
     if (verified->verification.verdict == Verdict::kInvalid) ++invalid_;
-    Print(wrong, request, *verified);
+    AnswerRow row;
+    row.relation = verified->response.relation();
+    row.separation = verified->response.separation();
+    Print({wrong.answer, Judge(*wrong.answer, row, max_error_)}, request, *verified);
     return absl::OkStatus();
   }
 

@@ -135,12 +135,11 @@ def judge(
     columns = _read(table) if isinstance(table, (str, os.PathLike)) else dict(table)
     rows = _as_table(columns, orthogonality_tolerance)
     asking = _Asking(client or shared_client(), rows, hulls or {}, timeout)
-    found = [
-        _judge_rows(rows, first, asking.ask(np.arange(first, min(first + _ROWS_PER_CALL, len(rows)))),
-                    limit)
-        for first in range(0, len(rows), _ROWS_PER_CALL)
-    ]  # fmt: skip
-    return _collect(asking, len(rows), found)
+    found = []
+    for first in range(0, len(rows), _ROWS_PER_CALL):
+        part = np.arange(first, min(first + _ROWS_PER_CALL, len(rows)))
+        found.append(_judge_rows(rows, part, asking.ask(part), limit))
+    return _collect(asking, rows, found, limit)
 
 
 # --- Tables ---
@@ -286,13 +285,15 @@ class _Asking:
             shapes=self._shapes,
         )
 
-    def ask(self, rows: npt.NDArray[np.int64], certificate: bool = False) -> Batch:
+    def ask(self, rows: npt.NDArray[np.int64], prove: bool = False) -> Batch:
+        """prove: with certificates, and separations that are the nearest doubles."""
         first = np.arange(len(rows))
         return self.client.check_collisions(
             self.placements(rows),
             np.stack([first, first + len(rows)], axis=1),
             separation=True,
-            certificate=certificate,
+            max_error=0 if prove else None,
+            certificate=prove,
             timeout=self._timeout,
         )
 
@@ -319,9 +320,10 @@ def _difference(
         return np.where(said == truth, 0.0, np.abs(said - truth))
 
 
-def _judge_rows(table: _Table, first: int, batch: Batch, max_error: float) -> _Findings:
-    count = len(batch)
-    rows = np.arange(first, first + count)
+def _judge_rows(
+    table: _Table, rows: npt.NDArray[np.int64], batch: Batch, max_error: float
+) -> _Findings:
+    count = len(rows)
     truth = batch.answers.relations
     values, bounds = batch.answers.separations, batch.answers.separation_bounds
     assert values is not None and bounds is not None
@@ -354,12 +356,14 @@ def _judge_rows(table: _Table, first: int, batch: Batch, max_error: float) -> _F
     )
     unknown = Problem("INTERNAL", "the server gave no reason", None)
     failed = {
-        int(first + row): batch.problem(int(row)) or unknown for row in np.flatnonzero(~answered)
+        int(rows[row]): batch.problem(int(row)) or unknown for row in np.flatnonzero(~answered)
     }
     return _Findings(rows, faults, errors, distance_errors, depth_errors, failed)
 
 
-def _collect(asking: _Asking, count: int, found: Sequence[_Findings]) -> Judged:
+def _collect(
+    asking: _Asking, table: _Table, found: Sequence[_Findings], max_error: float
+) -> Judged:
     """Asks for the certificates of the wrong answers, and verifies them."""
     faults = np.concatenate([np.zeros((0, len(Fault)), bool), *(part.faults for part in found)])
     errors = np.concatenate([np.empty(0), *(part.errors for part in found)])
@@ -369,14 +373,15 @@ def _collect(asking: _Asking, count: int, found: Sequence[_Findings]) -> Judged:
     proven: list[WrongAnswer] = []
     for first in range(0, len(wrong), _ROWS_PER_CALL):
         rows = wrong[first : first + _ROWS_PER_CALL]
-        batch = asking.ask(rows, certificate=True)
+        batch = asking.ask(rows, prove=True)
+        exact = _judge_rows(table, rows, batch, max_error)
         placements = asking.placements(rows)
         for index, row in enumerate(rows.tolist()):
             verifier.check_row(placements, batch, index)
             named = tuple(Fault(fault) for fault in np.flatnonzero(faults[row]).tolist())
-            proven.append(WrongAnswer(row, named, float(errors[row]), batch[index]))
+            proven.append(WrongAnswer(row, named, float(exact.errors[index]), batch[index]))
     return Judged(
-        count,
+        len(table),
         proven,
         {fault: int(faults[:, fault].sum()) for fault in Fault},
         {row: problem for part in found for row, problem in part.failed.items()},

@@ -189,6 +189,7 @@ TEST_F(LimitedScene, GroupsMoversAndDetailsApply) {
   v1::FindCollisionsRequest request;
   for (const double x : {0.0, 1.5, 4.0, 4.25}) *request.add_placements() = PlacementOf("cube", x);
   request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_max_error(0);
   request.mutable_wanted()->set_witness(true);
   request.mutable_wanted()->set_clearance(2);
   request.set_limit(3);

@@ -19,16 +19,16 @@ using ::testing::StartsWith;
 
 class PointCheck : public HullctlOnServer {
  protected:
+  PointCheck() {
+    std::string pattern = (fs::temp_directory_path() / "hullctl-points-XXXXXX").string();
+    EXPECT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  ~PointCheck() override { fs::remove_all(folder_); }
+
   void SetUp() override {
     HullctlOnServer::SetUp();
-    std::string pattern = (fs::temp_directory_path() / "hullctl-points-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
     Put("cube", server::Cube());
-  }
-  void TearDown() override {
-    fs::remove_all(folder_);
-    HullctlOnServer::TearDown();
   }
 
   std::string Write(const std::string& name, const std::string& text) const {
@@ -56,9 +56,9 @@ TEST_F(PointCheck, TellsInsideOnAndOutsideExactly) {
 
 TEST_F(PointCheck, ReadsEveryFormatAndShowsTheDepth) {
   const std::string points = Write("points.obj", "v 0.5 0.5 0.25\nv 0.5 0.5 3\n");
-  const Ran ran = Ask({"check", "cube", "--points", points, "--separation"});
-  EXPECT_THAT(ran.out, HasSubstr("0.5 0.5 0.25\tinside\t-0.25 within "));
-  EXPECT_THAT(ran.out, HasSubstr("0.5 0.5 3\toutside\t2 within "));
+  const Ran ran = Ask({"check", "cube", "--points", points, "--max-error", "0"});
+  EXPECT_THAT(ran.out, HasSubstr("0.5 0.5 0.25\tinside\t-0.25 within 0\n"));
+  EXPECT_THAT(ran.out, HasSubstr("0.5 0.5 3\toutside\t2 within 0\n"));
   const Ran json = AskJson({"check", "cube", "--points", points, "--max-error", "0.1"});
   EXPECT_THAT(json.out, StartsWith("{\"point\":[0.5,0.5,0.25],\"side\":\"inside\","
                                    "\"relation\":\"RELATION_OVERLAPPING\""));
@@ -115,12 +115,12 @@ TEST_F(PointCheck, NearestPairsOfAScene) {
             "place:\n  a: {id: cube}\n  b: {id: cube, at: [0.5, 0, 0]}\n"
             "  c: {id: cube, at: [3, 0, 0]}\n  d: {id: cube, at: [9, 0, 0]}\n");
   for (const char* const command : {"scene", "check"}) {
-    std::vector<std::string> arguments = {"scene", scene, "--nearest", "2"};
-    if (command[0] == 'c') arguments = {"scene", "check", scene, "--nearest", "2"};
+    std::vector<std::string> arguments = {"scene", scene, "--nearest", "2", "--max-error", "0"};
+    if (command[0] == 'c') arguments.insert(arguments.begin() + 1, "check");
     const Ran ran = Ask(arguments);
     EXPECT_EQ(ran.code, 0) << ran.err;
-    EXPECT_THAT(ran.out, StartsWith("a\tb\tOVERLAPPING\t-0.5"));
-    EXPECT_THAT(ran.out, HasSubstr("\nb\tc\tSEPARATED\t1.5"));
+    EXPECT_THAT(ran.out, StartsWith("a\tb\tOVERLAPPING\t-0.5 within 0"));
+    EXPECT_THAT(ran.out, HasSubstr("\nb\tc\tSEPARATED\t1.5 within 0"));
     EXPECT_THAT(ran.out, EndsWith("\n# touching 0 overlapping 1 separated 5 failed 0\n"));
   }
   EXPECT_EQ(Ask({"scene", scene, "--nearest", "9", "--clearance", "2", "--output", "name"}).out,
