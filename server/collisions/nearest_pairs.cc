@@ -24,14 +24,22 @@ void AddBounded(const RankedPair& pair, size_t limit, std::vector<RankedPair>* h
 
 }  // namespace
 
-NearestPairs::NearestPairs(size_t limit, std::span<const Box> boxes, double max_error)
-    : limit_(limit), max_error_(max_error + std::numeric_limits<double>::denorm_min()) {
+NearestPairs::NearestPairs(size_t limit, std::vector<Box> boxes, double max_error)
+    : limit_(limit),
+      boxes_(std::move(boxes)),
+      max_error_(max_error + std::numeric_limits<double>::denorm_min()) {
   double largest = 0;
-  for (const Box& box : boxes) {
+  for (const Box& box : boxes_) {
     if (!box.IsEmpty()) largest = std::max(largest, (box.high - box.low).norm());
   }
   // The default error of a separation is relative to the sizes of both hulls.
   max_error_ += 4 * kRelativeError * largest;
+}
+
+bool NearestPairs::MayBeNear(uint32_t a, uint32_t b) const {
+  const Vector gaps = (boxes_[b].low - boxes_[a].high).cwiseMax(boxes_[a].low - boxes_[b].high);
+  // The rounding of the norm is far below the tolerance in bound().
+  return gaps.cwiseMax(0).norm() <= bound();
 }
 
 void NearestPairs::Add(const RankedPair& pair) {
@@ -60,7 +68,8 @@ std::vector<RankedPair> NearestPairs::Take() {
 
 size_t NearestPairs::MaxMemoryBytes(uint64_t pairs) const {
   // Vectors double their capacity. A pair is in one of the heaps.
-  return 2 * sizeof(RankedPair) * std::min<uint64_t>(2 * uint64_t{limit_}, pairs);
+  return boxes_.capacity() * sizeof(Box) +
+         2 * sizeof(RankedPair) * std::min<uint64_t>(2 * uint64_t{limit_}, pairs);
 }
 
 }  // namespace hulld::server

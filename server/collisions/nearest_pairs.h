@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <limits>
 #include <mutex>
-#include <span>
 #include <vector>
 
 #include "core/query/box_tree.h"
@@ -32,12 +31,14 @@ struct RankedPair {
 // Thread-safe.
 class NearestPairs {
  public:
-  // boxes: those of the placements, which bound the rounding of separations. max_error: the
-  // requested one, or 0.
-  NearestPairs(size_t limit, std::span<const Box> boxes, double max_error);
+  // boxes: one for each placement. max_error: the requested one, or 0.
+  NearestPairs(size_t limit, std::vector<Box> boxes, double max_error);
 
   // Any pair whose exact separation exceeds this has `limit` nearer ones. Never increases.
   double bound() const { return bound_.load(std::memory_order_relaxed); }
+  // False if the boxes prove that `limit` pairs are nearer than these placements, which do not
+  // overlap. Cost: some ten operations.
+  bool MayBeNear(uint32_t a, uint32_t b) const;
 
   void Add(const RankedPair& pair);
   void AddUnanswered(uint32_t a, uint32_t b);
@@ -45,11 +46,12 @@ class NearestPairs {
   // Removes and returns the nearest pairs in ascending order, then those without an answer.
   std::vector<RankedPair> Take();
 
-  // Memory at most used for the pairs of a scene with this many.
+  // Upper bound of the memory, in a scene with this many pairs.
   size_t MaxMemoryBytes(uint64_t pairs) const;
 
  private:
   const size_t limit_;
+  const std::vector<Box> boxes_;
   // Upper bound of the error of a reported separation near 0.
   double max_error_;
   std::atomic<double> bound_ = std::numeric_limits<double>::infinity();

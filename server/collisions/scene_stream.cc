@@ -229,13 +229,10 @@ absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, S
 
 absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer,
                                ScenePiece& piece) {
-  QueryOptions query = options_.query;
-  if (answer.ok() && nearest_->bound() < *query.clearance) {
-    query.clearance = nearest_->bound();
-    answer = AskPlaced(table_, a, b, query, nullptr).answer;
-  }
-  const bool is_near = answer.ok() && *answer->within_clearance;
-  if (is_near) {
+  const bool may_be_near =
+      answer.ok() && (answer->relation == Relation::kOverlapping || nearest_->MayBeNear(a, b));
+  if (may_be_near) {
+    QueryOptions query = options_.query;
     query.want_separation = true;
     answer = AskPlaced(table_, a, b, query, nullptr).answer;
   }
@@ -245,7 +242,7 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> an
   Count(relation, 1, &piece.totals);
   if (!answer.ok()) {
     nearest_->AddUnanswered(a, b);
-  } else if (is_near) {
+  } else if (may_be_near) {
     nearest_->Add({answer->separation->value, a, b, relation});
   }
   return absl::OkStatus();

@@ -56,13 +56,21 @@ TEST(NearestPairs, OrderOfAdditionsDoesNotMatter) {
 
 TEST(NearestPairs, BoundCoversTheErrorOfSeparations) {
   const Box box = {Vector(0, 0, 0), Vector(3, 4, 0)};
-  NearestPairs nearest(1, {&box, 1}, 0.25);
+  NearestPairs nearest(1, {box}, 0.25);
   EXPECT_EQ(nearest.bound(), kInfinity);
   nearest.AddUnanswered(0, 1);
   EXPECT_EQ(nearest.bound(), kInfinity);
   nearest.Add({2, 0, 1, v1::RELATION_SEPARATED});
   EXPECT_GT(nearest.bound(), 2.25 + 1e-10);
   EXPECT_LT(nearest.bound(), 2.25 + 1e-9);
+  const Box far = {Vector(3, 4, 3), Vector(4, 5, 3)};
+  NearestPairs apart(1, {box, far, box}, 0);
+  EXPECT_TRUE(apart.MayBeNear(0, 1));
+  apart.Add({3, 0, 1, v1::RELATION_SEPARATED});
+  EXPECT_TRUE(apart.MayBeNear(0, 1));
+  apart.Add({2.9, 0, 1, v1::RELATION_SEPARATED});
+  EXPECT_FALSE(apart.MayBeNear(1, 0));
+  EXPECT_TRUE(apart.MayBeNear(0, 2));
   NearestPairs points(1, {}, 0);
   points.Add({0, 0, 1, v1::RELATION_TOUCHING});
   EXPECT_GT(points.bound(), 0);
