@@ -135,6 +135,7 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/view",
     "client/hullctl/parts",
     "client/hullctl/robot",
+    "client/hullctl/pairs",
     "client/hullctl/commands",
     "client/hullctl",
 };

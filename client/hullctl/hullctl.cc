@@ -20,6 +20,7 @@
 #include "client/hullctl/completion/completion_script.h"
 #include "client/hullctl/completion/completion_values.h"
 #include "client/hullctl/local/local_server.h"
+#include "client/hullctl/pairs/judge_command.h"
 #include "client/hullctl/parts/cover_command.h"
 #include "client/hullctl/robot/robot_commands.h"
 
@@ -95,6 +96,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddRobotCommand(program, invocation);
   AddCoverCommand(program, invocation);
   AddVerifyCommand(program, invocation);
+  AddJudgeCommand(program, invocation);
   AddWatchCommand(program, invocation);
   program.BeginGroup("Run a server");
   AddStatusCommand(program, invocation);

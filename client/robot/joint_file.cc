@@ -11,9 +11,7 @@
 #include "client/formats/text_number.h"
 
 namespace hulld {
-namespace {
 
-// Returns the cells of a line, without quotes and spaces. Empty for a blank line or a comment.
 std::vector<std::string_view> CellsOf(std::string_view line) {
   std::vector<std::string_view> cells;
   line = Trim(line);
@@ -35,6 +33,8 @@ std::vector<std::string_view> CellsOf(std::string_view line) {
     line.remove_prefix(end + 1);
   }
 }
+
+namespace {
 
 // Returns the names of variables, separated by commas.
 std::string NamesOf(const std::vector<JointVariable>& variables) {

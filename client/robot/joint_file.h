@@ -5,12 +5,17 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/formats/byte_source.h"
 #include "client/robot/robot.h"
 
 namespace hulld {
+
+// Returns the cells of a line of a table, without quotes and spaces; separated by the first comma,
+// semicolon, or tab, otherwise by spaces. Empty for a blank line or a comment (#).
+std::vector<std::string_view> CellsOf(std::string_view line);
 
 // Reads waypoints one by one from a table: a header of variable names (see JointVariable), then one
 // row per waypoint, in radians and meters, separated by commas, semicolons, tabs, or spaces. Skips

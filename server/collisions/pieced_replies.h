@@ -154,7 +154,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual void Deliver(Work& piece) = 0;
   // Merges a small reply into the queued one; returns false if they do not fit.
   virtual bool Join(const Reply& reply, Reply* waiting) = 0;
-  // Called after every piece was delivered, to queue a final message; the end is set afterwards.
+  // Called after every piece was delivered. Returns the number of further units that only then
+  // exist, if any.
+  virtual uint64_t CountFollowingUnits() { return 0; }
+  // Called after that, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
   void RunSlice(Work& piece) {
@@ -268,6 +271,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     }
     NoteHeldBytes();
     if (is_head_left_) return;
+    if (pieces_.empty() && next_unit_ == unit_count_) unit_count_ += CountFollowingUnits();
     if (this->unsent_bytes() < kMostUnsentBytes) StartSlices();
     if (!pieces_.empty() || next_unit_ < unit_count_) return;
     OnAllDelivered();

@@ -8,6 +8,7 @@
 #include "server/collisions/placed/scene_groups.h"
 #include "server/wire/answer_columns.h"
 #include "server/wire/decode.h"
+#include "server/wire/encode.h"
 
 namespace hulld::server {
 namespace {
@@ -27,19 +28,31 @@ constexpr size_t kBoxesPerStep = 256;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
-void Count(v1::Relation relation, v1::SceneTotals* totals) {
+// Adds `by` pairs of a relation, or without an answer. -1: modulo 2^64, as in the sums of AddTo.
+void Count(v1::Relation relation, uint64_t by, v1::SceneTotals* totals) {
   switch (relation) {
     case v1::RELATION_SEPARATED:
-      return totals->set_separated(totals->separated() + 1);
+      return totals->set_separated(totals->separated() + by);
     case v1::RELATION_TOUCHING:
-      return totals->set_touching(totals->touching() + 1);
+      return totals->set_touching(totals->touching() + by);
     case v1::RELATION_OVERLAPPING:
-      return totals->set_overlapping(totals->overlapping() + 1);
+      return totals->set_overlapping(totals->overlapping() + by);
     case v1::RELATION_WITHIN_TOLERANCE:
-      return totals->set_within_tolerance(totals->within_tolerance() + 1);
+      return totals->set_within_tolerance(totals->within_tolerance() + by);
     default:
-      return totals->set_failed(totals->failed() + 1);
+      return totals->set_failed(totals->failed() + by);
   }
+}
+
+// Returns the query for relation and clearance alone.
+QueryOptions WithoutDetails(QueryOptions options) {
+  options.want_axis = false;
+  options.want_analysis = false;
+  options.want_certificate = false;
+  options.want_separation = false;
+  options.want_witness = false;
+  options.want_normal = false;
+  return options;
 }
 
 void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
@@ -95,7 +108,19 @@ absl::Status SceneStream::Validate() {
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
   options_.query = *std::move(options);
-  return absl::OkStatus();
+  return request().has_limit() ? ValidateLimit() : absl::OkStatus();
+}
+
+absl::Status SceneStream::ValidateLimit() const {
+  if (request().limit() == 0) {
+    return absl::InvalidArgumentError("limit is 0; set at least 1, or leave it out");
+  }
+  if (request().wanted().separation() && request().wanted().has_clearance()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "limit orders the pairs within a clearance by separation; set wanted.separation and "
+      "wanted.clearance, which may be infinite");
 }
 
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
@@ -115,6 +140,11 @@ absl::Status SceneStream::Prepare() {
     for (size_t i = begin; i < end; ++i) boxes[i] = table_.BoxOf(i);
   });
   if (call().ShouldStop()) return call().StopStatus();
+  if (request().has_limit()) {
+    nearest_ = std::make_unique<NearestPairs>(request().limit(), boxes,
+                                              options_.query.max_error.value_or(0));
+    ranked_query_ = std::exchange(options_.query, WithoutDetails(options_.query));
+  }
   absl::StatusOr<SceneSearch> search =
       SceneSearch::Make(table_.placed(), options_, std::move(boxes));
   if (!search.ok()) return search.status();
@@ -125,7 +155,9 @@ absl::Status SceneStream::Prepare() {
 
 size_t SceneStream::HeldBytes() const {
   return table_.MemoryBytes() + ignored_groups_.capacity() * sizeof(GroupPair) +
-         (search_.has_value() ? search_->MemoryBytes() : 0);
+         (search_.has_value() ? search_->MemoryBytes() : 0) +
+         (nearest_ != nullptr && search_.has_value() ? nearest_->MaxMemoryBytes(search_->pairs())
+                                                     : 0);
 }
 
 bool SceneStream::QueueHead() {
@@ -138,8 +170,7 @@ bool SceneStream::QueueHead() {
 }
 
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
-  v1::FindCollisionsResponse reply;
-  size_t reply_bytes = 0;
+  if (piece.next >= search_->size()) return AdvanceRanked(piece, end);
   const uint64_t steps_per_look = table_.has_bodies() || table_.has_motions() ? 1 : kStepsPerPoll;
   for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
     if (piece.next == piece.end) break;
@@ -155,38 +186,94 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       ++piece.next;
       continue;
     }
-    PlacedAnswer answer;
-    if (table_.has_motions()) {
-      answer = AskMoving(table_, a, *b, motion_options_);
-    } else {
-      answer.answer = search_->Ask(a, *b, &answer.of_body);
+    absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
+    if (!found.ok()) return found.status();
+    if (found->answer.ok() && !search_->IsFound(*found->answer)) continue;
+    if (nearest_ == nullptr) {
+      Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
+    } else if (absl::Status s = Rank(a, *b, std::move(found->answer), piece); !s.ok()) {
+      return s;
     }
-    if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
-    if (!answer.answer.ok()) {
-      answer.answer = NameLimit(table_, a, *b, answer.answer.status(), options_.query);
-    }
-    piece.totals.set_candidates(piece.totals.candidates() + 1);
-    if (answer.answer.ok() && !answer.contact.has_value()) piece.rungs.Add(answer.answer->rung);
-    if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
-    reply_bytes += AddFound(a, *b, answer, piece, &reply);
-    if (reply_bytes < FullMessageBytes(request().wanted())) continue;
-    piece.Add(std::exchange(reply, {}));
-    reply_bytes = 0;
   }
-  if (reply.pairs_size() > 0) piece.Add(std::move(reply));
+  piece.AddRows();
   piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
 
-size_t SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
-                             v1::FindCollisionsResponse* reply) {
-  const int position = reply->pairs_size() / 2;
-  reply->add_pairs(a);
-  reply->add_pairs(b);
-  const size_t bytes =
-      AddPlacedAnswer(table_, a, b, answer, request().wanted(), reply->mutable_columns());
-  Count(reply->columns().relations(position), &piece.totals);
-  return kPairBytes + bytes;
+absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end) {
+  do {
+    const RankedPair& pair = ranked_[piece.next - search_->size()];
+    PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, nullptr);
+    if (absl::IsCancelled(found.answer.status())) return found.answer.status();
+    if (!found.answer.ok()) {
+      found.answer = NameLimit(table_, pair.a, pair.b, found.answer.status(), ranked_query_);
+    }
+    const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
+    // Details such as a certificate may be refused.
+    Count(pair.relation, uint64_t{0} - 1, &piece.totals);
+    Count(relation, 1, &piece.totals);
+    ++piece.next;
+  } while (piece.next < piece.end && Clock::now() < end);
+  piece.AddRows();
+  piece.is_done = piece.next == piece.end;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece) {
+  PlacedAnswer found;
+  if (table_.has_motions()) {
+    found = AskMoving(table_, a, b, motion_options_);
+  } else {
+    found.answer = search_->Ask(a, b, &found.of_body);
+  }
+  if (absl::IsCancelled(found.answer.status())) return found.answer.status();
+  if (!found.answer.ok()) {
+    found.answer = NameLimit(table_, a, b, found.answer.status(), options_.query);
+  }
+  piece.totals.set_candidates(piece.totals.candidates() + 1);
+  if (found.answer.ok() && !found.contact.has_value()) piece.rungs.Add(found.answer->rung);
+  return found;
+}
+
+absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer,
+                               ScenePiece& piece) {
+  const bool may_be_near =
+      answer.ok() && (answer->relation == Relation::kOverlapping || nearest_->MayBeNear(a, b));
+  if (may_be_near) {
+    QueryOptions query = options_.query;
+    query.want_separation = true;
+    answer = AskPlaced(table_, a, b, query, nullptr).answer;
+  }
+  if (absl::IsCancelled(answer.status())) return answer.status();
+  const v1::Relation relation =
+      answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
+  Count(relation, 1, &piece.totals);
+  if (!answer.ok()) {
+    nearest_->AddUnanswered(a, b);
+  } else if (may_be_near) {
+    nearest_->Add({answer->separation->value, a, b, relation});
+  }
+  return absl::OkStatus();
+}
+
+uint64_t SceneStream::CountFollowingUnits() {
+  if (nearest_ == nullptr) return 0;
+  std::vector<RankedPair> nearest = nearest_->Take();
+  if (nearest.empty()) return 0;
+  ranked_ = std::move(nearest);
+  return ranked_.size();
+}
+
+v1::Relation SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer,
+                                   ScenePiece& piece) {
+  v1::FindCollisionsResponse& rows = piece.rows;
+  rows.add_pairs(a);
+  rows.add_pairs(b);
+  piece.row_bytes += kPairBytes + AddPlacedAnswer(table_, a, b, answer, request().wanted(),
+                                                  rows.mutable_columns());
+  const v1::Relation relation = rows.columns().relations(rows.pairs_size() / 2 - 1);
+  if (piece.row_bytes >= FullMessageBytes(request().wanted())) piece.AddRows();
+  return relation;
 }
 
 void SceneStream::Deliver(ScenePiece& piece) {

@@ -6,12 +6,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/collisions/nearest_pairs.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
@@ -21,21 +24,30 @@
 
 namespace hulld::server {
 
-// A range of placements, each to be queried against its successors.
+// A range of placements, each to be queried against its successors, or of nearest pairs.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   // Remaining candidates of placement `next`, if it was started.
   bool has_candidates = false;
   SceneCandidates candidates;
+  // Rows of the next reply, and an upper estimate of their bytes.
+  v1::FindCollisionsResponse rows;
+  size_t row_bytes = 0;
   // Counts since the last delivery of the piece.
   v1::SceneTotals totals;
   RungCounts rungs;
 
-  size_t held_bytes() const { return candidates.MemoryBytes(); }
+  size_t held_bytes() const { return candidates.MemoryBytes() + row_bytes; }
+
+  void AddRows() {
+    if (row_bytes > 0) Add(std::exchange(rows, {}));
+    row_bytes = 0;
+  }
 };
 
 // A FindCollisions call: resolves each hull a single time and builds the tree of boxes, on a reader
 // thread, then searches ranges of placements on all threads of the pool. Both gathering and
-// querying the candidates of a placement are split into slices.
+// querying the candidates of a placement are split into slices. With a limit, this search only
+// ranks the pairs; the units that follow are the nearest pairs, which are then answered.
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
@@ -57,13 +69,21 @@ class SceneStream
   // The functions below require the mutex.
   bool QueueHead() override;
   uint64_t CountUnits() override { return search_->size(); }
+  uint64_t CountFollowingUnits() override;
   void Deliver(ScenePiece& piece) override;
   bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
 
   // Without the mutex.
-  size_t AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
-                  v1::FindCollisionsResponse* reply);
+  absl::Status ValidateLimit() const;
+  absl::Status AdvanceRanked(ScenePiece& piece, Clock::time_point end);
+  // Answers a candidate, in a scene with a limit by its relation and clearance alone, and counts
+  // it. CANCELLED.
+  absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece);
+  // Ranks a found pair by its separation. CANCELLED.
+  absl::Status Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer, ScenePiece& piece);
+  // Adds a row; returns its relation.
+  v1::Relation AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece);
 
   // Written before the first piece.
   SceneOptions options_;
@@ -73,6 +93,11 @@ class SceneStream
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;
   std::optional<SceneSearch> search_;
+  // With a limit: the query of the nearest pairs, and the pairs ranked so far.
+  QueryOptions ranked_query_;
+  std::unique_ptr<NearestPairs> nearest_;
+  // Written before the first piece of nearest pairs.
+  std::vector<RankedPair> ranked_;
 
   // Guarded by the mutex. The next row of the table of hulls to send.
   size_t next_row_ = 0;

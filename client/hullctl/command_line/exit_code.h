@@ -6,7 +6,8 @@ namespace hulld {
 // Exit codes. A collision is an answer, not an error.
 enum class ExitCode {
   kDone = 0,
-  // The server refused the request or failed, or an audit found defects.
+  // The server refused the request or failed; or an audit, a comparison, or a judgement found
+  // something.
   kRequestFailed = 1,
   // The command line or an input file is invalid, or an output file cannot be written.
   kUsage = 2,
@@ -24,7 +25,8 @@ enum class ExitCode {
 inline constexpr char kExitCodeHelp[] =
     "Exit codes:\n"
     "  0  done (a collision is an answer, not an error)\n"
-    "  1  the request failed: the server refused it, or an audit or 'scene diff' found something\n"
+    "  1  the request failed: the server refused it; or an audit, 'scene diff', or 'judge' found\n"
+    "     something\n"
     "  2  the command line or an input file is invalid, or a file cannot be written\n"
     "  3  no answer: the server is unreachable, is draining, or exceeded --timeout\n"
     "  4  some items of a batch failed\n"

@@ -8,6 +8,7 @@
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/pairs/batch_answers.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
@@ -71,8 +72,6 @@ class BatchRun {
 
  private:
   static constexpr size_t kPairsPerCall = 100000;
-  // Problems by placement or by pair.
-  using Problems = std::unordered_map<uint64_t, std::string>;
 
   // Returns the request for pairs [begin, end).
   v1::BatchCheckCollisionsRequest RequestFor(size_t begin, size_t end) const {
@@ -95,74 +94,43 @@ class BatchRun {
     const v1::BatchCheckCollisionsRequest request = RequestFor(begin, end);
     request_ = &request;
     first_ = begin;
-    placement_problems_.clear();
     head_.Clear();
     versions_.clear();
     piece_hulls_.clear();
-    size_t next = begin;
-    absl::Status status =
-        client_.BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
-          return Take(part, begin, end, &next);
+    return AskBatch(
+        client_, request,
+        [&](const v1::BatchCheckCollisionsResponse& part) {
+          TakeHead(part);
+          if (run_.json()) PrintMessage(part);
+          return absl::OkStatus();
+        },
+        [&](size_t pair, const AnswerRow& row, const std::string* problem) {
+          return Take(pair, row, problem);
         });
-    if (status.ok() && next != end) {
-      status = absl::InternalError("the answers end before the last pair");
-    }
-    return status;
   }
 
-  absl::Status Take(const v1::BatchCheckCollisionsResponse& part, size_t begin, size_t end,
-                    size_t* next) {
+  void TakeHead(const v1::BatchCheckCollisionsResponse& part) {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
     for (const v1::HullVersion& hull : part.piece_hulls()) {
       piece_hulls_.push_back(hull);
       versions_[hull.hull_id()] = &piece_hulls_.back();
     }
-    for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      placement_problems_[problem.placement()] = problem.message();
-    }
-    Problems pair_problems;
-    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      pair_problems[part.first_pair() + problem.row()] = problem.message();
-    }
-    const size_t count = static_cast<size_t>(part.columns().relations_size());
-    if (count == 0) {
-      if (run_.json()) PrintMessage(part, begin);
-      return absl::OkStatus();
-    }
-    if (begin + part.first_pair() != *next || count > end - *next ||
-        !AreParallel(part.columns(), count)) {
-      return absl::InternalError("the answers are out of order");
-    }
-    if (run_.json()) PrintMessage(part, begin);
-    for (size_t i = 0; i < count; ++i, ++*next) {
-      const AnswerRow row = RowAt(part.columns(), static_cast<int>(i));
-      const std::string* problem = nullptr;
-      std::optional<Verification> verification;
-      if (row.relation == v1::RELATION_UNSPECIFIED) {
-        problem = FindProblem(pair_problems, *next - begin);
-        ++failed_;
-      } else if (arguments_.details.verify) {
-        auto verified = Verify(row, *next - begin);
-        if (!verified.ok()) return verified.status();
-        verification = *std::move(verified);
-      }
-      Print(row, *next, problem, verification);
-    }
-    bar_.Update(*next);
-    return absl::OkStatus();
   }
 
-  const std::string* FindProblem(const Problems& pair_problems, size_t pair) const {
-    static const auto* const kUnknown = new std::string("the server gave no reason");
-    if (const auto found = pair_problems.find(pair); found != pair_problems.end()) {
-      return &found->second;
+  // pair: its index in the current call.
+  absl::Status Take(size_t pair, const AnswerRow& row, const std::string* problem) {
+    std::optional<Verification> verification;
+    if (problem != nullptr) {
+      ++failed_;
+    } else if (arguments_.details.verify) {
+      auto verified = Verify(row, pair);
+      if (!verified.ok()) return verified.status();
+      verification = *std::move(verified);
     }
-    for (const size_t side : {2 * pair, 2 * pair + 1}) {
-      const auto found = placement_problems_.find(request_->pairs(static_cast<int>(side)));
-      if (found != placement_problems_.end()) return &found->second;
-    }
-    return kUnknown;
+    Print(row, first_ + pair, problem, verification);
+    bar_.Update(first_ + pair + 1);
+    return absl::OkStatus();
   }
 
   absl::StatusOr<Verification> Verify(const AnswerRow& row, size_t pair) {
@@ -213,10 +181,10 @@ class BatchRun {
   }
 
   // Prints the server's message, with rows numbered across calls.
-  void PrintMessage(const v1::BatchCheckCollisionsResponse& part, size_t begin) {
+  void PrintMessage(const v1::BatchCheckCollisionsResponse& part) {
     bar_.Clear();
     v1::BatchCheckCollisionsResponse message = part;
-    message.set_first_pair(part.first_pair() + begin);
+    message.set_first_pair(part.first_pair() + first_);
     run_.out << MessageJson(message) << "\n";
   }
 
@@ -292,7 +260,6 @@ class BatchRun {
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
   // First pair of the current call.
   size_t first_ = 0;
-  Problems placement_problems_;
   std::unordered_map<int, uint64_t> counts_;
   uint64_t failed_ = 0;
   uint64_t invalid_ = 0;

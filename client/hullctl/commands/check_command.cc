@@ -1,3 +1,5 @@
+#include <absl/strings/str_cat.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -13,6 +15,7 @@
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/local/file_shape.h"
+#include "client/hullctl/pairs/point_check.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -32,6 +35,8 @@ struct PairArguments {
   // End poses of motions, as parsed.
   std::optional<v1::Pose> to_a;
   std::optional<v1::Pose> to_b;
+  // A file with points that takes the place of B.
+  std::string points;
 };
 
 std::string VersionText(const v1::HullVersion& hull) {
@@ -229,17 +234,54 @@ void SetMotion(const v1::Pose& end, v1::Placement* placement) {
   *placement->mutable_end_pose()->mutable_rotation() = q;
 }
 
+// Makes an ID or a file the shape of a placement.
+absl::Status SetSide(const Invocation& run, const std::string& argument, v1::Placement* placement) {
+  placement->set_hull_id(argument);
+  return IsShapeFile(argument) ? SetShape(run, argument, placement) : absl::OkStatus();
+}
+
+// INVALID_ARGUMENT: an option that only a pair takes, beside --points.
+absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
+  const v1::Wanted& wanted = arguments.details.wanted;
+  const std::pair<bool, const char*> given[] = {
+      {!arguments.b.empty(), "B"},
+      {arguments.request.b().has_pose(), "--pose-b"},
+      {arguments.to_a.has_value(), "--to-a"},
+      {arguments.to_b.has_value(), "--to-b"},
+      {arguments.request.b().radius() > 0, "--radius-b"},
+      {arguments.details.verify, "--verify"},
+      {!arguments.record.empty(), "--record"},
+      {wanted.axis(), "--axis"},
+      {wanted.analysis(), "--report"},
+      {wanted.certificate(), "--certificate"},
+      {wanted.witness(), "--witness"},
+      {wanted.normal(), "--normal"},
+      {wanted.has_clearance(), "--clearance"},
+      {arguments.details.tolerance.has_value(), "--tolerance"},
+      {arguments.details.method != v1::METHOD_UNSPECIFIED, "--textbook"}};
+  for (const auto& [is_given, name] : given) {
+    if (!is_given) continue;
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--points takes --pose-a, --radius-a, --separation, and --max-error; remove ", name));
+  }
+  return absl::OkStatus();
+}
+
+ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments) {
+  absl::Status status = RefuseOptionsOfPairs(arguments);
+  v1::Placement hull = arguments.request.a();
+  if (status.ok()) status = SetSide(run, arguments.a, &hull);
+  if (!status.ok()) return run.FailUsage(status);
+  return CheckPoints(run, hull, arguments.points, arguments.details.wanted);
+}
+
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
   if (arguments.to_a) SetMotion(*arguments.to_a, request.mutable_a());
   if (arguments.to_b) SetMotion(*arguments.to_b, request.mutable_b());
-  for (const auto& [argument, placement] : {std::pair(&arguments.a, request.mutable_a()),
-                                            std::pair(&arguments.b, request.mutable_b())}) {
-    placement->set_hull_id(*argument);
-    if (!IsShapeFile(*argument)) continue;
-    const absl::Status set = SetShape(run, *argument, placement);
-    if (!set.ok()) return run.FailUsage(set);
-  }
+  absl::Status status = SetSide(run, arguments.a, request.mutable_a());
+  if (status.ok()) status = SetSide(run, arguments.b, request.mutable_b());
+  if (!status.ok()) return run.FailUsage(status);
   double tolerance = 0;
   arguments.details.Apply(request.mutable_wanted(), &tolerance);
   request.set_tolerance(tolerance);
@@ -266,6 +308,13 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
     if (!written.ok()) return run.FailUsage(written);
   }
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
+}
+
+ExitCode Check(const Invocation& run, const PairArguments& arguments) {
+  if (!arguments.points.empty()) return CheckPointsOfFile(run, arguments);
+  if (!arguments.b.empty()) return CheckPair(run, arguments);
+  return run.FailUsage(absl::InvalidArgumentError(
+      "B is required: 'hullctl check A B', or 'hullctl check A --points FILE'"));
 }
 
 void AddPoseOption(Command command, const std::string& name, const char* help,
@@ -318,12 +367,18 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("check", "Check two hulls, bodies, or files for collision");
   constexpr char kSideHelp[] = "ID of a hull or body, or a file with points";
   command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kPlaced);
-  command.AddText("B", &arguments->b, kSideHelp).Required().Completes(ValueKind::kPlaced);
+  command.AddText("B", &arguments->b, kSideHelp).Completes(ValueKind::kPlaced);
   AddPoseOptions(command, arguments.get());
   command.AddLength("--radius-a", "Grow A by a ball of this radius: a point becomes a sphere",
                     [request](double radius) { request->mutable_a()->set_radius(radius); });
   command.AddLength("--radius-b", "Grow B by a ball of this radius",
                     [request](double radius) { request->mutable_b()->set_radius(radius); });
+  command
+      .AddText("--points", &arguments->points,
+               "Show which points of a file are inside A, on its boundary, or outside, instead of "
+               "a pair; - is standard input")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   AddQueryOptions(command, &arguments->details);
   AddMotionOptions(command, &arguments->details.wanted);
   AddFreshnessOptions(command, invocation);
@@ -358,10 +413,12 @@ void AddCheckCommand(Command program, Invocation* invocation) {
        {"With a margin of 2 mm about the arm", "hullctl check arm box --radius-a 0.002"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},
        {"When do they meet?", "hullctl check arm box --pose-b 2,0,0 --to-b 0.5,0,0"},
+       {"Which points of a cloud are inside, and how deep?",
+        "hullctl check arm --points cloud.ply --separation"},
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});
-  command.OnGiven([=] { invocation->action = [=] { return CheckPair(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -1,5 +1,7 @@
 #include <absl/strings/str_cat.h>
 
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <unordered_map>
 
@@ -108,7 +110,19 @@ class SceneRun {
 struct SceneArguments {
   std::string file;
   QueryDetails details;
+  // 0: all pairs.
+  uint32_t nearest = 0;
 };
+
+void AddNearestOption(Command command, SceneArguments* arguments) {
+  command
+      .AddNumber(
+          "--nearest", 1, std::numeric_limits<uint32_t>::max(),
+          "Find at most this many pairs, those of the least separation, nearest first; "
+          "implies --separation. Without --clearance, among all pairs",
+          [arguments](uint64_t number) { arguments->nearest = static_cast<uint32_t>(number); })
+      .ValueName("N");
+}
 
 // Reads a scene that must end the source.
 absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& details) {
@@ -120,10 +134,19 @@ absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& det
   return scene;
 }
 
-ExitCode Find(const Invocation& run, const QueryDetails& details, Scene* read) {
+// Makes a scene find its nearest pairs.
+void SetNearest(uint32_t count, v1::FindCollisionsRequest* request) {
+  request->set_limit(count);
+  v1::Wanted* const wanted = request->mutable_wanted();
+  wanted->set_separation(true);
+  if (!wanted->has_clearance()) wanted->set_clearance(std::numeric_limits<double>::infinity());
+}
+
+ExitCode Find(const Invocation& run, const SceneArguments& arguments, Scene* read) {
   double tolerance = read->request.tolerance();
-  details.Apply(read->request.mutable_wanted(), &tolerance);
+  arguments.details.Apply(read->request.mutable_wanted(), &tolerance);
   read->request.set_tolerance(tolerance);
+  if (arguments.nearest > 0) SetNearest(arguments.nearest, &read->request);
   SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
   if (scene.failed() == 0) return ExitCode::kDone;
@@ -145,16 +168,21 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
                      ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
                      "'hullctl scene check' or 'hullctl batch', or remove them")));
   }
-  return Find(run, arguments.details, &*read);
+  return Find(run, arguments, &*read);
 }
 
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
   auto read = ReadWhole(arguments.file, arguments.details);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
+    if (arguments.nearest > 0) {
+      return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
+          arguments.file,
+          ": --nearest finds pairs itself, but the file names pairs; remove one of them")));
+    }
     return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
   }
-  return Find(run, arguments.details, &*read);
+  return Find(run, arguments, &*read);
 }
 
 void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
@@ -162,6 +190,7 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
   Command command = scene.AddCommand("check", "Answer the queries of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddWantedOptions(command, &arguments->details);
+  AddNearestOption(command, arguments.get());
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "If the file names pairs, answers each, as 'hullctl batch' does. Otherwise finds all pairs\n"
@@ -184,13 +213,15 @@ void AddSceneCommand(Command program, Invocation* invocation) {
       program.AddCommand("scene", "Find all colliding pairs of a scene; manage scene files");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input");
   AddWantedOptions(command, &arguments->details);
+  AddNearestOption(command, arguments.get());
   AddFreshnessOptions(command, invocation);
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\n"
                      "With a clearance, separated pairs within it are found, too.");
   command.SetExamples(
       {{"", "hullctl scene scene.yaml"},
-       {"Pairs within a centimeter", "hullctl scene scene.yaml --clearance 0.01 --separation"}});
+       {"Pairs within a centimeter", "hullctl scene scene.yaml --clearance 0.01 --separation"},
+       {"The five nearest pairs", "hullctl scene scene.yaml --nearest 5"}});
   command.OnGiven([=] {
     // A subcommand has already set the action.
     if (invocation->action == nullptr) {

@@ -57,6 +57,7 @@ if TYPE_CHECKING:
         VertexPair,
         Witness,
     )
+    from hulld.answers.containment import Containment
     from hulld.answers.hits import Hits
     from hulld.answers.hulls import (
         Audit,
@@ -112,6 +113,7 @@ if TYPE_CHECKING:
     )
     from hulld.geometry.points import PointsLike, as_points
     from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
+    from hulld.judging import Fault, Judged, WrongAnswer, judge
     from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
@@ -153,12 +155,14 @@ __all__ = [
     "CollisionEventKind",
     "CollisionStream",
     "CollisionWatch",
+    "Containment",
     "CreatedHull",
     "DataLossError",
     "DeadlineExceededError",
     "DecidingPiece",
     "Durability",
     "FailedPreconditionError",
+    "Fault",
     "Feature",
     "FirstContact",
     "Freshness",
@@ -177,6 +181,7 @@ __all__ = [
     "HulldError",
     "InternalError",
     "InvalidArgumentError",
+    "Judged",
     "Limits",
     "Local",
     "LocalServer",
@@ -223,11 +228,13 @@ __all__ = [
     "Verifier",
     "VertexPair",
     "Witness",
+    "WrongAnswer",
     "__version__",
     "all_pairs",
     "as_points",
     "check",
     "find_program",
+    "judge",
     "local",
     "pack_poses",
     "read_token_file",
@@ -237,6 +244,7 @@ __all__ = [
 _MODULES = (
     "answers.bodies",
     "answers.collisions",
+    "answers.containment",
     "answers.hits",
     "answers.hulls",
     "answers.status",
@@ -251,6 +259,7 @@ _MODULES = (
     "geometry.placements",
     "geometry.points",
     "geometry.poses",
+    "judging",
     "local_server",
     "programs",
     "retry",

@@ -12,6 +12,13 @@ from hulld import arguments
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
 from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
+from hulld.answers.containment import (
+    Containment,
+    PointQuestion,
+    collect,
+    points_per_call,
+    require_answers,
+)
 from hulld.answers.hits import Hits, hits_of
 from hulld.answers.hulls import (
     CreatedHull,
@@ -37,14 +44,16 @@ from hulld.calls.wanted import Wanted
 from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
 from hulld.connection import PathLike
-from hulld.errors import HulldError, error_class, read_answer
+from hulld.errors import HulldError, read_answer
 from hulld.geometry.placements import (
     PlacementLike,
     Placements,
     PlacementsLike,
+    Subject,
     all_pairs,
     as_moving,
     as_pairs,
+    as_placement,
 )
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
 from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, PoseLike
@@ -517,6 +526,48 @@ class Client(ClientBase):
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._parts(call, self._seconds(timeout), freshness)
 
+    def contains(
+        self,
+        points: PointsLike,
+        hull: Subject,
+        *,
+        pose: PoseLike = None,
+        separation: bool = False,
+        max_error: float | None = None,
+        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
+    ) -> Containment:
+        """Which points are inside a hull or body, on its boundary, or outside: exact, for the
+        doubles given.
+
+        points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: its
+        pose in the world. separation, max_error: as in check_collision; the distance, or minus the
+        depth. A point in a seam of two pieces of a body is on both, so on the body. The points go
+        in as few calls as the server's limits allow, each about the current version of the hull;
+        `timeout` is for each.
+
+        NotFoundError: no such hull.
+        """
+        array = as_points(points)
+        question = PointQuestion(as_placement((hull, pose)), orthogonality_tolerance)
+        separation = separation or max_error is not None
+        status = self.get_status(timeout=timeout)
+        rows = points_per_call(status.limits)
+        parts = []
+        for first in range(0, len(array), rows):
+            packed, pairs = question.pairs(array[first : first + rows])
+            batch = self.check_collisions(
+                packed,
+                pairs,
+                separation=separation,
+                max_error=max_error,
+                freshness=freshness,
+                timeout=timeout,
+            )
+            parts.append(require_answers(batch, first))
+        return collect(parts, separation)
+
     def cast(
         self,
         origins: npt.ArrayLike,
@@ -566,6 +617,7 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        limit: int | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         freshness: Freshness | None = None,
@@ -577,14 +629,17 @@ class Client(ClientBase):
         groups: the group of each placement; with ignore_same_group, pairs within a group are left
         out, and so are pairs of two groups that ignored_group_pairs (k x 2) names. movers: only
         pairs with at least one of the first `movers` placements. The rest as in check_collisions;
-        with a clearance, all pairs within it are found.
+        with a clearance, all pairs within it are found. limit: at most this many pairs, those of
+        the least separation, in ascending order, with their separations; without a clearance,
+        among all pairs. The totals still count every pair within the clearance. Pairs without an
+        answer follow, at most as many.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
             axis, analysis, certificate, separation, max_error, witness, clearance, normal
-        )
-        call = requests.find_collisions(packed, scene, wanted, tolerance)
+        ).for_limit(limit)
+        call = requests.find_collisions(packed, scene, wanted, limit, tolerance)
         return self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
 
     def iter_find_collisions(
@@ -603,6 +658,7 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        limit: int | None = None,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         freshness: Freshness | None = None,
@@ -614,8 +670,8 @@ class Client(ClientBase):
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
             axis, analysis, certificate, separation, max_error, witness, clearance, normal
-        )
-        call = requests.find_collisions(packed, scene, wanted, tolerance)
+        ).for_limit(limit)
+        call = requests.find_collisions(packed, scene, wanted, limit, tolerance)
         return self._parts(call, self._seconds(timeout), freshness)
 
     def stream_collisions(

@@ -138,7 +138,8 @@ TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
   EXPECT_EQ(error({}), "hullctl: no command given; usage: hullctl COMMAND [OPTIONS]");
   EXPECT_EQ(error({"backup"}),
             "hullctl: no command given; usage: hullctl backup COMMAND [OPTIONS]");
-  EXPECT_EQ(error({"check", "a"}), "hullctl: B is required; usage: hullctl check A B [OPTIONS]");
+  EXPECT_EQ(error({"check", "a"}),
+            "hullctl: B is required: 'hullctl check A B', or 'hullctl check A --points FILE'");
   EXPECT_EQ(error({"create", "a", "b"}),
             "hullctl: unexpected argument \"b\"; usage: hullctl create ID [OPTIONS]");
   EXPECT_EQ(error({"check", "a", "b", "--verfy"}),

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 #include <utility>
 
 namespace hulld::fuzz {
@@ -148,6 +150,36 @@ std::string CheckSceneTotals(const v1::SceneTotals& totals, const v1::SceneTotal
            " but counted were " + counted.ShortDebugString();
   }
   return {};
+}
+
+// With a limit, rows are a part of what was found.
+std::string CheckLimitedTotals(uint32_t limit, const v1::SceneTotals& totals,
+                               const v1::SceneTotals& counted) {
+  const uint64_t answered = counted.separated() + counted.touching() + counted.overlapping();
+  if (answered > limit || counted.separated() > totals.separated() ||
+      counted.touching() > totals.touching() || counted.overlapping() > totals.overlapping() ||
+      counted.failed() > totals.failed() || totals.candidates() > totals.pairs()) {
+    return absl::StrCat("a scene with the limit ", limit,
+                        " has more rows than it found: ", totals.ShortDebugString(),
+                        " but counted were ", counted.ShortDebugString());
+  }
+  return {};
+}
+
+// Position of a row in a scene: by pair or, with a limit, by separation, rows without an answer
+// last.
+using SceneKey = std::tuple<bool, double, int64_t, int64_t>;
+
+SceneKey KeyOf(const v1::FindCollisionsRequest& request, const v1::FindCollisionsResponse& part,
+               int row) {
+  SceneKey key(false, 0, part.pairs(2 * row), part.pairs(2 * row + 1));
+  const v1::AnswerColumns& columns = part.columns();
+  if (!request.has_limit() || row >= columns.relations_size()) return key;
+  std::get<0>(key) = columns.relations(row) == v1::RELATION_UNSPECIFIED;
+  if (!std::get<0>(key) && row < columns.separations_size()) {
+    std::get<1>(key) = columns.separations(row);
+  }
+  return key;
 }
 
 void Count(v1::Relation relation, v1::SceneTotals* totals) {
@@ -307,15 +339,16 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
       CheckProblems(parts.front().placement_problems(), PlacementCount(request), &problems);
   if (!finding.empty()) return finding;
   v1::SceneTotals counted;
-  std::pair<int64_t, int64_t> before(-1, -1);
+  SceneKey before(false, -std::numeric_limits<double>::infinity(), -1, -1);
   for (const v1::FindCollisionsResponse& part : parts.subspan(1)) {
     if (part.pairs_size() % 2 != 0) return "half a pair";
-    for (int i = 0; i < part.pairs_size(); i += 2) {
-      const std::pair<int64_t, int64_t> pair(part.pairs(i), part.pairs(i + 1));
-      if (pair <= before || pair.first >= pair.second || pair.second >= PlacementCount(request)) {
+    for (int row = 0; 2 * row < part.pairs_size(); ++row) {
+      const SceneKey key = KeyOf(request, part, row);
+      const auto [unanswered, separation, a, b] = key;
+      if (key <= before || a >= b || b >= PlacementCount(request)) {
         return "pairs of a scene are out of order or out of range";
       }
-      before = pair;
+      before = key;
     }
     const auto has_problem = [&](int row) {
       return problems.count(part.pairs(2 * row)) + problems.count(part.pairs(2 * row + 1)) > 0;
@@ -327,7 +360,9 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
       Count(static_cast<v1::Relation>(relation), &counted);
     }
   }
-  return CheckSceneTotals(parts.back().totals(), counted);
+  const v1::SceneTotals& totals = parts.back().totals();
+  return request.has_limit() ? CheckLimitedTotals(request.limit(), totals, counted)
+                             : CheckSceneTotals(totals, counted);
 }
 
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts) {

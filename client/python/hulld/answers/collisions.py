@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hulld.answers.hulls import Header, enum_or_zero
+from hulld.errors import HulldError, error_class
 from hulld.geometry.placements import Placements
 from hulld.notebook import Viewer
 
@@ -538,6 +539,12 @@ class _Rows:
             if placement in self.placement_problems:
                 return self.placement_problems[placement]
         return None
+
+    def error(self, row: int, subject: str) -> HulldError:
+        """The error of pairs[row], which has no answer. subject: precedes the message."""
+        problem = self.problem(row) or Problem("INTERNAL", "the server gave no reason", None)
+        message = f"{subject}{problem.message}"
+        return error_class(problem.code)(message, code=problem.code, reason=problem.reason)
 
 
 @dataclass(frozen=True)

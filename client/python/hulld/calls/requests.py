@@ -359,10 +359,12 @@ def _group_numbers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
 
 
 def find_collisions(
-    placements: Placements, scene: SceneFilter, wanted: Wanted, tolerance: float
+    placements: Placements, scene: SceneFilter, wanted: Wanted, limit: int | None, tolerance: float
 ) -> Call[ScenePart]:
     fixed = collision_pb2.FindCollisionsRequest(
-        wanted=wanted.message(), tolerance=arguments.length(tolerance, "tolerance")
+        wanted=wanted.message(),
+        limit=arguments.optional_count(limit, "limit", least=1),
+        tolerance=arguments.length(tolerance, "tolerance"),
     )
     scene.put(fixed, len(placements))
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())

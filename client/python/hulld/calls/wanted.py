@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hulld import arguments
@@ -23,6 +24,13 @@ class Wanted:
     normal: bool = False
     max_time_error: float | None = None
     resolution: float | None = None
+
+    def for_limit(self, limit: int | None) -> Wanted:
+        """Adds the separation and the clearance that the limit of a scene requires."""
+        if limit is None:
+            return self
+        clearance = math.inf if self.clearance is None else self.clearance
+        return replace(self, separation=True, clearance=clearance)
 
     def message(self) -> Any:
         return collision_pb2.Wanted(

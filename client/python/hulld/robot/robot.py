@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hulld import arguments
-from hulld.answers.collisions import Batch, Problem, Relation
+from hulld.answers.collisions import Batch, Relation
 from hulld.calls.freshness import Freshness
 from hulld.client import Client
-from hulld.errors import NotFoundError, error_class
+from hulld.errors import NotFoundError
 from hulld.geometry.placements import Placements, PlacementsLike, as_radii
 from hulld.geometry.poses import PoseLike, pack_pose
 from hulld.local_server import shared_client
@@ -466,12 +466,8 @@ def _require_answers(
         return
     row = int(unanswered[0])
     a, b = pairs[row % len(pairs)]
-    problem = batch.problem(row) or Problem("INTERNAL", "the server gave no reason", None)
-    raise error_class(problem.code)(
-        f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}: "
-        f"{problem.message}",
-        code=problem.code,
-        reason=problem.reason,
+    raise batch.error(
+        row, f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}: "
     )
 
 

@@ -1,0 +1,283 @@
+#include "client/hullctl/pairs/judged_table.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <string_view>
+#include <utility>
+
+#include "client/formats/byte_source.h"
+#include "client/formats/text_number.h"
+#include "client/robot/joint_file.h"
+
+namespace hulld {
+namespace {
+
+absl::StatusOr<double> NumberOf(std::string_view cell) {
+  double number = 0;
+  const NumberText kind = ParseDouble(cell, &number);
+  if (kind != NumberText::kNumber) return absl::InvalidArgumentError(NumberProblem(kind, cell));
+  if (std::isnan(number)) {
+    return absl::InvalidArgumentError("nan is no answer; leave the cell empty");
+  }
+  return number;
+}
+
+absl::Status ReadFinite(std::string_view cell, double* number) {
+  const auto read = NumberOf(cell);
+  if (!read.ok()) return read.status();
+  if (std::isinf(*read))
+    return absl::InvalidArgumentError(absl::StrCat(std::string(cell), " is not finite"));
+  *number = *read;
+  return absl::OkStatus();
+}
+
+absl::Status ReadName(std::string_view cell, std::string* name) {
+  *name = cell;
+  return absl::OkStatus();
+}
+
+absl::Status ReadRelation(std::string_view cell, std::optional<v1::Relation>* relation) {
+  for (const v1::Relation one :
+       {v1::RELATION_SEPARATED, v1::RELATION_TOUCHING, v1::RELATION_OVERLAPPING}) {
+    const std::string name = v1::Relation_Name(one).substr(std::string_view("RELATION_").size());
+    if (absl::AsciiStrToUpper(std::string(cell)) != name) continue;
+    *relation = one;
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(Quoted(cell), " is none of SEPARATED, TOUCHING, OVERLAPPING"));
+}
+
+absl::Status ReadColliding(std::string_view cell, std::optional<bool>* colliding) {
+  const std::string word = absl::AsciiStrToLower(std::string(cell));
+  const bool is_true = word == "1" || word == "true";
+  if (!is_true && word != "0" && word != "false") {
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(cell), " is none of 0, 1, false, true"));
+  }
+  *colliding = is_true;
+  return absl::OkStatus();
+}
+
+absl::Status ReadDistance(std::string_view cell, std::optional<double>* distance) {
+  const auto read = NumberOf(cell);
+  if (read.ok()) *distance = *read;
+  return read.status();
+}
+
+absl::Status ReadDepth(std::string_view cell, std::optional<double>* depth) {
+  const auto read = NumberOf(cell);
+  if (!read.ok()) return read.status();
+  if (*read < 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        std::string(cell), " is no depth, a length of at least 0; leave the cell empty"));
+  }
+  *depth = *read;
+  return absl::OkStatus();
+}
+
+// Reads a cell into its field. Empty cells are not read.
+using CellReader = std::function<absl::Status(std::string_view cell, JudgedAnswer* answer)>;
+
+std::map<std::string, CellReader, std::less<>> MakeReaders() {
+  std::map<std::string, CellReader, std::less<>> readers;
+  constexpr const char* kPoseColumns[] = {"_qw", "_qx", "_qy", "_qz", "_x", "_y", "_z"};
+  for (const size_t side : {size_t{0}, size_t{1}}) {
+    const std::string name = side == 0 ? "a" : "b";
+    readers[name] = [side](std::string_view cell, JudgedAnswer* answer) {
+      return ReadName(cell, &answer->names[side]);
+    };
+    for (size_t i = 0; i < 7; ++i) {
+      readers[name + kPoseColumns[i]] = [side, i](std::string_view cell, JudgedAnswer* answer) {
+        return ReadFinite(cell, &answer->poses[side][i]);
+      };
+    }
+  }
+  readers["relation"] = [](std::string_view cell, JudgedAnswer* answer) {
+    return ReadRelation(cell, &answer->relation);
+  };
+  readers["colliding"] = [](std::string_view cell, JudgedAnswer* answer) {
+    return ReadColliding(cell, &answer->colliding);
+  };
+  readers["distance"] = [](std::string_view cell, JudgedAnswer* answer) {
+    return ReadDistance(cell, &answer->distance);
+  };
+  readers["depth"] = [](std::string_view cell, JudgedAnswer* answer) {
+    return ReadDepth(cell, &answer->depth);
+  };
+  return readers;
+}
+
+// Reads the rows of a table whose header was read.
+class TableReader {
+ public:
+  // INVALID_ARGUMENT: a column is missing or repeated.
+  absl::Status ReadHeader(const std::vector<std::string_view>& cells,
+                          std::vector<std::string>* ignored) {
+    static const auto* const kReaders = new auto(MakeReaders());
+    for (const std::string_view cell : cells) {
+      const std::string name = absl::AsciiStrToLower(std::string(cell));
+      if (std::find(columns_.begin(), columns_.end(), name) != columns_.end()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("the header names ", Quoted(name), " twice"));
+      }
+      columns_.push_back(name);
+      const auto reader = kReaders->find(name);
+      readers_.push_back(reader == kReaders->end() ? nullptr : &reader->second);
+      if (readers_.back() == nullptr) ignored->push_back(name);
+    }
+    for (const char* name : {"a", "b"}) {
+      if (!Has(name)) {
+        return absl::InvalidArgumentError(absl::StrCat(
+            "the header names no column ", name, ", which holds an ID or a file for each row"));
+      }
+      const std::string first = absl::StrCat(name, "_q");
+      const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {
+        return column.size() == 4 && column.starts_with(first);
+      });
+      if (given != 0 && given != 4) {
+        return absl::InvalidArgumentError(absl::StrCat("a quaternion has four columns: ", first,
+                                                       "w ", first, "x ", first, "y ", first, "z"));
+      }
+    }
+    if (Has("relation") || Has("colliding") || Has("distance") || Has("depth")) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(
+        "the header names no answer; it needs relation, colliding, distance, or depth");
+  }
+
+  absl::StatusOr<JudgedAnswer> ReadRow(const std::vector<std::string_view>& cells) const {
+    if (cells.size() != columns_.size()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("the row has ", cells.size(), " cells, the header ", columns_.size()));
+    }
+    JudgedAnswer answer;
+    answer.poses[0] = answer.poses[1] = {1, 0, 0, 0, 0, 0, 0};
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].empty() || readers_[i] == nullptr) continue;
+      const absl::Status read = (*readers_[i])(cells[i], &answer);
+      if (!read.ok()) {
+        return absl::InvalidArgumentError(absl::StrCat(columns_[i], ": ", read.message()));
+      }
+    }
+    for (const size_t side : {size_t{0}, size_t{1}}) {
+      const char* const name = side == 0 ? "a" : "b";
+      if (answer.names[side].empty()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(name, " is empty; it takes an ID or a file"));
+      }
+      const auto& pose = answer.poses[side];
+      if (std::all_of(pose.begin(), pose.begin() + 4, [](double part) { return part == 0; })) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(name, "_qw, ", name, "_qx, ", name, "_qy, ", name,
+                         "_qz are all 0; any other quaternion is a rotation"));
+      }
+    }
+    return answer;
+  }
+
+ private:
+  bool Has(std::string_view name) const {
+    return std::find(columns_.begin(), columns_.end(), name) != columns_.end();
+  }
+
+  std::vector<std::string> columns_;
+  // Null for columns that are ignored.
+  std::vector<const CellReader*> readers_;
+};
+
+// |claimed - truth|; equal infinities agree.
+double Difference(double claimed, double truth) {
+  return claimed == truth ? 0 : std::abs(claimed - truth);
+}
+
+std::optional<Fault> FaultOfRelation(const JudgedAnswer& answer, v1::Relation truth) {
+  const bool touching = truth == v1::RELATION_TOUCHING;
+  const bool separated = truth == v1::RELATION_SEPARATED;
+  const auto wrong = [&](bool said_contact) {
+    return touching                    ? Fault::kTouching
+           : separated && said_contact ? Fault::kFalseContact
+           : said_contact              ? Fault::kTouching
+                                       : Fault::kMiss;
+  };
+  if (answer.relation && *answer.relation != truth) {
+    return wrong(*answer.relation != v1::RELATION_SEPARATED);
+  }
+  if (answer.colliding && *answer.colliding == separated) return wrong(*answer.colliding);
+  return std::nullopt;
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
+                                                          std::vector<std::string>* ignored) {
+  const auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  TableReader reader;
+  std::vector<JudgedAnswer> answers;
+  bool has_header = false;
+  std::string_view line;
+  while ((*source)->ReadLine(&line)) {
+    const std::vector<std::string_view> cells = CellsOf(line);
+    if (cells.empty()) continue;
+    if (!std::exchange(has_header, true)) {
+      const absl::Status read = reader.ReadHeader(cells, ignored);
+      if (!read.ok()) return (*source)->ErrorAtLine(std::string(read.message()));
+      continue;
+    }
+    auto answer = reader.ReadRow(cells);
+    if (!answer.ok()) return (*source)->ErrorAtLine(std::string(answer.status().message()));
+    answer->line = (*source)->line();
+    answers.push_back(*std::move(answer));
+  }
+  if (absl::Status status = (*source)->status(); !status.ok()) return status;
+  if (!answers.empty()) return answers;
+  return absl::InvalidArgumentError(absl::StrCat(path, ": the table holds no answers"));
+}
+
+const char* FaultName(Fault fault) {
+  switch (fault) {
+    case Fault::kFalseContact:
+      return "false contact";
+    case Fault::kMiss:
+      return "miss";
+    case Fault::kTouching:
+      return "touching mistaken";
+    case Fault::kDistance:
+      return "distance";
+    case Fault::kDepth:
+      return "depth";
+  }
+  return "";
+}
+
+Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, double max_error) {
+  Judgement judgement;
+  const double separation = row.separation->value();
+  if (const std::optional<Fault> fault = FaultOfRelation(answer, row.relation)) {
+    judgement.faults.push_back(*fault);
+    judgement.error = std::abs(separation);
+  }
+  const auto judge = [&](double claimed, double truth, Fault fault) {
+    const double error = Difference(claimed, truth);
+    if (error <= max_error + row.separation->bound()) return error;
+    judgement.faults.push_back(fault);
+    judgement.error = std::max(judgement.error, error);
+    return error;
+  };
+  if (answer.distance) {
+    const double truth = *answer.distance < 0 ? separation : std::max(separation, 0.0);
+    judgement.distance_error = judge(*answer.distance, truth, Fault::kDistance);
+  }
+  if (answer.depth) {
+    judgement.depth_error = judge(*answer.depth, std::max(-separation, 0.0), Fault::kDepth);
+  }
+  return judgement;
+}
+
+}  // namespace hulld

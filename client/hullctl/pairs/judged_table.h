@@ -1,0 +1,70 @@
+#ifndef HULLD_CLIENT_HULLCTL_PAIRS_JUDGED_TABLE_H_
+#define HULLD_CLIENT_HULLCTL_PAIRS_JUDGED_TABLE_H_
+
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/hullctl/printing/answer_row.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// An answer of another program.
+struct JudgedAnswer {
+  uint64_t line = 0;
+  // IDs of hulls or bodies, or files with points.
+  std::array<std::string, 2> names;
+  // Quaternion w x y z, translation x y z.
+  std::array<std::array<double, 7>, 2> poses;
+  // The answer, as far as it is given. Relation: TOUCHING and OVERLAPPING are one if the program
+  // only says that the hulls collide.
+  std::optional<bool> colliding;
+  std::optional<v1::Relation> relation;
+  std::optional<double> distance;
+  std::optional<double> depth;
+};
+
+// Reads a table: a header of column names, then a row for each answer, separated by commas,
+// semicolons, tabs, or spaces. Columns: a and b; for each of them a pose, as in a_x a_y a_z a_qw
+// a_qx a_qy a_qz (default: identity); and at least one of relation, colliding, distance, and depth,
+// with empty cells for answers that are not given. `ignored` receives the names of other columns.
+// INVALID_ARGUMENT names the line and the column.
+absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
+                                                          std::vector<std::string>* ignored);
+
+enum class Fault {
+  // Separated hulls are said to collide.
+  kFalseContact,
+  // Overlapping hulls are said to be separated.
+  kMiss,
+  // Another relation is said of touching hulls, or touching is said of overlapping ones.
+  kTouching,
+  // The distance or the depth is wrong.
+  kDistance,
+  kDepth,
+};
+inline constexpr int kFaults = 5;
+// "false contact" and so on.
+const char* FaultName(Fault fault);
+
+struct Judgement {
+  std::vector<Fault> faults;
+  // The largest length by which the answer is wrong; 0 for touching hulls mistaken.
+  double error = 0;
+  // |answer - separation| of a distance, and of a depth; 0 if none is given.
+  double distance_error = 0;
+  double depth_error = 0;
+};
+
+// Judges an answer by the relation and separation of `row`. A negative distance is minus a depth. A
+// distance or depth is wrong if its error exceeds max_error for certain, by the proven bound.
+Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, double max_error);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_PAIRS_JUDGED_TABLE_H_

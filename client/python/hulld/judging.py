@@ -1,0 +1,390 @@
+"""Judges the answers of another program by exact ones."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld import arguments
+from hulld.answers.collisions import AnswerRow, Batch, Problem, Relation
+from hulld.client import Client
+from hulld.geometry.placements import Placements
+from hulld.geometry.points import PointsLike
+from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, pack_poses
+from hulld.local_server import shared_client
+from hulld.verification import Verifier
+
+#: The columns of a table by name, the path of a CSV file, or that of an NPZ file.
+TableLike = Union[Mapping[str, Any], str, "os.PathLike[str]"]
+
+_ROWS_PER_CALL = 1 << 16
+_CELLS = ("qw", "qx", "qy", "qz", "x", "y", "z")
+_ANSWERS = ("relation", "colliding", "distance", "depth")
+_COLUMNS = ("a", "b", "poses_a", "poses_b", *_ANSWERS)
+
+
+class Fault(IntEnum):
+    """A defect of an answer."""
+
+    #: Separated hulls are said to collide.
+    FALSE_CONTACT = 0
+    #: Overlapping hulls are said to be separated.
+    MISS = 1
+    #: Another relation is said of touching hulls, or touching is said of overlapping ones.
+    TOUCHING_MISTAKEN = 2
+    DISTANCE = 3
+    DEPTH = 4
+
+
+@dataclass(frozen=True)
+class WrongAnswer:
+    """A wrong answer. row: of the table, from 0. error: the largest length by which it is wrong; 0
+    if touching hulls are mistaken. answer: the exact one; its certificate was verified."""
+
+    row: int
+    faults: tuple[Fault, ...]
+    error: float
+    answer: AnswerRow
+
+    def __repr__(self) -> str:
+        faults = ", ".join(fault.name for fault in self.faults)
+        separation = self.answer.separation
+        value = "" if separation is None else f", separation={separation.value!r}"
+        return (
+            f"WrongAnswer(row {self.row}: {faults}, off by {self.error!r}, "
+            f"{self.answer.relation.name}{value})"
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class Judged:
+    """The result of judge. wrong: worst first. counts: wrong answers by fault; an answer may have
+    several. failed: by row, why there is no exact answer. distance_errors, depth_errors: n, the
+    absolute errors; NaN where none was given."""
+
+    answers: int
+    wrong: Sequence[WrongAnswer]
+    counts: Mapping[Fault, int]
+    failed: Mapping[int, Problem]
+    distance_errors: npt.NDArray[np.float64]
+    depth_errors: npt.NDArray[np.float64]
+
+    def __bool__(self) -> bool:
+        raise TypeError("a judgement is neither true nor false; use len(judged.wrong)")
+
+    def __repr__(self) -> str:
+        counts = "".join(f", {fault.name} {count}" for fault, count in self.counts.items() if count)
+        distance, depth = (
+            float(np.nanmax(errors, initial=0.0))
+            for errors in (self.distance_errors, self.depth_errors)
+        )
+        return (
+            f"Judged({self.answers} answers, {len(self.wrong)} wrong{counts}; largest error of a "
+            f"distance {distance:.3g}, of a depth {depth:.3g})"
+        )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """A table with one entry per row in each column. NaN, and UNSPECIFIED: no answer."""
+
+    names: tuple[Sequence[str], Sequence[str]]
+    poses: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+    relations: npt.NDArray[np.uint8]
+    #: 1, 0, or NaN.
+    colliding: npt.NDArray[np.float64]
+    distances: npt.NDArray[np.float64]
+    depths: npt.NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.relations)
+
+
+def judge(
+    table: TableLike,
+    *,
+    hulls: Mapping[str, PointsLike] | None = None,
+    max_error: float = 0.0,
+    client: Client | None = None,
+    orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
+    timeout: float | None = None,
+) -> Judged:
+    """Finds the wrong answers of another program, and proves that they are wrong.
+
+    table: columns by name, one entry per row: a, b (IDs of hulls or bodies, or names in `hulls`),
+    poses_a, poses_b (as in pack_poses; default: identity), and at least one of relation
+    (SEPARATED, TOUCHING, OVERLAPPING, or hulld.Relation), colliding (boolean), distance (negative:
+    minus a depth), and depth, NaN or empty where there is no answer. Or the path of a .npz file
+    with these arrays, or of a CSV file as `hullctl judge` reads it. hulls: points, n x 3, by name.
+    max_error: a distance or depth is wrong if its error exceeds this for certain, by the proven
+    bound; 0: as exact as that. client: None: a private server, which knows no IDs. timeout: of each
+    call.
+
+    ValueError: the table is malformed. VerificationError: a certificate does not prove the server's
+    answer.
+    """
+    limit = arguments.length(max_error, "max_error")
+    columns = _read(table) if isinstance(table, (str, os.PathLike)) else dict(table)
+    rows = _as_table(columns, orthogonality_tolerance)
+    asking = _Asking(client or shared_client(), rows, hulls or {}, timeout)
+    found = []
+    for first in range(0, len(rows), _ROWS_PER_CALL):
+        part = np.arange(first, min(first + _ROWS_PER_CALL, len(rows)))
+        found.append(_judge_rows(rows, part, asking.ask(part), limit))
+    return _collect(asking, rows, found, limit)
+
+
+# --- Tables ---
+
+
+def _read(path: str | os.PathLike[str]) -> dict[str, Any]:
+    if os.fspath(path).endswith(".npz"):
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    with open(path, newline="", encoding="utf-8") as file:
+        lines = [line for line in file if line.strip() and not line.lstrip().startswith("#")]
+    if not lines:
+        raise ValueError(f"{os.fspath(path)}: the table holds no answers")
+    dialect = next((mark for mark in ";\t," if mark in lines[0]), ",")
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=dialect)]
+    header = [name.lower() for name in rows[0]]
+    for number, row in enumerate(rows[1:]):
+        if len(row) != len(header):
+            raise ValueError(
+                f"{os.fspath(path)}: row {number} has {len(row)} cells, the header {len(header)}"
+            )
+    cells = {name: [row[index] for row in rows[1:]] for index, name in enumerate(header)}
+    columns: dict[str, Any] = {name: cells[name] for name in ("a", "b", *_ANSWERS) if name in cells}
+    for side in "ab":
+        given = [cell for cell in _CELLS[:4] if f"{side}_{cell}" in cells]
+        if len(given) not in (0, 4):
+            raise ValueError(f"{os.fspath(path)}: a quaternion has four columns, from {side}_qw on")
+        pose = np.zeros((len(rows) - 1, 7))
+        pose[:, 0] = f"{side}_qw" not in cells
+        for index, cell in enumerate(_CELLS):
+            if f"{side}_{cell}" in cells:
+                pose[:, index] = _numbers(cells[f"{side}_{cell}"], f"{side}_{cell}", empty=0.0)
+        columns[f"poses_{side}"] = pose
+    return columns
+
+
+def _as_table(columns: Mapping[str, Any], orthogonality_tolerance: float) -> _Table:
+    for name in columns:
+        if name not in _COLUMNS:
+            raise ValueError(f"the table has no column {name!r}; columns: {', '.join(_COLUMNS)}")
+    for name in ("a", "b"):
+        if name not in columns:
+            raise ValueError(f"the table needs the column {name!r}, the IDs or names of hulls")
+    if not any(name in columns for name in _ANSWERS):
+        raise ValueError(
+            f"the table needs an answer: {', '.join(_ANSWERS[:-1])}, or {_ANSWERS[-1]}"
+        )
+    count = len(columns["a"])
+    for name, column in columns.items():
+        if column is not None and len(column) != count:
+            raise ValueError(f"{name} has {len(column)} rows, a {count}")
+    poses = []
+    for name in ("poses_a", "poses_b"):
+        given = columns.get(name)
+        packed = np.tile([1.0, 0, 0, 0, 0, 0, 0], (count, 1)) if given is None else pack_poses(
+            given, orthogonality_tolerance=orthogonality_tolerance
+        )  # fmt: skip
+        poses.append(packed)
+    return _Table(
+        ([str(name) for name in columns["a"]], [str(name) for name in columns["b"]]),
+        (poses[0], poses[1]),
+        _relations(columns.get("relation"), count),
+        _booleans(columns.get("colliding"), count),
+        _lengths(columns.get("distance"), count, "distance", -math.inf),
+        _lengths(columns.get("depth"), count, "depth", 0.0),
+    )
+
+
+def _numbers(values: Any, name: str, empty: float) -> npt.NDArray[np.float64]:
+    numbers = np.empty(len(values))
+    for row, value in enumerate(values):
+        if isinstance(value, str) and not value:
+            numbers[row] = empty
+            continue
+        try:
+            numbers[row] = float(value)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}[{row}] is {value!r}, not a number") from None
+    return numbers
+
+
+def _lengths(values: Any, count: int, name: str, least: float) -> npt.NDArray[np.float64]:
+    if values is None:
+        return np.full(count, np.nan)
+    lengths = _numbers(values, name, empty=math.nan)
+    if (lengths < least).any():
+        row = int(np.argmax(lengths < least))
+        raise ValueError(f"{name}[{row}] is {lengths[row]}; it must be at least {least:g}, or NaN")
+    return lengths
+
+
+def _relations(values: Any, count: int) -> npt.NDArray[np.uint8]:
+    relations = np.zeros(count, np.uint8)
+    for row, value in enumerate([] if values is None else values):
+        if isinstance(value, str):
+            known = {"": 0, "SEPARATED": 1, "TOUCHING": 2, "OVERLAPPING": 3}.get(value.upper())
+        else:
+            known = int(value) if value in (0, 1, 2, 3) else None
+        if known is None:
+            raise ValueError(
+                f"relation[{row}] is {value!r}; it is SEPARATED, TOUCHING, or OVERLAPPING"
+            )
+        relations[row] = known
+    return relations
+
+
+def _booleans(values: Any, count: int) -> npt.NDArray[np.float64]:
+    booleans = np.full(count, np.nan)
+    for row, value in enumerate([] if values is None else values):
+        word = str(value).lower()
+        if word in ("1", "true", "1.0", "0", "false", "0.0"):
+            booleans[row] = word[0] in "1t"
+        elif word not in ("", "nan", "none"):
+            raise ValueError(f"colliding[{row}] is {value!r}; it is 0, 1, true, or false")
+    return booleans
+
+
+# --- Questions ---
+
+
+class _Asking:
+    """Asks about rows of a table."""
+
+    def __init__(
+        self, client: Client, table: _Table, hulls: Mapping[str, PointsLike], timeout: float | None
+    ) -> None:
+        self.client = client
+        self._table = table
+        self._timeout = timeout
+        used = dict.fromkeys([*table.names[0], *table.names[1]])
+        self._ids = [name for name in used if name not in hulls]
+        self._shapes = [hulls[name] for name in used if name in hulls]
+        order = [*self._ids, *(name for name in used if name in hulls)]
+        places = {name: index for index, name in enumerate(order)}
+        self._indices = [np.array([places[name] for name in side], int) for side in table.names]
+
+    def placements(self, rows: npt.NDArray[np.int64]) -> Placements:
+        """A of each row, then B of each row."""
+        return Placements(
+            self._ids,
+            np.concatenate([poses[rows] for poses in self._table.poses]),
+            np.concatenate([indices[rows] for indices in self._indices]),
+            shapes=self._shapes,
+        )
+
+    def ask(self, rows: npt.NDArray[np.int64], prove: bool = False) -> Batch:
+        """prove: with certificates, and separations that are the nearest doubles."""
+        first = np.arange(len(rows))
+        return self.client.check_collisions(
+            self.placements(rows),
+            np.stack([first, first + len(rows)], axis=1),
+            separation=True,
+            max_error=0 if prove else None,
+            certificate=prove,
+            timeout=self._timeout,
+        )
+
+
+# --- Judgement ---
+
+
+@dataclass
+class _Findings:
+    """Faults and errors of consecutive rows. faults: rows x Fault."""
+
+    rows: npt.NDArray[np.int64]
+    faults: npt.NDArray[np.bool_]
+    errors: npt.NDArray[np.float64]
+    distance_errors: npt.NDArray[np.float64]
+    depth_errors: npt.NDArray[np.float64]
+    failed: dict[int, Problem] = field(default_factory=dict)
+
+
+def _difference(
+    said: npt.NDArray[np.float64], truth: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    with np.errstate(invalid="ignore"):
+        return np.where(said == truth, 0.0, np.abs(said - truth))
+
+
+def _judge_rows(
+    table: _Table, rows: npt.NDArray[np.int64], batch: Batch, max_error: float
+) -> _Findings:
+    count = len(rows)
+    truth = batch.answers.relations
+    values, bounds = batch.answers.separations, batch.answers.separation_bounds
+    assert values is not None and bounds is not None
+    answered = truth != Relation.UNSPECIFIED
+    said, colliding = table.relations[rows], table.colliding[rows]
+    is_said = said != Relation.UNSPECIFIED
+    contact = truth != Relation.SEPARATED
+    said_contact = np.where(is_said, said != Relation.SEPARATED, colliding == 1)
+    mistaken = (is_said & (said != truth)) | (~np.isnan(colliding) & ((colliding == 1) != contact))
+    said_distance, said_depth = table.distances[rows], table.depths[rows]
+    distance_errors = _difference(
+        said_distance, np.where(said_distance < 0, values, np.maximum(values, 0.0))
+    )
+    depth_errors = _difference(said_depth, np.maximum(-values, 0.0))
+    faults = np.zeros((count, len(Fault)), bool)
+    touching = (truth == Relation.TOUCHING) | (contact & said_contact)
+    faults[:, Fault.FALSE_CONTACT] = mistaken & ~contact
+    faults[:, Fault.TOUCHING_MISTAKEN] = mistaken & touching
+    faults[:, Fault.MISS] = mistaken & contact & ~touching
+    faults[:, Fault.DISTANCE] = distance_errors > max_error + bounds
+    faults[:, Fault.DEPTH] = depth_errors > max_error + bounds
+    faults[~answered] = False
+    errors = np.max(
+        [
+            np.where(mistaken, np.abs(values), 0.0),
+            np.where(faults[:, Fault.DISTANCE], distance_errors, 0.0),
+            np.where(faults[:, Fault.DEPTH], depth_errors, 0.0),
+        ],
+        axis=0,
+    )
+    unknown = Problem("INTERNAL", "the server gave no reason", None)
+    failed = {
+        int(rows[row]): batch.problem(int(row)) or unknown for row in np.flatnonzero(~answered)
+    }
+    return _Findings(rows, faults, errors, distance_errors, depth_errors, failed)
+
+
+def _collect(
+    asking: _Asking, table: _Table, found: Sequence[_Findings], max_error: float
+) -> Judged:
+    """Asks for the certificates of the wrong answers, and verifies them."""
+    faults = np.concatenate([np.zeros((0, len(Fault)), bool), *(part.faults for part in found)])
+    errors = np.concatenate([np.empty(0), *(part.errors for part in found)])
+    wrong = np.flatnonzero(faults.any(axis=1))
+    wrong = wrong[np.argsort(-errors[wrong], kind="stable")]
+    verifier = Verifier(asking.client)
+    proven: list[WrongAnswer] = []
+    for first in range(0, len(wrong), _ROWS_PER_CALL):
+        rows = wrong[first : first + _ROWS_PER_CALL]
+        batch = asking.ask(rows, prove=True)
+        exact = _judge_rows(table, rows, batch, max_error)
+        placements = asking.placements(rows)
+        for index, row in enumerate(rows.tolist()):
+            verifier.check_row(placements, batch, index)
+            named = tuple(Fault(fault) for fault in np.flatnonzero(faults[row]).tolist())
+            proven.append(WrongAnswer(row, named, float(exact.errors[index]), batch[index]))
+    return Judged(
+        len(table),
+        proven,
+        {fault: int(faults[:, fault].sum()) for fault in Fault},
+        {row: problem for part in found for row, problem in part.failed.items()},
+        np.concatenate([np.empty(0), *(part.distance_errors for part in found)]),
+        np.concatenate([np.empty(0), *(part.depth_errors for part in found)]),
+    )

@@ -1,0 +1,192 @@
+// hullctl judge: another program's answers against exact ones.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace judge_command_test {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class Judge : public HullctlOnServer {
+ protected:
+  Judge() {
+    std::string pattern = (fs::temp_directory_path() / "hullctl-judge-XXXXXX").string();
+    EXPECT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  ~Judge() override { fs::remove_all(folder_); }
+
+  void SetUp() override {
+    HullctlOnServer::SetUp();
+    Put("cube", server::Cube());
+  }
+
+  std::string Write(const std::string& name, const std::string& text) const {
+    const fs::path path = folder_ / name;
+    std::ofstream(path) << text;
+    return path.string();
+  }
+
+  Ran JudgeText(const std::string& table, std::vector<std::string> options = {}) {
+    options.insert(options.begin(), {"judge", Write("answers.csv", table)});
+    return Ask(std::move(options));
+  }
+
+  static std::vector<std::string> Lines(const std::string& text) {
+    std::vector<std::string> lines;
+    std::istringstream in(text);
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Judge, RightAnswersPass) {
+  const Ran ran = JudgeText(
+      "a,b,b_x,relation,distance,depth\n"
+      "cube,cube,3,SEPARATED,2,0\n"
+      "cube,cube,1,touching,0,0\n"
+      "cube,cube,0.5,OVERLAPPING,0,0.5\n"
+      "cube,cube,0.5,,-0.5,\n",
+      {"--max-error", "1e-12"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, StartsWith("# 4 answers, 0 wrong, 0 failed\n"));
+}
+
+TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
+  const Ran ran = JudgeText(
+      "a,b,b_x,relation,distance\n"
+      "cube,cube,3,SEPARATED,2.25\n"
+      "cube,cube,2,OVERLAPPING,\n"
+      "cube,cube,1,SEPARATED,0\n"
+      "cube,cube,0.25,SEPARATED,0\n"
+      "cube,cube,0.5,TOUCHING,0\n");
+  EXPECT_EQ(ran.code, 1);
+  const std::vector<std::string> lines = Lines(ran.out);
+  ASSERT_EQ(lines.size(), 8u) << ran.out;
+  EXPECT_THAT(lines[0], StartsWith("line 3\tcube\tcube\tfalse contact\toff by 1\tSEPARATED\t1 "));
+  EXPECT_THAT(lines[1], StartsWith("line 5\tcube\tcube\tmiss\toff by 0.75\tOVERLAPPING\t-0.75"));
+  EXPECT_THAT(lines[2], HasSubstr("line 6\tcube\tcube\ttouching mistaken\toff by 0.5"));
+  EXPECT_THAT(lines[3], HasSubstr("line 2\tcube\tcube\tdistance\toff by 0.25\tSEPARATED\t2 "));
+  EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching mistaken\toff by 0\tTOUCHING"));
+  for (size_t i = 0; i < 5; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
+  EXPECT_EQ(lines[5], "# 5 answers, 5 wrong, 0 failed");
+  EXPECT_EQ(lines[6], "# false contact 1, miss 1, touching mistaken 2, distance 1, depth 0");
+  EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
+}
+
+TEST_F(Judge, AProgramThatOnlySaysCollidingMayCallTouchingEither) {
+  const Ran ran = JudgeText(
+      "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, StartsWith("line 3\tcube\tcube\ttouching mistaken\t"));
+  EXPECT_THAT(ran.out, HasSubstr("# 4 answers, 1 wrong"));
+}
+
+TEST_F(Judge, JsonLinesAreRecordsForVerify) {
+  const std::string shape = Write("tetrahedron.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+  const Ran ran = JudgeText("a;b;b_qw;b_qx;b_qy;b_qz;b_x;relation;solver\n" + shape +
+                                ";cube;0;0;0;2;3;OVERLAPPING;fast\n",
+                            {"--output", "json"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("ignored columns: solver"));
+  const std::vector<std::string> lines = Lines(ran.out);
+  ASSERT_EQ(lines.size(), 2u) << ran.out;
+  EXPECT_THAT(lines[0], StartsWith("{\"line\":\"2\",\"fault\":\"false contact\",\"error\":1"));
+  EXPECT_THAT(lines[1], StartsWith("{\"answers\":\"1\",\"wrong\":\"1\",\"falseContacts\":\"1\""));
+  const Ran verified = Ask({"verify", Write("record.json", lines[0])});
+  EXPECT_EQ(verified.out, "SEPARATED: valid\n");
+  EXPECT_THAT(Lines(JudgeText("a,b,b_x,colliding\ncube,cube,9,1\n", {"--output", "name"}).out),
+              ElementsAre("2"));
+}
+
+// The answers of a box test in floats that grows its boxes by a margin, as physics engines do.
+TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
+  constexpr float kMargin = 0.04F;
+  std::mt19937 random(11);
+  std::uniform_int_distribution<int> steps(-48, 48);
+  std::string table = "a,b,b_x,b_y,b_z,colliding,distance\n";
+  int false_contacts = 0;
+  double largest = 0;
+  for (int i = 0; i < 300; ++i) {
+    std::array<double, 3> gap;
+    std::string row = "cube,cube";
+    float squared = 0;
+    double exact_squared = 0;
+    for (double& one : gap) {
+      const double place = steps(random) / 32.0;
+      row += "," + std::to_string(place);
+      one = std::max(std::abs(place) - 1, 0.0);
+      exact_squared += one * one;
+      const float with_margin = std::max(static_cast<float>(one) - kMargin, 0.0F);
+      squared += with_margin * with_margin;
+    }
+    const bool says_contact = squared == 0;
+    const double distance = std::sqrt(squared);
+    false_contacts += says_contact && exact_squared > 0;
+    largest = std::max(largest, std::abs(distance - std::sqrt(exact_squared)));
+    std::ostringstream text;
+    text.precision(17);
+    text << row << "," << says_contact << "," << distance << "\n";
+    table += text.str();
+  }
+  ASSERT_GT(false_contacts, 3);
+  const Ran ran = JudgeText(table, {"--max-error", "0.1"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, HasSubstr("# 300 answers, " + std::to_string(false_contacts) + " wrong"));
+  EXPECT_THAT(ran.out, HasSubstr("# false contact " + std::to_string(false_contacts) +
+                                 ", miss 0, touching mistaken 0, distance 0, depth 0"));
+  const std::string reported = ran.out.substr(ran.out.find("of a distance ") + 14);
+  EXPECT_NEAR(std::stod(reported), largest, 1e-9);
+}
+
+TEST_F(Judge, PairsWithoutAnAnswerFailAlone) {
+  const Ran ran = JudgeText("a,b,colliding\ncube,absent,1\ncube,cube,1\n");
+  EXPECT_EQ(ran.code, 4);
+  EXPECT_THAT(ran.err, HasSubstr("line 2: hull \"absent\" not found"));
+  EXPECT_THAT(ran.out, StartsWith("# 2 answers, 0 wrong, 1 failed\n"));
+}
+
+TEST_F(Judge, NamesLineAndColumnOfAMistake) {
+  const auto error = [this](const std::string& table, const std::string& what) {
+    const Ran ran = JudgeText(table);
+    EXPECT_EQ(ran.code, 2) << table;
+    EXPECT_THAT(ran.err, HasSubstr(what)) << table;
+  };
+  error("", "the table holds no answers");
+  error("a,b,colliding\n", "the table holds no answers");
+  error("a,colliding\n", "answers.csv:1: the header names no column b");
+  error("a,b,b_x\n", "needs relation, colliding, distance, or depth");
+  error("a,b,colliding,A\n", "the header names \"a\" twice");
+  error("a,b,b_qw,colliding\n", "a quaternion has four columns: b_qw b_qx b_qy b_qz");
+  error("a,b,colliding\ncube,cube\n", "answers.csv:2: the row has 2 cells, the header 3");
+  error("a,b,colliding\ncube,,1\n", "answers.csv:2: b is empty");
+  error("a,b,colliding\ncube,cube,yes\n", "colliding: \"yes\" is none of 0, 1, false, true");
+  error("a,b,relation\ncube,cube,NEAR\n", "\"NEAR\" is none of SEPARATED, TOUCHING, OVERLAPPING");
+  error("a,b,distance\ncube,cube,far\n", "distance: \"far\" is not a number");
+  error("a,b,distance\ncube,cube,nan\n", "leave the cell empty");
+  error("a,b,depth\ncube,cube,-1\n", "depth: -1 is no depth");
+  error("a,b,b_x,depth\ncube,cube,inf,1\n", "b_x: inf is not finite");
+  error("a,b,b_qw,b_qx,b_qy,b_qz,depth\ncube,cube,0,0,0,0,1\n", "are all 0");
+}
+
+}  // namespace judge_command_test
+}  // namespace hulld
