@@ -143,9 +143,8 @@ export class AnswerPanel {
     const {pose, radius = 0} = object;
     if (!pose.every((value, i) => value === answer.poses[7 * k + i]))
       return `${object.name} has moved since the answer`;
-    return piece ?
-        {xyz: hull.xyz, poses: [pose, piece.pose], radii: [radius, piece.radius]} :
-        {xyz: hull.xyz, poses: [pose], radii: [radius]};
+    return piece ? {xyz: hull.xyz, poses: [pose, piece.pose], radii: [radius, piece.radius]} :
+                   {xyz: hull.xyz, poses: [pose], radii: [radius]};
   }
 
   verdict(answer) {
