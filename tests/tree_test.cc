@@ -83,6 +83,7 @@ constexpr std::string_view kRooms[] = {
     "core/query/exact",
     "core/query",
     "core/query/body",
+    "core/query/motion",
     "core/query/scene",
     "server/settings",
     "server/contract",

@@ -11,6 +11,8 @@
 #include "core/numeric/vector.h"
 
 namespace hulld {
+Box Box::All() { return {Vector::Constant(-kLargestDouble), Vector::Constant(kLargestDouble)}; }
+
 Box Box::Empty() { return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)}; }
 
 Box GrownBy(const Box& box, double clearance) {
@@ -35,7 +37,7 @@ Box BoundingBox(const PlacedHull& placed) {
   const double translation_error =
       placed.product() == nullptr ? 0 : placed.product()->translation_error();
   if (!IsFilterSize(size) || !std::isfinite(translation_error)) {
-    return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
+    return Box::All();
   }
   const QueryHull& hull = placed.query_hull();
   const double error = kSupportErrorFactor * size + translation_error;

@@ -21,6 +21,8 @@ struct Box {
   Vector high;
 
   static Box Empty();
+  // Meets every box but the empty one.
+  static Box All();
   bool IsEmpty() const { return (low.array() > high.array()).any(); }
   bool Meets(const Box& other) const {
     return (low.array() <= other.high.array()).all() && (other.low.array() <= high.array()).all();

@@ -31,7 +31,7 @@ Box SweptBox(const MovingHull& moving) {
     return Union(at_start, BoundingBox(PlacedHull(moving.hull, end, moving.radius)));
   }
   const double reach = Reach(at_start, start.t);
-  if (!std::isfinite(reach)) return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
+  if (!std::isfinite(reach)) return Box::All();
   return GrownBy(Union({start.t, start.t}, {end.t, end.t}), reach);
 }
 

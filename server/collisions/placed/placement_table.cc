@@ -255,11 +255,12 @@ void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
 
 // A body in motion is refused by the query, so its box meets all others.
 Box PlacementTable::SweptBoxOf(size_t i) const {
+  if (!is_answerable(i)) return Box::Empty();
   if (!is_body(i)) return SweptBox(MovingAt(i));
   const Motion motion = MotionAt(i);
   const bool is_at_rest = motion.start.q == motion.end.q && motion.start.t == motion.end.t;
   if (is_at_rest) return BoundingBox(bodies_[i]);
-  return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
+  return Box::All();
 }
 
 size_t PlacementTable::MemoryBytes() const {

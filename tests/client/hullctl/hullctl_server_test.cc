@@ -100,8 +100,8 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
   EXPECT_THAT(Ask(with({"--verify"})).out, HasSubstr("verified         valid"));
   EXPECT_EQ(Ask(with({"--output", "name"})).out, "OVERLAPPING\n");
   EXPECT_THAT(AskJson(meets).out,
-              HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"contactTime\":0.5,"
-                        "\"intervals\":[]}"));
+              HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"intervals\":[],"
+                        "\"contactTime\":0.5}"));
   ran = Ask(with({"--separation"}));
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("wanted.separation excludes end_pose"));
@@ -161,10 +161,10 @@ TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
   Ran ran = Ask({"cast", origin, "8,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
-            "HULL        TIME   POINT        NORMAL\n"
-            "near/cube   0.125  0 0.5 0.5    -1 0 0\n"
-            "near/point  0.5    3 0.5 0.5    -1 0 0\n"
-            "far/wall    0.625  4 0.5 0.5    -1 0 0\n");
+            "HULL        TIME   POINT      NORMAL\n"
+            "near/cube   0.125  0 0.5 0.5  -1 0 0\n"
+            "near/point  0.5    3 0.5 0.5  -1 0 0\n"
+            "far/wall    0.625  4 0.5 0.5  -1 0 0\n");
   EXPECT_EQ(Ask({"cast", origin, "4,0,0", "--output", "name"}).out, "near/cube\nnear/point\n");
   EXPECT_EQ(Ask({"cast", origin, "8,0,0", "far/", "--output", "name"}).out, "far/wall\n");
   EXPECT_EQ(AskJson({"cast", origin, "8,0,0", "near/c"}).out,

@@ -87,6 +87,10 @@ class MessageFiller {
   // always.
   bool IsPresent(const FieldDescriptor& field) {
     const std::string& name = field.name();
+    // Most calls take no motions.
+    if (name == "end_pose" || name == "max_time_error" || name == "resolution") {
+      return in_.OneOf(32);
+    }
     if (field.has_optional_keyword() || name == "tolerance" || name == "simplification") {
       return in_.OneOf(4);
     }
@@ -210,7 +214,8 @@ class MessageFiller {
     const std::string& name = field.name();
     const double number = Double();
     const bool is_length = name == "tolerance" || name == "max_error" || name == "clearance" ||
-                           name == "radius" || name == "radii";
+                           name == "radius" || name == "radii" || name == "max_time_error" ||
+                           name == "resolution";
     return is_length && tame_ ? std::abs(number) : number;
   }
 

@@ -458,6 +458,8 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   // A body has taken over the ID of a deleted hull.
   if (!response.piece_hulls().empty()) return;
   if (asked.a().has_points() || asked.b().has_points()) return;
+  // The certificate of a motion holds at the time of contact.
+  if (asked.a().has_end_pose() || asked.b().has_end_pose()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {
     return Note(absl::StrCat("two answers to one question: ", v1::Relation_Name(answer.relation()),
@@ -466,8 +468,10 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   const std::vector<double> a = VerticesOf(request.a().hull_id());
   const std::vector<double> b = VerticesOf(request.b().hull_id());
   const auto check = [&](const v1::CheckCollisionResponse& proven) {
-    const absl::Status checked = hulld::CheckCertificate(
-        proven.relation(), proven.certificate(), {a, request.a().pose()}, {b, request.b().pose()});
+    const absl::Status checked =
+        hulld::CheckCertificate(proven.relation(), proven.certificate(),
+                                {a, request.a().pose(), nullptr, false, {request.a().radius()}},
+                                {b, request.b().pose(), nullptr, false, {request.b().radius()}});
     if (!checked.ok()) Note("the certificate is wrong: " + checked.ToString());
   };
   check(response);

@@ -154,7 +154,9 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
   EXPECT_THAT(json, HasSubstr(R"("number":3)"));
   EXPECT_THAT(json, HasSubstr(R"("title":"two \"boxes\"")"));
   EXPECT_THAT(
-      json, HasSubstr(R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0]})"));
+      json,
+      HasSubstr(
+          R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0],"radius":0})"));
 }
 
 // Invalid UTF-8 would end the connection of the page.
