@@ -39,6 +39,16 @@ absl::StatusOr<Decision> PairAt::DecideCores(const std::function<bool()>& should
   return decision;
 }
 
+absl::StatusOr<bool> PairAt::IsWithin(double length,
+                                      const std::function<bool()>& should_stop) const {
+  QueryOptions options;
+  options.clearance = length;
+  options.should_stop = should_stop;
+  const absl::StatusOr<Answer> answer = CheckCollision(*placed_a_, *placed_b_, options);
+  if (!answer.ok()) return answer.status();
+  return answer->within_clearance.value();
+}
+
 absl::StatusOr<Answer> PairAt::Check(bool want_certificate,
                                      const std::function<bool()>& should_stop) const {
   QueryOptions options;

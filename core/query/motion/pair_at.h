@@ -31,6 +31,9 @@ class PairAt {
   // Decides the relation of the hulls without their radii, exactly. CANCELLED: should_stop, which
   // may be empty, returned true.
   absl::StatusOr<Decision> DecideCores(const std::function<bool()>& should_stop) const;
+  // Returns true if the separation of the rounded hulls is at most `length`, exactly. Errors: as
+  // above.
+  absl::StatusOr<bool> IsWithin(double length, const std::function<bool()>& should_stop) const;
   // Returns the relation of the rounded hulls, exactly, with its proof if requested. Errors: as
   // above.
   absl::StatusOr<Answer> Check(bool want_certificate,

@@ -202,7 +202,8 @@ double TranslationSearch::NextTime() const {
 
 absl::Status TranslationSearch::QueryAt(double time) {
   if (poll_.Step()) return MotionStopped();
-  stride_ = std::min<int64_t>(stride_ * kStrideFactor, OrdinalOf(1.0));
+  const int64_t longest = OrdinalOf(1.0);
+  stride_ = stride_ > longest / kStrideFactor ? longest : stride_ * kStrideFactor;
   const PairAt at(a_, b_, time);
   absl::StatusOr<Decision> decision = at.DecideCores(options_.should_stop);
   if (!decision.ok()) return decision.status();

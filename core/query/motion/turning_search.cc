@@ -70,6 +70,10 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       if (*relation != Relation::kSeparated) return Contact(time);
     }
     if (may_tolerate && step->gap_after <= resolution_) {
+      // The gap along n may be less than the separation.
+      const absl::StatusOr<bool> near = IsWithinResolution();
+      if (!near.ok()) return near.status();
+      if (!*near) continue;
       const absl::StatusOr<bool> tolerable = RemainsTolerable(*n);
       if (!tolerable.ok()) return tolerable.status();
       const absl::StatusOr<Relation> at_end = RelationAt(1);
@@ -87,6 +91,10 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
       PairAt(a_, b_, time).Check(/*want_certificate=*/false, options_.should_stop);
   if (!answer.ok()) return answer.status();
   return answer->relation;
+}
+
+absl::StatusOr<bool> TurningSearch::IsWithinResolution() const {
+  return PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
 }
 
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) const {
@@ -167,13 +175,17 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   absl::StatusOr<Relation> relation = RelationAt(latest);
   if (!relation.ok()) return relation.status();
   if (*relation != Relation::kSeparated) return Contact(latest);
-  const Vector n = last_direction_.isZero(0) ? Vector(Vector::UnitX()) : last_direction_;
-  const absl::StatusOr<bool> tolerable = RemainsTolerable(n);
-  if (!tolerable.ok()) return tolerable.status();
-  if (*tolerable) return WithoutContact(Relation::kWithinTolerance);
-  const absl::StatusOr<double> contact = FindLateContact();
-  if (!contact.ok()) return contact.status();
-  if (*contact <= 1) return Contact(*contact);
+  const absl::StatusOr<bool> near = IsWithinResolution();
+  if (!near.ok()) return near.status();
+  if (*near) {
+    const Vector n = last_direction_.isZero(0) ? Vector(Vector::UnitX()) : last_direction_;
+    const absl::StatusOr<bool> tolerable = RemainsTolerable(n);
+    if (!tolerable.ok()) return tolerable.status();
+    if (*tolerable) return WithoutContact(Relation::kWithinTolerance);
+    const absl::StatusOr<double> contact = FindLateContact();
+    if (!contact.ok()) return contact.status();
+    if (*contact <= 1) return Contact(*contact);
+  }
   return absl::InvalidArgumentError(
       "no separation can be proven between the poses: a rotation nearly vanishes, or sizes are out "
       "of range; add a pose between them");

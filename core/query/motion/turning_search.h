@@ -45,6 +45,7 @@ class TurningSearch {
   };
 
   absl::StatusOr<Relation> RelationAt(double time) const;
+  absl::StatusOr<bool> IsWithinResolution() const;
   absl::StatusOr<Vector> DirectionAt(double time) const;
   std::optional<Step> FindStep(const Vector& n) const;
   double LatestContactTime() const;

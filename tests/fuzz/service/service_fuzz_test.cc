@@ -115,7 +115,7 @@ constexpr Goal kGoals[] = {
 };
 
 TEST(ServiceFuzz, RandomProgramsOfCallsPassEveryCheck) {
-  const uint64_t seed = TestSeed(602);
+  const uint64_t seed = TestSeed(603);
   Random random(seed);
   ServiceFuzz memory("memory");
   ServiceFuzz durable("rocksdb");

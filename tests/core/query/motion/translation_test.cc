@@ -238,6 +238,23 @@ TEST(Translation, ExtremeScalesAreExact) {
   EXPECT_LT(*early.contact_time, 1e-150);
 }
 
+// Beyond the range of floating point, exact queries alone find the contact.
+TEST(Translation, ScaledPairsMeetAtTheSameTime) {
+  const std::vector<Vector> triangle = {{9, -6, -1}, {-13, -5, 9}, {-1, 4, -3}};
+  const std::vector<Vector> solid = {{3, 0, -5}, {5, -5, -5}, {-5, 2, -2}, {0, -2, 2}, {3, -4, 1}};
+  for (const int exponent : {-900, -300, 0, 280, 300, 900}) {
+    SCOPED_TRACE(exponent);
+    const double scale = std::ldexp(1.0, exponent);
+    const OwnMoving a(Scaled(triangle, scale), Straight(Vector(scale * Vector(-8, 3, 11)),
+                                                        Vector(scale * Vector(4, 0, -4))));
+    const Pose rest = {{3, 2, -1, -1}, scale * Vector(3, 1, 3)};
+    const FirstContact contact = Find(a, OwnMoving(Scaled(solid, scale), {rest, rest}));
+    EXPECT_EQ(contact.relation, Relation::kOverlapping);
+    EXPECT_EQ(contact.separated_until, 0.4505591524426133);
+    EXPECT_EQ(contact.contact_time, 0.45055915244261335);
+  }
+}
+
 TEST(Translation, DistantOffsetsCostNoAccuracy) {
   const Vector far(0x1p40, -0x1p41, 0x1p40);
   const OwnMoving a(Cube(1), Straight(far, Vector(far + Vector(1, 0, 0))));

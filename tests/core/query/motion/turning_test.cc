@@ -171,6 +171,24 @@ TEST(Turning, AFinerResolutionSeparatesNearerMisses) {
   EXPECT_EQ(Find(box, wall, options).relation, Relation::kSeparated);
 }
 
+// A point on a circle about the other hull: the plane of a step comes within the resolution, the
+// pair does not.
+TEST(Turning, PairsFartherApartThanTheResolutionAreDecided) {
+  const Motion quarter = {{{1, 0, 0, 0}, Vector::Zero()}, {{1, 0, 0, 1}, Vector::Zero()}};
+  for (const double resolution : {0.001, 0.02, 0.05, 0.5}) {
+    MotionOptions options;
+    options.resolution = resolution;
+    const FirstContact contact =
+        Find(OwnMoving({{0, 0, 0}}, AtRest()), OwnMoving({{1, 0, 0}}, quarter), options);
+    EXPECT_EQ(contact.relation, Relation::kSeparated) << resolution;
+  }
+  for (const double gap : {1e-6, 1e-7}) {
+    const FirstContact contact =
+        Find(OwnMoving({{0, 0, 0}}, AtRest(), 1), OwnMoving({{1 + gap, 0, 0}}, quarter));
+    EXPECT_EQ(contact.relation, Relation::kSeparated) << gap;
+  }
+}
+
 TEST(Turning, TheBracketIsAsNarrowAsRequested) {
   const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
   const OwnMoving wall(Box(0.5, 5, 5), AtRest({1.25 + 0.5, 0, 0}));
