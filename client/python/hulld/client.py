@@ -44,7 +44,7 @@ from hulld.calls.wanted import Wanted
 from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
 from hulld.connection import PathLike
-from hulld.errors import HulldError, read_answer
+from hulld.errors import HulldError, error_class, read_answer
 from hulld.geometry.placements import (
     PlacementLike,
     Placements,
@@ -591,9 +591,8 @@ class Client(ClientBase):
         groups = np.repeat([0, 1], [len(starts), len(targets)])
         among_rays = SceneFilter(groups, False, [(0, 0)], len(starts))
         wanted = Wanted(certificate=True)
-        call = requests.find_collisions(
-            with_rays(targets, starts, ends), among_rays, wanted, 0.0
-        )
+        moving = with_rays(targets, starts, ends)
+        call = requests.find_collisions(moving, among_rays, wanted, None, 0.0)
         found = self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
         for problem in (*found.placement_problems.values(), *found.answers.problems.values()):
             raise error_class(problem.code)(

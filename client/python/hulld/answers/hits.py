@@ -64,7 +64,8 @@ def hits_of(
     """The hits in a scene of rays, and then other placements."""
     answers = found.answers
     all_times = np.empty(0) if answers.contact_times is None else answers.contact_times
-    rows = np.lexsort((all_times, found.pairs[:, 0]))
+    by_time = np.argsort(all_times, kind="stable")
+    rows = by_time[np.argsort(found.pairs[by_time, 0], kind="stable")]
     rays, times = found.pairs[rows, 0], all_times[rows]
     along = times[:, np.newaxis]
     normals = [_normal(answers.motion_proofs.get(int(row), ())) for row in rows]
