@@ -165,9 +165,8 @@ function holdsOriginInside(points) {
 // Returns true if a point of the hull of the points is within r of 0 or, if `nearer`, less than r
 // from it. The nearest one is a vertex, or inside an edge or a triangle, or it is 0 itself.
 function comesWithin(points, rSquared, nearer) {
-  const holds = (numerator, denominator) => nearer ?
-      numerator < rSquared * denominator :
-      numerator <= rSquared * denominator;
+  const holds = (numerator, denominator) =>
+      nearer ? numerator < rSquared * denominator : numerator <= rSquared * denominator;
   const holdsEdge = (p, q) => {
     const e = difference(q, p);
     const moment = cross(p, q);
@@ -246,9 +245,9 @@ function check(relation, certificate, placedA, placedB) {
 }
 
 // Returns the missing proof, or an empty text if the certificate proves that A and B are in this
-// relation. The certificate is in the JSON mapping of the contract; a and b are {xyz, poses, radii}:
-// the vertices, and the poses and radii of the hull from the world inward (two for a piece of a
-// body).
+// relation. The certificate is in the JSON mapping of the contract; a and b are {xyz, poses,
+// radii}: the vertices, and the poses and radii of the hull from the world inward (two for a piece
+// of a body).
 //
 // Cost: O(vertices) operations on integers of any length: about two microseconds per vertex.
 export function certificateProblem(relation, certificate, a, b) {
