@@ -27,7 +27,7 @@ struct AnswerRow {
   std::optional<v1::Witness> witness;
   std::optional<v1::Normal> normal;
   std::optional<bool> within_clearance;
-  // Of a pair in motion, with its intervals if proven; absent if the pair has no answer.
+  // For a pair in motion that has an answer; holds intervals if a certificate was requested.
   std::optional<v1::FirstContact> first_contact;
   // The deciding pieces of bodies, -1 if none decided; absent without bodies.
   std::optional<std::pair<int32_t, int32_t>> pieces;

@@ -64,15 +64,16 @@ Cubic Product(const std::array<double, 3>& f, double g0, double g1) {
 
 }  // namespace
 
-// Bernstein coefficients over an interval, of a hull in motion.
+// Bernstein coefficients of a hull in motion over an interval.
 struct MovingPlane::Bounds {
-  // Of |q|^2, and the largest of |q|^2 at both ends.
+  // Coefficients of |q|^2.
   Cubic weights;
+  // The larger of |q|^2 at both ends.
   double weight = 0;
-  // The largest and the least of those of |q|^2 n.p over all vertices.
+  // For each coefficient of |q|^2 n.p, its largest and its least value over all vertices.
   Cubic most;
   Cubic least;
-  // Error bound of these, without the part of the offset.
+  // Error bound of `most` and `least`; the offset adds to it.
   double error = 0;
   // False if the hull turns too far.
   bool usable = false;

@@ -19,10 +19,10 @@ struct SweptRelation {
   std::optional<IntegerVector> axis;
 };
 
-// Decides whether two hulls meet, and whether they overlap, at some time of a translation. With C =
-// A - B at the middle of the motion, and 2 h the displacement of B relative to A, the pair meets at
-// a time in [0, 1] if and only if the sum of C and the segment from -h to h contains the origin;
-// and if C is solid, it overlaps at a time if and only if the sum contains it in its interior.
+// Returns the strongest relation of two hulls over all times of a translation. Let C be A - B at
+// time 1/2, let 2 h be the displacement of B relative to A, and let S be the Minkowski sum of C and
+// the segment from -h to h. The pair meets at some time if and only if S contains the origin. If C
+// is solid, the pair overlaps at some time if and only if the interior of S contains the origin.
 // `middle`: the pair at time 1/2. `half`: h in units of that pair, not zero. CANCELLED:
 // should_stop, which may be empty, returned true.
 absl::StatusOr<SweptRelation> FindSweptRelation(ExactPair& middle, const IntegerVector& half,

@@ -160,7 +160,7 @@ absl::StatusOr<bool> TurningSearch::RemainsTolerable(Vector n) {
     time = until;
     const absl::StatusOr<Vector> nearest = DirectionAt(time);
     if (!nearest.ok()) return nearest.status();
-    // Where the hulls meet, the last direction may be better.
+    // The nearest direction is unreliable if the hulls meet; the previous one may then be better.
     if (!nearest->isZero(0) &&
         plane_.Try(*nearest, time, time).gap > plane_.Try(n, time, time).gap) {
       n = *nearest;

@@ -79,7 +79,8 @@ std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
   return result;
 }
 
-// Returns the quaternion of a motion at a time times a power of two, each component rounded once.
+// Returns the quaternion of a motion at a time, scaled by a power of two. Each component is rounded
+// once.
 Quaternion RoundedExactlyAt(const Motion& motion, double time) {
   const std::array<Integer, 4> q = QuaternionAt(motion, time);
   int largest = 0;
@@ -91,8 +92,8 @@ Quaternion RoundedExactlyAt(const Motion& motion, double time) {
   return rounded;
 }
 
-// Returns the quaternion of a motion at a time times a positive number, each component within u of
-// the largest, and terms of the size of u^2.
+// Returns the quaternion of a motion at a time, scaled by a positive number. The error of each
+// component is at most u times the largest component, up to terms in u^2.
 Quaternion RoundedAt(const Motion& motion, double time) {
   const Quaternion& q0 = motion.start.q;
   const Quaternion& q1 = motion.end.q;

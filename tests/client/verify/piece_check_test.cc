@@ -63,7 +63,7 @@ struct Body {
   }
 
   v1::Pose pose;
-  // Of its placement and of each piece.
+  // Radii of the placement and of each piece.
   double radius = 0;
   double piece_radius = 0;
   std::deque<std::vector<double>> hulls;

@@ -14,6 +14,7 @@
 #include "client/packed_placements.h"
 #include "client/verify/answer_check.h"
 #include "server/store/body_record.h"
+#include "tests/server/collisions/watch_round.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -158,7 +159,7 @@ TEST_F(RoundedPlacements, TextbookRefusesThem) {
 TEST_F(RoundedPlacements, RadiiOfBodiesAddToThoseOfTheirPieces) {
   PutRow();
   const v1::Placement row = Rounded(PlacementOf("row"), 0.5);
-  // Beside the first cube, and beside the second.
+  // A ball at the first cube, a ball at the second, and the next double of each.
   ExpectProven(row, Ball(0.25, -0.75, 0.5, 0.5), kTouching);
   ExpectProven(row, Ball(std::nextafter(0.25, 0), -0.75, 0.5, 0.5), kSeparated);
   ExpectProven(row, Ball(0.25, 6, 0.5, 0.5), kTouching);
@@ -234,22 +235,12 @@ TEST_F(RoundedPlacements, WatchesReportWhenRadiiMeet) {
   *open.add_placements() = Rounded(PlacementOf("cube"), 0.5);
   *open.add_placements() = Ball(1, 3, 0.5, 0.5);
   const auto watch = client().WatchCollisions(open);
-  const auto round = [&watch] {
-    v1::WatchCollisionsResponse all;
-    while (!all.synced()) {
-      const auto message = watch->Next();
-      EXPECT_TRUE(message.ok()) << message.status();
-      if (!message.ok()) break;
-      all.MergeFrom(*message);
-    }
-    return all;
-  };
-  EXPECT_EQ(round().events_size(), 0);
+  EXPECT_EQ(ReadRound(*watch).events_size(), 0);
   v1::CollisionWatchUpdate update;
   update.add_placements(1);
   for (const double number : {1.0, 0.0, 0.0, 0.0, 2.5, 0.5, 0.5}) update.add_poses(number);
   ASSERT_TRUE(watch->Update(update).ok());
-  const v1::WatchCollisionsResponse touching = round();
+  const v1::WatchCollisionsResponse touching = ReadRound(*watch);
   ASSERT_EQ(touching.events_size(), 1);
   EXPECT_EQ(touching.events(0).kind(), v1::COLLISION_EVENT_KIND_TOUCH);
 }

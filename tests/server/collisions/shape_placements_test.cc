@@ -15,6 +15,7 @@
 #include "client/calls/grpc_status.h"
 #include "client/client.h"
 #include "client/packed_placements.h"
+#include "tests/server/collisions/watch_round.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -309,23 +310,13 @@ TEST_F(InlineShapes, WatchesFollowTheOtherHulls) {
   *open.add_placements() = AtX(Shape(Cube()), 5);
   *open.add_placements() = PlacementOf("cube");
   const auto watch = client().WatchCollisions(open);
-  const auto round = [&watch] {
-    v1::WatchCollisionsResponse all;
-    while (!all.synced()) {
-      const auto message = watch->Next();
-      EXPECT_TRUE(message.ok()) << message.status();
-      if (!message.ok()) break;
-      all.MergeFrom(*message);
-    }
-    return all;
-  };
-  v1::WatchCollisionsResponse first = round();
+  v1::WatchCollisionsResponse first = ReadRound(*watch);
   EXPECT_THAT(first.events(), IsEmpty());
   ASSERT_EQ(first.hulls_size(), 1);
   EXPECT_EQ(first.hulls(0).hull_id(), "cube");
   Appender appender(*hulls_, "cube", "grows");
   ASSERT_TRUE(appender.Append(1, {5.5, 0.5, 0.5}).has_value());
-  v1::WatchCollisionsResponse second = round();
+  v1::WatchCollisionsResponse second = ReadRound(*watch);
   ASSERT_EQ(second.events_size(), 1);
   EXPECT_EQ(second.events(0).kind(), v1::COLLISION_EVENT_KIND_ENTER);
   EXPECT_EQ(second.events(0).revision_a(), 0u);

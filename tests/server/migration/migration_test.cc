@@ -372,7 +372,7 @@ TEST_P(MigrationTest, TheCommandLineIsChecked) {
 }
 
 #ifdef HULLD_SANITIZED
-// Each kind once as source and once as destination.
+// Every kind of store is the source once and the destination once.
 const auto kPlaces =
     ::testing::Values(std::tuple("rocksdb", "postgres"), std::tuple("postgres", "rocksdb"));
 #else

@@ -6,44 +6,23 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <random>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include "tests/client/hullctl/hullctl_on_server.h"
+#include "tests/client/hullctl/pairs/cube_server.h"
 
 namespace hulld {
 namespace judge_command_test {
 
-namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-class Judge : public HullctlOnServer {
+class Judge : public CubeServer {
  protected:
-  Judge() {
-    std::string pattern = (fs::temp_directory_path() / "hullctl-judge-XXXXXX").string();
-    EXPECT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  ~Judge() override { fs::remove_all(folder_); }
-
-  void SetUp() override {
-    HullctlOnServer::SetUp();
-    Put("cube", server::Cube());
-  }
-
-  std::string Write(const std::string& name, const std::string& text) const {
-    const fs::path path = folder_ / name;
-    std::ofstream(path) << text;
-    return path.string();
-  }
-
   Ran JudgeText(const std::string& table, std::vector<std::string> options = {}) {
     options.insert(options.begin(), {"judge", Write("answers.csv", table)});
     return Ask(std::move(options));
@@ -55,8 +34,6 @@ class Judge : public HullctlOnServer {
     for (std::string line; std::getline(in, line);) lines.push_back(line);
     return lines;
   }
-
-  fs::path folder_;
 };
 
 TEST_F(Judge, RightAnswersPass) {

@@ -3,42 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <string>
 
-#include "tests/client/hullctl/hullctl_on_server.h"
+#include "tests/client/hullctl/pairs/cube_server.h"
 
 namespace hulld {
 namespace point_check_test {
 
-namespace fs = std::filesystem;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-class PointCheck : public HullctlOnServer {
- protected:
-  PointCheck() {
-    std::string pattern = (fs::temp_directory_path() / "hullctl-points-XXXXXX").string();
-    EXPECT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  ~PointCheck() override { fs::remove_all(folder_); }
-
-  void SetUp() override {
-    HullctlOnServer::SetUp();
-    Put("cube", server::Cube());
-  }
-
-  std::string Write(const std::string& name, const std::string& text) const {
-    const fs::path path = folder_ / name;
-    std::ofstream(path) << text;
-    return path.string();
-  }
-
-  fs::path folder_;
-};
+class PointCheck : public CubeServer {};
 
 TEST_F(PointCheck, TellsInsideOnAndOutsideExactly) {
   const std::string points =

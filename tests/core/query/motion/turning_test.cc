@@ -67,7 +67,7 @@ Pose RandomPose(Random& random, double length) {
   return pose;
 }
 
-// The same rotation at the end, on the shorter path.
+// Returns the motion between two poses on the shorter of its two paths.
 Motion Between(const Pose& start, Pose end) {
   double dot = 0;
   for (int i = 0; i < 4; ++i) dot += start.q[i] * end.q[i];
@@ -268,6 +268,21 @@ TEST(Turning, ExtremeScalesKeepTheRelation) {
     EXPECT_EQ(contact.relation, Relation::kOverlapping);
     const OwnMoving far(Scaled(Box(0.5, 5, 5), scale), AtRest({2 * scale, 0, 0}));
     EXPECT_EQ(Find(box, far).relation, Relation::kSeparated);
+  }
+}
+
+// Out of the range of planes, no bracket is as narrow as requested.
+TEST(Turning, RoundedShapesOfExtremeSizeAreRefused) {
+  for (const double scale : {0x1p-800, 0x1p920}) {
+    std::vector<Vector> cube = Box(0.5, 0.5, 0.5);
+    for (Vector& corner : cube) corner *= scale;
+    const OwnMoving a(cube, AtRest(), 0.5 * scale);
+    const OwnMoving b(
+        cube,
+        {{{1, 0, 0, 0}, scale * Vector(5, 0.3, 0.2)}, {{1, 0, 0, 0}, scale * Vector(-1, 0.3, 0.2)}},
+        0.5 * scale);
+    const absl::Status status = FindFirstContact(a.moving(), b.moving()).status();
+    EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
   }
 }
 
