@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-constexpr size_t kWidth = 100;
+constexpr size_t kHelpWidth = 100;
 // Longer names have their text on the next line.
 constexpr size_t kWidestName = 26;
 
@@ -45,7 +45,7 @@ void AppendList(const std::string& heading, const std::vector<Entry>& entries, s
     const bool fits = name.size() <= kWidestName;
     absl::StrAppend(
         text, fits ? std::string(indent - 2 - name.size(), ' ') : "\n" + std::string(indent, ' '));
-    absl::StrAppend(text, Wrapped(help, indent, kWidth - indent), "\n");
+    absl::StrAppend(text, Wrapped(help, indent, kHelpWidth - indent), "\n");
   }
 }
 

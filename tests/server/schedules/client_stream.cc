@@ -2,7 +2,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "server/contract/error_info.h"
@@ -12,8 +11,6 @@ namespace hulld::server {
 namespace {
 
 using State = Ledger::State;
-
-uint64_t CountOf(CurveSet set) { return static_cast<uint64_t>(std::popcount(set)); }
 
 }  // namespace
 

@@ -1,6 +1,7 @@
 #ifndef HULLD_TESTS_SERVER_SCHEDULES_CURVE_POINTS_H_
 #define HULLD_TESTS_SERVER_SCHEDULES_CURVE_POINTS_H_
 
+#include <bit>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -13,6 +14,8 @@ namespace hulld::server {
 // any subset, so a hull of a subset has exactly that subset as vertices (the cyclic polytope:
 // Ziegler 1995, Lectures on Polytopes, 0.6).
 using CurveSet = uint32_t;
+
+inline uint64_t CountOf(CurveSet set) { return static_cast<uint64_t>(std::popcount(set)); }
 inline constexpr uint32_t kCurvePoints = 12;
 
 inline Vector CurvePoint(uint32_t t) {

@@ -1,7 +1,6 @@
 #include "tests/server/schedules/ledger.h"
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "core/base/check.h"
@@ -16,8 +15,6 @@ size_t NumberOf(const std::string& name, char first, size_t count) {
 
 size_t HullOf(const std::string& id) { return NumberOf(id, 'a', kHulls); }
 size_t WriterOf(const std::string& id) { return NumberOf(id, 'u', kWriters); }
-
-uint64_t CountOf(CurveSet set) { return static_cast<uint64_t>(std::popcount(set)); }
 
 // Points of the curve are in general position.
 bool HasSize(const HullRecord& record, CurveSet points) {

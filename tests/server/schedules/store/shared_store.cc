@@ -12,8 +12,6 @@
 namespace hulld::server {
 namespace {
 
-Random& Dice() { return Scheduler::Current().random(); }
-
 absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
 
 }  // namespace
@@ -67,7 +65,7 @@ absl::StatusOr<std::vector<Vector>> SharedStore::LoadVertices(const StoredHull& 
   Scheduler& scheduler = Scheduler::Current();
   ++database_.counts_.loads;
   scheduler.Note("database: reads points of a hull at revision", hull.record.revision);
-  if (Dice().OneIn(database_.faults_.read)) {
+  if (Scheduler::Current().random().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     return absl::UnavailableError("the database does not answer");
   }
@@ -90,7 +88,7 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
   Scheduler& scheduler = Scheduler::Current();
   ++database_.counts_.sequences;
   scheduler.Note("database: reads a sequence of a hull at revision", hull.revision);
-  if (Dice().OneIn(database_.faults_.read)) {
+  if (Scheduler::Current().random().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     return absl::UnavailableError("the database does not answer");
   }
@@ -136,7 +134,7 @@ void SharedStore::NotePeerChanges() {
 
 void SharedStore::StartFetch() {
   Begin("database: is sent the question what others did since change", known_.seen);
-  if (!Dice().OneIn(database_.faults_.read)) {
+  if (!Scheduler::Current().random().OneIn(database_.faults_.read)) {
     const Known before = known_;
     NotePeerChanges();
     started_ = std::exchange(known_, before);
@@ -148,7 +146,8 @@ absl::Status SharedStore::Fetch() {
   Begin("database: is asked what others did since change", known_.seen);
   absl::Status status;
   // A server that cannot reach the database at its start ends.
-  if (std::exchange(has_fetched_, true) && Dice().OneIn(database_.faults_.read)) {
+  if (std::exchange(has_fetched_, true) &&
+      Scheduler::Current().random().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     status = absl::UnavailableError("the database does not answer");
   } else if (started_.has_value()) {
@@ -177,7 +176,8 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
     ++database_.counts_.refused;
     return status;
   };
-  if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("it cannot be reached"));
+  if (Scheduler::Current().random().OneIn(faults.refused))
+    return refuse(absl::UnavailableError("it cannot be reached"));
   NotePeerChanges();
   std::vector<Change*> kept;
   for (Change* change : changes) {
@@ -186,14 +186,15 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
   database_.counts_.superseded += changes.size() - kept.size();
   if (kept.empty()) return absl::OkStatus();
   NumberChanges(kept, known_.revision);
-  if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("the session ended"));
-  if (Dice().OneIn(faults.full)) {
+  if (Scheduler::Current().random().OneIn(faults.refused))
+    return refuse(absl::UnavailableError("the session ended"));
+  if (Scheduler::Current().random().OneIn(faults.full)) {
     database_.was_full_ = true;
     return refuse(absl::ResourceExhaustedError("the disk of the database is full"));
   }
-  const bool is_unknown = Dice().OneIn(faults.unknown);
+  const bool is_unknown = Scheduler::Current().random().OneIn(faults.unknown);
   if (is_unknown) ++database_.counts_.unknown;
-  if (!is_unknown || Dice().OneIn(2)) {
+  if (!is_unknown || Scheduler::Current().random().OneIn(2)) {
     for (const Change* change : kept) database_.Keep(*change, is_unknown);
   }
   if (is_unknown) return absl::UnavailableError("nobody can tell whether it was committed");
@@ -219,7 +220,8 @@ void SharedStore::NoteEnd(bool failed) {
 void SharedStore::NotifyPeers() {
   const std::lock_guard lock(database_.servers_mutex_);
   for (SharedStore* server : database_.servers_) {
-    if (server != this && server->on_peer_commit_ && Dice().OneIn(2)) server->on_peer_commit_();
+    if (server != this && server->on_peer_commit_ && Scheduler::Current().random().OneIn(2))
+      server->on_peer_commit_();
   }
 }
 

@@ -10,8 +10,6 @@
 namespace hulld::server {
 namespace {
 
-Random& Dice() { return Scheduler::Current().random(); }
-
 absl::Status Killed() { return absl::UnavailableError("the process was killed"); }
 
 }  // namespace
@@ -30,12 +28,12 @@ absl::StatusOr<std::vector<Vector>> SimulatedStore::LoadVertices(const StoredHul
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.loads;
   scheduler.Note("store: reads points of a hull at revision", hull.record.revision);
-  if (Dice().OneIn(faults_.read)) {
+  if (Scheduler::Current().random().OneIn(faults_.read)) {
     ++counts_.failed_reads;
     return absl::UnavailableError("the disk does not answer");
   }
   const uint64_t incarnation = hull.record.create_revision;
-  if (Dice().OneIn(faults_.damage)) damaged_.insert(incarnation);
+  if (Scheduler::Current().random().OneIn(faults_.damage)) damaged_.insert(incarnation);
   if (is_damaged(incarnation)) return absl::DataLossError("the points are damaged");
   const auto found = hulls_.find(hull.record.hull_id);
   std::vector<Vector> points;
@@ -54,7 +52,7 @@ absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.sequences;
   scheduler.Note("store: reads a sequence of a hull at revision", hull.revision);
-  if (Dice().OneIn(faults_.read)) {
+  if (Scheduler::Current().random().OneIn(faults_.read)) {
     ++counts_.failed_reads;
     return absl::UnavailableError("the disk does not answer");
   }
@@ -73,7 +71,7 @@ absl::StatusOr<FoundRecords> SimulatedStore::FindRecords(std::span<const std::st
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.lookups;
   scheduler.Note("store: is asked for records:", ids.size());
-  if (Dice().OneIn(faults_.read)) {
+  if (Scheduler::Current().random().OneIn(faults_.read)) {
     ++counts_.failed_reads;
     ++counts_.failed_lookups;
     return absl::UnavailableError("the disk does not answer");
@@ -160,16 +158,16 @@ absl::Status SimulatedStore::RefuseBatch(std::span<const Change* const> changes)
     leave_unknown();
     return Killed();
   }
-  if (Dice().OneIn(faults_.full)) {
+  if (Scheduler::Current().random().OneIn(faults_.full)) {
     ++counts_.refused;
     was_full_ = true;
     return absl::ResourceExhaustedError("the disk is full");
   }
-  if (Dice().OneIn(faults_.unknown)) {
+  if (Scheduler::Current().random().OneIn(faults_.unknown)) {
     leave_unknown();
     return absl::UnavailableError("the disk failed, and it is not known what it keeps");
   }
-  if (Dice().OneIn(faults_.refused)) {
+  if (Scheduler::Current().random().OneIn(faults_.refused)) {
     ++counts_.refused;
     return absl::UnavailableError("the disk failed");
   }
@@ -181,7 +179,7 @@ absl::Status SimulatedStore::Recover() {
   if (is_busy_) scheduler.Fail("the store is to recover while it commits");
   is_busy_ = true;
   scheduler.Note("store: recovers");
-  const bool fails = is_dead_ || Dice().OneIn(faults_.recover);
+  const bool fails = is_dead_ || Scheduler::Current().random().OneIn(faults_.recover);
   if (fails) {
     ++counts_.refused;
   } else {
@@ -202,7 +200,7 @@ void SimulatedStore::Reopen(const StoreFaults& faults) {
   faults_ = faults;
   is_dead_ = is_failing_ = false;
   // All or none.
-  if (!unknown_.empty() && Dice().OneIn(2)) {
+  if (!unknown_.empty() && Scheduler::Current().random().OneIn(2)) {
     ++counts_.revived;
     for (const Change& change : unknown_) Keep(change, true);
   }
