@@ -118,6 +118,9 @@ class Browser:
             options.add_argument("--force-prefers-reduced-motion")
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         self.driver = webdriver.Chrome(service=Service(DRIVER), options=options)
+        # Selenium's 30 s are too short for a busy machine.
+        self.driver.set_script_timeout(600)
+        self.driver.set_page_load_timeout(600)
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {
             "features": [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"},
                          {"name": "prefers-reduced-motion", "value": "reduce" if calm else ""}]})
@@ -136,7 +139,7 @@ class Browser:
     def js(self, expression, *arguments):
         return self.driver.execute_script("return " + expression, *arguments)
 
-    def wait(self, expression, *arguments, seconds=60):
+    def wait(self, expression, *arguments, seconds=300):
         """Waits until an expression is true, and returns it."""
         return WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(
             lambda _: self.js(f"(() => {{ try {{ return {expression} }} catch {{ return null }} }})()",
