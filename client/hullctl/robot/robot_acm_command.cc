@@ -88,12 +88,9 @@ std::vector<DisabledPair> Judge(const std::set<LinkPair>& adjacent,
 absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const RobotModel& model,
                     const Client& client, const std::atomic<bool>& stopped,
                     std::map<LinkPair, Tally>* tallies, const std::vector<uint32_t>& pairs) {
-  WaypointStream::Scope scope;
-  AddMoving(model, &scope);
-  scope.pairs = pairs;
   absl::Status problem;
   WaypointStream stream(
-      client, std::move(scope),
+      client, MakeCheckScope(model, {}, pairs), {}, 0,
       [&](uint64_t sample, size_t pair, const AnswerRow& row, const std::string& cause) {
         const LinkPair links =
             MakeLinkPair(model.parts[pairs[2 * pair]].link, model.parts[pairs[2 * pair + 1]].link);
@@ -112,7 +109,8 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
         static_cast<size_t>(std::min<uint64_t>(stream.lanes(), arguments.samples - done));
     std::vector<double> poses;
     for (size_t i = 0; i < count; ++i) {
-      model.AppendPoses(kNoMotion, RandomValues(model.robot, &random), &poses);
+      model.AppendPoses(kNoMotion, AllJointValues(model.robot, RandomValues(model.robot, &random)),
+                        &poses);
     }
     if (absl::Status asked = stream.Ask(count, poses); !asked.ok()) return asked;
     if (!problem.ok()) return problem;
@@ -129,8 +127,7 @@ ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
   std::atomic<bool> stopped = false;
   const Interrupt interrupt([&stopped] { stopped = true; });
   const Client client = run.MakeClient();
-  TemporaryHulls temporary(client, "robot");
-  absl::Status status = RegisterHulls(run, arguments.robot, client, &temporary, &*model);
+  absl::Status status = PrepareHulls(run, arguments.robot, client, &*model);
   const std::set<LinkPair> adjacent = AdjacentPairs(model->robot);
   std::set<LinkPair> left_out = LoosePairs(model->robot);
   left_out.insert(adjacent.begin(), adjacent.end());

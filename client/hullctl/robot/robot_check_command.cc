@@ -2,8 +2,10 @@
 
 #include <atomic>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <unordered_map>
 #include <utility>
 
@@ -17,6 +19,8 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
+#include "client/hullctl/robot/check_scope.h"
+#include "client/hullctl/robot/continuous_check.h"
 #include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
 #include "client/hullctl/robot/waypoint_stream.h"
@@ -29,6 +33,8 @@ namespace {
 
 // Maximum number of limit violations printed individually; the rest are only counted.
 constexpr size_t kMostWarnings = 5;
+// A micrometer.
+constexpr double kDefaultResolution = 1e-6;
 
 struct RobotCheckArguments {
   RobotArguments robot;
@@ -42,15 +48,9 @@ struct RobotCheckArguments {
   std::vector<std::string> ignored;
   bool adjacent = false;
   bool first = false;
+  bool continuous = false;
+  double resolution = kDefaultResolution;
   QueryDetails details;
-};
-
-// Objects of the queries: the parts of the robot, then its surroundings.
-struct Cast {
-  std::vector<std::string> names;
-  std::vector<std::string> fixed_hulls;
-  std::vector<double> fixed_radii;
-  std::vector<double> fixed_poses;
 };
 
 // Returns true if a joint connects the two links.
@@ -109,7 +109,6 @@ class RobotCheck {
         arguments_(arguments),
         model_(std::move(model)),
         client_(run.MakeClient()),
-        temporary_(client_, "robot"),
         bar_(run.err, run.shows_progress, "checks", 0) {}
 
   ExitCode Run();
@@ -124,28 +123,37 @@ class RobotCheck {
   absl::StatusOr<bool> ReadWaypoint(Waypoint* free_values);
   absl::StatusOr<bool> NextWaypoint(Waypoint* free_values);
   void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
-  absl::Status AskAll(WaypointStream* stream);
+  absl::Status CheckContinuousOptions();
+  absl::StatusOr<std::vector<Waypoint>> ReadWaypoints(size_t most);
+  bool IsFinished() const { return stopped_ || (arguments_.first && HasContact()); }
+  bool HasContact() const { return first_.has_value() || first_event_.has_value(); }
+  absl::Status CheckWaypoints(CheckScope scope);
+  absl::Status CheckMotions(CheckScope scope);
   void Take(uint64_t waypoint, size_t pair, const AnswerRow& row, const std::string& problem);
   void PrintFailure(uint64_t waypoint, size_t pair, const std::string& problem);
   void TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides);
   void PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row);
   std::string TextOf(size_t pair, const AnswerRow& row) const;
+  void TakeEvent(const ContinuousCheck::Event& event);
+  void PrintEvent(const ContinuousCheck::Event& event, const char* name);
   void PrintHead();
   void PrintTotals();
+  void PrintMotionTotals();
   std::string PlaceOf(uint64_t waypoint) const;
   const std::string& NameOf(size_t pair, size_t side) const {
-    return cast_.names[pairs_[2 * pair + side]];
+    return names_[pairs_[2 * pair + side]];
   }
 
   const Invocation& run_;
   const RobotCheckArguments& arguments_;
   RobotModel model_;
   const Client client_;
-  TemporaryHulls temporary_;
   ProgressBar bar_;
   // Surroundings of the robot, if any.
   Scene scene_;
-  Cast cast_;
+  Surroundings around_;
+  // Names of the parts, then of the surroundings.
+  std::vector<std::string> names_;
   std::vector<uint32_t> pairs_;
   // Number of excluded pairs of links with shapes, and the reason.
   size_t left_out_ = 0;
@@ -174,12 +182,17 @@ class RobotCheck {
     v1::Relation relation;
   };
   std::optional<Contact> first_;
+  // With --continuous: the first contact, the pairs in contact, and for each pair the last two
+  // waypoints between which it was not decided.
+  std::optional<ContinuousCheck::Event> first_event_;
+  std::set<size_t> contacts_;
+  std::map<size_t, uint64_t> undecided_;
   // True for each pair that collided at the previous waypoint.
   std::vector<bool> collides_;
 };
 
 absl::Status RobotCheck::AddScene() {
-  for (const RobotPart& part : model_.parts) cast_.names.push_back(part.name);
+  for (const RobotPart& part : model_.parts) names_.push_back(part.name);
   if (arguments_.scene.empty()) return absl::OkStatus();
   const auto source = ByteSource::Open(arguments_.scene);
   if (!source.ok()) return source.status();
@@ -187,12 +200,12 @@ absl::Status RobotCheck::AddScene() {
   if (!scene.ok()) return scene.status();
   scene_ = *std::move(scene);
   for (uint32_t i = 0; i < scene_.size(); ++i) {
-    cast_.names.push_back(scene_.NameOf(i));
-    cast_.fixed_hulls.push_back(*scene_.HullOf(i));
+    names_.push_back(scene_.NameOf(i));
+    around_.hulls.push_back(*scene_.HullOf(i));
     const v1::Placement placement = scene_.PlacementOf(i);
-    cast_.fixed_radii.push_back(placement.radius());
+    around_.radii.push_back(placement.radius());
     const Pose7 pose = NumbersOf(placement.pose());
-    cast_.fixed_poses.insert(cast_.fixed_poses.end(), pose.begin(), pose.end());
+    around_.poses.insert(around_.poses.end(), pose.begin(), pose.end());
   }
   return absl::OkStatus();
 }
@@ -216,7 +229,7 @@ absl::Status RobotCheck::ChoosePairs() {
   }
   const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
   for (uint32_t a = 0; a < robot_parts; ++a) {
-    for (uint32_t b = robot_parts; b < cast_.names.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
+    for (uint32_t b = robot_parts; b < names_.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
   }
   for (const std::string& ignored : arguments_.ignored) {
     const size_t comma = ignored.find(',');
@@ -225,7 +238,7 @@ absl::Status RobotCheck::ChoosePairs() {
     std::vector<uint32_t> kept;
     for (size_t i = 0; i < pairs_.size(); i += 2) {
       const auto is = [&](uint32_t part, const std::string& name) {
-        return cast_.names[part] == name ||
+        return names_[part] == name ||
                (part < robot_parts &&
                 model_.robot.links[static_cast<size_t>(model_.parts[part].link)].name == name);
       };
@@ -335,27 +348,159 @@ void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
   }
 }
 
-absl::Status RobotCheck::AskAll(WaypointStream* stream) {
-  bool more = true;
-  while (more && !stopped_ && !(arguments_.first && first_.has_value())) {
+// Returns the next waypoints; empty at the end.
+absl::StatusOr<std::vector<RobotCheck::Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
+  std::vector<Waypoint> waypoints;
+  while (waypoints.size() < most) {
+    Waypoint values;
+    const auto more = NextWaypoint(&values);
+    if (!more.ok()) return more.status();
+    if (!*more) break;
+    WarnOfLimits(waypoints_ + waypoints.size(), values);
+    waypoints.push_back(std::move(values));
+  }
+  return waypoints;
+}
+
+absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
+  double tolerance = 0;
+  v1::Wanted wanted;
+  arguments_.details.Apply(&wanted, &tolerance);
+  // A single waypoint is examined in detail.
+  if (!many_ && tolerance == 0) wanted.set_separation(true);
+  WaypointStream stream(client_, std::move(scope), std::move(wanted), tolerance,
+                        [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
+                               const std::string& problem) { Take(waypoint, pair, row, problem); });
+  while (!IsFinished()) {
+    const auto waypoints = ReadWaypoints(stream.lanes());
+    if (!waypoints.ok()) return waypoints.status();
+    if (waypoints->empty()) break;
     std::vector<double> poses;
-    size_t count = 0;
-    while (count < stream->lanes()) {
-      Waypoint values;
-      const auto next = NextWaypoint(&values);
-      if (!next.ok()) return next.status();
-      more = *next;
-      if (!more) break;
-      WarnOfLimits(waypoints_ + count, values);
-      model_.AppendPoses(arguments_.X_WB, values, &poses);
-      ++count;
+    for (const Waypoint& values : *waypoints) {
+      model_.AppendPoses(arguments_.X_WB, AllJointValues(model_.robot, values), &poses);
     }
-    if (count == 0) break;
-    if (absl::Status asked = stream->Ask(count, poses); !asked.ok()) return asked;
-    waypoints_ += count;
+    absl::Status asked = stream.Ask(waypoints->size(), poses);
+    if (!asked.ok()) return asked;
+    waypoints_ += waypoints->size();
     bar_.Update(waypoints_ * pairs_.size() / 2);
   }
-  return stream->Close();
+  return stream.Close();
+}
+
+absl::Status RobotCheck::CheckContinuousOptions() {
+  if (!arguments_.continuous) return absl::OkStatus();
+  if (!many_) {
+    return absl::InvalidArgumentError(
+        "--continuous checks the motion between waypoints; pass two or more with --joints");
+  }
+  v1::Wanted wanted = arguments_.details.wanted;
+  wanted.clear_clearance();
+  if (wanted.ByteSizeLong() == 0 && !arguments_.details.tolerance.has_value()) {
+    return absl::OkStatus();
+  }
+  return absl::InvalidArgumentError(
+      "--continuous finds first contacts; it takes --clearance, but no --tolerance and no other "
+      "result");
+}
+
+absl::Status RobotCheck::CheckMotions(CheckScope scope) {
+  ContinuousCheck check(client_, model_, std::move(scope),
+                        {.X_WB = arguments_.X_WB,
+                         .clearance = arguments_.details.wanted.clearance(),
+                         .resolution = arguments_.resolution},
+                        stopped_,
+                        [this](const ContinuousCheck::Event& event) { TakeEvent(event); });
+  while (!IsFinished()) {
+    // The last waypoint of one call starts the motion of the next one.
+    const auto waypoints = ReadWaypoints(check.waypoints_per_call());
+    if (!waypoints.ok()) return waypoints.status();
+    if (waypoints->empty()) break;
+    absl::Status checked = check.Check(*waypoints);
+    if (absl::IsCancelled(checked)) break;
+    if (!checked.ok()) return checked;
+    waypoints_ += waypoints->size();
+    bar_.Update(waypoints_ * pairs_.size() / 2);
+  }
+  return absl::OkStatus();
+}
+
+void RobotCheck::TakeEvent(const ContinuousCheck::Event& event) {
+  if (arguments_.first && HasContact() && event.waypoint > first_event_->waypoint) return;
+  if (!event.problem.empty()) {
+    PrintFailure(event.waypoint, event.pair, event.problem);
+    return;
+  }
+  if (event.contact_time.has_value()) {
+    contacts_.insert(event.pair);
+    const bool is_first = !HasContact() || (event.waypoint == first_event_->waypoint &&
+                                            *event.contact_time < *first_event_->contact_time);
+    if (is_first) first_event_ = event;
+    PrintEvent(event, arguments_.details.wanted.clearance() > 0 ? "NEAR" : "CONTACT");
+    return;
+  }
+  const auto [last, is_new] = undecided_.try_emplace(event.pair, event.waypoint);
+  // One line for consecutive waypoints.
+  if (is_new || last->second + 1 != event.waypoint) PrintEvent(event, "UNDECIDED");
+  last->second = event.waypoint;
+}
+
+void RobotCheck::PrintEvent(const ContinuousCheck::Event& event, const char* name) {
+  bar_.Clear();
+  v1::FirstContact contact;
+  contact.set_separated_until(event.separated_until);
+  if (event.contact_time.has_value()) contact.set_contact_time(*event.contact_time);
+  if (run_.json()) {
+    JsonObject object;
+    object.Add("waypoint", event.waypoint + 1)
+        .Add("a", NameOf(event.pair, 0))
+        .Add("b", NameOf(event.pair, 1))
+        .Add("event", name)
+        .Add("relation", v1::Relation_Name(event.relation))
+        .AddJson("firstContact", MessageJson(contact));
+    run_.out << object.Close() << "\n";
+    return;
+  }
+  run_.out << event.waypoint + 1 << "-" << event.waypoint + 2 << "\t" << name << "\t"
+           << NameOf(event.pair, 0) << "\t" << NameOf(event.pair, 1);
+  if (event.contact_time.has_value()) run_.out << "\t" << RelationText(event.relation);
+  if (!run_.names()) {
+    run_.out << "\tseparated until " << ShortestText(event.separated_until);
+    if (event.contact_time.has_value()) {
+      run_.out << "\tcontact at " << ShortestText(*event.contact_time);
+    }
+  }
+  run_.out << "\n";
+}
+
+void RobotCheck::PrintMotionTotals() {
+  if (run_.json() || run_.names()) return;
+  const double clearance = arguments_.details.wanted.clearance();
+  if (!arguments_.first || !HasContact()) {
+    for (const size_t pair : contacts_) undecided_.erase(pair);
+    const size_t others = contacts_.size() + undecided_.size() + failed_;
+    run_.out << "# free " << pairs_.size() / 2 - others << (clearance > 0 ? " near " : " contact ")
+             << contacts_.size() << " undecided " << undecided_.size() << " failed " << failed_
+             << "\n# " << waypoints_ << " waypoints and the motion between them; free: ";
+    if (clearance > 0) {
+      run_.out << "separated by more than " << ShortestText(clearance) << ", proven\n";
+    } else {
+      run_.out << "separated, proven\n";
+    }
+  }
+  if (!undecided_.empty()) {
+    run_.out << "# not decided within " << ShortestText(arguments_.resolution)
+             << ": lower --resolution\n";
+  }
+  if (first_event_.has_value()) {
+    run_.out << "# first " << (clearance > 0 ? "approach" : "contact") << " after "
+             << PlaceOf(first_event_->waypoint) << ", at "
+             << ShortestText(*first_event_->contact_time)
+             << " of the way to the next: " << NameOf(first_event_->pair, 0) << " with "
+             << NameOf(first_event_->pair, 1) << ", " << RelationText(first_event_->relation)
+             << "\n";
+  } else if (undecided_.empty() && failed_ == 0) {
+    run_.out << "# no contact\n";
+  }
 }
 
 void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row) {
@@ -461,35 +606,23 @@ void RobotCheck::PrintTotals() {
 }
 
 ExitCode RobotCheck::Run() {
-  for (const auto prepare :
-       {&RobotCheck::AddScene, &RobotCheck::ChoosePairs, &RobotCheck::OpenWaypoints}) {
+  for (const auto prepare : {&RobotCheck::AddScene, &RobotCheck::ChoosePairs,
+                             &RobotCheck::OpenWaypoints, &RobotCheck::CheckContinuousOptions}) {
     if (absl::Status ready = (this->*prepare)(); !ready.ok()) return run_.FailUsage(ready);
   }
   const Interrupt interrupt([this] { stopped_ = true; });
-  absl::Status status = RegisterHulls(run_, arguments_.robot, client_, &temporary_, &model_);
+  absl::Status status = PrepareHulls(run_, arguments_.robot, client_, &model_);
   if (!status.ok()) return run_.Fail(status);
-  WaypointStream::Scope scope;
-  AddMoving(model_, &scope);
-  scope.fixed = cast_.fixed_hulls;
-  scope.fixed_radii = cast_.fixed_radii;
-  scope.fixed_poses = cast_.fixed_poses;
-  scope.pairs = pairs_;
-  double tolerance = 0;
-  arguments_.details.Apply(&scope.wanted, &tolerance);
-  scope.tolerance = tolerance;
-  // A single waypoint is examined in detail.
-  if (!many_ && tolerance == 0) scope.wanted.set_separation(true);
   collides_.assign(pairs_.size() / 2, false);
   PrintHead();
-  WaypointStream stream(client_, std::move(scope),
-                        [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
-                               const std::string& problem) { Take(waypoint, pair, row, problem); });
-  status = AskAll(&stream);
+  CheckScope scope = MakeCheckScope(model_, around_, pairs_);
+  status =
+      arguments_.continuous ? CheckMotions(std::move(scope)) : CheckWaypoints(std::move(scope));
   bar_.Clear();
   if (!status.ok()) {
     return absl::IsInvalidArgument(status) ? run_.FailUsage(status) : run_.Fail(status);
   }
-  PrintTotals();
+  arguments_.continuous ? PrintMotionTotals() : PrintTotals();
   if (beyond_limits_ > kMostWarnings) {
     run_.err << "hullctl: warning: " << beyond_limits_ << " waypoints exceed limits of joints\n";
   }
@@ -520,7 +653,7 @@ void AddPairOptions(Command command, RobotCheckArguments* arguments) {
 // Adds options for one configuration of the robot or many.
 void AddWaypointOptions(Command command, const std::shared_ptr<RobotCheckArguments>& arguments) {
   command
-      .AddText("--joints", &arguments->joints,
+      .AddText("--joints,--trajectory", &arguments->joints,
                "CSV table: a header of joints, then a row per waypoint; - is standard input")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
@@ -570,14 +703,24 @@ void DescribeRobotCheck(Command command) {
       "value beyond its limits gives a warning. One configuration prints every pair and its\n"
       "separation. For several waypoints, pairs are printed as they begin (ENTER) and end (LEAVE)\n"
       "to collide or touch, and the first contact at the end. Only the waypoints are checked, not\n"
-      "the motion between them. A collision is an answer: exit code 0.");
+      "the motion between them. A collision is an answer: exit code 0.\n"
+      "\n"
+      "With --continuous, every joint moves linearly from each waypoint to the next. A pair "
+      "without\n"
+      "a line is free throughout, which is proven for the path itself, with --clearance by more\n"
+      "than that. CONTACT, or NEAR with --clearance: the first time at which its poses collide or\n"
+      "touch, and the time before it until which it is free, as parts of the way between the two\n"
+      "waypoints; after it, the pair is not checked. UNDECIDED: it comes within --resolution of\n"
+      "contact between these waypoints, and no pose was found in contact.");
   command.SetExamples(
       {{"All joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
        {"One joint bent", "hullctl robot check arm.urdf --joint elbow_joint=2.5"},
        {"A trajectory within a cell",
         "hullctl robot check arm.urdf --joints path.csv --scene cell.yaml --ignore "
         "base_link,floor"},
-       {"Until the first contact", "hullctl robot check arm.urdf --joints path.csv --first"}});
+       {"Until the first contact", "hullctl robot check arm.urdf --joints path.csv --first"},
+       {"A trajectory, and the motion between its waypoints",
+        "hullctl robot check arm.urdf --joints path.csv --continuous --clearance 0.01"}});
 }
 
 }  // namespace
@@ -591,6 +734,14 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
   AddWaypointOptions(command, arguments);
   AddSceneOptions(command, arguments.get());
   command.AddFlag("--first", &arguments->first, "Stop at the first waypoint in contact");
+  const Option continuous =
+      command.AddFlag("--continuous", &arguments->continuous,
+                      "Check the motion between waypoints, too: joints move linearly");
+  command
+      .AddLength("--resolution",
+                 "With --continuous: leave undecided what comes this near (default 1e-6)",
+                 [arguments](double length) { arguments->resolution = length; })
+      .Needs(continuous);
   AddWantedOptions(command, &arguments->details);
   DescribeRobotCheck(command);
   command.OnGiven(

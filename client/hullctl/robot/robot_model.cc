@@ -4,11 +4,17 @@
 #include <absl/strings/str_format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <memory>
+#include <optional>
 #include <utility>
 
+#include "client/enclosure/mesh_volume.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/hull_segment.h"
+#include "client/hullctl/local/file_shape.h"
+#include "client/hullctl/local/local_server.h"
 #include "client/hullctl/parts/swell.h"
 #include "client/hullctl/robot/mesh_pieces.h"
 #include "client/point_messages.h"
@@ -23,11 +29,15 @@ const char kRobotHelp[] =
     "printed. A sphere becomes its center and a capsule its segment, both exact with their "
     "radius.\n"
     "A mesh file of several named parts that are all convex, as V-HACD and CoACD write them,\n"
-    "becomes one hull per part; --split does so with any parts. The hulls are deleted at the end,\n"
-    "unless --prefix keeps them, without radii. Meshes are obj, stl, ply, off, gltf, or dae. A\n"
-    "package://NAME/ is searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and\n"
-    "in the folders above FILE. Units are meters and radians, as in URDF. Poses are computed in\n"
-    "floating point; answers are exact for these poses.\n";
+    "becomes one hull per part; --split does so with any parts. Queries carry the hulls, which "
+    "are\n"
+    "not stored unless --prefix keeps them, without radii. A hull of more than 4096 vertices "
+    "needs\n"
+    "--prefix or --local. Meshes are obj, stl, ply, off, gltf, or dae. A package://NAME/ is\n"
+    "searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and in the folders above\n"
+    "FILE. Units are meters and radians, as in URDF. Poses are computed in floating point; "
+    "answers\n"
+    "are exact for these poses.\n";
 
 namespace {
 
@@ -101,15 +111,82 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
 }
 
 // Warns if the hull of a part is so much larger than its mesh that it fits it poorly.
-void WarnOfSwollenPart(const Invocation& run, const Client& client, const RobotPart& part) {
-  if (part.mesh.triangles.empty()) return;
-  // Failure to read the hull does not fail the check; the mesh is only compared.
-  const auto swell = SwellOf(client, part.hull_id, part.hull.xyz.size() / 3, part.mesh);
-  if (!swell.ok() || swell->ratio.value_or(1) < kSwellToWarn) return;
+void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullMesh& hull) {
+  const std::optional<double> ratio = VolumeRatio(hull, part.mesh);
+  if (ratio.value_or(1) < kSwellToWarn) return;
   run.err << "hullctl: warning: the hull of " << part.name << " has "
-          << absl::StrFormat("%.4g", *swell->ratio)
+          << absl::StrFormat("%.4g", *ratio)
           << " times the volume of its mesh and may collide where the mesh does not; use a convex "
              "decomposition of the mesh, or --split\n";
+}
+
+absl::Status Register(const Client& client, const RobotPart& part, const std::string& id) {
+  v1::ReplaceOpen open;
+  open.set_hull_id(id);
+  open.set_create_if_absent(true);
+  return client
+      .ReplaceHull(
+          open,
+          [&part](const Client::PointSink& sink) { return SendInMessages(part.hull.xyz, sink); })
+      .status();
+}
+
+// Drops repeated points, of which a list of triangles has many.
+void KeepDistinctPoints(std::vector<double>* xyz) {
+  std::set<std::array<double, 3>> known;
+  size_t kept = 0;
+  for (size_t i = 0; i < xyz->size(); i += 3) {
+    if (!known.insert({(*xyz)[i], (*xyz)[i + 1], (*xyz)[i + 2]}).second) continue;
+    for (size_t axis = 0; axis < 3; ++axis) (*xyz)[kept++] = (*xyz)[i + axis];
+  }
+  xyz->resize(kept);
+}
+
+// A server of hullctl's own, started by the first hull that needs it.
+class HullBuilder {
+ public:
+  absl::StatusOr<HullMesh> Build(const RobotPart& part) {
+    if (!client_.has_value()) {
+      auto server = LocalServer::Start();
+      if (!server.ok()) return server.status();
+      server_ = *std::move(server);
+      ClientOptions options;
+      options.server = server_->address();
+      options.own_connection = true;
+      client_.emplace(std::move(options));
+    }
+    if (absl::Status built = Register(*client_, part, "part"); !built.ok()) return built;
+    return client_->GetHullMesh("part");
+  }
+
+ private:
+  std::unique_ptr<LocalServer> server_;
+  std::optional<Client> client_;
+};
+
+// Makes the hull of a mesh an inline shape.
+absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, RobotPart* part) {
+  KeepDistinctPoints(&part->hull.xyz);
+  const bool is_small = part->hull.xyz.size() <= 3 * kMaxShapePoints;
+  if (is_small && part->mesh.triangles.empty()) return absl::OkStatus();
+  const auto hull = builder->Build(*part);
+  if (!hull.ok()) {
+    if (is_small) return absl::OkStatus();
+    return absl::Status(hull.status().code(),
+                        absl::StrCat(part->name, " has more than ", kMaxShapePoints,
+                                     " points, so a local server has to find the vertices of its "
+                                     "hull; --prefix needs none: ",
+                                     hull.status().message()));
+  }
+  if (hull->vertex_count() > kMaxShapePoints) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(part->name, ": its hull has ", hull->vertex_count(),
+                     " vertices, and a query carries up to ", kMaxShapePoints,
+                     "; use --local, or register the hulls with --prefix"));
+  }
+  WarnOfSwollenPart(run, *part, *hull);
+  part->hull.xyz = hull->xyz;
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -127,14 +204,13 @@ void AddRobotArguments(Command command, RobotArguments* arguments) {
       .OneOf({"names", "components", "none"});
   command
       .AddText("--prefix", &arguments->prefix,
-               "Keep the hulls of the links under this prefix, such as arm/ (default: delete them)")
+               "Keep the hulls of the links under this prefix, such as arm/ (default: store none)")
       .ValueName("PREFIX");
 }
 
-void RobotModel::AppendPoses(const RigidPose& X_WB, const std::vector<double>& free_values,
+void RobotModel::AppendPoses(const RigidPose& X_WB, std::span<const JointValue> joint_values,
                              std::vector<double>* poses) const {
-  const std::vector<JointValue> values = AllJointValues(robot, free_values);
-  const std::vector<RigidPose> X_WL = LinkPoses(robot, X_WB, values);
+  const std::vector<RigidPose> X_WL = LinkPoses(robot, X_WB, joint_values);
   for (const RobotPart& part : parts) {
     const RigidPose X_WS = Compose(X_WL[static_cast<size_t>(part.link)], part.X_LS);
     poses->insert(poses->end(), X_WS.begin(), X_WS.end());
@@ -171,38 +247,26 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
   return model;
 }
 
-absl::Status RegisterHulls(const Invocation& run, const RobotArguments& arguments,
-                           const Client& client, TemporaryHulls* temporary, RobotModel* model) {
+absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments,
+                          const Client& client, RobotModel* model) {
+  const bool registers = run.local || !arguments.prefix.empty();
+  HullBuilder builder;
   std::set<std::string> taken;
   for (RobotPart& part : model->parts) {
-    const std::string segment = UniqueHullSegment(part.name, &taken);
-    const auto feed = [&part](const Client::PointSink& sink) {
-      return SendInMessages(part.hull.xyz, sink);
-    };
-    if (arguments.prefix.empty()) {
-      auto id = temporary->Add(segment, feed);
-      if (!id.ok()) return id.status();
-      part.hull_id = *std::move(id);
+    if (registers) {
+      part.hull_id = arguments.prefix + UniqueHullSegment(part.name, &taken);
+      absl::Status registered = Register(client, part, part.hull_id);
+      if (!registered.ok()) return registered;
+      // Failure to read the hull does not fail the check; the mesh is only compared.
+      const auto hull = part.mesh.triangles.empty() ? HullMesh() : client.GetHullMesh(part.hull_id);
+      if (hull.ok()) WarnOfSwollenPart(run, part, *hull);
     } else {
-      v1::ReplaceOpen open;
-      open.set_hull_id(arguments.prefix + segment);
-      open.set_create_if_absent(true);
-      if (const auto replaced = client.ReplaceHull(open, feed); !replaced.ok()) {
-        return replaced.status();
-      }
-      part.hull_id = open.hull_id();
+      absl::Status reduced = ReduceToVertices(run, &builder, &part);
+      if (!reduced.ok()) return reduced;
     }
-    WarnOfSwollenPart(run, client, part);
     part.mesh = {};
   }
   return absl::OkStatus();
-}
-
-void AddMoving(const RobotModel& model, WaypointStream::Scope* scope) {
-  for (const RobotPart& part : model.parts) {
-    scope->moving.push_back(part.hull_id);
-    scope->moving_radii.push_back(part.hull.radius);
-  }
 }
 
 }  // namespace hulld

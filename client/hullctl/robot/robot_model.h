@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,6 @@
 #include "client/formats/mesh_file.h"
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
-#include "client/hullctl/robot/waypoint_stream.h"
-#include "client/hullctl/view/temporary_hulls.h"
 #include "client/robot/robot.h"
 #include "client/robot/shape_hull.h"
 #include "client/robot/srdf_file.h"
@@ -26,7 +25,7 @@ struct RobotArguments {
   std::vector<std::string> packages;
   // Division of meshes into pieces: "names", "components", or "none"; empty: automatic.
   std::string split;
-  // ID prefix under which the hulls of the links are kept; empty: they are removed at the end.
+  // ID prefix under which the hulls of the links are kept; empty: they are sent with each query.
   std::string prefix;
 };
 
@@ -42,8 +41,9 @@ struct RobotPart {
   std::string name;
   RigidPose X_LS = kNoMotion;
   ShapeHull hull;
-  // Surface, as in MeshPiece; dropped by RegisterHulls.
+  // Surface, as in MeshPiece; dropped by PrepareHulls.
   TriangleMesh mesh;
+  // Empty: an inline shape.
   std::string hull_id;
 };
 
@@ -53,8 +53,8 @@ struct RobotModel {
   // Meshes with several pieces: "forearm: 5 pieces of meshes/forearm.obj".
   std::vector<std::string> notes;
 
-  // Appends X_WS of each part, seven numbers each, to `poses`. free_values: one per variable.
-  void AppendPoses(const RigidPose& X_WB, const std::vector<double>& free_values,
+  // Appends X_WS of each part, seven numbers each, to `poses`. joint_values: as for LinkPoses.
+  void AppendPoses(const RigidPose& X_WB, std::span<const JointValue> joint_values,
                    std::vector<double>* poses) const;
   // Returns the pairs of parts of different links, except for pairs of links in `left_out`: two
   // indices into parts each.
@@ -65,14 +65,14 @@ struct RobotModel {
 // and line.
 absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments);
 
-// Creates the server's hulls of all parts and sets their IDs: under the prefix of the arguments,
-// replacing existing hulls, or as temporary hulls. Warns of each hull that is much larger than its
-// mesh (kSwellToWarn).
-absl::Status RegisterHulls(const Invocation& run, const RobotArguments& arguments,
-                           const Client& client, TemporaryHulls* temporary, RobotModel* model);
-
-// Adds all parts as the moving ones. Requires their IDs.
-void AddMoving(const RobotModel& model, WaypointStream::Scope* scope);
+// Prepares the hulls of all parts for queries. With a prefix, registers them under it and sets
+// their IDs; replaces existing hulls. Likewise with --local, without a prefix. Otherwise makes them
+// inline shapes: a server of hullctl's own reduces a mesh to the vertices of its hull. Warns of
+// each hull that is much larger than its mesh (kSwellToWarn). INVALID_ARGUMENT: a hull has more
+// vertices than an inline shape takes. Errors of the servers; without a local server, a mesh of few
+// points is sent as it is.
+absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments,
+                          const Client& client, RobotModel* model);
 
 }  // namespace hulld
 

@@ -12,8 +12,13 @@ constexpr size_t kMostLanes = 1024;
 
 }  // namespace
 
-WaypointStream::WaypointStream(const Client& client, Scope scope, Receiver receive)
-    : client_(client), scope_(std::move(scope)), receive_(std::move(receive)) {
+WaypointStream::WaypointStream(const Client& client, CheckScope scope, v1::Wanted wanted,
+                               double tolerance, Receiver receive)
+    : client_(client),
+      scope_(std::move(scope)),
+      wanted_(std::move(wanted)),
+      tolerance_(tolerance),
+      receive_(std::move(receive)) {
   const size_t pairs = std::max<size_t>(1, scope_.pairs.size() / 2);
   lanes_ = std::clamp<size_t>(kPairsPerMessage / pairs, 1, kMostLanes);
 }
@@ -29,27 +34,26 @@ absl::Status WaypointStream::Close() {
 
 absl::StatusOr<v1::StreamCollisionsResponse> WaypointStream::Open(
     size_t count, const std::vector<double>& poses) {
-  const auto moving = static_cast<uint32_t>(scope_.moving.size());
-  const auto all_moving = static_cast<uint32_t>(count) * moving;
+  const auto all_parts = static_cast<uint32_t>(count) * scope_.parts;
+  const auto fixed = static_cast<uint32_t>(scope_.hull_of.size()) - scope_.parts;
   v1::CollisionStreamOpen open;
   v1::PackedPlacements* const packed = open.mutable_packed_placements();
-  for (const std::string& hull : scope_.moving) packed->add_hull_ids(hull);
-  for (const std::string& hull : scope_.fixed) packed->add_hull_ids(hull);
-  for (uint32_t placement = 0; placement < all_moving; ++placement) {
-    packed->add_hulls(placement % moving);
-    packed->add_radii(scope_.moving_radii[placement % moving]);
+  *packed = scope_.hulls;
+  for (uint32_t placement = 0; placement < all_parts + fixed; ++placement) {
+    const uint32_t object =
+        placement < all_parts ? placement % scope_.parts : placement - all_parts + scope_.parts;
+    packed->add_hulls(scope_.hull_of[object]);
+    packed->add_radii(scope_.radii[object]);
   }
-  for (uint32_t i = 0; i < scope_.fixed.size(); ++i) packed->add_hulls(moving + i);
-  packed->mutable_radii()->Add(scope_.fixed_radii.begin(), scope_.fixed_radii.end());
   packed->mutable_poses()->Add(poses.begin(), poses.end());
   packed->mutable_poses()->Add(scope_.fixed_poses.begin(), scope_.fixed_poses.end());
   for (uint32_t lane = 0; lane < count; ++lane) {
-    for (const uint32_t part : scope_.pairs) {
-      open.add_pairs(part < moving ? lane * moving + part : all_moving + (part - moving));
+    for (const uint32_t object : scope_.pairs) {
+      open.add_pairs(PlacementOf(lane, object, count));
     }
   }
-  *open.mutable_wanted() = scope_.wanted;
-  open.set_tolerance(scope_.tolerance);
+  *open.mutable_wanted() = wanted_;
+  open.set_tolerance(tolerance_);
   open_lanes_ = count;
   stream_ = client_.OpenCollisionStream();
   return stream_->Open(std::move(open));
@@ -61,18 +65,19 @@ absl::StatusOr<v1::StreamCollisionsResponse> WaypointStream::Update(
     return absl::InternalError("a message has more waypoints than the first one");
   }
   v1::CollisionStreamUpdate update;
-  for (uint32_t i = 0; i < count * scope_.moving.size(); ++i) update.add_placements(i);
+  for (uint32_t i = 0; i < count * scope_.parts; ++i) update.add_placements(i);
   update.mutable_poses()->Add(poses.begin(), poses.end());
   return stream_->Update(std::move(update));
 }
 
+uint32_t WaypointStream::PlacementOf(uint32_t lane, uint32_t object, size_t lanes) const {
+  const bool moves = object < scope_.parts;
+  return (moves ? lane : static_cast<uint32_t>(lanes) - 1) * scope_.parts + object;
+}
+
 std::string WaypointStream::ProblemOf(uint32_t lane, size_t pair) const {
-  const auto moving = static_cast<uint32_t>(scope_.moving.size());
   for (const size_t side : {2 * pair, 2 * pair + 1}) {
-    const uint32_t part = scope_.pairs[side];
-    const uint32_t placement = part < moving
-                                   ? lane * moving + part
-                                   : static_cast<uint32_t>(open_lanes_) * moving + part - moving;
+    const uint32_t placement = PlacementOf(lane, scope_.pairs[side], open_lanes_);
     const auto found = placement_problems_.find(placement);
     if (found != placement_problems_.end()) return found->second;
   }

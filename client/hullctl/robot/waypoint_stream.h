@@ -12,6 +12,7 @@
 
 #include "client/client.h"
 #include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/robot/check_scope.h"
 
 namespace hulld {
 
@@ -21,31 +22,18 @@ namespace hulld {
 // previous waypoint.
 class WaypointStream {
  public:
-  struct Scope {
-    // Hulls and radii of the moving parts, and of the fixed ones with their poses (seven numbers
-    // each).
-    std::vector<std::string> moving;
-    std::vector<double> moving_radii;
-    std::vector<std::string> fixed;
-    std::vector<double> fixed_radii;
-    std::vector<double> fixed_poses;
-    // Two indices each: into `moving`, then continuing into `fixed`.
-    std::vector<uint32_t> pairs;
-    v1::Wanted wanted;
-    double tolerance = 0;
-  };
-
   // Receives an answer: the pair's index in the scope, and its row. `problem` is the reason for a
   // missing answer; empty otherwise.
   using Receiver = std::function<void(uint64_t waypoint, size_t pair, const AnswerRow& row,
                                       const std::string& problem)>;
 
-  WaypointStream(const Client& client, Scope scope, Receiver receive);
+  WaypointStream(const Client& client, CheckScope scope, v1::Wanted wanted, double tolerance,
+                 Receiver receive);
 
   // Returns the number of waypoints per message.
   size_t lanes() const { return lanes_; }
 
-  // Queries `count` waypoints, at most lanes(). poses: of all moving parts, seven numbers each,
+  // Queries `count` waypoints, at most lanes(). poses: of all parts, seven numbers each,
   // waypoint after waypoint. Answers are ordered by waypoint, then by pair. INTERNAL: more
   // waypoints than in the first call.
   absl::Status Ask(size_t count, const std::vector<double>& poses);
@@ -57,10 +45,14 @@ class WaypointStream {
   absl::StatusOr<v1::StreamCollisionsResponse> Update(size_t count,
                                                       const std::vector<double>& poses);
   absl::Status Take(const v1::StreamCollisionsResponse& answer, size_t count);
+  // Returns the placement of an object on a lane, of so many. The fixed objects follow all parts.
+  uint32_t PlacementOf(uint32_t lane, uint32_t object, size_t lanes) const;
   std::string ProblemOf(uint32_t lane, size_t pair) const;
 
   const Client& client_;
-  const Scope scope_;
+  const CheckScope scope_;
+  const v1::Wanted wanted_;
+  const double tolerance_;
   const Receiver receive_;
   size_t lanes_;
   std::unique_ptr<CollisionStream> stream_;

@@ -41,7 +41,7 @@ absl::StatusOr<std::string> TemporaryHulls::Add(
   if (prefix_.empty()) {
     const auto random = RandomHex(kPrefixBytes);
     if (!random.ok()) return random.status();
-    prefix_ = absl::StrCat(root_, "/", *random, "/");
+    prefix_ = absl::StrCat("view/", *random, "/");
   }
   const std::string id = prefix_ + HullSegment(name);
   v1::ReplaceOpen open;

@@ -5,20 +5,17 @@
 
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/client.h"
 
 namespace hulld {
 
-// Hulls that exist on the server while hullctl needs them, under "ROOT/RANDOM/". The destructor
+// Hulls that exist on the server while hullctl needs them, under "view/RANDOM/". The destructor
 // deletes them; a killed process leaves them for `hullctl delete`.
 class TemporaryHulls {
  public:
-  // root: a segment of an ID.
-  explicit TemporaryHulls(const Client& client, std::string root = "view")
-      : client_(client), root_(std::move(root)) {}
+  explicit TemporaryHulls(const Client& client) : client_(client) {}
   ~TemporaryHulls();
   TemporaryHulls(const TemporaryHulls&) = delete;
   TemporaryHulls& operator=(const TemporaryHulls&) = delete;
@@ -31,8 +28,7 @@ class TemporaryHulls {
 
  private:
   const Client& client_;
-  const std::string root_;
-  // "ROOT/RANDOM/"; empty before the first hull.
+  // "view/RANDOM/"; empty before the first hull.
   std::string prefix_;
   std::vector<std::string> ids_;
 };

@@ -1,0 +1,35 @@
+#include "client/hullctl/robot/check_scope.h"
+
+#include <utility>
+
+namespace hulld {
+
+CheckScope MakeCheckScope(const RobotModel& model, const Surroundings& around,
+                          std::vector<uint32_t> pairs) {
+  CheckScope scope;
+  scope.parts = static_cast<uint32_t>(model.parts.size());
+  scope.fixed_poses = around.poses;
+  scope.pairs = std::move(pairs);
+  const auto add_id = [&scope](const std::string& id, double radius) {
+    scope.hull_of.push_back(static_cast<uint32_t>(scope.hulls.hull_ids_size()));
+    scope.hulls.add_hull_ids(id);
+    scope.radii.push_back(radius);
+  };
+  // All parts have IDs, or none has. Inline shapes count from the number of all IDs on.
+  auto next_shape = static_cast<uint32_t>(around.hulls.size());
+  for (const RobotPart& part : model.parts) {
+    if (!part.hull_id.empty()) {
+      add_id(part.hull_id, part.hull.radius);
+      continue;
+    }
+    scope.hull_of.push_back(next_shape++);
+    scope.radii.push_back(part.hull.radius);
+    scope.hulls.add_shape_sizes(static_cast<uint32_t>(part.hull.xyz.size() / 3));
+    scope.hulls.mutable_shape_points()->mutable_xyz()->Add(part.hull.xyz.begin(),
+                                                           part.hull.xyz.end());
+  }
+  for (size_t i = 0; i < around.hulls.size(); ++i) add_id(around.hulls[i], around.radii[i]);
+  return scope;
+}
+
+}  // namespace hulld
