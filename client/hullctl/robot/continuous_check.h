@@ -94,9 +94,9 @@ class ContinuousCheck {
     // Spans before the contact that are not proven to be free, in order of time.
     std::vector<Span> open = {Span{}};
     // The earliest poses in contact so far.
-    std::optional<double> contact_time;
+    std::optional<double> contact_time = std::nullopt;
     v1::Relation relation = v1::RELATION_UNSPECIFIED;
-    std::string problem;
+    std::string problem = {};
     bool is_done = false;
   };
   // A span of a search, and the answer about it.

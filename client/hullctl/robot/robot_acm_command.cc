@@ -136,7 +136,9 @@ ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
   if (status.ok() && !pairs.empty()) {
     status = Sample(run, arguments, *model, client, stopped, &tallies, pairs);
   }
-  if (!status.ok()) return run.Fail(status);
+  if (!status.ok()) {
+    return absl::IsInvalidArgument(status) ? run.FailUsage(status) : run.Fail(status);
+  }
   const std::vector<DisabledPair> disabled = Judge(adjacent, tallies, arguments.samples);
   const std::string comment = absl::StrCat(
       "Adjacent: connected by a joint, or through links without shapes. Never, Always: in ",

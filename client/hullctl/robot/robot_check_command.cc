@@ -114,6 +114,11 @@ class RobotCheck {
   ExitCode Run();
 
  private:
+  // Reports an error of a file or a call.
+  ExitCode Fail(const absl::Status& status) const {
+    return absl::IsInvalidArgument(status) ? run_.FailUsage(status) : run_.Fail(status);
+  }
+
   using Waypoint = std::vector<double>;
 
   absl::Status AddScene();
@@ -612,16 +617,14 @@ ExitCode RobotCheck::Run() {
   }
   const Interrupt interrupt([this] { stopped_ = true; });
   absl::Status status = PrepareHulls(run_, arguments_.robot, client_, &model_);
-  if (!status.ok()) return run_.Fail(status);
+  if (!status.ok()) return Fail(status);
   collides_.assign(pairs_.size() / 2, false);
   PrintHead();
   CheckScope scope = MakeCheckScope(model_, around_, pairs_);
   status =
       arguments_.continuous ? CheckMotions(std::move(scope)) : CheckWaypoints(std::move(scope));
   bar_.Clear();
-  if (!status.ok()) {
-    return absl::IsInvalidArgument(status) ? run_.FailUsage(status) : run_.Fail(status);
-  }
+  if (!status.ok()) return Fail(status);
   arguments_.continuous ? PrintMotionTotals() : PrintTotals();
   if (beyond_limits_ > kMostWarnings) {
     run_.err << "hullctl: warning: " << beyond_limits_ << " waypoints exceed limits of joints\n";

@@ -42,8 +42,6 @@ TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
   EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 left out by being adjacent\n"));
   EXPECT_THAT(ran.out, HasSubstr("a\tc\tSEPARATED\t0.9"));
   EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 0 overlapping 0 failed 0\n"));
-  // The temporary hulls are deleted.
-  EXPECT_EQ(Hulls(), "");
   ran = Robot({"--adjacent"});
   EXPECT_THAT(ran.out, HasSubstr("a\tb\tTOUCHING\t0"));
   ran = Robot({"--joint", "j=-2"});
@@ -96,7 +94,6 @@ TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
   EXPECT_THAT(ran.err, HasSubstr("path.csv:7: j is at 9"));
   ran = Robot({"--joints", path.path(), "--first"});
   EXPECT_THAT(ran.out, HasSubstr("# separated 2 touching 0 overlapping 1 failed 0\n"));
-  EXPECT_EQ(Hulls(), "");
 }
 
 // More waypoints than one message holds.
@@ -142,7 +139,6 @@ TEST_F(HullctlRobot, CheckReadsTheOutputOfAcm) {
   EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"}).out, ran.out);
   const TempFile srdf("chain.srdf", ran.out);
   EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pair; 2 left out by "));
-  EXPECT_EQ(Hulls(), "");
 }
 
 // b is attached to a through a link without shapes.
@@ -291,6 +287,65 @@ TEST_F(MeshRobot, OtherPartsArePiecesWhereAskedFor) {
   ran = Check(obj, {"--split", "components"});
   EXPECT_THAT(ran.out, HasSubstr("# gap: 3 pieces of "));
   EXPECT_THAT(ran.out, Not(HasSubstr("OVERLAPPING\t")));
+}
+
+class StoredHulls : public MeshRobot {
+ protected:
+  // Returns the revision of the store, which every change raises.
+  uint64_t Revision() {
+    grpc::ClientContext context;
+    v1::ListHullsResponse list;
+    EXPECT_TRUE(hulls_->ListHulls(&context, {}, &list).ok());
+    return list.header().revision();
+  }
+};
+
+TEST_F(StoredHulls, ChecksStoreNothing) {
+  Put("cube", server::Cube());
+  const uint64_t before = Revision();
+  const TempFile path("path.csv", "j\n0\n-2\n");
+  EXPECT_EQ(Robot({}).code, 0);
+  EXPECT_EQ(Robot({"--joints", path.path()}).code, 0);
+  EXPECT_EQ(Robot({"--joints", path.path(), "--continuous"}).code, 0);
+  EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "5"}).code, 0);
+  EXPECT_EQ(Check(BoxObj("o box", 0, 1)).code, 0);
+  EXPECT_EQ(Revision(), before);
+  EXPECT_EQ(Hulls(), "cube\n");
+  EXPECT_EQ(Robot({"--prefix", "arm/"}).code, 0);
+  EXPECT_GT(Revision(), before);
+}
+
+// Returns points as OBJ.
+std::string PointObj(const server::Coordinates& xyz) {
+  std::string text;
+  for (size_t i = 0; i < xyz.size(); i += 3) {
+    text += "v " + std::to_string(xyz[i]) + " " + std::to_string(xyz[i + 1]) + " " +
+            std::to_string(xyz[i + 2]) + "\n";
+  }
+  return text;
+}
+
+TEST_F(StoredHulls, MeshesOfManyPointsSendTheVerticesOfTheirHull) {
+  const std::string many = PointObj(server::Sphere(5000));
+  const std::string inside = BoxObj("o box", 0, 1) + PointObj([] {
+                               server::Coordinates xyz = server::Sphere(5000, 2);
+                               for (double& x : xyz) x = 0.5 + x / 8;
+                               return xyz;
+                             }());
+  Ran ran = Check(inside);
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tSEPARATED\t0.75"));
+  ran = Check(many);
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("gap: its hull has 5000 vertices, and a query carries up to 4096; "
+                                 "use --local, or register the hulls with --prefix"));
+  EXPECT_EQ(Check(many, {"--prefix", "arm/"}).code, 0);
+  setenv("HULLD_BINARY", "/nonexistent/hulld", 1);
+  ran = Check(inside);
+  const Ran few = Check(BoxObj("o box", 0, 1));
+  unsetenv("HULLD_BINARY");
+  EXPECT_THAT(ran.err, HasSubstr("gap has more than 4096 points, so a local server has to find"));
+  EXPECT_EQ(few.code, 0) << few.err;
 }
 
 TEST_F(HullctlRobot, ErrorsNameFileAndLine) {
