@@ -22,8 +22,8 @@ namespace {
 // (Davis, Interpolation and Approximation, 1963, theorem 3.1.1, applied in the direction of the
 // error). This bounds the error of the translation by h^2 / 8 |c''|, and the distance of q from the
 // interpolated quaternion r by h^2 / 8 W^2 / 4. The rotations of a unit quaternion q and of any
-// quaternion r differ by twice the angle between q and r, whose sine is at most |q - r|, so they
-// move a point at a distance `reach` by at most 2 reach |q - r| relative to each other. Together:
+// quaternion r differ by twice the angle between q and r. Its sine is at most |q - r|, so the
+// images of a point at a distance `reach` are at most 2 reach |q - r| apart. Together:
 //   deviation <= h^2 / 8 (|c''| + reach W^2 / 2).
 //
 // Adaptive subdivision by bounds of the path length: Schwarzer, Saha, Latombe, Adaptive dynamic
@@ -33,7 +33,7 @@ namespace {
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 // Covers the rounding of the bounds themselves, sums and products of fewer than 2^20 nonnegative
 // terms, and products of rounding errors.
-constexpr double kOutward = 1 + 0x1p-20;
+constexpr double kRoundedUp = 1 + 0x1p-20;
 
 // Rounding errors (proven), in units of roundoff. A component of a product of quaternions is a sum
 // of four products: an error of 4 |a| |b| (Cauchy-Schwarz), and 8 for four components.
@@ -129,14 +129,14 @@ void AddJoint(const RobotJoint& joint, const JointValue& from, const JointValue&
 }  // namespace
 
 double MotionBound::Travel(double duration, double reach) const {
-  return kOutward * duration * (speed + turn * reach) + std::numeric_limits<double>::min();
+  return kRoundedUp * duration * (speed + turn * reach) + std::numeric_limits<double>::min();
 }
 
 double MotionBound::Deviation(double duration, double reach) const {
   const double curved = duration * duration / 8 * (bend + reach * turn * turn / 2);
   const double rounded = rounding + 2 * reach * (quaternion_rounding + kNormalization * kUnit);
   // The least normal double covers underflow.
-  return kOutward * (curved + rounded) + std::numeric_limits<double>::min();
+  return kRoundedUp * (curved + rounded) + std::numeric_limits<double>::min();
 }
 
 MotionBound BoundFixedFrame(const MotionBound& link, const RigidPose& X_LS) {

@@ -22,7 +22,7 @@ constexpr double kMostTurnOfSegment = 4096;
 // Times in [0, 1] that are multiples of 2^-50 are exact, as are their differences from 1.
 constexpr double kShortestSpan = 0x1p-50;
 // Covers the rounding of three sums.
-constexpr double kOutward = 1 + 0x1p-50;
+constexpr double kRoundedUp = 1 + 0x1p-50;
 
 void Normalize(double* quaternion) {
   double squared = 0;
@@ -151,7 +151,7 @@ absl::Status ContinuousCheck::AskMotions(std::vector<Asked>* asked) {
       const uint32_t object = ObjectOf(search, side);
       const double inflation = DeviationOf(one, side) + (side == 0 ? settings_.clearance : 0);
       const double radius =
-          inflation == 0 ? scope_.radii[object] : kOutward * (scope_.radii[object] + inflation);
+          inflation == 0 ? scope_.radii[object] : kRoundedUp * (scope_.radii[object] + inflation);
       Place(object, radius, begin, &end, &request);
     }
   }

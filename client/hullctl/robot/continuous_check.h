@@ -78,7 +78,7 @@ class ContinuousCheck {
   struct Segment {
     std::vector<JointValue> from;
     std::vector<JointValue> to;
-    // Of each part.
+    // Bounds of each part.
     std::vector<MotionBound> bounds;
   };
   struct Span {
@@ -112,8 +112,8 @@ class ContinuousCheck {
   absl::Status AskMotions(std::vector<Asked>* asked);
   // Checks poses at times of searches.
   absl::Status AskPoses(const std::vector<std::pair<Search*, double>>& times);
-  // Replaces the asked spans at the front of the search by what is left of them. Adds the times
-  // whose poses are to be checked.
+  // Replaces the asked spans, at the front of the search, by their halves that are not proven free.
+  // Adds the times at which poses have to be checked.
   void Divide(std::span<const Asked> asked, Search* search,
               std::vector<std::pair<Search*, double>>* times);
   void Close(Search* search);

@@ -120,7 +120,7 @@ void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullM
              "decomposition of the mesh, or --split\n";
 }
 
-absl::Status Register(const Client& client, const RobotPart& part, const std::string& id) {
+absl::Status RegisterPart(const Client& client, const RobotPart& part, const std::string& id) {
   v1::ReplaceOpen open;
   open.set_hull_id(id);
   open.set_create_if_absent(true);
@@ -155,7 +155,7 @@ class HullBuilder {
       options.own_connection = true;
       client_.emplace(std::move(options));
     }
-    if (absl::Status built = Register(*client_, part, "part"); !built.ok()) return built;
+    if (absl::Status built = RegisterPart(*client_, part, "part"); !built.ok()) return built;
     return client_->GetHullMesh("part");
   }
 
@@ -255,7 +255,7 @@ absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments
   for (RobotPart& part : model->parts) {
     if (registers) {
       part.hull_id = arguments.prefix + UniqueHullSegment(part.name, &taken);
-      absl::Status registered = Register(client, part, part.hull_id);
+      absl::Status registered = RegisterPart(client, part, part.hull_id);
       if (!registered.ok()) return registered;
       // Failure to read the hull does not fail the check; the mesh is only compared.
       const auto hull = part.mesh.triangles.empty() ? HullMesh() : client.GetHullMesh(part.hull_id);
