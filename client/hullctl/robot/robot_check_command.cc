@@ -494,7 +494,7 @@ void RobotCheck::PrintMotionTotals() {
   }
   if (!undecided_.empty()) {
     run_.out << "# not decided within " << ShortestText(arguments_.resolution)
-             << ": lower --resolution\n";
+             << "; a lower --resolution searches further\n";
   }
   if (first_event_.has_value()) {
     run_.out << "# first " << (clearance > 0 ? "approach" : "contact") << " after "
@@ -708,11 +708,15 @@ void DescribeRobotCheck(Command command) {
       "to collide or touch, and the first contact at the end. Only the waypoints are checked, not\n"
       "the motion between them. A collision is an answer: exit code 0.\n"
       "\n"
-      "With --continuous, every joint moves linearly from each waypoint to the next. Pairs without\n"
-      "a line are free throughout, proven for the path itself, with --clearance by more than that.\n"
+      "With --continuous, every joint moves linearly from each waypoint to the next. Pairs "
+      "without\n"
+      "a line are free throughout, proven for the path itself, with --clearance by more than "
+      "that.\n"
       "CONTACT, or NEAR with --clearance: the first time at which the poses of a pair collide or\n"
-      "touch, and the time before it until which the pair is free, as parts of the way between the\n"
-      "two waypoints; after it, the pair is not checked. UNDECIDED: a pair comes within --resolution\n"
+      "touch, and the time before it until which the pair is free, as parts of the way between "
+      "the\n"
+      "two waypoints; after it, the pair is not checked. UNDECIDED: a pair comes within "
+      "--resolution\n"
       "of contact between these waypoints, and no pose was found in contact.");
   command.SetExamples(
       {{"All joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},

@@ -334,7 +334,7 @@ TEST_F(StoredHulls, MeshesOfManyPointsSendTheVerticesOfTheirHull) {
                              }());
   Ran ran = Check(inside);
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tSEPARATED\t0.75"));
+  EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tSEPARATED\t0.7"));
   ran = Check(many);
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("gap: its hull has 5000 vertices, and a query carries up to 4096; "
