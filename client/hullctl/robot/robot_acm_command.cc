@@ -12,6 +12,7 @@
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/load/point_generator.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/robot/check_scope.h"
 #include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
 #include "client/hullctl/robot/waypoint_stream.h"
