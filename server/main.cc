@@ -52,7 +52,7 @@ void LogStore(const Config& config) {
 }
 
 // Waits for SIGTERM or SIGINT. Reloads certificates and tokens at each SIGHUP, and periodically
-// returns unused memory.
+// puts idle hulls to rest and returns unused memory.
 int WaitForEnd(const sigset_t& signals, Server& server) {
   // A choice: memory is returned soon after a peak, and a check costs 0.1 ms.
   constexpr timespec kPause = {.tv_sec = 10, .tv_nsec = 0};
@@ -64,6 +64,7 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
     } else if (received > 0) {
       return received;
     } else {
+      server.RestIdleHulls();
       GiveBackFreeMemory();
     }
   }

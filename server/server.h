@@ -59,6 +59,9 @@ class Server {
   // Checks the files of certificates and tokens now instead of at the next interval.
   void ReloadFiles() { guard_->Reload(); }
 
+  // Registry::RestIdleHulls.
+  void RestIdleHulls() { registry_.RestIdleHulls(); }
+
   // Store::OnEnded: this server must end without draining.
   void OnStoreEnded(std::function<void()> ended) { store_->OnEnded(std::move(ended)); }
 

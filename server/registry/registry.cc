@@ -109,6 +109,14 @@ HoldStatistics Registry::Holds() const {
   return state_.mutex.Statistics();
 }
 
+void Registry::RestIdleHulls() {
+  std::string cursor;
+  for (bool more = true; more;) {
+    Locked locked(state_.mutex);
+    more = state_.catalog.hulls().RestIdle(locked, cursor);
+  }
+}
+
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(state_.mutex);
   return state_.catalog.Sizes();

@@ -116,6 +116,10 @@ class Registry {
   absl::StatusOr<HullPage> List(const std::string& prefix, const std::string& after,
                                 size_t page_size, const std::function<bool()>& should_stop = {});
 
+  // Puts small hulls to rest that no call named since the previous call of this (HullTable). Call
+  // every few seconds. Cost: some 0.2 us per hull.
+  void RestIdleHulls();
+
   RegistrySizes Sizes() const;
   // Hold times and work per hold of the registry's mutex.
   HoldStatistics Holds() const;

@@ -46,36 +46,86 @@ HullChange HullTable::Entry::Describe(const std::string& id) const {
   return change;
 }
 
+HullTable::HullTable(bool readable, MemoryBudget& budget)
+    : readable_(readable), budget_(budget), compact_account_(budget, [this](Locked& /*locked*/) {
+        if (readable_) DropCompact();
+      }) {}
+
+const HullTable::Entry* HullTable::FindEntry(std::string_view id) const {
+  const auto found = index_.find(id);
+  return found == index_.end() ? nullptr : &(*found)->second;
+}
+
+std::pair<HullTable::Place, bool> HullTable::AddEntry(const std::string& id) {
+  if (const auto found = index_.find(id); found != index_.end()) return {*found, false};
+  const Place place = entries_.try_emplace(id).first;
+  index_.insert(place);
+  return {place, true};
+}
+
+void HullTable::EraseEntry(Place place) {
+  SetCompact(place->second, nullptr);
+  index_.erase(place);
+  entries_.erase(place);
+}
+
 bool HullTable::contains(const std::string& id) const {
-  const auto found = entries_.find(id);
-  return found != entries_.end() && !found->second.is_absent_;
+  const Entry* const entry = FindEntry(id);
+  return entry != nullptr && !entry->is_absent_;
 }
 
 bool HullTable::IsVisible(const std::string& id) const {
-  const auto found = entries_.find(id);
-  return found != entries_.end() && found->second.visible();
+  const Entry* const entry = FindEntry(id);
+  return entry != nullptr && entry->visible();
 }
 
 std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
-  const auto found = entries_.find(id);
-  if (found == entries_.end())
-    return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
-  Entry& entry = found->second;
+  const auto found = index_.find(id);
+  if (found == index_.end()) return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
+  Entry& entry = (*found)->second;
   entry.is_used_ = true;
+  entry.is_idle_ = false;
   if (entry.is_absent_) return nullptr;
-  if (entry.awake_ == nullptr) {
-    const RestingHull& resting = entry.resting_;
-    const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
-    entry.awake_ =
-        std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
-    if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
-  }
+  if (entry.awake_ == nullptr) Wake(id, entry);
   return entry.awake_;
+}
+
+void HullTable::Wake(const std::string& id, Entry& entry) {
+  const RestingHull& resting = entry.resting_;
+  const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
+  entry.awake_ = std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
+  if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
+  if (resting.compact == nullptr) return;
+  entry.awake_->Restore(*resting.compact);
+  SetCompact(entry, nullptr);
+}
+
+// Sets the points of a hull at rest, and counts them. Under memory pressure they go first: the
+// hulls of the other accounts were used since.
+void HullTable::SetCompact(Entry& entry, std::unique_ptr<CompactHull> compact) {
+  std::unique_ptr<CompactHull>& kept = entry.resting_.compact;
+  if (kept == nullptr && compact == nullptr) return;
+  if (kept != nullptr) compact_bytes_ -= kept->MemoryBytes();
+  kept = std::move(compact);
+  if (kept != nullptr) compact_bytes_ += kept->MemoryBytes();
+  compact_account_.Set(compact_bytes_, !readable_);
+  compact_account_.Age();
+}
+
+// Drops the points of some hulls at rest, which the store can read back.
+void HullTable::DropCompact() {
+  constexpr int kMostVisited = 128;
+  auto next = entries_.upper_bound(compact_hand_);
+  for (int i = 0; i < kMostVisited && next != entries_.end(); ++i) {
+    compact_hand_ = next->first;
+    SetCompact(next++->second, nullptr);
+  }
+  if (next == entries_.end()) compact_hand_.clear();
 }
 
 // Requires: no hull has the ID. Its absence may be known.
 HullTable::Entry& HullTable::Add(const std::string& id) {
-  const auto [place, is_new] = entries_.try_emplace(id);
+  const auto [place, is_new] = AddEntry(id);
   HULLD_CHECK(is_new || place->second.is_absent_);
   place->second.is_absent_ = false;
   ++size_;
@@ -88,14 +138,14 @@ void HullTable::AddResting(const StoredHull& stored) {
 
 void HullTable::NoteAbsent(const std::string& id) {
   HULLD_CHECK(is_cache());
-  const auto [place, is_new] = entries_.try_emplace(id);
+  const auto [place, is_new] = AddEntry(id);
   HULLD_CHECK(is_new || place->second.is_absent_);
   place->second.is_absent_ = true;
 }
 
 void HullTable::ForgetAbsent(const std::string& id) {
-  const auto found = entries_.find(id);
-  if (found != entries_.end() && found->second.is_absent_) entries_.erase(found);
+  const auto found = index_.find(id);
+  if (found != index_.end() && (*found)->second.is_absent_) EraseEntry(*found);
 }
 
 HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
@@ -109,20 +159,51 @@ void HullTable::Insert(const HullPointer& hull) {
 }
 
 void HullTable::Erase(const HullPointer& hull) {
-  const auto found = entries_.find(hull->committed().record.hull_id);
-  HULLD_CHECK(found != entries_.end() && found->second.awake_ == hull);
+  const auto found = index_.find(hull->committed().record.hull_id);
+  HULLD_CHECK(found != index_.end() && (*found)->second.awake_ == hull);
   --size_;
-  if (!is_cache()) {
-    entries_.erase(found);
-    return;
-  }
-  found->second = {};
-  found->second.is_absent_ = true;
+  if (!is_cache()) return EraseEntry(*found);
+  Entry& entry = (*found)->second;
+  SetCompact(entry, nullptr);
+  entry = {};
+  entry.is_absent_ = true;
 }
 
 // True if the record alone can restore the hull.
 bool HullTable::IsUnused(const HullPointer& hull) const {
   return hull.use_count() == 1 && hull->IsAtRest();
+}
+
+HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
+  RestingHull resting(hull.committed());
+  const HullChange described = hull.Describe();
+  resting.has_box = described.has_box;
+  resting.low = described.low;
+  resting.high = described.high;
+  return resting;
+}
+
+bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
+  // Takes longer than a lookup: the points are copied.
+  constexpr uint64_t kMostRested = kMostLookupsPerHold / 4;
+  uint64_t rested = 0;
+  auto next = entries_.upper_bound(cursor);
+  for (uint64_t visited = 0; visited < kMostLookupsPerHold && rested < kMostRested; ++visited) {
+    if (next == entries_.end()) return false;
+    cursor = next->first;
+    Entry& entry = next++->second;
+    locked.NoteLookup();
+    const bool was_idle = std::exchange(entry.is_idle_, true);
+    if (!was_idle || entry.awake_ == nullptr || entry.awake_.use_count() > 1) continue;
+    std::unique_ptr<CompactHull> compact = entry.awake_->Compact();
+    if (compact == nullptr) continue;
+    entry.resting_ = AtRest(*entry.awake_);
+    entry.awake_->account.Close();
+    locked.Discard(std::exchange(entry.awake_, nullptr));
+    SetCompact(entry, std::move(compact));
+    ++rested;
+  }
+  return true;
 }
 
 void HullTable::RestSome() {
@@ -137,17 +218,12 @@ void HullTable::RestSome() {
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
       if (!IsUnused(entry.awake_)) continue;
-      RestingHull resting(entry.awake_->committed());
-      const HullChange described = entry.awake_->Describe();
-      resting.has_box = described.has_box;
-      resting.low = described.low;
-      resting.high = described.high;
-      entry.resting_ = resting;
+      entry.resting_ = AtRest(*entry.awake_);
       entry.awake_ = nullptr;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
     if (!entry.is_absent_) --size_;
-    entries_.erase(looked_at);
+    EraseEntry(looked_at);
   }
 }
 

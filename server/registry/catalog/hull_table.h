@@ -1,16 +1,23 @@
 #ifndef HULLD_SERVER_REGISTRY_CATALOG_HULL_TABLE_H_
 #define HULLD_SERVER_REGISTRY_CATALOG_HULL_TABLE_H_
 
+#include <absl/container/flat_hash_set.h>
+
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 
+#include "server/registry/catalog/compact_hull.h"
 #include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/registry_types.h"
+#include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/store/hull_record.h"
 
@@ -25,6 +32,10 @@ namespace hulld::server {
 // turns it back into a record when it finds the hull unused. Each operation advances the hand by a
 // few hulls, so no pass over all of them is needed.
 //
+// A small hull that is in memory and was not looked up for some time (RestIdle) takes its record
+// and its points (CompactHull). If the store can read it back, the points are evicted before any
+// hull in use.
+//
 // If the store finds records, this is a cache of records and of known absences of both hull and
 // body: an ID without an entry is unknown. When the cache exceeds its limit, the hand evicts
 // entries that are at rest and were not looked up since its last visit.
@@ -38,7 +49,7 @@ class HullTable {
   static constexpr uint64_t kBytesOfRecord = 320;
 
   // readable: true if the store can read hulls back. The budget must outlive this.
-  HullTable(bool readable, MemoryBudget& budget) : readable_(readable), budget_(budget) {}
+  HullTable(bool readable, MemoryBudget& budget);
 
   // Makes this a cache of at most `records`, exceeded only by hulls in use. Requires an empty
   // table.
@@ -61,6 +72,8 @@ class HullTable {
     Vector high = Vector::Zero();
     int8_t dimension = -1;
     bool has_box = false;
+    // Null if the store holds the points, or there are none.
+    std::unique_ptr<CompactHull> compact;
   };
 
  public:
@@ -71,6 +84,8 @@ class HullTable {
     uint64_t revision() const;
     // Null for a hull at rest.
     const HullPointer& awake() const { return awake_; }
+    // Null unless the hull is at rest with its points.
+    const CompactHull* compact() const { return resting_.compact.get(); }
     // Describes the committed hull for watches and lists. id: the hull's own.
     HullChange Describe(const std::string& id) const;
 
@@ -83,6 +98,8 @@ class HullTable {
     bool is_absent_ = false;
     // Looked up since the last visit of the hand.
     bool is_used_ = false;
+    // Not looked up since the last call of RestIdle.
+    bool is_idle_ = false;
   };
   using Entries = std::map<std::string, Entry>;
 
@@ -92,12 +109,12 @@ class HullTable {
   bool IsVisible(const std::string& id) const;
   // Returns true if the ID's state is known, including absence. Unless this is a cache, an ID
   // without an entry is absent.
-  bool Knows(const std::string& id) const { return !is_cache() || entries_.contains(id); }
+  bool Knows(const std::string& id) const { return !is_cache() || index_.contains(id); }
   // Entries in the byte order of the IDs. A cache includes known absences.
   const Entries& entries() const { return entries_; }
 
   // Returns the hull and wakes it if it is at rest; null if it is absent; nullopt if it is unknown.
-  // Cost: O(log n).
+  // Cost: O(1), and restoring a small hull's points.
   std::optional<HullPointer> Ask(const std::string& id);
   // As Ask, but returns null for an unknown ID.
   HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
@@ -117,21 +134,58 @@ class HullTable {
   // its limit. Cost: O(log n).
   void RestSome();
   static constexpr int kHullsPerStep = 4;
+  // Visits the hulls after `cursor`, which starts empty, for one hold of the mutex. Puts small
+  // hulls to rest that are in memory, unused, and were not looked up since the last visit. Returns
+  // false if no hull is left to visit. Cost: some 50 us.
+  bool RestIdle(Locked& locked, std::string& cursor);
+  // Bytes of the points and writers of hulls at rest, which count against the budget.
+  uint64_t compact_bytes() const { return compact_bytes_; }
 
  private:
+  using Place = Entries::iterator;
+  // Hashes and compares entries by their IDs.
+  struct HashOfId {
+    using is_transparent = void;
+    size_t operator()(std::string_view id) const { return std::hash<std::string_view>()(id); }
+    size_t operator()(Place place) const { return (*this)(place->first); }
+  };
+  struct EqualIds {
+    using is_transparent = void;
+    static std::string_view IdOf(std::string_view id) { return id; }
+    static std::string_view IdOf(Place place) { return place->first; }
+    template <typename A, typename B>
+    bool operator()(const A& a, const B& b) const {
+      return IdOf(a) == IdOf(b);
+    }
+  };
+
   bool is_cache() const { return most_.has_value(); }
+  // Returns null for an unknown ID.
+  const Entry* FindEntry(std::string_view id) const;
+  std::pair<Place, bool> AddEntry(const std::string& id);
+  void EraseEntry(Place place);
   Entry& Add(const std::string& id);
+  void Wake(const std::string& id, Entry& entry);
   bool IsUnused(const HullPointer& hull) const;
+  static RestingHull AtRest(const RegisteredHull& hull);
+  void SetCompact(Entry& entry, std::unique_ptr<CompactHull> compact);
+  void DropCompact();
 
   const bool readable_;
   MemoryBudget& budget_;
   Entries entries_;
+  // All entries, for lookups. A search of the ordered map takes some 2 us if it holds a million.
+  absl::flat_hash_set<Place, HashOfId, EqualIds> index_;
   // Number of entries that are hulls.
   std::atomic<size_t> size_ = 0;
   // Limit in records; set if this is a cache.
   std::optional<size_t> most_;
-  // ID of the last hull that RestSome visited.
+  // ID of the last hull that RestSome visited, and of the last one that DropCompact visited.
   std::string hand_;
+  std::string compact_hand_;
+  // Sum over all entries, and its account.
+  uint64_t compact_bytes_ = 0;
+  MemoryBudget::Account compact_account_;
 };
 
 }  // namespace hulld::server

@@ -170,6 +170,13 @@ void RegisteredHull::DiscardBuilder(Locked& locked) {
   in_flight_.builder_bytes = 0;
 }
 
+void RegisteredHull::DiscardUnneededBuilder(Locked& locked) {
+  const bool is_small = committed().record.vertex_count <= kMostOfSmall;
+  if (!is_small || !state.quiet() || !watches.empty() || !chunks.empty()) return;
+  DiscardBuilder(locked);
+  in_flight_.revisions = nullptr;
+}
+
 void RegisteredHull::AddToHead(const PointCounts& added, const WriterSequence& writer,
                                Change* change) {
   if (state.in_flight() == 0) {
@@ -226,7 +233,8 @@ void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
 std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
   if (committed().record.vertex_count == 0) return EmptyServedHull();
   if (live() == nullptr) return nullptr;
-  if (served_.version == nullptr) {
+  const bool is_new = served_.version == nullptr;
+  if (is_new) {
     if (served_.canonical == nullptr) {
       served_.canonical =
           std::make_shared<CanonicalHull>(std::make_shared<MemoryPart>(account.budget(), nullptr));
@@ -236,18 +244,13 @@ std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
                                                          mark.high(), served_.canonical);
   }
   std::shared_ptr<const Reading> reading = served_.readers.lock();
+  if (is_new) CountParts();
   if (reading == nullptr) {
-    CountParts();
     reading = std::make_shared<const Reading>(account.parts(), served_.version);
     served_.readers = reading;
   }
   const ServedHull* const shown = reading->served.get();
   return {std::move(reading), shown};
-}
-
-uint64_t RegisteredHull::SharedBytes() const {
-  return (live() == nullptr ? 0 : live()->MemoryBytes()) +
-         (served_.canonical == nullptr ? 0 : served_.canonical->MemoryBytes());
 }
 
 void RegisteredHull::EndLoading() {
@@ -287,6 +290,7 @@ void RegisteredHull::NoteUse() {
 // A part at a repeated address reuses free memory: the former part had no holder.
 void RegisteredHull::CountParts() {
   std::vector<std::shared_ptr<MemoryPart>> parts;
+  served_.shared_bytes = 0;
   if (live() != nullptr) {
     for (const LiveHull::Shared& shared : live()->SharedBy(committed_.mark)) {
       const auto known = std::ranges::find(account.parts(), shared.what, &MemoryPart::what);
@@ -294,17 +298,51 @@ void RegisteredHull::CountParts() {
                           ? *known
                           : std::make_shared<MemoryPart>(account.budget(), shared.what));
       parts.back()->SetBytes(shared.bytes);
+      served_.shared_bytes += shared.bytes;
     }
   }
-  if (served_.canonical != nullptr) parts.push_back(served_.canonical->part());
+  if (served_.canonical != nullptr) {
+    parts.push_back(served_.canonical->part());
+    served_.shared_bytes += served_.canonical->MemoryBytes();
+  }
   account.Hold(std::move(parts));
 }
 
-bool RegisteredHull::IsAtRest() const {
+bool RegisteredHull::IsUnused() const {
   return state.life() == HullState::Life::kPresent && state.quiet() && !state.damaged() &&
-         live() == nullptr && builder() == nullptr && served_.canonical == nullptr &&
-         !is_loading() && !is_preparing() && in_flight_.writers.empty() &&
-         in_flight_.sequence_readers == 0 && watches.empty() && chunks.empty() && exclusive.empty();
+         !is_loading() && !is_preparing() && in_flight_.sequence_readers == 0 && watches.empty() &&
+         chunks.empty() && exclusive.empty();
+}
+
+bool RegisteredHull::IsAtRest() const {
+  return IsUnused() && live() == nullptr && builder() == nullptr && served_.canonical == nullptr &&
+         in_flight_.writers.empty();
+}
+
+std::unique_ptr<CompactHull> RegisteredHull::Compact() const {
+  if (!IsUnused() || IsRead()) return nullptr;
+  auto compact = std::make_unique<CompactHull>();
+  if (live() != nullptr) {
+    if (committed().record.vertex_count > kMostOfSmall) return nullptr;
+    compact->points = live()->PointsAt(committed_.mark);
+    // Points that are vertices no longer are dropped by preparing.
+    if (compact->points.size() > 2 * kMostOfSmall) return nullptr;
+    compact->points.shrink_to_fit();
+  }
+  if (!readable_from_store_) {
+    compact->writers.reserve(in_flight_.writers.size());
+    for (const auto& [writer_id, sequences] : in_flight_.writers) {
+      compact->writers.emplace_back(writer_id, sequences.committed);
+    }
+  }
+  return compact;
+}
+
+void RegisteredHull::Restore(CompactHull& compact) {
+  for (const auto& [writer_id, sequence] : compact.writers) KeepSequence(writer_id, sequence);
+  if (compact.points.empty()) return;
+  SetLive(std::make_shared<LiveHull>(std::move(compact.points), committed().record.dimension));
+  NoteUse();
 }
 
 void RegisteredHull::DiscardAll(Locked& locked) {

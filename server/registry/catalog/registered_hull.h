@@ -18,6 +18,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
+#include "server/registry/catalog/compact_hull.h"
 #include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
@@ -63,6 +64,9 @@ class RegisteredHull {
   // Maximum number of a peer server's points that are added to a hull in memory: some 100 us. With
   // more, the hull is reloaded at its next use, and its builder is rebuilt.
   static constexpr uint64_t kMostGrowth = 1 << 12;
+  // Maximum number of vertices of a small hull. Its builder takes more memory than the rest of it
+  // and is rebuilt in some 20 us.
+  static constexpr uint64_t kMostOfSmall = 64;
 
   // readable: true if the store can read the hull back.
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
@@ -123,6 +127,9 @@ class RegisteredHull {
   const std::vector<Vector>& builder_backlog() const { return in_flight_.backlog; }
   // Drops the builder unless a thread owns it.
   void DiscardBuilder(Locked& locked);
+  // Drops the builder of a small hull that no session appends to, and all that its changes in
+  // flight needed.
+  void DiscardUnneededBuilder(Locked& locked);
   // Adds a built chunk to the head, and completes its change. added: counts of its points.
   void AddToHead(const PointCounts& added, const WriterSequence& writer, Change* change);
   // Returns to the committed state after a chunk in flight, and with it all later ones, was
@@ -143,8 +150,8 @@ class RegisteredHull {
   // counts as held for readers until the last of them releases it, even if the hull ends first.
   // Cost: O(log n) for the first reader, O(1) for later ones.
   std::shared_ptr<const ServedHull> Serve();
-  // Approximate bytes that the current version shares with readers.
-  uint64_t SharedBytes() const;
+  // Approximate bytes that the current version shares with readers, as last counted.
+  uint64_t shared_bytes() const { return served_.shared_bytes; }
   // A reader reads the points from the store. EndLoading notifies `changed`.
   bool is_loading() const { return served_.is_loading; }
   void StartLoading() { served_.is_loading = true; }
@@ -166,8 +173,15 @@ class RegisteredHull {
 
   // Updates the memory account and the time of last use. Cost: O(log n).
   void NoteUse();
+  // Updates the time of last use after a read that changed no memory. Cost: O(1).
+  void NoteRead() { account.Touch(); }
   // True if the stored record alone can restore the hull.
   bool IsAtRest() const;
+  // Returns what restores the hull together with its record, if it is small and unused; otherwise
+  // null. Cost: O(points).
+  std::unique_ptr<CompactHull> Compact() const;
+  // Restores a hull that was compact. Requires: nothing was set before but the box.
+  void Restore(CompactHull& compact);
   // Drops all memory of a hull that is gone.
   void DiscardAll(Locked& locked);
   // Returns a chunk to the queue, before all later chunks.
@@ -240,6 +254,8 @@ class RegisteredHull {
     std::shared_ptr<const ServedHull> version;
     // Canonical snapshot, shared by all served versions of the committed revision.
     std::shared_ptr<CanonicalHull> canonical;
+    // Sum of the account's parts when they were last counted.
+    uint64_t shared_bytes = 0;
     // Readers' reference to `version`.
     std::weak_ptr<const Reading> readers;
   };
@@ -252,6 +268,8 @@ class RegisteredHull {
   // Drops the points beyond the committed mark after their refusal.
   void RevertLive(Locked& locked);
   void Grow(Locked& locked, const std::vector<Vector>& points, int dimension);
+  // True if no call, thread, or session depends on more than the record and the points.
+  bool IsUnused() const;
   bool IsRead() const { return !served_.readers.expired() || live().use_count() > 1; }
   // Updates the account's shared parts.
   void CountParts();

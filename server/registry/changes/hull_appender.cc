@@ -201,9 +201,13 @@ absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, Register
 }
 
 void HullChanges::CloseAppend(const AppendSession& session) {
-  const std::lock_guard lock(state_.mutex);
-  session.hull->watches.erase(session.watch);
-  session.hull->DropUnusedWriters();
+  Locked locked(state_.mutex);
+  RegisteredHull& hull = *session.hull;
+  hull.watches.erase(session.watch);
+  hull.DropUnusedWriters();
+  if (hull.builder() == nullptr || hull.state.gone()) return;
+  hull.DiscardUnneededBuilder(locked);
+  hull.NoteUse();
 }
 
 void HullChanges::Append(const AppendSession& session, Chunk chunk,

@@ -28,6 +28,7 @@ void HullChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
                       }
                       // A hull at rest may be evicted.
                       if (hull->state.quiet() && !hull->state.gone()) {
+                        hull->DiscardUnneededBuilder(later);
                         hull->NoteUse();
                         state_.memory.Evict(later);
                       }

@@ -217,6 +217,7 @@ absl::StatusOr<ReplaceResult> HullChanges::FinishReplacement(Locked& locked,
   } else {
     state_.ApplyReplacement(locked, former, hull, change.hull);
   }
+  hull->DiscardUnneededBuilder(locked);
   hull->NoteUse();
   state_.memory.Evict(locked);
   return ReplaceResult{state_.catalog.revision(), change.hull.record, former == nullptr};

@@ -51,6 +51,14 @@ void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
   Enter();
 }
 
+void MemoryBudget::Account::Touch() {
+  if (bytes_ > 0) budget_.used_.splice(budget_.used_.begin(), budget_.used_, place_);
+}
+
+void MemoryBudget::Account::Age() {
+  if (bytes_ > 0) budget_.used_.splice(budget_.used_.end(), budget_.used_, place_);
+}
+
 void MemoryBudget::Account::Hold(std::vector<std::shared_ptr<MemoryPart>> parts) {
   if (parts == parts_) return;
   {
@@ -99,11 +107,14 @@ void MemoryPart::SetBytes(uint64_t bytes) {
   Enter();
 }
 
-void MemoryPart::Pin(bool pins) {
-  const std::lock_guard lock(usage_->mutex);
-  Leave();
-  pins_ += pins ? 1 : -1;
-  Enter();
+void MemoryPart::Pin(const std::vector<std::shared_ptr<MemoryPart>>& parts, bool pins) {
+  if (parts.empty()) return;
+  const std::lock_guard lock(parts.front()->usage_->mutex);
+  for (const auto& part : parts) {
+    part->Leave();
+    part->pins_ += pins ? 1 : -1;
+    part->Enter();
+  }
 }
 
 void MemoryCharge::Set(uint64_t bytes) {

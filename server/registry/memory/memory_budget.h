@@ -84,6 +84,9 @@ class MemoryBudget {
     // Sets the memory excluding parts; is_for_writing: a writer needs it and the parts. Marks the
     // account as just used. Cost: O(1).
     void Set(uint64_t bytes, bool is_for_writing);
+    // Marks the account as just used, or as the first to evict from. Cost: O(1).
+    void Touch();
+    void Age();
     // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
     void Hold(std::vector<std::shared_ptr<MemoryPart>> parts);
     const std::vector<std::shared_ptr<MemoryPart>>& parts() const { return parts_; }
@@ -169,7 +172,8 @@ class MemoryPart {
   friend class MemoryBudget::Account;
   friend class MemoryPin;
 
-  void Pin(bool pins);
+  // Requires: all parts are of one budget.
+  static void Pin(const std::vector<std::shared_ptr<MemoryPart>>& parts, bool pins);
   // Require the budget's mutex.
   void Enter();
   void Leave();
@@ -186,13 +190,11 @@ class MemoryPart {
 class MemoryPin {
  public:
   explicit MemoryPin(std::vector<std::shared_ptr<MemoryPart>> parts) : parts_(std::move(parts)) {
-    for (const auto& part : parts_) part->Pin(true);
+    MemoryPart::Pin(parts_, true);
   }
   MemoryPin(const MemoryPin&) = delete;
   MemoryPin& operator=(const MemoryPin&) = delete;
-  ~MemoryPin() {
-    for (const auto& part : parts_) part->Pin(false);
-  }
+  ~MemoryPin() { MemoryPart::Pin(parts_, false); }
 
  private:
   const std::vector<std::shared_ptr<MemoryPart>> parts_;

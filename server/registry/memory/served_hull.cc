@@ -33,7 +33,7 @@ CanonicalHull::CanonicalHull(Hull hull) { Keep(std::move(hull)); }
 
 void CanonicalHull::Keep(Hull hull) {
   HULLD_CHECK(!is_made());
-  hull_.emplace(std::move(hull));
+  hull_ = std::make_unique<const Hull>(std::move(hull));
   hull_bytes_.store(hull_->MemoryBytes(), std::memory_order_release);
   Count();
 }
@@ -80,7 +80,7 @@ absl::Status CanonicalHull::MakeQueryHull(const std::function<bool()>& should_st
       [&] {
         absl::StatusOr<QueryHull> made = QueryHull::Prepare(*hull_, should_stop);
         if (!made.ok()) return made.status();
-        query_hull_.emplace(*std::move(made));
+        query_hull_ = std::make_unique<const QueryHull>(*std::move(made));
         query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
         Count();
         return absl::OkStatus();

@@ -9,7 +9,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <utility>
 
 #include "core/hull/hull.h"
@@ -31,7 +30,7 @@ class CanonicalHull {
   explicit CanonicalHull(Hull hull);
 
   // Null until built. Cost: O(1).
-  const Hull* hull() const { return is_made() ? &*hull_ : nullptr; }
+  const Hull* hull() const { return is_made() ? hull_.get() : nullptr; }
 
   // Builds the snapshot from a version of the hull; waits if another thread does. DATA_LOSS naming
   // the hull: the version's points contradict `record`. CANCELLED: should_stop, which may be empty,
@@ -70,9 +69,9 @@ class CanonicalHull {
   // A thread is building the snapshot or the query structure. Guarded by the mutex.
   bool making_ = false;
   // Written once, before hull_bytes_ becomes positive.
-  std::optional<Hull> hull_;
+  std::unique_ptr<const Hull> hull_;
   // Likewise before query_hull_bytes_ becomes positive.
-  std::optional<QueryHull> query_hull_;
+  std::unique_ptr<const QueryHull> query_hull_;
   // Positive after each is built.
   std::atomic<size_t> hull_bytes_ = 0;
   std::atomic<size_t> query_hull_bytes_ = 0;

@@ -206,9 +206,9 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
   if (!was_missing)
     ++(was_loaded ? state_.catalog.statistics().misses : state_.catalog.statistics().hits);
   known.view = HullView{hull->committed().record, hull->Serve()};
-  known.bytes = hull->SharedBytes();
-  // A freshly loaded hull was counted at its load; Serve counted the rest.
-  if (!was_loaded) hull->NoteUse();
+  known.bytes = hull->shared_bytes();
+  // Serve counted its parts.
+  hull->NoteRead();
   if (was_missing || was_loaded) {
     state_.memory.Evict(locked);
     state_.catalog.hulls().RestSome();

@@ -447,5 +447,59 @@ TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {
   EXPECT_EQ(hulls_->registry().Cache().bytes, bytes);
 }
 
+TEST(RegistryOfMemoryStore, ASmallHullHasABuilderOnlyWhileASessionIsOpen) {
+  MemoryRegistry hulls(std::make_unique<MemoryStore>());
+  const auto bytes = [&] { return hulls.registry().Cache().bytes; };
+  Replacement replacement;
+  replacement.hull_id = "h";
+  replacement.create_if_absent = true;
+  replacement.builder = std::make_shared<HullBuilder>();
+  replacement.counts = *replacement.builder->Add(CubeCorners());
+  ASSERT_TRUE(hulls.Replace(std::move(replacement)).ok());
+  LiveHull live(CubeCorners(), 3);
+  EXPECT_EQ(bytes(), live.MemoryBytes());
+  const absl::StatusOr<OpenResult> opened = hulls.Open("h");
+  ASSERT_TRUE(opened.ok());
+  ASSERT_TRUE(hulls.Append(opened->session, 1, {{2, 0, 0}}).ok());
+  live.Append(std::vector<Vector>{{2, 0, 0}}, 3);
+  EXPECT_GT(bytes(), live.MemoryBytes() + HullBuilder().MemoryBytes());
+  hulls.registry().hulls().CloseAppend(opened->session);
+  EXPECT_EQ(bytes(), live.MemoryBytes());
+  // The next session goes on from there.
+  EXPECT_EQ(hulls.Put("h", {{3, 0, 0}, {0, 0, 0}})->counts, (PointCounts{2, 1, 1, 0}));
+}
+
+TEST(RegistryOfMemoryStore, AnIdleHullComesBackAsItWas) {
+  MemoryRegistry hulls(std::make_unique<MemoryStore>());
+  Registry& registry = hulls.registry();
+  ASSERT_TRUE(hulls.Put("h", CubeCorners()).ok());
+  ASSERT_TRUE(hulls.Put("h", {{2, 0, 0}}).ok());
+  const HullRecord record = hulls.View("h")->record;
+  const uint64_t awake = registry.Cache().bytes;
+  for (int i = 0; i < 2; ++i) registry.RestIdleHulls();
+  EXPECT_LT(registry.Cache().bytes, awake / 2);
+  EXPECT_GE(registry.Cache().writing_bytes, 9 * sizeof(Vector));
+  EXPECT_EQ(registry.List("", "", 10)->hulls.front().record, record);
+  const HullView view = *hulls.View("h");
+  EXPECT_EQ(view.record, record);
+  EXPECT_EQ(CanonicalOf(view).vertices().size(), record.vertex_count);
+  for (int i = 0; i < 2; ++i) registry.RestIdleHulls();
+  // The writer's sequence is still known, and so is the hull.
+  EXPECT_EQ(hulls.Open("h")->last_sequence, 2);
+  EXPECT_EQ(hulls.Put("h", {{0.5, 0.5, 0.5}})->counts, (PointCounts{1, 0, 0, 1}));
+}
+
+TEST_F(RegistryMemory, AnIdleHullIsNotReadAgain) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Registry& registry = hulls_->registry();
+  for (int i = 0; i < 2; ++i) registry.RestIdleHulls();
+  EXPECT_GT(registry.Cache().bytes, 0);
+  const std::vector<std::string> ids = {"h"};
+  EXPECT_TRUE(registry.reader().TryResolve(ids).has_value());
+  EXPECT_EQ(registry.Cache().loads, 0);
+  EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
+}
+
 }  // namespace registry_memory_test
 }  // namespace hulld::server

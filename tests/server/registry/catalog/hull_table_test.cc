@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "server/registry/catalog/registered_hull.h"
+#include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
 namespace hull_table_test {
@@ -31,6 +34,25 @@ class HullTableTest : public ::testing::Test {
   }
   bool IsAwake(const std::string& id) const {
     return table_.entries().find(id)->second.awake() != nullptr;
+  }
+  // The hull with the points of a unit cube.
+  HullTable::HullPointer Cube(const std::string& id) {
+    table_.AddResting(Stored(id, 3));
+    HullTable::HullPointer hull = table_.Find(id);
+    hull->SetLive(std::make_shared<LiveHull>(CubeCorners(), 3));
+    hull->NoteUse();
+    return hull;
+  }
+  static void RestIdle(Locked& locked, HullTable& table) {
+    std::string cursor;
+    while (table.RestIdle(locked, cursor)) {
+      locked.Unlock();
+      locked.Lock();
+    }
+  }
+  // Longer than a hull must be unused.
+  void PassTime() {
+    for (int i = 0; i < 2; ++i) RestIdle(locked_, table_);
   }
 
   FairMutex mutex_;
@@ -119,6 +141,106 @@ TEST_F(HullTableTest, TheHandGoesRoundAnyNumberOfHulls) {
   for (int i = 0; i < 37; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
 }
 
+TEST_F(HullTableTest, AnIdleSmallHullTakesItsPointsAlone) {
+  Cube("a");
+  RestIdle(locked_, table_);
+  EXPECT_TRUE(IsAwake("a")) << "looked up since the last visit";
+  RestIdle(locked_, table_);
+  ASSERT_FALSE(IsAwake("a"));
+  EXPECT_EQ(table_.entries().find("a")->second.compact()->points.size(), 8);
+  EXPECT_EQ(budget_.Statistics().bytes, table_.compact_bytes());
+  EXPECT_GE(table_.compact_bytes(), 8 * sizeof(Vector));
+  EXPECT_TRUE(table_.entries().find("a")->second.Describe("a").has_box);
+  const auto hull = table_.Find("a");
+  EXPECT_EQ(hull->committed(), Stored("a", 3));
+  EXPECT_EQ(hull->builder(), nullptr);
+  EXPECT_EQ(hull->Serve()->query_hull().point_count(), 8);
+  EXPECT_EQ(hull->Serve()->high(), Vector(1, 1, 1));
+  EXPECT_EQ(table_.compact_bytes(), 0);
+  EXPECT_GE(budget_.Statistics().bytes, hull->live()->MemoryBytes());
+}
+
+TEST_F(HullTableTest, IdleHullsInUseStayAwake) {
+  const auto expect_awake_while = [&](const char* what, auto begin, auto end) {
+    begin(*Cube("x"));
+    PassTime();
+    EXPECT_TRUE(IsAwake("x")) << what;
+    end(*table_.Find("x"));
+    PassTime();
+    EXPECT_FALSE(IsAwake("x")) << what;
+    table_.Erase(table_.Find("x"));
+  };
+  std::shared_ptr<const ServedHull> served;
+  expect_awake_while(
+      "a reader", [&](RegisteredHull& hull) { served = hull.Serve(); },
+      [&](RegisteredHull&) { served = nullptr; });
+  HullTable::HullPointer held;
+  expect_awake_while(
+      "a call", [&](RegisteredHull&) { held = table_.Find("x"); },
+      [&](RegisteredHull&) { held = nullptr; });
+  expect_awake_while(
+      "a session", [](RegisteredHull& hull) { hull.watches[1] = {}; },
+      [](RegisteredHull& hull) { hull.watches.clear(); });
+  expect_awake_while(
+      "a thread that prepares it", [](RegisteredHull& hull) { hull.SetPreparing(true); },
+      [](RegisteredHull& hull) { hull.SetPreparing(false); });
+  expect_awake_while(
+      "an end on its way", [](RegisteredHull& hull) { hull.state.StartEnding(); },
+      [](RegisteredHull& hull) { hull.state.Refuse(); });
+}
+
+TEST_F(HullTableTest, AnIdleLargeHullStaysAwake) {
+  StoredHull stored = Stored("x", 3);
+  stored.record.vertex_count = 1000;
+  table_.AddResting(stored);
+  table_.Find("x")->SetLive(std::make_shared<LiveHull>(SpherePoints(1000), 3));
+  PassTime();
+  EXPECT_TRUE(IsAwake("x"));
+}
+
+TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
+  constexpr int kHulls = 300;
+  for (int i = 0; i < kHulls; ++i) Cube("h" + std::to_string(i));
+  PassTime();
+  for (int i = 0; i < kHulls; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
+  EXPECT_LE(mutex_.Statistics().most_lookups, kMostLookupsPerHold);
+}
+
+// Of two idle hulls and one in use, the idle ones lose their points.
+TEST_F(HullTableTest, UnderPressureIdleHullsAreDroppedFirst) {
+  Cube("a");
+  Cube("b");
+  PassTime();
+  const auto used = Cube("c");
+  const uint64_t all = budget_.Statistics().bytes;
+  MemoryCharge charge(budget_, MemoryUse::kReading, (1 << 30) - all + 1);
+  budget_.Evict(locked_);
+  EXPECT_EQ(table_.compact_bytes(), 0);
+  EXPECT_NE(used->live(), nullptr);
+  EXPECT_FALSE(table_.Find("a")->IsReady());
+  EXPECT_EQ(table_.Find("a")->committed(), Stored("a", 3));
+}
+
+TEST_F(HullTableTest, WithoutAStoreIdleHullsKeepPointsAndSequences) {
+  HullTable table(false, budget_);
+  const auto insert = [&](const std::string& id) {
+    const auto hull = table.Insert(Stored(id, 3), HullState::Present());
+    hull->SetLive(std::make_shared<LiveHull>(CubeCorners(), 3));
+    hull->KeepSequence("w", 4);
+    hull->NoteUse();
+  };
+  insert("x");
+  for (int i = 0; i < 2; ++i) RestIdle(locked_, table);
+  ASSERT_NE(table.entries().find("x")->second.compact(), nullptr);
+  EXPECT_EQ(budget_.Statistics().writing, table.compact_bytes());
+  MemoryCharge charge(budget_, MemoryUse::kReading, 1 << 30);
+  budget_.Evict(locked_);
+  const auto hull = table.Find("x");
+  EXPECT_EQ(hull->Serve()->query_hull().point_count(), 8);
+  EXPECT_EQ(hull->CommittedSequence("w"), 4);
+  EXPECT_EQ(hull->HeadSequence("w"), 4);
+}
+
 // Sanitizers have their own allocators.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST_F(HullTableTest, AHullAtRestTakesLessThan300Bytes) {
@@ -128,6 +250,16 @@ TEST_F(HullTableTest, AHullAtRestTakesLessThan300Bytes) {
   const size_t each = (mallinfo2().uordblks - before) / kHulls;
   RecordProperty("bytes", static_cast<int>(each));
   EXPECT_LT(each, 300);
+}
+
+TEST_F(HullTableTest, AnIdleBoxTakesLessThan600Bytes) {
+  constexpr int kHulls = 20000;
+  const size_t before = mallinfo2().uordblks;
+  for (int i = 0; i < kHulls; ++i) Cube("part/" + std::to_string(i));
+  PassTime();
+  const size_t each = (mallinfo2().uordblks - before) / kHulls;
+  RecordProperty("bytes", static_cast<int>(each));
+  EXPECT_LT(each, 600);
 }
 #endif
 

@@ -184,5 +184,18 @@ TEST(MemoryBudgetDeathTest, AnEvictionWithoutTheMutexOfTheOwnersEndsTheProcess) 
   EXPECT_DEATH(budget.Evict(locked), "check failed");
 }
 
+TEST_F(MemoryBudgetTest, AgedAccountsAreEvictedFirstAndTouchedOnesLast) {
+  std::vector<std::unique_ptr<Owner>> owners;
+  for (int i = 0; i < 4; ++i) {
+    owners.push_back(std::make_unique<Owner>(*this, i, 25));
+    owners.back()->account.Set(25, false);
+  }
+  owners[0]->account.Touch();
+  owners[3]->account.Age();
+  const MemoryCharge charge(budget_, MemoryUse::kReading, 100);
+  Evict();
+  EXPECT_THAT(asked_, ElementsAre(3, 1, 2, 0));
+}
+
 }  // namespace memory_budget_test
 }  // namespace hulld::server
