@@ -176,7 +176,8 @@ int main(int argc, char** argv) {
   options.durability = hulld::server::Durability::kRelaxed;
   auto store = hulld::server::RocksDbStore::Open(options);
   if (!store.ok()) {
-    std::fprintf(stderr, "many_hulls_benchmark: %s\n", std::string(store.status().message()).c_str());
+    std::fprintf(stderr, "many_hulls_benchmark: %s\n",
+                 std::string(store.status().message()).c_str());
     return 1;
   }
   return hulld::server::Run(**store, hulls);
