@@ -64,7 +64,7 @@ std::pair<HullTable::Place, bool> HullTable::AddEntry(const std::string& id) {
 }
 
 void HullTable::EraseEntry(Place place) {
-  SetCompact(place->second, nullptr);
+  ExchangeCompact(place->second, nullptr);
   index_.erase(place);
   entries_.erase(place);
 }
@@ -95,21 +95,23 @@ void HullTable::Wake(const std::string& id, Entry& entry) {
   const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
   entry.awake_ = std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
   if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
-  if (resting.compact == nullptr) return;
-  entry.awake_->Restore(*resting.compact);
-  SetCompact(entry, nullptr);
+  if (const auto compact = ExchangeCompact(entry, nullptr); compact != nullptr) {
+    entry.awake_->Restore(*compact);
+  }
 }
 
-// Sets the points of a hull at rest, and counts them. Under memory pressure they go first: the
-// hulls of the other accounts were used since.
-void HullTable::SetCompact(Entry& entry, std::unique_ptr<CompactHull> compact) {
+// Sets the points of a hull at rest, counts them, and returns the former ones. Under memory
+// pressure they go first: the hulls of the other accounts were used since.
+std::unique_ptr<CompactHull> HullTable::ExchangeCompact(Entry& entry,
+                                                        std::unique_ptr<CompactHull> compact) {
   std::unique_ptr<CompactHull>& kept = entry.resting_.compact;
-  if (kept == nullptr && compact == nullptr) return;
+  if (kept == nullptr && compact == nullptr) return nullptr;
   if (kept != nullptr) compact_bytes_ -= kept->MemoryBytes();
-  kept = std::move(compact);
-  if (kept != nullptr) compact_bytes_ += kept->MemoryBytes();
+  if (compact != nullptr) compact_bytes_ += compact->MemoryBytes();
+  std::swap(kept, compact);
   compact_account_.Set(compact_bytes_, !readable_);
   compact_account_.Age();
+  return compact;
 }
 
 // Drops the points of some hulls at rest, which the store can read back.
@@ -118,7 +120,7 @@ void HullTable::DropCompact() {
   auto next = entries_.upper_bound(compact_hand_);
   for (int i = 0; i < kMostVisited && next != entries_.end(); ++i) {
     compact_hand_ = next->first;
-    SetCompact(next++->second, nullptr);
+    ExchangeCompact(next++->second, nullptr);
   }
   if (next == entries_.end()) compact_hand_.clear();
 }
@@ -164,7 +166,7 @@ void HullTable::Erase(const HullPointer& hull) {
   --size_;
   if (!is_cache()) return EraseEntry(*found);
   Entry& entry = (*found)->second;
-  SetCompact(entry, nullptr);
+  ExchangeCompact(entry, nullptr);
   entry = {};
   entry.is_absent_ = true;
 }
@@ -200,7 +202,7 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
     entry.resting_ = AtRest(*entry.awake_);
     entry.awake_->account.Close();
     locked.Discard(std::exchange(entry.awake_, nullptr));
-    SetCompact(entry, std::move(compact));
+    ExchangeCompact(entry, std::move(compact));
     ++rested;
   }
   return true;

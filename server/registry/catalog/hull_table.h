@@ -168,7 +168,7 @@ class HullTable {
   void Wake(const std::string& id, Entry& entry);
   bool IsUnused(const HullPointer& hull) const;
   static RestingHull AtRest(const RegisteredHull& hull);
-  void SetCompact(Entry& entry, std::unique_ptr<CompactHull> compact);
+  std::unique_ptr<CompactHull> ExchangeCompact(Entry& entry, std::unique_ptr<CompactHull> compact);
   void DropCompact();
 
   const bool readable_;
