@@ -28,9 +28,9 @@ namespace hulld::server {
 // A store may hold millions of hulls with few in use. A hull at rest, unused since its load or for
 // some time, takes only a record: 240 bytes of heap including its ID instead of 1120; with a
 // 32-byte ID 289 instead of 1271 (**observed**: mallinfo2 of glibc 2.36 over 200 000 hulls; IDs of
-// up to 15 bytes cost nothing more). A lookup turns the record into a RegisteredHull. A clock hand
-// turns it back into a record when it finds the hull unused. Each operation advances the hand by a
-// few hulls, so no pass over all of them is needed.
+// up to 15 bytes cost nothing more), and some 20 bytes in the index. A lookup turns the record into
+// a RegisteredHull. A clock hand turns it back into a record when it finds the hull unused. Each
+// operation advances the hand by a few hulls, so no pass over all of them is needed.
 //
 // A small hull that is in memory and was not looked up for some time (RestIdle) takes its record
 // and its points (CompactHull). If the store can read it back, the points are evicted before any

@@ -177,8 +177,8 @@ class RegisteredHull {
   void NoteRead() { account.Touch(); }
   // True if the stored record alone can restore the hull.
   bool IsAtRest() const;
-  // Returns what restores the hull together with its record, if it is small and unused; otherwise
-  // null. Cost: O(points).
+  // Returns the points and sequences that restore the hull together with its record; null unless it
+  // is small and unused. Cost: O(points).
   std::unique_ptr<CompactHull> Compact() const;
   // Restores a hull that was compact. Requires: nothing was set before but the box.
   void Restore(CompactHull& compact);

@@ -28,7 +28,6 @@
 namespace hulld::server {
 namespace {
 
-// Milliseconds would do for the whole; clock() wraps too early.
 double ProcessorSeconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
