@@ -94,6 +94,18 @@ class RobotTest(viewer_case.ViewerCase):
         self.browser.driver.find_element(By.ID, "play").click()
         self.browser.wait("!hulldViewer.timeLine.playing && hulldViewer.model.objects[2].pose[6] === 3")
 
+    def test_the_page_of_the_guide_proves_its_answers(self):
+        page = pathlib.Path(__file__).resolve().parents[4] / "client/pictures/arm.html"
+        self.browser.driver.get(page.as_uri())
+        self.browser.wait("document.body.dataset.fitted")
+        self.browser.js("hulldViewer.model.select(2, 0)")
+        relations = set()
+        for waypoint in range(self.browser.js("hulldViewer.model.waypoints.length")):
+            self.slide("#moment", waypoint)
+            self.assertIn("\u2713 Proven", self.browser.text("#proof"), waypoint)
+            relations.add(self.browser.text("#relation").split()[-1])
+        self.assertEqual(relations, {"separated", "overlapping"})
+
     def test_wrong_uses_are_refused(self):
         for arguments, words in (
                 (["arm.urdf", "box"], "arm.urdf is a robot; it cannot be combined"),
