@@ -54,7 +54,7 @@ class RobotTest(viewer_case.ViewerCase):
         self.browser.wait("hulldViewer.model.objects[2].pose[4] === 4")
         self.assertEqual(self.place(1), [6, 0, 0])
         answer = self.assert_answers_as_api()
-        self.assertEqual(answer["separation"]["value"], 2.5)
+        self.assertAlmostEqual(answer["separation"]["value"], 2.5)
         # Links are moved by joints alone.
         self.assertTrue(self.browser.js("document.querySelector('#mode-move').disabled"))
         self.keys("x", "x")
