@@ -56,7 +56,7 @@ class FilesTest(viewer_case.ViewerCase):
         pathlib.Path(self.hulld.directory, "shapes.txt").write_text(json.dumps(scene))
         self.view("shapes.txt")
         self.browser.wait(AT_REST)
-        self.assertEqual(self.browser.fact("separation"), "2")
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
         self.assertIn("\u2713 Proven", self.browser.text("#proof"))
 
     def test_a_scene_file_needs_no_server_of_its_own(self):
@@ -68,7 +68,7 @@ class FilesTest(viewer_case.ViewerCase):
                         str(target)], cwd=self.hulld.directory, check=True)
         self.browser.driver.get(target.as_uri())
         self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
-        self.assertEqual(self.browser.fact("separation"), "2")
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
         self.assertIn("\u2713 Proven", self.browser.text("#proof"))
 
     def test_a_picture_without_a_window(self):
