@@ -473,7 +473,8 @@ def _collect(
     order = np.argsort(np.concatenate([np.empty(0, np.int64), *(part.rows for part in found)]))
 
     def all_of(values: Sequence[npt.NDArray[Any]], none: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return np.concatenate([none, *values])[order]
+        joined: npt.NDArray[Any] = np.concatenate([none, *values])[order]
+        return joined
 
     faults = all_of([part.faults for part in found], np.zeros((0, len(Fault)), bool))
     errors = all_of([part.errors for part in found], np.empty(0))
