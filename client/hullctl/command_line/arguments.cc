@@ -34,8 +34,8 @@ absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
   }
 }
 
-// The rotation of a pose, or none.
-v1::Quaternion RotationOf(const v1::Pose& pose) {
+// Returns the rotation of a pose; the identity if it has none.
+v1::Quaternion GivenRotation(const v1::Pose& pose) {
   if (pose.has_rotation()) return pose.rotation();
   v1::Quaternion none;
   none.set_w(1);
@@ -122,7 +122,7 @@ absl::StatusOr<v1::Pose> ParsePose(const std::string& text) {
 }
 
 void SetMotion(const v1::Pose& end, v1::Placement* placement) {
-  const v1::Quaternion start = RotationOf(placement->pose());
+  const v1::Quaternion start = GivenRotation(placement->pose());
   v1::Quaternion q = end.has_rotation() ? end.rotation() : start;
   const v1::Quaternion from = Scaled(start);
   const v1::Quaternion to = Scaled(q);
