@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -31,6 +32,25 @@ absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
     if (comma == std::string_view::npos) return numbers;
     text.remove_prefix(comma + 1);
   }
+}
+
+// Returns the rotation of a pose; the identity if it has none.
+v1::Quaternion GivenRotation(const v1::Pose& pose) {
+  if (pose.has_rotation()) return pose.rotation();
+  v1::Quaternion none;
+  none.set_w(1);
+  return none;
+}
+
+// Makes the largest component 1, so that products do not overflow.
+v1::Quaternion Scaled(v1::Quaternion q) {
+  const double largest =
+      std::max({std::abs(q.w()), std::abs(q.x()), std::abs(q.y()), std::abs(q.z())});
+  q.set_w(q.w() / largest);
+  q.set_x(q.x() / largest);
+  q.set_y(q.y() / largest);
+  q.set_z(q.z() / largest);
+  return q;
 }
 
 }  // namespace
@@ -99,6 +119,23 @@ absl::StatusOr<v1::Pose> ParsePose(const std::string& text) {
   absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
   if (!numbers.ok()) return numbers.status();
   return PoseFromNumbers(*numbers);
+}
+
+void SetMotion(const v1::Pose& end, v1::Placement* placement) {
+  const v1::Quaternion start = GivenRotation(placement->pose());
+  v1::Quaternion q = end.has_rotation() ? end.rotation() : start;
+  const v1::Quaternion from = Scaled(start);
+  const v1::Quaternion to = Scaled(q);
+  const bool is_longer =
+      from.w() * to.w() + from.x() * to.x() + from.y() * to.y() + from.z() * to.z() < 0;
+  if (is_longer) {
+    q.set_w(-q.w());
+    q.set_x(-q.x());
+    q.set_y(-q.y());
+    q.set_z(-q.z());
+  }
+  *placement->mutable_end_pose() = end;
+  *placement->mutable_end_pose()->mutable_rotation() = q;
 }
 
 }  // namespace hulld

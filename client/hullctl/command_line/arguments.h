@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "hulld/v1/collision.pb.h"
 #include "hulld/v1/geometry.pb.h"
 
 namespace hulld {
@@ -25,6 +26,10 @@ absl::StatusOr<v1::Pose> ParsePose(const std::string& text);
 
 // Makes a pose of 3 or 7 numbers.
 absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers);
+
+// Moves a placement to `end`, on the shorter of the two paths between the rotations. Without a
+// rotation, `end` keeps that of the start.
+void SetMotion(const v1::Pose& end, v1::Placement* placement);
 
 }  // namespace hulld
 

@@ -1,7 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
-#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -196,42 +194,6 @@ void PrintAnswer(const Invocation& run, const PairArguments& arguments,
   } else {
     PrintAnswerTable(run, arguments, request, response, verification);
   }
-}
-
-v1::Quaternion RotationOf(const v1::Pose& pose) {
-  if (pose.has_rotation()) return pose.rotation();
-  v1::Quaternion none;
-  none.set_w(1);
-  return none;
-}
-
-// Makes the largest component 1, so that products do not overflow.
-v1::Quaternion Scaled(v1::Quaternion q) {
-  const double largest =
-      std::max({std::abs(q.w()), std::abs(q.x()), std::abs(q.y()), std::abs(q.z())});
-  q.set_w(q.w() / largest);
-  q.set_x(q.x() / largest);
-  q.set_y(q.y() / largest);
-  q.set_z(q.z() / largest);
-  return q;
-}
-
-// Moves a placement to `end`, on the shorter of the two paths between the rotations.
-void SetMotion(const v1::Pose& end, v1::Placement* placement) {
-  const v1::Quaternion start = RotationOf(placement->pose());
-  v1::Quaternion q = end.has_rotation() ? end.rotation() : start;
-  const v1::Quaternion from = Scaled(start);
-  const v1::Quaternion to = Scaled(q);
-  const bool is_longer =
-      from.w() * to.w() + from.x() * to.x() + from.y() * to.y() + from.z() * to.z() < 0;
-  if (is_longer) {
-    q.set_w(-q.w());
-    q.set_x(-q.x());
-    q.set_y(-q.y());
-    q.set_z(-q.z());
-  }
-  *placement->mutable_end_pose() = end;
-  *placement->mutable_end_pose()->mutable_rotation() = q;
 }
 
 // Makes an ID or a file the shape of a placement.

@@ -15,6 +15,9 @@
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/local/local_server.h"
 #include "client/hullctl/printing/table.h"
+#include "client/hullctl/robot/robot_scene.h"
+#include "client/hullctl/scene/scene_sync.h"
+#include "client/hullctl/scene/yaml_scene.h"
 #include "client/hullctl/view/bridge/bridge.h"
 #include "client/hullctl/view/bridge/page_html.h"
 #include "client/hullctl/view/browser_picture.h"
@@ -38,12 +41,26 @@ struct ViewArguments {
   std::string html_file;
   std::string png_file;
   PictureSize size;
-  std::string up = "y";
+  // Empty: chosen by Up.
+  std::string up;
+  // Of the robot, if the only thing is one.
+  RobotSceneArguments robot;
 };
 
-// Returns true if the file name is that of a scene rather than a mesh or points.
-bool IsSceneName(const std::string& name) {
-  return name.ends_with(".json") || name.ends_with(".yaml") || name.ends_with(".yml");
+// Returns true if the argument is the file of a robot.
+bool IsRobot(const std::string& argument) {
+  return (argument.ends_with(".urdf") || argument.ends_with(".xml")) && IsFile(argument);
+}
+
+// Returns true if the argument is a scene rather than a mesh or points.
+bool IsScene(const std::string& argument) {
+  return IsFile(argument) && !IsRobot(argument) && IsSceneFile(argument);
+}
+
+// Returns the axis that points up: z for a robot, as in ROS; otherwise y, as in glTF.
+std::string Up(const ViewArguments& arguments) {
+  if (!arguments.up.empty()) return arguments.up;
+  return std::ranges::any_of(arguments.things, IsRobot) ? "z" : "y";
 }
 
 // A file, readable only by this user, that redirects a browser to the address. Other users can see
@@ -98,7 +115,7 @@ class Viewing {
   Viewing(const Invocation& run, const ViewArguments& arguments)
       : run_(run),
         arguments_(arguments),
-        program_{run.MakeClient(), run.server, arguments.up, arguments.edit, {}, {}},
+        program_{run.MakeClient(), run.server, Up(arguments), arguments.edit, {}, {}},
         temporary_(program_.client) {}
 
   ExitCode Run() {
@@ -136,12 +153,13 @@ class Viewing {
     if (things.size() > 1) absl::StrAppend(&scene.title, " and ", things.size() - 1, " more");
     if (things.empty()) things.emplace_back();
     for (const std::string& thing : things) {
-      if (IsSceneName(thing) && IsFile(thing)) {
+      if (IsRobot(thing) || IsScene(thing)) {
         if (things.size() > 1) {
           return run_.FailUsage(absl::InvalidArgumentError(
-              absl::StrCat(thing, " is a scene; it cannot be combined with other arguments")));
+              absl::StrCat(thing, " is a ", IsRobot(thing) ? "robot" : "scene",
+                           "; it cannot be combined with other arguments")));
         }
-        const absl::Status added = AddSceneFile(thing, &scene);
+        const absl::Status added = IsRobot(thing) ? AddTheRobot(&scene) : AddTheScene(&scene);
         if (!added.ok()) return run_.FailUsage(added);
       } else if (IsFile(thing)) {
         const absl::Status added = AddFile(thing, &scene);
@@ -153,6 +171,24 @@ class Viewing {
     }
     program_.scenes.push_back(std::move(scene));
     return ExitCode::kDone;
+  }
+
+  absl::Status AddTheRobot(ViewScene* scene) {
+    RobotSceneArguments robot = arguments_.robot;
+    robot.robot.urdf = arguments_.things[0];
+    return AddRobot(robot, program_.client, &temporary_, scene);
+  }
+
+  // With --local, the server receives the hulls and bodies that the scene defines.
+  absl::Status AddTheScene(ViewScene* scene) {
+    const std::string& path = arguments_.things[0];
+    if (run_.local) {
+      const auto description = ReadYamlScene(path);
+      const absl::Status put =
+          description.ok() ? PutAll(program_.client, *description) : absl::OkStatus();
+      if (!put.ok()) return put;
+    }
+    return AddSceneFile(path, scene);
   }
 
   // Takes the shape from the file. Its hull is registered on the server of --local; any other
@@ -262,6 +298,12 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
     return run.FailUsage(
         absl::InvalidArgumentError("--demo shows its own scenes; remove " + arguments.things[0]));
   }
+  const bool is_robot = arguments.things.size() == 1 && IsRobot(arguments.things[0]);
+  if (!is_robot && !(arguments.robot.joints.empty() && arguments.robot.srdf.empty() &&
+                     arguments.robot.robot.packages.empty())) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--joints, --srdf, and --package need a robot: name one .urdf file"));
+  }
   if (!arguments.demo && !arguments.scene_key.empty()) {
     return run.FailUsage(absl::InvalidArgumentError("--scene needs --demo"));
   }
@@ -276,7 +318,7 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   const bool is_temporary =
       arguments.demo || (!arguments.things.empty() &&
                          std::ranges::all_of(arguments.things, [](const std::string& thing) {
-                           return IsFile(thing) && !IsSceneName(thing);
+                           return IsFile(thing) && !IsScene(thing);
                          }));
   if (!is_temporary || run.local) return Viewing(run, arguments).Run();
   // All hulls are temporary: a server of its own keeps them.
@@ -289,6 +331,19 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   return Viewing(local, arguments).Run();
 }
 
+void AddRobotOptions(Command command, RobotSceneArguments* robot) {
+  command.AddText("--joints", &robot->joints, "Trajectory of a robot, as for 'hullctl robot check'")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  command
+      .AddText("--srdf", &robot->srdf,
+               "Exclude exactly the pairs of links that this semantic description disables")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  command.AddRepeated("--package", &robot->robot.packages, "Folder of a package; repeatable")
+      .ValueName("NAME=DIR");
+}
+
 }  // namespace
 
 void AddViewCommand(Command program, Invocation* invocation) {
@@ -296,8 +351,8 @@ void AddViewCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("view", "Show hulls, bodies, and files in a browser");
   command
       .AddTexts("ID|PREFIX|FILE", &arguments->things,
-                "IDs or prefixes of hulls and bodies, meshes, points, or a scene (.yaml, .json); "
-                "default: all hulls and bodies")
+                "IDs or prefixes of hulls and bodies, meshes, points, a scene, or a robot "
+                "(.urdf); default: all hulls and bodies")
       .Completes(ValueKind::kPlaced);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the demo scenes, keys 0 to 7, with temporary hulls");
@@ -323,7 +378,8 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .ValueName("WIDTHxHEIGHT");
   command.AddFlag("--edit", &arguments->edit,
                   "Let the page append points to hulls and delete them");
-  command.AddText("--up", &arguments->up, "The axis that points up (default y)")
+  AddRobotOptions(command, &arguments->robot);
+  command.AddText("--up", &arguments->up, "The axis that points up (default z for a robot, else y)")
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
   command.SetDetails(
@@ -332,12 +388,17 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "--edit it changes nothing on the server. Files alone, and --demo, need no server: hullctl\n"
       "starts one of its own, which ends with the viewer. Beside hulls of another server, the\n"
       "hull of a FILE is not stored: its vertices, at most 4096, are sent with each query. Press\n"
-      "? on the page for its keys. --png runs chromium or another browser of its family.");
+      "? on the page for its keys. --png runs chromium or another browser of its family.\n"
+      "\n"
+      "A scene is YAML or JSON, as for 'hullctl scene'; with --local, its hulls and bodies are\n"
+      "created, too. A robot has a slider for each joint and, with --joints, a time line that\n"
+      "marks the waypoints in contact. Its pairs are those of 'hullctl robot check'.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
        {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
        {"A scene", "hullctl view scene.json"},
+       {"A robot on its way", "hullctl view arm.urdf --joints path.csv"},
        {"A file to share", "hullctl view arm --html arm.html"},
        {"A picture for a report", "hullctl view scene.yaml --png scene.png --size 1200x800"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });

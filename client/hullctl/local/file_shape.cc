@@ -6,6 +6,8 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
+#include <utility>
 
 #include "client/formats/point_file.h"
 #include "client/hullctl/body/hull_segment.h"
@@ -37,42 +39,50 @@ absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* poin
   return absl::InvalidArgumentError(absl::StrCat(request.path, ": the file holds no point"));
 }
 
-// Registers the hull of a file; returns its ID.
-absl::StatusOr<std::string> Register(const Client& client, const ReadRequest& request) {
-  v1::ReplaceOpen open;
-  // The whole path, so that files of different folders differ.
-  open.set_hull_id(HullSegment(request.path));
-  open.set_create_if_absent(true);
-  const auto replaced = client.ReplaceHull(open, [&request](const Client::PointSink& sink) {
+using Feed = std::function<absl::Status(const Client::PointSink& sink)>;
+
+Feed FeedOf(const ReadRequest& request) {
+  return [&request](const Client::PointSink& sink) {
     return ReadPoints(request, [&sink](const PointChunk& block) { return sink(ToProto(block)); })
         .status();
-  });
-  if (!replaced.ok()) return replaced.status();
-  return open.hull_id();
+  };
 }
 
-// Returns the hull of a file, built by a local server.
-absl::StatusOr<HullMesh> Build(const ReadRequest& request) {
+absl::Status Register(const Client& client, const std::string& hull_id, const Feed& feed) {
+  v1::ReplaceOpen open;
+  open.set_hull_id(hull_id);
+  open.set_create_if_absent(true);
+  return client.ReplaceHull(open, feed).status();
+}
+
+// Returns the hulls of the points from each feed, built by a local server.
+absl::StatusOr<std::vector<HullMesh>> Build(const std::vector<Feed>& feeds) {
   const auto server = LocalServer::Start();
   if (!server.ok()) return server.status();
   ClientOptions options;
   options.server = (*server)->address();
   options.own_connection = true;
   const Client client(options);
-  const auto id = Register(client, request);
-  if (!id.ok()) return id.status();
-  return client.GetHullMesh(*id);
+  std::vector<HullMesh> hulls;
+  for (const Feed& feed : feeds) {
+    if (absl::Status status = Register(client, "shape", feed); !status.ok()) return status;
+    auto mesh = client.GetHullMesh("shape");
+    if (!mesh.ok()) return mesh.status();
+    hulls.push_back(*std::move(mesh));
+  }
+  return hulls;
 }
 
 // Sets `points` to the vertices of the hull of a file.
 absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
-  const auto mesh = Build(request);
-  if (!mesh.ok()) {
-    return absl::Status(mesh.status().code(),
+  const auto hulls = Build({FeedOf(request)});
+  if (!hulls.ok()) {
+    return absl::Status(hulls.status().code(),
                         absl::StrCat(request.path, " holds more than ", kMaxShapePoints,
                                      " points, so a local server has to find the vertices: ",
-                                     mesh.status().message()));
+                                     hulls.status().message()));
   }
+  const HullMesh* const mesh = &hulls->front();
   if (mesh->vertex_count() > kMaxShapePoints) {
     return absl::InvalidArgumentError(
         absl::StrCat(request.path, ": its hull has ", mesh->vertex_count(),
@@ -101,9 +111,11 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
   if (absl::IsOutOfRange(read)) {
     points.Clear();
     if (run.local) {
-      const auto id = Register(run.MakeClient(), request);
-      if (!id.ok()) return id.status();
-      placement->set_hull_id(*id);
+      // The whole path, so that files of different folders differ.
+      const std::string id = HullSegment(request.path);
+      const absl::Status status = Register(run.MakeClient(), id, FeedOf(request));
+      if (!status.ok()) return status;
+      placement->set_hull_id(id);
       return absl::OkStatus();
     }
     read = ReadVertices(request, &points);
@@ -117,7 +129,17 @@ absl::StatusOr<HullMesh> HullOfFile(const std::string& path) {
   if (!format.ok()) return format.status();
   ReadRequest request{path, *format, {}, {}};
   request.options.skip_nonfinite = true;
-  return Build(request);
+  auto hulls = Build({FeedOf(request)});
+  if (!hulls.ok()) return hulls.status();
+  return std::move(hulls->front());
+}
+
+absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes) {
+  std::vector<Feed> feeds;
+  for (const v1::PointBlock& shape : shapes) {
+    feeds.emplace_back([&shape](const Client::PointSink& sink) { return sink(shape); });
+  }
+  return Build(feeds);
 }
 
 }  // namespace hulld

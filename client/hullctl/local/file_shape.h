@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include <string>
+#include <vector>
 
 #include "client/client.h"
 #include "client/hullctl/command_line/invocation.h"
@@ -26,6 +27,9 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
 // Returns the hull of all finite points of a file, built by a server of hullctl's own. Errors as
 // above, whatever the number of vertices.
 absl::StatusOr<HullMesh> HullOfFile(const std::string& path);
+
+// Returns the hull of each shape, built by a server of hullctl's own. Errors of that server.
+absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes);
 
 // Limit of the server (Placement.points).
 inline constexpr size_t kMaxShapePoints = 4096;

@@ -4,9 +4,12 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +19,7 @@
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/pairs/batch_answers.h"
 #include "client/hullctl/pairs/judged_table.h"
+#include "client/hullctl/pairs/trade_plot.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
@@ -30,7 +34,8 @@ constexpr size_t kAnswersPerCall = 65'536;
 
 struct JudgeArguments {
   std::string file;
-  double max_error = 0;
+  Allowed allowed;
+  std::string plot_file;
 };
 
 // The hulls, bodies, and files of a table, each once.
@@ -89,17 +94,21 @@ struct WrongAnswer {
 class JudgeRun {
  public:
   JudgeRun(const Invocation& run, const std::vector<JudgedAnswer>& answers,
-           const JudgedHulls& hulls, double max_error)
+           const JudgedHulls& hulls, const JudgeArguments& arguments)
       : run_(run),
         answers_(answers),
         hulls_(hulls),
-        max_error_(max_error),
+        arguments_(arguments),
         client_(run.MakeClient()),
         bar_(run.err, run.shows_progress, "answers", answers.size()) {}
 
   ExitCode Run() {
-    for (size_t begin = 0; begin < answers_.size(); begin += kAnswersPerCall) {
-      const absl::Status asked = Ask(begin, std::min(begin + kAnswersPerCall, answers_.size()));
+    std::vector<const JudgedAnswer*> resting;
+    std::vector<const JudgedAnswer*> moving;
+    for (const JudgedAnswer& answer : answers_)
+      (answer.moves ? moving : resting).push_back(&answer);
+    for (const auto& answers : {resting, moving}) {
+      const absl::Status asked = AskAll(answers);
       if (!asked.ok()) return run_.Fail(asked);
     }
     bar_.Clear();
@@ -111,6 +120,10 @@ class JudgeRun {
       if (!proven.ok()) return run_.Fail(proven);
     }
     PrintSummary();
+    if (!arguments_.plot_file.empty()) {
+      const absl::Status plotted = Plot(resting);
+      if (!plotted.ok()) return run_.FailUsage(plotted);
+    }
     return invalid_ > 0      ? ExitCode::kInvalidCertificate
            : !wrong_.empty() ? ExitCode::kRequestFailed
            : failed_ > 0     ? ExitCode::kSomeFailed
@@ -118,35 +131,57 @@ class JudgeRun {
   }
 
  private:
-  absl::Status Ask(size_t begin, size_t end) {
+  using Answers = std::span<const JudgedAnswer* const>;
+
+  // Asks about answers that all move, or all rest.
+  absl::Status AskAll(Answers answers) {
+    for (size_t begin = 0; begin < answers.size(); begin += kAnswersPerCall) {
+      const Answers part =
+          answers.subspan(begin, std::min(kAnswersPerCall, answers.size() - begin));
+      const absl::Status asked =
+          AskBatch(client_, RequestFor(part), nullptr,
+                   [&](size_t pair, const AnswerRow& row, const std::string* problem) {
+                     Take(*part[pair], row, problem);
+                     bar_.Update(++taken_);
+                     return absl::OkStatus();
+                   });
+      if (!asked.ok()) return asked;
+    }
+    return absl::OkStatus();
+  }
+
+  v1::BatchCheckCollisionsRequest RequestFor(Answers answers) const {
     v1::BatchCheckCollisionsRequest request;
-    request.mutable_wanted()->set_separation(true);
+    request.mutable_wanted()->set_separation(!answers.front()->moves);
     v1::PackedPlacements& packed = *request.mutable_packed_placements();
     packed = hulls_.packed();
-    for (size_t i = begin; i < end; ++i) {
+    for (const JudgedAnswer* const answer : answers) {
       for (const size_t side : {size_t{0}, size_t{1}}) {
         request.add_pairs(static_cast<uint32_t>(packed.hulls_size()));
-        packed.add_hulls(hulls_.IndexOf(answers_[i].names[side]));
-        const auto& pose = answers_[i].poses[side];
+        packed.add_hulls(hulls_.IndexOf(answer->names[side]));
+        const auto& pose = answer->poses[side];
         packed.mutable_poses()->Add(pose.begin(), pose.end());
+        const auto& end = answer->end_poses[side];
+        if (answer->moves) packed.mutable_end_poses()->Add(end.begin(), end.end());
       }
     }
-    return AskBatch(client_, request, nullptr,
-                    [&](size_t pair, const AnswerRow& row, const std::string* problem) {
-                      Take(answers_[begin + pair], row, problem);
-                      bar_.Update(begin + pair + 1);
-                      return absl::OkStatus();
-                    });
+    return request;
   }
 
   void Take(const JudgedAnswer& answer, const AnswerRow& row, const std::string* problem) {
-    if (problem != nullptr) {
+    const bool is_open = row.relation == v1::RELATION_WITHIN_TOLERANCE;
+    if (problem != nullptr || is_open) {
       ++failed_;
       bar_.Clear();
-      run_.err << "hullctl: line " << answer.line << ": " << *problem << "\n";
+      run_.err << "hullctl: line " << answer.line << ": "
+               << (is_open ? "the motion is so near to a graze that neither contact nor separation "
+                             "is proven"
+                           : *problem)
+               << "\n";
       return;
     }
-    Judgement judgement = Judge(answer, row, max_error_);
+    Judgement judgement = Judge(answer, row, arguments_.allowed);
+    time_error_ = std::max(time_error_, judgement.time_error);
     distance_error_ = std::max(distance_error_, judgement.distance_error);
     depth_error_ = std::max(depth_error_, judgement.depth_error);
     for (const Fault fault : judgement.faults) ++counts_[static_cast<int>(fault)];
@@ -156,30 +191,43 @@ class JudgeRun {
   // Asks again, with a certificate and the nearest double of the separation, and prints the wrong
   // answer.
   absl::Status Prove(const WrongAnswer& wrong) {
+    const bool moves = wrong.answer->moves;
     v1::CheckCollisionRequest request;
-    request.mutable_wanted()->set_separation(true);
-    request.mutable_wanted()->set_max_error(0);
     request.mutable_wanted()->set_certificate(true);
+    if (!moves) {
+      request.mutable_wanted()->set_separation(true);
+      request.mutable_wanted()->set_max_error(0);
+    }
     for (const size_t side : {size_t{0}, size_t{1}}) {
       v1::Placement& placement = side == 0 ? *request.mutable_a() : *request.mutable_b();
       placement = hulls_.placement(wrong.answer->names[side]);
-      const auto& pose = wrong.answer->poses[side];
-      const auto made = PoseFromNumbers({pose.begin(), pose.end()});
-      if (!made.ok()) return made.status();
-      *placement.mutable_pose() = *made;
+      const auto set = [](const std::array<double, 7>& numbers, v1::Pose* pose) {
+        const auto made = PoseFromNumbers({numbers.begin(), numbers.end()});
+        if (made.ok()) *pose = *made;
+        return made.status();
+      };
+      absl::Status made = set(wrong.answer->poses[side], placement.mutable_pose());
+      if (made.ok() && moves) {
+        made = set(wrong.answer->end_poses[side], placement.mutable_end_pose());
+      }
+      if (!made.ok()) return made;
     }
     const auto verified = CheckCollisionVerified(client_, request);
     if (!verified.ok()) return verified.status();
     if (verified->verification.verdict == Verdict::kInvalid) ++invalid_;
     AnswerRow row;
     row.relation = verified->response.relation();
-    row.separation = verified->response.separation();
-    Print({wrong.answer, Judge(*wrong.answer, row, max_error_)}, request, *verified);
+    if (moves) {
+      row.first_contact = verified->response.first_contact();
+    } else {
+      row.separation = verified->response.separation();
+    }
+    Print({wrong.answer, Judge(*wrong.answer, row, arguments_.allowed)}, row, request, *verified);
     return absl::OkStatus();
   }
 
-  void Print(const WrongAnswer& wrong, const v1::CheckCollisionRequest& request,
-             const VerifiedResponse& proof) {
+  void Print(const WrongAnswer& wrong, const AnswerRow& row,
+             const v1::CheckCollisionRequest& request, const VerifiedResponse& proof) {
     const std::string faults =
         absl::StrJoin(wrong.judgement.faults, ", ",
                       [](std::string* out, Fault fault) { out->append(FaultName(fault)); });
@@ -196,12 +244,9 @@ class JudgeRun {
                       .Close()
                << "\n";
     } else {
-      const v1::CheckCollisionResponse& response = proof.response;
       run_.out << "line " << wrong.answer->line << "\t" << wrong.answer->names[0] << "\t"
                << wrong.answer->names[1] << "\t" << run_.paint(Hue::kBad, faults) << "\toff by "
-               << ShortestText(wrong.judgement.error) << "\t"
-               << PaintedRelation(response.relation(), run_.paint) << "\t"
-               << SeparationText(response.separation()) << "\t"
+               << ShortestText(wrong.judgement.error) << "\t" << RowText(row, run_.paint) << "\t"
                << VerificationText(proof.verification, run_.paint) << "\n";
     }
     run_.out << std::flush;
@@ -213,8 +258,8 @@ class JudgeRun {
   }
 
   void PrintSummary() {
-    constexpr const char* kMembers[kFaults] = {"falseContacts", "misses", "touchingMistaken",
-                                               "wrongDistances", "wrongDepths"};
+    constexpr const char* kMembers[kFaults] = {"falseContacts",  "misses",      "touchingMistaken",
+                                               "wrongDistances", "wrongDepths", "wrongTimes"};
     if (run_.names()) return;
     if (run_.json()) {
       JsonObject object;
@@ -222,7 +267,8 @@ class JudgeRun {
       for (int i = 0; i < kFaults; ++i) object.Add(kMembers[i], counts_[i]);
       object.Add("failed", failed_)
           .AddJson("largestDistanceError", JsonNumber(distance_error_))
-          .AddJson("largestDepthError", JsonNumber(depth_error_));
+          .AddJson("largestDepthError", JsonNumber(depth_error_))
+          .AddJson("largestTimeError", JsonNumber(time_error_));
       run_.out << object.Close() << "\n";
       return;
     }
@@ -232,13 +278,56 @@ class JudgeRun {
       run_.out << (i > 0 ? ", " : " ") << FaultName(static_cast<Fault>(i)) << " " << counts_[i];
     }
     run_.out << "\n# largest error of a distance " << ShortestText(distance_error_)
-             << ", of a depth " << ShortestText(depth_error_) << "\n";
+             << ", of a depth " << ShortestText(depth_error_) << ", of a time "
+             << ShortestText(time_error_) << "\n";
+  }
+
+  // Plots the time and the error of the program beside those of this server, which depend on the
+  // wanted accuracy.
+  absl::Status Plot(Answers resting) {
+    TradePlot plot;
+    for (const JudgedAnswer& answer : answers_) {
+      if (answer.microseconds) plot.times.push_back(*answer.microseconds);
+    }
+    plot.error = std::max(distance_error_, depth_error_);
+    plot.wrong = static_cast<double>(wrong_.size()) / static_cast<double>(answers_.size());
+    if (resting.empty() || plot.times.empty()) {
+      return absl::InvalidArgumentError(
+          "--plot needs pairs at rest, and a column us: microseconds of each answer");
+    }
+    const Answers part = resting.subspan(0, std::min(kAnswersPerCall, resting.size()));
+    for (const double exponent : {-15.0, -12.0, -9.0, -6.0, -3.0}) {
+      const auto point = Measure(part, std::pow(10, exponent));
+      if (!point.ok()) return point.status();
+      plot.server.push_back(*point);
+    }
+    return WriteTradePlot(plot, arguments_.plot_file);
+  }
+
+  // Returns the time of a pair, and the largest proven bound.
+  absl::StatusOr<TradePoint> Measure(Answers answers, double max_error) {
+    v1::BatchCheckCollisionsRequest request = RequestFor(answers);
+    request.mutable_wanted()->set_max_error(max_error);
+    TradePoint point;
+    const auto start = std::chrono::steady_clock::now();
+    const absl::Status asked =
+        AskBatch(client_, request, nullptr,
+                 [&](size_t /*pair*/, const AnswerRow& row, const std::string* problem) {
+                   if (problem == nullptr) {
+                     point.error = std::max(point.error, row.separation->bound());
+                   }
+                   return absl::OkStatus();
+                 });
+    const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - start;
+    point.microseconds = time.count() / static_cast<double>(answers.size());
+    if (!asked.ok()) return asked;
+    return point;
   }
 
   const Invocation& run_;
   const std::vector<JudgedAnswer>& answers_;
   const JudgedHulls& hulls_;
-  const double max_error_;
+  const JudgeArguments& arguments_;
   const Client client_;
   ProgressBar bar_;
   std::vector<WrongAnswer> wrong_;
@@ -247,6 +336,8 @@ class JudgeRun {
   uint64_t invalid_ = 0;
   double distance_error_ = 0;
   double depth_error_ = 0;
+  double time_error_ = 0;
+  uint64_t taken_ = 0;
 };
 
 ExitCode JudgeTable(const Invocation& run, const JudgeArguments& arguments) {
@@ -261,7 +352,7 @@ ExitCode JudgeTable(const Invocation& run, const JudgeArguments& arguments) {
   if (absl::Status resolved = hulls.Resolve(run, *answers); !resolved.ok()) {
     return run.FailUsage(resolved);
   }
-  return JudgeRun(run, *answers, hulls, arguments.max_error).Run();
+  return JudgeRun(run, *answers, hulls, arguments).Run();
 }
 
 }  // namespace
@@ -275,25 +366,38 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
   command.AddLength("--max-error",
                     "Largest error that a distance or depth may have (default 0: as exact as the "
                     "proven bound)",
-                    [data = arguments.get()](double length) { data->max_error = length; });
+                    [data = arguments.get()](double length) { data->allowed.error = length; });
+  command.AddLength("--max-time-error",
+                    "How far a time of contact may be outside of the proven bracket (default 0)",
+                    [data = arguments.get()](double time) { data->allowed.time_error = time; });
+  command
+      .AddText("--plot", &arguments->plot_file,
+               "Plot time and error of the program beside those of hulld, as SVG, with gnuplot")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "The table has a header of column names, in any order, then a row for each answer:\n"
       "  a, b                    IDs of hulls or bodies, or files with points\n"
       "  a_x, a_y, a_z           translation of a (default 0), likewise b_x and so on\n"
       "  a_qw, a_qx, a_qy, a_qz  quaternion of a (default identity), likewise b_qw and so on\n"
+      "  a_to_x, ..., a_to_qz    pose of a at the end of a motion (default: that of the start)\n"
       "  relation                SEPARATED, TOUCHING, or OVERLAPPING\n"
       "  colliding               0 or 1, of a program that does not tell touching from "
       "overlapping\n"
       "  distance                0 or more; a negative one is minus a depth\n"
       "  depth                   0 or more\n"
+      "  contact_time            time of the first contact of a motion, 0 to 1\n"
+      "  us                      microseconds of the answer, for --plot\n"
       "An empty cell is no answer. Other columns are ignored, with a note. Wrong answers are\n"
       "printed worst first, each with the exact relation, the separation, and the check of its\n"
       "certificate by hullctl's own exact arithmetic; with --output json, each line is a record\n"
       "for 'hullctl verify'. Exits with 1 if an answer is wrong.");
-  command.SetExamples({{"", "hullctl judge answers.csv"},
-                       {"Files, without a server; distances to a micrometer",
-                        "hullctl judge answers.csv --local --max-error 1e-6"}});
+  command.SetExamples(
+      {{"", "hullctl judge answers.csv"},
+       {"Files, without a server; distances to a micrometer",
+        "hullctl judge answers.csv --local --max-error 1e-6"},
+       {"A chart of time and error", "hullctl judge answers.csv --plot trade.svg"}});
   command.OnGiven(
       [=] { invocation->action = [=] { return JudgeTable(*invocation, *arguments); }; });
 }

@@ -6,16 +6,22 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <string_view>
 #include <utility>
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/pose/rigid_pose.h"
 #include "client/robot/joint_file.h"
 
 namespace hulld {
 namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 absl::StatusOr<double> NumberOf(std::string_view cell) {
   double number = 0;
@@ -69,45 +75,61 @@ absl::Status ReadDistance(std::string_view cell, std::optional<double>* distance
   return read.status();
 }
 
-absl::Status ReadDepth(std::string_view cell, std::optional<double>* depth) {
+// Reads a number from 0 to `most`, called `what`.
+absl::Status ReadUpTo(double most, const char* what, std::string_view cell,
+                      std::optional<double>* value) {
   const auto read = NumberOf(cell);
   if (!read.ok()) return read.status();
-  if (*read < 0) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        std::string(cell), " is no depth, a length of at least 0; leave the cell empty"));
+  if (*read < 0 || *read > most) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(std::string(cell), " is no ", what, "; leave the cell empty"));
   }
-  *depth = *read;
+  *value = *read;
   return absl::OkStatus();
 }
 
+using EndCells = std::array<std::array<std::optional<double>, 7>, 2>;
+
 // Reads a cell into its field. Empty cells are not read.
-using CellReader = std::function<absl::Status(std::string_view cell, JudgedAnswer* answer)>;
+using CellReader =
+    std::function<absl::Status(std::string_view cell, JudgedAnswer* answer, EndCells* ends)>;
 
 std::map<std::string, CellReader, std::less<>> MakeReaders() {
   std::map<std::string, CellReader, std::less<>> readers;
   constexpr const char* kPoseColumns[] = {"_qw", "_qx", "_qy", "_qz", "_x", "_y", "_z"};
   for (const size_t side : {size_t{0}, size_t{1}}) {
     const std::string name = side == 0 ? "a" : "b";
-    readers[name] = [side](std::string_view cell, JudgedAnswer* answer) {
+    readers[name] = [side](std::string_view cell, JudgedAnswer* answer, EndCells*) {
       return ReadName(cell, &answer->names[side]);
     };
     for (size_t i = 0; i < 7; ++i) {
-      readers[name + kPoseColumns[i]] = [side, i](std::string_view cell, JudgedAnswer* answer) {
+      readers[name + kPoseColumns[i]] = [side, i](std::string_view cell, JudgedAnswer* answer,
+                                                  EndCells*) {
         return ReadFinite(cell, &answer->poses[side][i]);
+      };
+      readers[name + "_to" + kPoseColumns[i]] = [side, i](std::string_view cell, JudgedAnswer*,
+                                                          EndCells* ends) {
+        return ReadFinite(cell, &(*ends)[side][i].emplace());
       };
     }
   }
-  readers["relation"] = [](std::string_view cell, JudgedAnswer* answer) {
+  readers["relation"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
     return ReadRelation(cell, &answer->relation);
   };
-  readers["colliding"] = [](std::string_view cell, JudgedAnswer* answer) {
+  readers["colliding"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
     return ReadColliding(cell, &answer->colliding);
   };
-  readers["distance"] = [](std::string_view cell, JudgedAnswer* answer) {
+  readers["distance"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
     return ReadDistance(cell, &answer->distance);
   };
-  readers["depth"] = [](std::string_view cell, JudgedAnswer* answer) {
-    return ReadDepth(cell, &answer->depth);
+  readers["depth"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
+    return ReadUpTo(kInfinity, "depth, a length of at least 0", cell, &answer->depth);
+  };
+  readers["contact_time"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
+    return ReadUpTo(1, "time from 0 to 1", cell, &answer->contact_time);
+  };
+  readers["us"] = [](std::string_view cell, JudgedAnswer* answer, EndCells*) {
+    return ReadUpTo(kInfinity, "duration of at least 0", cell, &answer->microseconds);
   };
   return readers;
 }
@@ -135,20 +157,21 @@ class TableReader {
         return absl::InvalidArgumentError(absl::StrCat(
             "the header names no column ", name, ", which holds an ID or a file for each row"));
       }
-      const std::string first = absl::StrCat(name, "_q");
-      const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {
-        return column.size() == 4 && column.starts_with(first);
-      });
-      if (given != 0 && given != 4) {
+      for (const std::string& first : {absl::StrCat(name, "_q"), absl::StrCat(name, "_to_q")}) {
+        const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {
+          return column.size() == first.size() + 1 && column.starts_with(first);
+        });
+        if (given == 0 || given == 4) continue;
         return absl::InvalidArgumentError(absl::StrCat("a quaternion has four columns: ", first,
                                                        "w ", first, "x ", first, "y ", first, "z"));
       }
     }
-    if (Has("relation") || Has("colliding") || Has("distance") || Has("depth")) {
-      return absl::OkStatus();
+    for (const char* name : {"relation", "colliding", "distance", "depth", "contact_time"}) {
+      if (Has(name)) return absl::OkStatus();
     }
     return absl::InvalidArgumentError(
-        "the header names no answer; it needs relation, colliding, distance, or depth");
+        "the header names no answer; it needs relation, colliding, distance, depth, or "
+        "contact_time");
   }
 
   absl::StatusOr<JudgedAnswer> ReadRow(const std::vector<std::string_view>& cells) const {
@@ -157,10 +180,11 @@ class TableReader {
           absl::StrCat("the row has ", cells.size(), " cells, the header ", columns_.size()));
     }
     JudgedAnswer answer;
-    answer.poses[0] = answer.poses[1] = {1, 0, 0, 0, 0, 0, 0};
+    answer.poses[0] = answer.poses[1] = kNoMotion;
+    EndCells ends;
     for (size_t i = 0; i < cells.size(); ++i) {
       if (cells[i].empty() || readers_[i] == nullptr) continue;
-      const absl::Status read = (*readers_[i])(cells[i], &answer);
+      const absl::Status read = (*readers_[i])(cells[i], &answer, &ends);
       if (!read.ok()) {
         return absl::InvalidArgumentError(absl::StrCat(columns_[i], ": ", read.message()));
       }
@@ -171,17 +195,51 @@ class TableReader {
         return absl::InvalidArgumentError(
             absl::StrCat(name, " is empty; it takes an ID or a file"));
       }
-      const auto& pose = answer.poses[side];
-      if (std::all_of(pose.begin(), pose.begin() + 4, [](double part) { return part == 0; })) {
-        return absl::InvalidArgumentError(
-            absl::StrCat(name, "_qw, ", name, "_qx, ", name, "_qy, ", name,
-                         "_qz are all 0; any other quaternion is a rotation"));
-      }
+      absl::Status rotates = CheckRotation(answer.poses[side], name);
+      if (!rotates.ok()) return rotates;
+      rotates = SetEnd(ends[side], side, absl::StrCat(name, "_to"), &answer);
+      if (!rotates.ok()) return rotates;
+    }
+    if (answer.moves && (answer.distance || answer.depth)) {
+      return absl::InvalidArgumentError(
+          "distance and depth are those of a pair at rest; leave them empty for a motion");
+    }
+    if (!answer.moves && answer.contact_time) {
+      return absl::InvalidArgumentError(
+          "contact_time needs a motion: an end pose, as in a_to_x, a_to_y, a_to_z");
     }
     return answer;
   }
 
  private:
+  static absl::Status CheckRotation(const RigidPose& pose, const std::string& name) {
+    if (std::any_of(pose.begin(), pose.begin() + 4, [](double part) { return part != 0; })) {
+      return absl::OkStatus();
+    }
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, "_qw, ", name, "_qx, ", name, "_qy, ", name,
+                     "_qz are all 0; any other quaternion is a rotation"));
+  }
+
+  // Sets the end pose of a side: the pose, with the cells that are given, on the shorter path.
+  static absl::Status SetEnd(const std::array<std::optional<double>, 7>& cells, size_t side,
+                             const std::string& name, JudgedAnswer* answer) {
+    RigidPose end = answer->poses[side];
+    for (size_t i = 0; i < cells.size(); ++i) {
+      answer->moves = answer->moves || cells[i].has_value();
+      end[i] = cells[i].value_or(end[i]);
+    }
+    if (absl::Status rotates = CheckRotation(end, name); !rotates.ok()) return rotates;
+    const auto to = PoseFromNumbers({end.begin(), end.end()});
+    const auto from = PoseFromNumbers({answer->poses[side].begin(), answer->poses[side].end()});
+    if (!to.ok() || !from.ok()) return to.ok() ? from.status() : to.status();
+    v1::Placement placement;
+    *placement.mutable_pose() = *from;
+    SetMotion(*to, &placement);
+    answer->end_poses[side] = NumbersOf(placement.end_pose());
+    return absl::OkStatus();
+  }
+
   bool Has(std::string_view name) const {
     return std::find(columns_.begin(), columns_.end(), name) != columns_.end();
   }
@@ -210,6 +268,31 @@ std::optional<Fault> FaultOfRelation(const JudgedAnswer& answer, v1::Relation tr
   }
   if (answer.colliding && *answer.colliding == separated) return wrong(*answer.colliding);
   return std::nullopt;
+}
+
+Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double max_error) {
+  Judgement judgement;
+  const v1::FirstContact& truth = *row.first_contact;
+  const bool touches = truth.has_contact_time();
+  // A program may say so in several columns; any that says otherwise is wrong.
+  const bool says_contact =
+      answer.contact_time || answer.colliding.value_or(false) ||
+      answer.relation.value_or(v1::RELATION_SEPARATED) != v1::RELATION_SEPARATED;
+  const bool says_none =
+      (answer.colliding && !*answer.colliding) || answer.relation == v1::RELATION_SEPARATED;
+  const double said = answer.contact_time.value_or(1);
+  // The end of the bracket; 1 without contact.
+  const double contact = touches ? truth.contact_time() : 1;
+  if (touches ? says_none : says_contact) {
+    judgement.faults.push_back(touches ? Fault::kMiss : Fault::kFalseContact);
+    judgement.error = touches ? 1 - contact : 1 - said;
+  }
+  if (!touches || !answer.contact_time) return judgement;
+  judgement.time_error = std::max({0.0, truth.separated_until() - said, said - contact});
+  if (judgement.time_error <= max_error) return judgement;
+  judgement.faults.push_back(Fault::kTime);
+  judgement.error = std::max(judgement.error, judgement.time_error);
+  return judgement;
 }
 
 }  // namespace
@@ -252,11 +335,14 @@ const char* FaultName(Fault fault) {
       return "distance";
     case Fault::kDepth:
       return "depth";
+    case Fault::kTime:
+      return "time";
   }
   return "";
 }
 
-Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, double max_error) {
+Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, const Allowed& allowed) {
+  if (answer.moves) return JudgeMotion(answer, row, allowed.time_error);
   Judgement judgement;
   const double separation = row.separation->value();
   if (const std::optional<Fault> fault = FaultOfRelation(answer, row.relation)) {
@@ -265,7 +351,7 @@ Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, double max_err
   }
   const auto judge = [&](double claimed, double truth, Fault fault) {
     const double error = Difference(claimed, truth);
-    if (error <= max_error + row.separation->bound()) return error;
+    if (error <= allowed.error + row.separation->bound()) return error;
     judgement.faults.push_back(fault);
     judgement.error = std::max(judgement.error, error);
     return error;

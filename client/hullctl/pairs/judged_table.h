@@ -21,18 +21,26 @@ struct JudgedAnswer {
   std::array<std::string, 2> names;
   // Quaternion w x y z, translation x y z.
   std::array<std::array<double, 7>, 2> poses;
+  // True if the pair moves; then its poses at the end.
+  bool moves = false;
+  std::array<std::array<double, 7>, 2> end_poses;
   // The answer, as far as it is given. Relation: TOUCHING and OVERLAPPING are one if the program
   // only says that the hulls collide.
   std::optional<bool> colliding;
   std::optional<v1::Relation> relation;
   std::optional<double> distance;
   std::optional<double> depth;
+  // Of a pair that moves: from 0 to 1.
+  std::optional<double> contact_time;
+  // Duration of the call of the other program, in microseconds.
+  std::optional<double> microseconds;
 };
 
 // Reads a table: a header of column names, then a row for each answer, separated by commas,
 // semicolons, tabs, or spaces. Columns: a and b; for each of them a pose, as in a_x a_y a_z a_qw
-// a_qx a_qy a_qz (default: identity); and at least one of relation, colliding, distance, and depth,
-// with empty cells for answers that are not given. `ignored` receives the names of other columns.
+// a_qx a_qy a_qz (default: identity), and the pose at the end of a motion, as in a_to_x (default:
+// the pose); and at least one of relation, colliding, distance, depth, and contact_time, with empty
+// cells for answers that are not given. `ignored` receives the names of other columns but us.
 // INVALID_ARGUMENT names the line and the column.
 absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
                                                           std::vector<std::string>* ignored);
@@ -47,23 +55,36 @@ enum class Fault {
   // The distance or the depth is wrong.
   kDistance,
   kDepth,
+  // The time of the first contact is wrong.
+  kTime,
 };
-inline constexpr int kFaults = 5;
+inline constexpr int kFaults = 6;
 // "false contact" and so on.
 const char* FaultName(Fault fault);
 
 struct Judgement {
   std::vector<Fault> faults;
-  // The largest length by which the answer is wrong; 0 for touching hulls mistaken.
+  // The largest length by which the answer is wrong, of a motion the time; 0 for touching hulls
+  // mistaken.
   double error = 0;
   // |answer - separation| of a distance, and of a depth; 0 if none is given.
   double distance_error = 0;
   double depth_error = 0;
+  // Of a time of contact: how far it is outside of the proven bracket.
+  double time_error = 0;
 };
 
-// Judges an answer by the relation and separation of `row`. A negative distance is minus a depth. A
-// distance or depth is wrong if its error exceeds max_error for certain, by the proven bound.
-Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, double max_error);
+// Largest errors that an answer may have.
+struct Allowed {
+  double error = 0;
+  double time_error = 0;
+};
+
+// Judges an answer by the relation and separation, or the first contact, of `row`. A negative
+// distance is minus a depth. A distance or depth is wrong if its error exceeds allowed.error for
+// certain, by the proven bound. Of a motion, TOUCHING and OVERLAPPING are one, and no contact
+// counts as one at the end. Requires a proven answer: not WITHIN_TOLERANCE.
+Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, const Allowed& allowed);
 
 }  // namespace hulld
 

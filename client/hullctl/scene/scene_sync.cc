@@ -83,6 +83,18 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
   return client.ReplaceHull(open, feed).status();
 }
 
+absl::Status PutAll(const Client& client, const SceneDescription& scene) {
+  for (const HullDefinition& hull : scene.hulls) {
+    const auto xyz = PointsOf(hull);
+    if (!xyz.ok()) return xyz.status();
+    if (absl::Status put = PutHull(client, hull.hull_id, *xyz); !put.ok()) return put;
+  }
+  for (const BodyDefinition& body : scene.bodies) {
+    if (absl::Status put = client.PutBody(BodyRequest(body)).status(); !put.ok()) return put;
+  }
+  return absl::OkStatus();
+}
+
 bool OwnsItsPrefix(const SceneDescription& scene) { return scene.prefix.ends_with('/'); }
 
 absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {

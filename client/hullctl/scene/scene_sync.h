@@ -33,6 +33,10 @@ absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& b
 absl::Status PutHull(const Client& client, const std::string& hull_id,
                      const std::vector<double>& xyz);
 
+// Replaces all hulls and bodies that the scene defines. Returns the first error, of a definition as
+// in PointsOf or of a call.
+absl::Status PutAll(const Client& client, const SceneDescription& scene);
+
 // A hull or a body of the server.
 struct Kept {
   std::string id;

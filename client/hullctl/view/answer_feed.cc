@@ -61,12 +61,6 @@ std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
   return absl::StrCat("[", pair.first, ",", pair.second, "]");
 }
 
-std::string PosesJson(const ViewObject& a, const ViewObject& b) {
-  std::vector<double> poses(a.pose.begin(), a.pose.end());
-  poses.insert(poses.end(), b.pose.begin(), b.pose.end());
-  return NumbersJson(poses.data(), poses.size());
-}
-
 std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                           const ViewObject& b, uint64_t update, bool rest,
                           const v1::HullVersion& version_a, const v1::HullVersion& version_b,
@@ -76,7 +70,7 @@ std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& 
       .AddJson("update", std::to_string(update))
       .AddJson("rest", rest ? "true" : "false")
       .AddJson("pair", PairJson(pair))
-      .AddJson("poses", PosesJson(a, b))
+      .AddJson("poses", PosesJson({a.pose, b.pose}))
       .AddJson("hullA", MessageJson(version_a))
       .AddJson("hullB", MessageJson(version_b));
   AddRow(row, &message);

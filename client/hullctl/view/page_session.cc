@@ -78,7 +78,24 @@ void PageSession::OnMessage(std::string_view json) {
     geometry_.Ask(message->geometry);
   }
   if (message->question) answers_.Ask(*message->question);
+  if (message->joints) MoveJoints(*message->joints);
   if (message->edit) Edit(*std::move(message->edit));
+}
+
+void PageSession::MoveJoints(const ViewConfiguration& configuration) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (configuration.scene != scene_) return;
+  }
+  if (configuration.values.size() != shown_->joints.joints.size() ||
+      shown_->joints.joints.empty()) {
+    page_->SendText(ProblemMessage("The page sent values for other joints than the scene has."));
+    return;
+  }
+  const auto poses = shown_->joints.poses(configuration.values);
+  page_->SendText(poses.ok() ? TextMessage("poses", {{"scene", std::to_string(configuration.scene)},
+                                                     {"poses", PosesJson(*poses)}})
+                             : ProblemMessage(std::string(poses.status().message())));
 }
 
 void PageSession::Edit(ViewEdit edit) {
@@ -115,6 +132,7 @@ void PageSession::Show(const std::string& key) {
     for (const ViewObject& object : scene->objects) known_.insert(object.hull_id);
     known_.insert(scene->pieces.begin(), scene->pieces.end());
   }
+  shown_ = &*scene;
   answers_.Show(*scene, number);
   geometry_.Show(scene->files);
   page_->SendText(SceneMessage(*scene, number));

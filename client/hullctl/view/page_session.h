@@ -47,6 +47,7 @@ class PageSession final : public PageHandler {
  private:
   void Show(const std::string& key);
   void Edit(ViewEdit edit);
+  void MoveJoints(const ViewConfiguration& configuration);
   // Also follows these pieces of bodies from now on.
   void WidenWatch(const std::vector<ShapeRequest>& shapes);
   // Replaces the current watch.
@@ -67,6 +68,8 @@ class PageSession final : public PageHandler {
   std::vector<std::string> prefixes_;
   std::unordered_set<std::string> known_;
 
+  // The current scene.
+  const ViewScene* shown_ = nullptr;
   // Request of the last follower.
   v1::WatchHullsRequest watched_;
   // Declared last, as their threads use the other members. The last one follows the current scene;

@@ -1,6 +1,7 @@
 #include "client/hullctl/view/protocol.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <bit>
 #include <cmath>
@@ -128,6 +129,18 @@ ShapeRequest ReadSimplification(Reader* reader) {
   return shape;
 }
 
+ViewConfiguration ReadConfiguration(Reader* reader) {
+  ViewConfiguration configuration;
+  configuration.scene = reader->Count("scene");
+  for (const Value& number : reader->List("values").values()) {
+    if (!std::isfinite(number.number_value()) || number.kind_case() != Value::kNumberValue) {
+      reader->Complain("values", "contains a value that is not a finite number");
+    }
+    configuration.values.push_back(number.number_value());
+  }
+  return configuration;
+}
+
 ViewEdit ReadEdit(Reader* reader) {
   ViewEdit edit;
   const std::string action = reader->Text("action");
@@ -199,6 +212,8 @@ absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
     message.question = ReadQuestion(&reader);
   } else if (type == "edit") {
     message.edit = ReadEdit(&reader);
+  } else if (type == "joints") {
+    message.joints = ReadConfiguration(&reader);
   } else {
     reader.Complain("type", "is unknown to the bridge");
   }
@@ -241,9 +256,16 @@ std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
                         .AddJson("file", std::to_string(object.file))
                         .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
                         .AddJson("radius", NumberJson(object.radius))
+                        .AddJson("isJointed", object.is_jointed ? "true" : "false")
                         .Close());
   }
   return json + "]";
+}
+
+std::string PosesJson(const std::vector<Pose7>& poses) {
+  std::vector<double> numbers;
+  for (const Pose7& pose : poses) numbers.insert(numbers.end(), pose.begin(), pose.end());
+  return NumbersJson(numbers.data(), numbers.size());
 }
 
 std::string SceneMessage(const ViewScene& scene, uint64_t number) {
@@ -252,12 +274,33 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
     absl::StrAppend(&files, i > 0 ? "," : "",
                     JsonObject().Add("name", scene.files[i]->name).Close());
   }
-  return TextMessage("scene", {{"number", std::to_string(number)},
-                               {"key", QuoteJson(scene.key)},
-                               {"title", QuoteJson(scene.title)},
-                               {"note", QuoteJson(scene.note)},
-                               {"files", files + "]"},
-                               {"objects", ObjectsJson(scene.objects)}});
+  const auto joined = [](const auto& items, const auto& json_of) {
+    return "[" +
+           absl::StrJoin(items, ",",
+                         [&](std::string* out, const auto& item) { out->append(json_of(item)); }) +
+           "]";
+  };
+  const auto joint_json = [](const ViewJoints::Joint& joint) {
+    return JsonObject()
+        .Add("name", joint.name)
+        .AddJson("low", NumberJson(joint.low))
+        .AddJson("high", NumberJson(joint.high))
+        .AddJson("value", NumberJson(joint.value))
+        .Close();
+  };
+  const auto values_json = [](const std::vector<double>& values) {
+    return NumbersJson(values.data(), values.size());
+  };
+  return TextMessage("scene",
+                     {{"number", std::to_string(number)},
+                      {"key", QuoteJson(scene.key)},
+                      {"title", QuoteJson(scene.title)},
+                      {"note", QuoteJson(scene.note)},
+                      {"files", files + "]"},
+                      {"objects", ObjectsJson(scene.objects)},
+                      {"joints", joined(scene.joints.joints, joint_json)},
+                      {"waypoints", joined(scene.joints.waypoints, values_json)},
+                      {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"}});
 }
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {

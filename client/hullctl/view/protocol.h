@@ -35,14 +35,18 @@ namespace hulld {
 //   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
 //              numbers each. Refused unless `hello` permits it. `edited` answers it; pending edits
 //              of a hull may share an answer.
+//   joints     {scene, values, waypoint}: moves the joints of the scene; waypoint: the index of the
+//              waypoint with these values, or null. `poses` answers it.
 //
 // The bridge to the page:
 //   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: true if the page
 //              may change hulls.
-//   scene      {number, key, title, note, files: [{name}], objects: [OBJECT]}: replaces all
-//              previous content. OBJECT is {name, hullId, file, pose}: hullId is that of a hull or
-//              a body, "" if absent; file is -1 if absent. Later messages name objects and files
-//              by their index here.
+//   scene      {number, key, title, note, files: [{name}], objects: [OBJECT], joints: [{name, low,
+//              high, value}], waypoints: [values], contacts}: replaces all previous content. OBJECT
+//              is {name, hullId, file, pose, radius, isJointed}: hullId is that of a hull or a
+//              body, "" if absent; file is -1 if absent; isJointed: moved by the joints only. Later
+//              messages name objects and files by their index here. contacts: the waypoints with a
+//              colliding pair.
 //   objects    {scene, objects}: appends objects to that scene.
 //   hull       {event}: a HullEvent of the contract: a hull or a body changed, appeared, or was
 //              deleted.
@@ -53,6 +57,7 @@ namespace hulld {
 //              {tolerance, relation, rung}, the result of CheckCollision with it.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
 //              of the scene that collide (FindCollisions), a < b.
+//   poses      {scene, poses}: of all jointed objects, seven numbers each.
 //   edited     {hullId, done, message}: result of an edit; message is for people.
 //   problem    {message}: an error, for people.
 //
@@ -68,8 +73,8 @@ namespace hulld {
 //              part.
 //   {kind: "missing", hullId | file, message}: it does not exist.
 //
-// A recording, for a page without a bridge, is {hello, scene, frames: [base64], collisions,
-// answers: [answer]}.
+// A recording, for a page without a bridge, is {hello, scene, frames: [base64], states: [{poses,
+// collisions, answers: [answer]}]}: the state at the start or, if the scene has waypoints, at each.
 
 // A parsed message of the page.
 struct ViewQuestion {
@@ -95,11 +100,16 @@ struct ViewEdit {
   // Points to append, n x 3.
   std::vector<double> points;
 };
+struct ViewConfiguration {
+  uint64_t scene = 0;
+  std::vector<double> values;
+};
 struct PageMessage {
   std::optional<std::string> show;
   std::vector<ShapeRequest> geometry;
   std::optional<ViewQuestion> question;
   std::optional<ViewEdit> edit;
+  std::optional<ViewConfiguration> joints;
 };
 
 // INVALID_ARGUMENT names the defect.
@@ -113,6 +123,9 @@ std::string ProblemMessage(const std::string& message);
 std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from = 0);
 // `number` counts the scenes shown to the page.
 std::string SceneMessage(const ViewScene& scene, uint64_t number);
+
+// Returns the numbers of poses, one after the other.
+std::string PosesJson(const std::vector<Pose7>& poses);
 
 // Return frames.
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh);

@@ -3,7 +3,10 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/view/answer_feed.h"
@@ -37,10 +40,8 @@ std::string AllFrames(const Client& client, const ViewScene& scene) {
   return frames + "]";
 }
 
-absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scene) {
+absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<ViewObject>& objects) {
   std::string answers = "[";
-  const auto& objects = scene.objects;
-  if (objects.size() > kMostRecordedObjects) return answers + "]";
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
@@ -57,19 +58,55 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scen
   return answers + "]";
 }
 
+// Returns the poses of the jointed objects, and the answers about all of them.
+absl::StatusOr<std::string> State(const Client& client, const v1::FindCollisionsRequest& rules,
+                                  const std::vector<ViewObject>& objects, bool with_answers) {
+  const auto collisions = SceneAnswerJson(client, rules, objects, 0, 0);
+  if (!collisions.ok()) return collisions.status();
+  const auto answers = AllPairs(client, with_answers ? objects : std::vector<ViewObject>());
+  if (!answers.ok()) return answers.status();
+  std::vector<Pose7> poses;
+  for (const ViewObject& object : objects) {
+    if (object.is_jointed) poses.push_back(object.pose);
+  }
+  return JsonObject()
+      .AddJson("poses", PosesJson(poses))
+      .AddJson("collisions", *collisions)
+      .AddJson("answers", *answers)
+      .Close();
+}
+
+absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& scene) {
+  std::vector<ViewObject> objects = scene.objects;
+  const size_t count = std::max<size_t>(1, scene.joints.waypoints.size());
+  const size_t pairs = objects.size() * (objects.size() - 1) / 2;
+  std::string states = "[";
+  for (size_t i = 0; i < count; ++i) {
+    if (!scene.joints.waypoints.empty()) {
+      const auto poses = scene.joints.poses(scene.joints.waypoints[i]);
+      if (!poses.ok()) return poses.status();
+      auto pose = poses->begin();
+      for (ViewObject& object : objects) {
+        if (object.is_jointed) object.pose = *pose++;
+      }
+    }
+    const auto state = State(client, scene.rules, objects, count * pairs <= kMostRecordedAnswers);
+    if (!state.ok()) return state.status();
+    absl::StrAppend(&states, i > 0 ? "," : "", *state);
+  }
+  return states + "]";
+}
+
 }  // namespace
 
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene) {
-  const auto collisions = SceneAnswerJson(program.client, scene.rules, scene.objects, 0, 0);
-  if (!collisions.ok()) return collisions.status();
-  const auto answers = AllPairs(program.client, scene);
-  if (!answers.ok()) return answers.status();
+  const auto states = AllStates(program.client, scene);
+  if (!states.ok()) return states.status();
   return JsonObject()
       .AddJson("hello", HelloMessage(program))
       .AddJson("scene", SceneMessage(scene, 1))
       .AddJson("frames", AllFrames(program.client, scene))
-      .AddJson("collisions", *collisions)
-      .AddJson("answers", *answers)
+      .AddJson("states", *states)
       .Close();
 }
 

@@ -9,12 +9,12 @@
 
 namespace hulld {
 
-// Returns the current content of a scene, for a page without a bridge (protocol.h): shapes,
-// colliding pairs, and, for scenes of at most kMostRecordedObjects objects, the full answer for
-// each pair. Returns errors of the calls.
+// Returns the current content of a scene, for a page without a bridge (protocol.h): shapes and, at
+// each waypoint, poses and colliding pairs. The full answer for each pair of objects is included if
+// these are at most kMostRecordedAnswers. Returns errors of the calls.
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene);
 
-inline constexpr size_t kMostRecordedObjects = 12;
+inline constexpr size_t kMostRecordedAnswers = 2000;
 
 }  // namespace hulld
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <string_view>
 #include <unordered_set>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
@@ -83,6 +85,28 @@ bool IsFile(const std::string& argument) {
          !std::filesystem::is_directory(argument, ignored);
 }
 
+bool IsSceneFile(const std::string& path) {
+  for (const char* extension : {".json", ".yaml", ".yml"}) {
+    if (path.ends_with(extension)) return true;
+  }
+  const auto format = PointFormatOfPath(path);
+  std::error_code ignored;
+  if (format.value_or(PointFormat::kXyz) != PointFormat::kXyz ||
+      !std::filesystem::is_regular_file(path, ignored)) {
+    return false;
+  }
+  const auto source = ByteSource::Open(path);
+  std::string_view line;
+  while (source.ok() && (*source)->ReadLine(&line)) {
+    const std::string_view text = Trim(line);
+    if (text.empty() || text.front() == '#') continue;
+    // Lines of the former format are refused with their YAML equivalent.
+    return text.front() == '{' || text.find(':') != std::string_view::npos ||
+           text.starts_with("place ");
+  }
+  return false;
+}
+
 absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
                                ViewScene* scene) {
   const auto hulls = client.ListAllHulls(id_or_prefix);
@@ -119,17 +143,51 @@ absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_pr
   return absl::OkStatus();
 }
 
+namespace {
+
+// Gives the objects at `indices` the hulls of their inline shapes. A hull stands in a file of its
+// own, from which the page receives it.
+absl::Status AddShapes(const std::vector<size_t>& indices,
+                       const std::vector<v1::PointBlock>& shapes, ViewScene* scene) {
+  if (shapes.empty()) return absl::OkStatus();
+  auto hulls = HullsOfShapes(shapes);
+  if (!hulls.ok()) return hulls.status();
+  for (size_t i = 0; i < indices.size(); ++i) {
+    ViewObject& object = scene->objects[indices[i]];
+    auto file = std::make_shared<FileShape>();
+    file->name = object.name;
+    file->hull = std::make_shared<const HullMesh>(std::move((*hulls)[i]));
+    file->xyz = file->hull->xyz;
+    file->point_count = file->hull->vertex_count();
+    file->hull_name = object.name;
+    object.hull = file->hull;
+    object.hull_id = file->hull_name;
+    object.file = static_cast<int>(scene->files.size());
+    scene->files.push_back(std::move(file));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
   const auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
   absl::StatusOr<Scene> file = ReadScene(source->get());
   if (!file.ok()) return file.status();
+  std::vector<size_t> indices;
+  std::vector<v1::PointBlock> shapes;
   for (uint32_t i = 0; i < file->size(); ++i) {
     const std::string& hull_id = *file->HullOf(i);
-    const std::string& name = file->names.empty() ? hull_id : file->names[i];
-    const v1::Placement placement = file->PlacementOf(i);
+    v1::Placement placement = file->PlacementOf(i);
+    const std::string& name =
+        file->names.empty() && !placement.has_points() ? hull_id : file->NameOf(i);
     scene->objects.push_back({name, hull_id, -1, NumbersOf(placement.pose()), placement.radius()});
+    if (!placement.has_points()) continue;
+    indices.push_back(scene->objects.size() - 1);
+    shapes.push_back(std::move(*placement.mutable_points()));
   }
+  if (absl::Status added = AddShapes(indices, shapes, scene); !added.ok()) return added;
   scene->rules = std::move(file->request);
   scene->rules.clear_placements();
   scene->rules.clear_packed_placements();

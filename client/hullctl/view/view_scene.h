@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -44,6 +45,27 @@ struct ViewObject {
   double radius = 0;
   // FileShape::hull of its file; null for an ID.
   std::shared_ptr<const HullMesh> hull = nullptr;
+  // Moved by the joints of the scene only.
+  bool is_jointed = false;
+};
+
+// Joints that move objects of a scene, and a trajectory of them.
+struct ViewJoints {
+  struct Joint {
+    std::string name;
+    // Range of its slider; contains the values of all waypoints.
+    double low = 0;
+    double high = 0;
+    double value = 0;
+  };
+  std::vector<Joint> joints;
+  // Returns the poses of the jointed objects, in order, for a finite value of each joint.
+  // INVALID_ARGUMENT: the values are no configuration.
+  std::function<absl::StatusOr<std::vector<Pose7>>(const std::vector<double>& values)> poses;
+  // Values of the joints at each waypoint.
+  std::vector<std::vector<double>> waypoints;
+  // Waypoints with a colliding pair, ascending.
+  std::vector<uint32_t> contacts;
 };
 
 struct ViewScene {
@@ -57,8 +79,11 @@ struct ViewScene {
   std::vector<std::string> prefixes;
   // Hulls under the prefixes that are shown only as pieces of bodies.
   std::vector<std::string> pieces;
-  // Selection of the queried pairs: groups and movers of a scene file. Without placements.
+  // Selection of the queried pairs: groups and movers of a scene file or a robot. Without
+  // placements.
   v1::FindCollisionsRequest rules;
+  // Empty unless the scene is a robot.
+  ViewJoints joints;
 };
 
 // Reads a mesh (IsMeshFormat) or the points of any other format. Skips points that are not finite.
@@ -77,8 +102,12 @@ bool IsFile(const std::string& argument);
 absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
                                ViewScene* scene);
 
+// Returns true if a file holds a scene rather than points or a mesh: by its extension, or, if that
+// is of plain text or of no known format, by its first line.
+bool IsSceneFile(const std::string& path);
+
 // Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the
-// position.
+// position. Errors of the server that builds the hulls of inline shapes.
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene);
 
 }  // namespace hulld

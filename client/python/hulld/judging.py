@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Union
@@ -27,8 +27,8 @@ TableLike = Union[Mapping[str, Any], str, "os.PathLike[str]"]
 
 _ROWS_PER_CALL = 1 << 16
 _CELLS = ("qw", "qx", "qy", "qz", "x", "y", "z")
-_ANSWERS = ("relation", "colliding", "distance", "depth")
-_COLUMNS = ("a", "b", "poses_a", "poses_b", *_ANSWERS)
+_ANSWERS = ("relation", "colliding", "distance", "depth", "contact_time")
+_COLUMNS = ("a", "b", "poses_a", "poses_b", "end_poses_a", "end_poses_b", *_ANSWERS)
 
 
 class Fault(IntEnum):
@@ -42,12 +42,15 @@ class Fault(IntEnum):
     TOUCHING_MISTAKEN = 2
     DISTANCE = 3
     DEPTH = 4
+    #: The time of the first contact is outside of the proven bracket.
+    TIME = 5
 
 
 @dataclass(frozen=True)
 class WrongAnswer:
-    """A wrong answer. row: of the table, from 0. error: the largest length by which it is wrong; 0
-    if touching hulls are mistaken. answer: the exact one; its certificate was verified."""
+    """A wrong answer. row: of the table, from 0. error: the largest length by which it is wrong, of
+    a motion the time; 0 if touching hulls are mistaken. answer: the exact one; its certificate was
+    verified."""
 
     row: int
     faults: tuple[Fault, ...]
@@ -68,7 +71,8 @@ class WrongAnswer:
 class Judged:
     """The result of judge. wrong: worst first. counts: wrong answers by fault; an answer may have
     several. failed: by row, why there is no exact answer. distance_errors, depth_errors: n, the
-    absolute errors; NaN where none was given."""
+    absolute errors; NaN where none was given. time_errors: n, how far times of contact are outside
+    of the proven brackets."""
 
     answers: int
     wrong: Sequence[WrongAnswer]
@@ -76,19 +80,20 @@ class Judged:
     failed: Mapping[int, Problem]
     distance_errors: npt.NDArray[np.float64]
     depth_errors: npt.NDArray[np.float64]
+    time_errors: npt.NDArray[np.float64]
 
     def __bool__(self) -> bool:
         raise TypeError("a judgement is neither true nor false; use len(judged.wrong)")
 
     def __repr__(self) -> str:
         counts = "".join(f", {fault.name} {count}" for fault, count in self.counts.items() if count)
-        distance, depth = (
+        distance, depth, time = (
             float(np.nanmax(errors, initial=0.0))
-            for errors in (self.distance_errors, self.depth_errors)
+            for errors in (self.distance_errors, self.depth_errors, self.time_errors)
         )
         return (
             f"Judged({self.answers} answers, {len(self.wrong)} wrong{counts}; largest error of a "
-            f"distance {distance:.3g}, of a depth {depth:.3g})"
+            f"distance {distance:.3g}, of a depth {depth:.3g}, of a time {time:.3g})"
         )
 
 
@@ -98,11 +103,22 @@ class _Table:
 
     names: tuple[Sequence[str], Sequence[str]]
     poses: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+    end_poses: tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+    #: True for rows that are motions.
+    moves: npt.NDArray[np.bool_]
     relations: npt.NDArray[np.uint8]
     #: 1, 0, or NaN.
     colliding: npt.NDArray[np.float64]
     distances: npt.NDArray[np.float64]
     depths: npt.NDArray[np.float64]
+    contact_times: npt.NDArray[np.float64]
+
+    def parts(self, rows: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
+        """Splits rows into those of a call each, all at rest or all in motion."""
+        for moves in (False, True):
+            kind = rows[self.moves[rows] == moves]
+            for first in range(0, len(kind), _ROWS_PER_CALL):
+                yield kind[first : first + _ROWS_PER_CALL]
 
     def __len__(self) -> int:
         return len(self.relations)
@@ -113,6 +129,7 @@ def judge(
     *,
     hulls: Mapping[str, PointsLike] | None = None,
     max_error: float = 0.0,
+    max_time_error: float = 0.0,
     client: Client | None = None,
     orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     timeout: float | None = None,
@@ -120,26 +137,31 @@ def judge(
     """Finds the wrong answers of another program, and proves that they are wrong.
 
     table: columns by name, one entry per row: a, b (IDs of hulls or bodies, or names in `hulls`),
-    poses_a, poses_b (as in pack_poses; default: identity), and at least one of relation
-    (SEPARATED, TOUCHING, OVERLAPPING, or hulld.Relation), colliding (boolean), distance (negative:
-    minus a depth), and depth, NaN or empty where there is no answer. Or the path of a .npz file
-    with these arrays, or of a CSV file as `hullctl judge` reads it. hulls: points, n x 3, by name.
-    max_error: a distance or depth is wrong if its error exceeds this for certain, by the proven
-    bound; 0: as exact as that. client: None: a private server, which knows no IDs. timeout: of each
+    poses_a, poses_b (as in pack_poses; default: identity), end_poses_a, end_poses_b (of motions;
+    default: the poses), and at least one of relation (SEPARATED, TOUCHING, OVERLAPPING, or
+    hulld.Relation), colliding (boolean), distance (negative: minus a depth), depth, and
+    contact_time (0 to 1, of a motion), NaN or empty where there is no answer. Or the path of a .npz
+    file with these arrays, or of a CSV file as `hullctl judge` reads it. hulls: points, n x 3, by
+    name. max_error: a distance or depth is wrong if its error exceeds this for certain, by the
+    proven bound; 0: as exact as that. max_time_error: how far a time of contact may be outside of
+    the proven bracket. client: None: a private server, which knows no IDs. timeout: of each
     call.
 
     ValueError: the table is malformed. VerificationError: a certificate does not prove the server's
     answer.
     """
-    limit = arguments.length(max_error, "max_error")
+    limits = (
+        arguments.length(max_error, "max_error"),
+        arguments.length(max_time_error, "max_time_error"),
+    )
     columns = _read(table) if isinstance(table, (str, os.PathLike)) else dict(table)
     rows = _as_table(columns, orthogonality_tolerance)
     asking = _Asking(client or shared_client(), rows, hulls or {}, timeout)
-    found = []
-    for first in range(0, len(rows), _ROWS_PER_CALL):
-        part = np.arange(first, min(first + _ROWS_PER_CALL, len(rows)))
-        found.append(_judge_rows(rows, part, asking.ask(part), limit))
-    return _collect(asking, rows, found, limit)
+    found = [
+        _judge_rows(rows, part, asking.ask(part), limits)
+        for part in rows.parts(np.arange(len(rows)))
+    ]
+    return _collect(asking, rows, found, limits)
 
 
 # --- Tables ---
@@ -164,16 +186,31 @@ def _read(path: str | os.PathLike[str]) -> dict[str, Any]:
     cells = {name: [row[index] for row in rows[1:]] for index, name in enumerate(header)}
     columns: dict[str, Any] = {name: cells[name] for name in ("a", "b", *_ANSWERS) if name in cells}
     for side in "ab":
-        given = [cell for cell in _CELLS[:4] if f"{side}_{cell}" in cells]
-        if len(given) not in (0, 4):
-            raise ValueError(f"{os.fspath(path)}: a quaternion has four columns, from {side}_qw on")
         pose = np.zeros((len(rows) - 1, 7))
         pose[:, 0] = f"{side}_qw" not in cells
-        for index, cell in enumerate(_CELLS):
-            if f"{side}_{cell}" in cells:
-                pose[:, index] = _numbers(cells[f"{side}_{cell}"], f"{side}_{cell}", empty=0.0)
-        columns[f"poses_{side}"] = pose
+        columns[f"poses_{side}"] = _read_poses(os.fspath(path), cells, side, pose, empty=0.0)
+        end = _read_poses(os.fspath(path), cells, f"{side}_to", pose.copy(), empty=math.nan)
+        # A cell that is not given is that of the start.
+        columns[f"end_poses_{side}"] = np.where(np.isnan(end), pose, end)
     return columns
+
+
+def _read_poses(
+    path: str,
+    cells: Mapping[str, list[str]],
+    prefix: str,
+    poses: npt.NDArray[np.float64],
+    empty: float,
+) -> npt.NDArray[np.float64]:
+    """Sets the numbers of poses that have a column."""
+    given = [cell for cell in _CELLS[:4] if f"{prefix}_{cell}" in cells]
+    if len(given) not in (0, 4):
+        raise ValueError(f"{path}: a quaternion has four columns, from {prefix}_qw on")
+    for index, cell in enumerate(_CELLS):
+        name = f"{prefix}_{cell}"
+        if name in cells:
+            poses[:, index] = _numbers(cells[name], name, empty=empty)
+    return poses
 
 
 def _as_table(columns: Mapping[str, Any], orthogonality_tolerance: float) -> _Table:
@@ -191,21 +228,39 @@ def _as_table(columns: Mapping[str, Any], orthogonality_tolerance: float) -> _Ta
     for name, column in columns.items():
         if column is not None and len(column) != count:
             raise ValueError(f"{name} has {len(column)} rows, a {count}")
-    poses = []
-    for name in ("poses_a", "poses_b"):
+    identities = np.tile([1.0, 0, 0, 0, 0, 0, 0], (count, 1))
+
+    def poses(name: str, default: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         given = columns.get(name)
-        packed = np.tile([1.0, 0, 0, 0, 0, 0, 0], (count, 1)) if given is None else pack_poses(
-            given, orthogonality_tolerance=orthogonality_tolerance
-        )  # fmt: skip
-        poses.append(packed)
+        if given is None:
+            return default
+        return pack_poses(given, orthogonality_tolerance=orthogonality_tolerance)
+
+    starts = (poses("poses_a", identities), poses("poses_b", identities))
+    ends = (poses("end_poses_a", starts[0]), poses("end_poses_b", starts[1]))
+    moves = ((starts[0] != ends[0]) | (starts[1] != ends[1])).any(axis=1)
+    times = _lengths(columns.get("contact_time"), count, "contact_time", 0.0)
+    _refuse(times > 1, "contact_time[{}] is above 1, the end of the motion")
+    _refuse(~np.isnan(times) & ~moves, "contact_time[{}] is that of no motion; give an end pose")
+    for name in ("distance", "depth"):
+        given = ~np.isnan(_lengths(columns.get(name), count, name, -math.inf))
+        _refuse(given & moves, name + "[{}] is that of a motion; only pairs at rest have one")
     return _Table(
         ([str(name) for name in columns["a"]], [str(name) for name in columns["b"]]),
-        (poses[0], poses[1]),
+        starts,
+        ends,
+        moves,
         _relations(columns.get("relation"), count),
         _booleans(columns.get("colliding"), count),
         _lengths(columns.get("distance"), count, "distance", -math.inf),
         _lengths(columns.get("depth"), count, "depth", 0.0),
+        times,
     )
+
+
+def _refuse(wrong: npt.NDArray[np.bool_], message: str) -> None:
+    if wrong.any():
+        raise ValueError(message.format(int(np.argmax(wrong))))
 
 
 def _numbers(values: Any, name: str, empty: float) -> npt.NDArray[np.float64]:
@@ -277,22 +332,25 @@ class _Asking:
         self._indices = [np.array([places[name] for name in side], int) for side in table.names]
 
     def placements(self, rows: npt.NDArray[np.int64]) -> Placements:
-        """A of each row, then B of each row."""
+        """A of each row, then B of each row. The rows are all at rest or all in motion."""
+        ends = np.concatenate([poses[rows] for poses in self._table.end_poses])
         return Placements(
             self._ids,
             np.concatenate([poses[rows] for poses in self._table.poses]),
             np.concatenate([indices[rows] for indices in self._indices]),
             shapes=self._shapes,
+            end_poses=ends if self._table.moves[rows].any() else None,
         )
 
     def ask(self, rows: npt.NDArray[np.int64], prove: bool = False) -> Batch:
         """prove: with certificates, and separations that are the nearest doubles."""
         first = np.arange(len(rows))
+        rests = not self._table.moves[rows].any()
         return self.client.check_collisions(
             self.placements(rows),
             np.stack([first, first + len(rows)], axis=1),
-            separation=True,
-            max_error=0 if prove else None,
+            separation=rests,
+            max_error=0 if prove and rests else None,
             certificate=prove,
             timeout=self._timeout,
         )
@@ -303,13 +361,14 @@ class _Asking:
 
 @dataclass
 class _Findings:
-    """Faults and errors of consecutive rows. faults: rows x Fault."""
+    """Faults and errors of rows. faults: rows x Fault."""
 
     rows: npt.NDArray[np.int64]
     faults: npt.NDArray[np.bool_]
     errors: npt.NDArray[np.float64]
     distance_errors: npt.NDArray[np.float64]
     depth_errors: npt.NDArray[np.float64]
+    time_errors: npt.NDArray[np.float64]
     failed: dict[int, Problem] = field(default_factory=dict)
 
 
@@ -321,8 +380,11 @@ def _difference(
 
 
 def _judge_rows(
-    table: _Table, rows: npt.NDArray[np.int64], batch: Batch, max_error: float
+    table: _Table, rows: npt.NDArray[np.int64], batch: Batch, limits: tuple[float, float]
 ) -> _Findings:
+    if table.moves[rows].any():
+        return _judge_motions(table, rows, batch, limits[1])
+    max_error = limits[0]
     count = len(rows)
     truth = batch.answers.relations
     values, bounds = batch.answers.separations, batch.answers.separation_bounds
@@ -354,37 +416,86 @@ def _judge_rows(
         ],
         axis=0,
     )
+    none = np.full(count, np.nan)
+    return _Findings(
+        rows, faults, errors, distance_errors, depth_errors, none, _failed(rows, batch, ~answered)
+    )
+
+
+def _failed(
+    rows: npt.NDArray[np.int64], batch: Batch, which: npt.NDArray[np.bool_]
+) -> dict[int, Problem]:
     unknown = Problem("INTERNAL", "the server gave no reason", None)
-    failed = {
-        int(rows[row]): batch.problem(int(row)) or unknown for row in np.flatnonzero(~answered)
-    }
-    return _Findings(rows, faults, errors, distance_errors, depth_errors, failed)
+    return {int(rows[row]): batch.problem(int(row)) or unknown for row in np.flatnonzero(which)}
+
+
+def _judge_motions(
+    table: _Table, rows: npt.NDArray[np.int64], batch: Batch, max_error: float
+) -> _Findings:
+    """TOUCHING and OVERLAPPING are one; no contact counts as one at the end."""
+    truth = batch.answers.relations
+    until, contact = batch.answers.separated_until, batch.answers.contact_times
+    assert until is not None and contact is not None
+    failed = _failed(rows, batch, truth == Relation.UNSPECIFIED)
+    graze = Problem("FAILED_PRECONDITION", "neither contact nor separation is proven", None)
+    is_open = truth == Relation.WITHIN_TOLERANCE
+    failed.update({int(rows[row]): graze for row in np.flatnonzero(is_open)})
+    answered = (truth != Relation.UNSPECIFIED) & ~is_open
+    touches = answered & ~np.isnan(contact)
+    said, colliding = table.relations[rows], table.colliding[rows]
+    times = table.contact_times[rows]
+    says_contact = ~np.isnan(times) | (colliding == 1) | (said > Relation.SEPARATED)
+    says_none = (colliding == 0) | (said == Relation.SEPARATED)
+    ends = np.where(touches, contact, 1.0)
+    with np.errstate(invalid="ignore"):
+        outside = np.maximum(np.maximum(until - times, times - ends), 0.0)
+    time_errors = np.where(touches, outside, np.nan)
+    faults = np.zeros((len(rows), len(Fault)), bool)
+    faults[:, Fault.MISS] = touches & says_none
+    faults[:, Fault.FALSE_CONTACT] = answered & ~touches & says_contact
+    faults[:, Fault.TIME] = time_errors > max_error
+    errors = np.max(
+        [
+            np.where(faults[:, Fault.MISS], 1 - ends, 0.0),
+            np.where(faults[:, Fault.FALSE_CONTACT] & ~np.isnan(times), 1 - times, 0.0),
+            np.where(faults[:, Fault.TIME], time_errors, 0.0),
+        ],
+        axis=0,
+    )
+    none = np.full(len(rows), np.nan)
+    return _Findings(rows, faults, errors, none, none, time_errors, failed)
 
 
 def _collect(
-    asking: _Asking, table: _Table, found: Sequence[_Findings], max_error: float
+    asking: _Asking, table: _Table, found: Sequence[_Findings], limits: tuple[float, float]
 ) -> Judged:
     """Asks for the certificates of the wrong answers, and verifies them."""
-    faults = np.concatenate([np.zeros((0, len(Fault)), bool), *(part.faults for part in found)])
-    errors = np.concatenate([np.empty(0), *(part.errors for part in found)])
+    order = np.argsort(np.concatenate([np.empty(0, np.int64), *(part.rows for part in found)]))
+
+    def all_of(values: Sequence[npt.NDArray[Any]], none: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        joined: npt.NDArray[Any] = np.concatenate([none, *values])[order]
+        return joined
+
+    faults = all_of([part.faults for part in found], np.zeros((0, len(Fault)), bool))
+    errors = all_of([part.errors for part in found], np.empty(0))
     wrong = np.flatnonzero(faults.any(axis=1))
     wrong = wrong[np.argsort(-errors[wrong], kind="stable")]
     verifier = Verifier(asking.client)
-    proven: list[WrongAnswer] = []
-    for first in range(0, len(wrong), _ROWS_PER_CALL):
-        rows = wrong[first : first + _ROWS_PER_CALL]
+    proven: dict[int, WrongAnswer] = {}
+    for rows in table.parts(wrong):
         batch = asking.ask(rows, prove=True)
-        exact = _judge_rows(table, rows, batch, max_error)
+        exact = _judge_rows(table, rows, batch, limits)
         placements = asking.placements(rows)
         for index, row in enumerate(rows.tolist()):
             verifier.check_row(placements, batch, index)
             named = tuple(Fault(fault) for fault in np.flatnonzero(faults[row]).tolist())
-            proven.append(WrongAnswer(row, named, float(exact.errors[index]), batch[index]))
+            proven[row] = WrongAnswer(row, named, float(exact.errors[index]), batch[index])
     return Judged(
         len(table),
-        proven,
+        [proven[row] for row in wrong.tolist()],
         {fault: int(faults[:, fault].sum()) for fault in Fault},
         {row: problem for part in found for row, problem in part.failed.items()},
-        np.concatenate([np.empty(0), *(part.distance_errors for part in found)]),
-        np.concatenate([np.empty(0), *(part.depth_errors for part in found)]),
+        all_of([part.distance_errors for part in found], np.empty(0)),
+        all_of([part.depth_errors for part in found], np.empty(0)),
+        all_of([part.time_errors for part in found], np.empty(0)),
     )

@@ -3,6 +3,7 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
+#include <zlib.h>
 
 #include <vector>
 
@@ -25,14 +26,19 @@ bool IsModule(std::string_view name) {
 
 // Our modules import each other as "hulld/NAME.js"; the import map resolves these names. So the
 // same files work when served and when embedded in one page.
-template <typename AddressOf>
-std::string ImportMap(const AddressOf& address_of) {
-  JsonObject imports;
+template <typename TextOf>
+std::string ModulesJson(const TextOf& text_of) {
+  JsonObject modules;
   for (const PageFile& file : PageFiles()) {
     if (!IsModule(file.name)) continue;
-    imports.Add(absl::StrCat("hulld/", std::string(file.name)).c_str(), address_of(file));
+    modules.Add(absl::StrCat("hulld/", std::string(file.name)).c_str(), text_of(file));
   }
-  return JsonObject().AddJson("imports", imports.Close()).Close();
+  return modules.Close();
+}
+
+template <typename AddressOf>
+std::string ImportMap(const AddressOf& address_of) {
+  return JsonObject().AddJson("imports", ModulesJson(address_of)).Close();
 }
 
 std::string FillIn(const std::string& resources) {
@@ -44,6 +50,46 @@ std::string FillIn(const std::string& resources) {
 // the backslash has no effect.
 std::string InScript(std::string_view text) {
   return absl::StrReplaceAll(absl::string_view(text.data(), text.size()), {{"</", "<\\/"}});
+}
+
+// Runs the packed scripts: a list of classic scripts, then the modules by name.
+constexpr char kUnpack[] = R"js((async () => {
+  const packed = Uint8Array.from(
+      atob(document.getElementById('packed').textContent), (c) => c.charCodeAt(0));
+  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const texts = await new Response(unpacked).json();
+  if (document.readyState === 'loading') {
+    await new Promise((resolve) => addEventListener('DOMContentLoaded', resolve));
+  }
+  const modules = Object.entries(texts.pop());
+  const imports = Object.fromEntries(modules.map(
+      ([name, text]) => [name, `data:text/javascript,${encodeURIComponent(text)}`]));
+  const run = (type, textContent) =>
+      document.head.append(Object.assign(document.createElement('script'), {type, textContent}));
+  for (const text of texts) run('text/javascript', text);
+  run('importmap', JSON.stringify({imports}));
+  run('module', 'import "hulld/main.js";');
+})())js";
+
+// Compresses in the format of zlib, "deflate" in browsers.
+std::string Deflated(const std::string& text) {
+  uLongf size = compressBound(text.size());
+  std::string packed(size, '\0');
+  compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+            reinterpret_cast<const Bytef*>(text.data()), text.size(), Z_BEST_COMPRESSION);
+  packed.resize(size);
+  return packed;
+}
+
+// Returns index.html with its style and a recording inside, and scripts that start the page.
+std::string StandaloneHtml(std::string_view recording_json, const std::string& scripts) {
+  // The policy permits no connection at all.
+  return FillIn(
+      absl::StrCat("<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+                   "script-src 'unsafe-inline' data:; style-src 'unsafe-inline'\">\n<style>\n",
+                   std::string(FindPageFile("style.css")->bytes),
+                   "</style>\n<script type=\"application/json\" id=\"recording\">",
+                   InScript(recording_json), "</script>\n", scripts));
 }
 
 }  // namespace
@@ -67,29 +113,32 @@ std::string ServedPagePolicy(std::string_view nonce, std::string_view host) {
 }
 
 std::string StandalonePage(std::string_view recording_json) {
-  // The policy permits no connection at all.
-  std::string resources =
-      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
-      "script-src 'unsafe-inline' data:; style-src 'unsafe-inline'\">\n";
-  absl::StrAppend(&resources, "<style>\n", std::string(FindPageFile("style.css")->bytes),
-                  "</style>\n");
+  std::string texts = "[";
   for (const std::string_view script : kClassicScripts) {
-    absl::StrAppend(&resources, "<script>", InScript(FindPageFile(script)->bytes), "</script>\n");
+    absl::StrAppend(&texts, QuoteJson(FindPageFile(script)->bytes), ",");
+  }
+  const std::string modules =
+      ModulesJson([](const PageFile& file) { return std::string(file.bytes); });
+  return StandaloneHtml(recording_json,
+                        absl::StrCat("<script type=\"text/plain\" id=\"packed\">",
+                                     absl::Base64Escape(Deflated(texts + modules + "]")),
+                                     "</script>\n<script>", kUnpack, "</script>"));
+}
+
+std::string PicturePage(std::string_view recording_json, const PictureSize& size) {
+  std::string scripts;
+  for (const std::string_view script : kClassicScripts) {
+    absl::StrAppend(&scripts, "<script>", InScript(FindPageFile(script)->bytes), "</script>\n");
   }
   const std::string map = ImportMap([](const PageFile& file) {
     return absl::StrCat("data:text/javascript;base64,",
                         absl::Base64Escape({file.bytes.data(), file.bytes.size()}));
   });
-  absl::StrAppend(&resources, "<script type=\"importmap\">", map, "</script>\n",
-                  "<script type=\"application/json\" id=\"recording\">", InScript(recording_json),
+  absl::StrAppend(&scripts, "<script type=\"importmap\">", map,
                   "</script>\n<script type=\"module\">import \"hulld/main.js\";</script>");
-  return FillIn(resources);
-}
-
-std::string PicturePage(std::string_view recording_json, const PictureSize& size) {
   const std::string body = absl::StrCat("\n<body class=\"picture\" style=\"--width: ", size.width,
                                         "px; --height: ", size.height, "px\">\n");
-  return absl::StrReplaceAll(StandalonePage(recording_json), {{"\n<body>\n", body}});
+  return absl::StrReplaceAll(StandaloneHtml(recording_json, scripts), {{"\n<body>\n", body}});
 }
 
 }  // namespace hulld

@@ -16,7 +16,7 @@ std::string ServedPage(std::string_view nonce);
 std::string ServedPagePolicy(std::string_view nonce, std::string_view host);
 
 // Returns the page as a single file that needs no server and no network. `recording_json`: its
-// content (protocol.h).
+// content (protocol.h). The scripts are compressed: about 300 KB.
 std::string StandalonePage(std::string_view recording_json);
 
 // In pixels.
@@ -26,7 +26,8 @@ struct PictureSize {
 };
 
 // Returns a standalone page without panels that stores a PNG of its view, as a data URL, in the
-// attribute data-png of its body.
+// attribute data-png of its body. Its scripts run at once, as virtual time waits for no
+// decompression.
 std::string PicturePage(std::string_view recording_json, const PictureSize& size);
 
 }  // namespace hulld

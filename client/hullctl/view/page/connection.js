@@ -35,12 +35,13 @@ class BridgeConnection {
   }
 }
 
-// Answers from a recording; unrecorded questions get no answer.
+// Answers from a recording, at the waypoint last asked for; unrecorded questions get no answer.
 class Recording {
   constructor(handlers, recording) {
     this.live = false;
     this.handlers = handlers;
     this.recording = recording;
+    this.state = recording.states[0];
     queueMicrotask(() => {
       handlers.hello({...recording.hello, scenes: []});
       handlers.scene(recording.scene);
@@ -48,15 +49,20 @@ class Recording {
         const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
         handlers.frame(decodeFrame(bytes.buffer));
       }
-      handlers.collisions(recording.collisions);
+      handlers.collisions(this.state.collisions);
     });
   }
 
-  send(message) {
-    if (message.type !== 'question' || !message.pair) return;
-    const [a, b] = message.pair;
-    const answer = this.recording.answers.find(({pair}) => pair[0] === a && pair[1] === b);
-    if (answer) this.handlers.answer({...answer, update: message.update});
+  send({type, scene, waypoint, pair, update}) {
+    if (type === 'joints') {
+      this.state = this.recording.states[waypoint];
+      this.handlers.poses({scene, poses: this.state.poses});
+      this.handlers.collisions(this.state.collisions);
+    }
+    if (type !== 'question' || !pair) return;
+    const [a, b] = pair;
+    const answer = this.state.answers.find(({pair}) => pair[0] === a && pair[1] === b);
+    if (answer) this.handlers.answer({...answer, update});
   }
 }
 

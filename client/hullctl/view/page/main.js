@@ -14,8 +14,10 @@ import {Stage} from 'hulld/drawing/stage.js';
 import {Model} from 'hulld/model.js';
 import {AnswerPanel} from 'hulld/panels/answer_panel.js';
 import {element, grouped} from 'hulld/panels/dom.js';
+import {JointPanel} from 'hulld/panels/joint_panel.js';
 import {bindKeys} from 'hulld/panels/keys.js';
 import {ObjectPanel} from 'hulld/panels/object_panel.js';
+import {TimeLine} from 'hulld/panels/time_line.js';
 import {Tree} from 'hulld/panels/tree.js';
 import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 
@@ -48,7 +50,11 @@ class Viewer {
       hull: (message) => this.hullChanged(message.event),
       answer: (message) => this.answer(message),
       collisions: (message) => this.collisions(message),
-      problem: (message) => this.say(message.message),
+      poses: (message) => this.posesCame(message),
+      problem: (message) => {
+        this.joining = false;
+        this.say(message.message);
+      },
       edited: (message) => this.edited(message),
       frame: (frame) => this.frame(frame),
       lost: () => this.lost(),
@@ -57,6 +63,12 @@ class Viewer {
     this.objectPanel = new ObjectPanel(
         this.model, this.connection.live, (...wish) => this.simplify(...wish),
         (edit) => this.connection.send({type: 'edit', ...edit}));
+    this.jointPanel = new JointPanel(
+        this.model, this.connection.live, (values, rest) => this.moveJoints(values, rest));
+    this.timeLine = new TimeLine(this.model, this.connection.live, (...where) => {
+      this.moveJoints(...where);
+      this.jointPanel.update();
+    });
     this.listen();
     this.bindControls();
     this.stage.beforeFrame(
@@ -81,10 +93,12 @@ class Viewer {
       this.updateTools();
       this.ask(true);
     });
-    model.on('pose', ({index, rest}) => {
-      this.views.get(index)?.place();
-      this.crowd?.write(model.objects[index]);
-      this.moved.add(index);
+    model.on('pose', ({indices, rest}) => {
+      for (const index of indices) {
+        this.views.get(index)?.place();
+        this.crowd?.write(model.objects[index]);
+        this.moved.add(index);
+      }
       if (this.ruler.ends.length) this.ruler.rebuild();
       this.gizmo.update();
       this.shell.place();
@@ -161,6 +175,9 @@ class Viewer {
     this.syncShown();
     model.tell('selection');
     this.mayChoosePair = true;
+    this.joining = false;
+    this.jointPanel.rebuild();
+    this.timeLine.rebuild();
     this.answerPanel.updateCollisions();
     this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
     this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
@@ -398,6 +415,32 @@ class Viewer {
     });
   }
 
+  // Moves the joints. The latest values win while an answer is in flight.
+  moveJoints(values, rest, waypoint = null) {
+    const {model} = this;
+    values.forEach((value, i) => model.joints[i].value = value);
+    this.wish = {values: values.slice(), rest, waypoint};
+    if (!this.joining) this.sendJoints();
+  }
+
+  sendJoints() {
+    const {values, rest, waypoint} = this.wish;
+    this.wish = null;
+    this.joining = true;
+    this.joiningRest = rest;
+    this.connection.send({type: 'joints', scene: this.model.number, values, waypoint});
+  }
+
+  posesCame({scene, poses}) {
+    if (scene !== this.model.number) return;
+    const rest = this.joiningRest;
+    this.joining = false;
+    if (this.wish) this.sendJoints();
+    this.model.setJointedPoses(poses, rest);
+    const bounds = this.model.bounds();
+    if (this.fitted && bounds) this.stage.keepInView(bounds);
+  }
+
   simplify(object, side, maxError) {
     if (maxError === 0) {
       this.shell.clear();
@@ -520,7 +563,7 @@ class Viewer {
 
   updateTools() {
     const object = this.model.selected === null ? null : this.model.objects[this.model.selected];
-    const can = Boolean(object?.hullId) && this.connection.live;
+    const can = Boolean(object?.hullId) && this.connection.live && !object.isJointed;
     for (const [id, mode] of [['mode-move', 'translate'], ['mode-turn', 'rotate']]) {
       $(id).disabled = !can;
       $(id).setAttribute('aria-pressed', String(can && this.gizmo.mode === mode));
@@ -590,6 +633,7 @@ class Viewer {
       orbit: (around, over) => stage.orbit(around, over),
       zoom: (factor) => stage.zoom(factor),
       nudge: (axis, steps) => this.connection.live && this.gizmo.nudge(axis, steps),
+      play: () => this.timeLine.play(),
       scene: (key) => this.scenes?.length > 1 && this.connection.send({type: 'show', key}),
     });
   }
@@ -632,7 +676,7 @@ class Viewer {
 
   reset() {
     const object = this.model.objects[this.model.selected];
-    if (object) this.model.setPose(object.index, object.start, true);
+    if (object && !object.isJointed) this.model.setPose(object.index, object.start, true);
   }
 
   toggleVisible() {

@@ -41,6 +41,11 @@ export class Model extends EventTarget {
     this.answer = null;
     this.collisions = {pairs: [], problems: [], totals: {}};
     this.relationOf = new Map();
+    // The joints of a robot: [{name, low, high, value}], their trajectory, and its waypoints with a
+    // colliding pair.
+    this.joints = [];
+    this.waypoints = [];
+    this.contacts = [];
     // {index, pose}: poses before each completed motion.
     this.history = [];
     // In double; drawn coordinates are relative to it.
@@ -55,10 +60,9 @@ export class Model extends EventTarget {
     for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
   }
 
-  load({number, files, objects}) {
+  load({number, files, objects, joints, waypoints, contacts}) {
     this.clear();
-    this.number = number;
-    this.files = files;
+    Object.assign(this, {number, files, joints, waypoints, contacts});
     this.addObjects(objects);
     this.show.mesh = files.length > 0;
   }
@@ -275,7 +279,16 @@ export class Model extends EventTarget {
       if (this.history.length > MOST_UNDONE) this.history.shift();
       object.rested = pose;
     }
-    this.tell('pose', {index, rest});
+    this.tell('pose', {indices: [index], rest});
+  }
+
+  // Sets the poses of all objects that joints move.
+  setJointedPoses(poses, rest) {
+    const jointed = this.objects.filter(({isJointed}) => isJointed);
+    jointed.forEach((object, i) => {
+      object.pose = poses.slice(7 * i, 7 * i + 7);
+    });
+    this.tell('pose', {indices: jointed.map(({index}) => index), rest});
   }
 
   // Restores the pose before the last completed motion, of any object.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <random>
 #include <sstream>
 #include <string>
@@ -66,7 +67,8 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching mistaken\toff by 0\tTOUCHING"));
   for (size_t i = 0; i < 5; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
   EXPECT_EQ(lines[5], "# 5 answers, 5 wrong, 0 failed");
-  EXPECT_EQ(lines[6], "# false contact 1, miss 1, touching mistaken 2, distance 1, depth 0");
+  EXPECT_EQ(lines[6],
+            "# false contact 1, miss 1, touching mistaken 2, distance 1, depth 0, time 0");
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
@@ -130,7 +132,7 @@ TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.out, HasSubstr("# 300 answers, " + std::to_string(false_contacts) + " wrong"));
   EXPECT_THAT(ran.out, HasSubstr("# false contact " + std::to_string(false_contacts) +
-                                 ", miss 0, touching mistaken 0, distance 0, depth 0"));
+                                 ", miss 0, touching mistaken 0, distance 0, depth 0, time 0"));
   const std::string reported = ran.out.substr(ran.out.find("of a distance ") + 14);
   EXPECT_NEAR(std::stod(reported), largest, 1e-9);
 }
@@ -151,7 +153,7 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
   error("", "the table holds no answers");
   error("a,b,colliding\n", "the table holds no answers");
   error("a,colliding\n", "answers.csv:1: the header names no column b");
-  error("a,b,b_x\n", "needs relation, colliding, distance, or depth");
+  error("a,b,b_x\n", "needs relation, colliding, distance, depth, or contact_time");
   error("a,b,colliding,A\n", "the header names \"a\" twice");
   error("a,b,b_qw,colliding\n", "a quaternion has four columns: b_qw b_qx b_qy b_qz");
   error("a,b,colliding\ncube,cube\n", "answers.csv:2: the row has 2 cells, the header 3");
@@ -163,6 +165,56 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
   error("a,b,depth\ncube,cube,-1\n", "depth: -1 is no depth");
   error("a,b,b_x,depth\ncube,cube,inf,1\n", "b_x: inf is not finite");
   error("a,b,b_qw,b_qx,b_qy,b_qz,depth\ncube,cube,0,0,0,0,1\n", "are all 0");
+  error("a,b,b_to_qw,colliding\n", "a quaternion has four columns: b_to_qw b_to_qx");
+  error("a,b,b_to_qw,b_to_qx,b_to_qy,b_to_qz,colliding\ncube,cube,0,0,0,0,1\n",
+        "b_to_qw, b_to_qx, b_to_qy, b_to_qz are all 0");
+  error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is no time from 0 to 1");
+  error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
+  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n", "distance and depth are those of a pair at rest");
+  error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is no duration of at least 0");
+}
+
+// Cubes approach along x by 2 from gaps of 1 and of 3.
+TEST_F(Judge, TimesOfContactAreJudgedAgainstTheProvenBracket) {
+  const std::string table =
+      "a,b,b_x,b_to_x,colliding,contact_time\n"
+      "cube,cube,2,0,1,0.5\n"
+      "cube,cube,2,0,1,0.5625\n"
+      "cube,cube,2,0,1,0.25\n"
+      "cube,cube,2,0,0,\n"
+      "cube,cube,4,2,0,\n"
+      "cube,cube,4,2,1,0.875\n"
+      "cube,cube,0.5,,1,\n";
+  const Ran ran = JudgeText(table);
+  EXPECT_EQ(ran.code, 1) << ran.err;
+  const std::vector<std::string> lines = Lines(ran.out);
+  ASSERT_EQ(lines.size(), 7u) << ran.out;
+  EXPECT_THAT(lines[0], StartsWith("line 5\tcube\tcube\tmiss\toff by 0.5\tOVERLAPPING\t"));
+  EXPECT_THAT(lines[1], StartsWith("line 4\tcube\tcube\ttime\toff by 0.25\t"));
+  EXPECT_THAT(lines[2], StartsWith("line 7\tcube\tcube\tfalse contact\toff by 0.125\tSEPARATED"));
+  EXPECT_THAT(lines[3], StartsWith("line 3\tcube\tcube\ttime\toff by 0.0625\t"));
+  for (size_t i = 0; i < 4; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
+  EXPECT_EQ(lines[4], "# 7 answers, 4 wrong, 0 failed");
+  EXPECT_EQ(lines[5],
+            "# false contact 1, miss 1, touching mistaken 0, distance 0, depth 0, time 2");
+  EXPECT_THAT(lines[6], EndsWith(", of a time 0.25"));
+  EXPECT_THAT(JudgeText(table, {"--max-time-error", "0.1"}).out, HasSubstr("3 wrong"));
+  const std::string record = Lines(JudgeText(table, {"--output", "json"}).out)[0];
+  EXPECT_EQ(Ask({"verify", Write("record.json", record)}).out, "OVERLAPPING: valid\n");
+}
+
+TEST_F(Judge, ThePlotShowsTheProgramBesideTheServer) {
+  const std::string table = "a,b,b_x,distance,us\ncube,cube,3,2.25,12\ncube,cube,4,3,8\n";
+  const std::string chart = Write("trade.svg", "");
+  const Ran ran = JudgeText(table, {"--plot", chart});
+  if (ran.err.find("needs gnuplot") != std::string::npos) GTEST_SKIP() << ran.err;
+  EXPECT_EQ(ran.code, 1) << ran.err;
+  std::ostringstream svg;
+  svg << std::ifstream(chart).rdbuf();
+  EXPECT_THAT(svg.str(), HasSubstr("the program, 50% wrong"));
+  EXPECT_THAT(svg.str(), HasSubstr("hulld, proven bound"));
+  EXPECT_THAT(JudgeText("a,b,b_x,distance\ncube,cube,3,2\n", {"--plot", chart}).err,
+              HasSubstr("--plot needs pairs at rest, and a column us"));
 }
 
 }  // namespace judge_command_test

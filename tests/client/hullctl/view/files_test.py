@@ -4,12 +4,14 @@
 """
 
 import base64
+import json
 import os
 import pathlib
 import struct
 import subprocess
 
 import viewer_case
+from viewer_case import AT_REST
 
 
 class FilesTest(viewer_case.ViewerCase):
@@ -46,6 +48,27 @@ class FilesTest(viewer_case.ViewerCase):
         self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
                                          ".filter(({name}) => !name.startsWith('data:')).length"), 0)
         self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
+
+    def test_inline_shapes_of_a_scene_are_shown(self):
+        corners = [x for p in range(8) for x in ((p & 1), (p >> 1 & 1), (p >> 2))]
+        scene = {"placements": [{"hullId": "box"},
+                                {"points": {"xyz": corners}, "pose": {"translation": {"x": 3}}}]}
+        pathlib.Path(self.hulld.directory, "shapes.txt").write_text(json.dumps(scene))
+        self.view("shapes.txt")
+        self.browser.wait(AT_REST)
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
+        self.assertIn("\u2713 Proven", self.browser.text("#proof"))
+
+    def test_a_scene_file_needs_no_server_of_its_own(self):
+        pathlib.Path(self.hulld.directory, "cell.txt").write_text(
+            "hulls: {leg: {box: [1, 1, 1]}}\nbodies: {stand: [{hull: leg}, {hull: leg, at: [2, 0, 0]}]}\n"
+            "place: {here: {body: stand}, there: {hull: leg, at: [5, 0, 0]}}\n")
+        target = pathlib.Path(self.hulld.directory, "cell.html")
+        subprocess.run([self.hulld.programs / "hullctl", "view", "cell.txt", "--local", "--html",
+                        str(target)], cwd=self.hulld.directory, check=True)
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
 
     def test_a_picture_without_a_window(self):
         target = pathlib.Path(self.hulld.directory, "room.png")

@@ -1,9 +1,13 @@
-"""Renders the pictures of the viewer in README.md and client/guide/VIEWER.md.
+"""Renders the pictures of the viewer in README.md and client/guide/VIEWER.md, and writes the page
+arm.html.
 
     /usr/bin/python3 pictures.py BIN_DIRECTORY OUTPUT_DIRECTORY
 """
 
+import math
 import pathlib
+import re
+import subprocess
 import sys
 
 import viewing
@@ -27,10 +31,28 @@ def take(hulld, target, scene, width, height, dark=False, before="true"):
         viewer.stop()
 
 
+def write_page(programs, target):
+    """Writes a page that plays a trajectory of the arm in ROBOTS.md: it folds onto its base."""
+    source = pathlib.Path(__file__).resolve().parents[4]
+    guide = (source / "client/guide/ROBOTS.md").read_text()
+    folder = target.parent
+    (folder / "arm.urdf").write_text(re.search(r"```xml\n(.*?)```", guide, re.S)[1])
+    rows = ["shoulder,elbow"]
+    for step in range(31):
+        fold = (1 - math.cos(2 * math.pi * step / 30)) / 2
+        rows.append(f"{0.9 * math.sin(2 * math.pi * step / 30):.3f},{3 * fold:.3f}")
+    (folder / "path.csv").write_text("\n".join(rows) + "\n")
+    subprocess.run([programs / "hullctl", "view", "arm.urdf", "--joints", "path.csv", "--html",
+                    target.name], cwd=folder, check=True)
+    for name in ("arm.urdf", "path.csv"):
+        (folder / name).unlink()
+
+
 def main():
     hulld = viewing.Hulld(viewing.bin_directory())
     target = pathlib.Path(sys.argv[1])
     try:
+        write_page(hulld.programs, target / "arm.html")
         moved = ("(hulldViewer.model.setPose(1, [0.9659258262890683, 0, 0.25881904510252074, 0, "
                  "{}], true), hulldViewer.fit())")
         take(hulld, target / "view.png", "0", 1160, 700, before=moved.format("165, 20, -10"))

@@ -156,7 +156,26 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
   EXPECT_THAT(
       json,
       HasSubstr(
-          R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0],"radius":0})"));
+          R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0],"radius":0,)"
+          R"("isJointed":false})"));
+  EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[])"));
+}
+
+TEST(Protocol, JointsTravelWithTheirTrajectory) {
+  ViewScene scene;
+  scene.joints.joints = {{"elbow", -1, 2, 0.5}};
+  scene.joints.waypoints = {{0.5}, {1e-300}};
+  scene.joints.contacts = {1};
+  EXPECT_THAT(SceneMessage(scene, 1),
+              HasSubstr(R"("joints":[{"name":"elbow","low":-1,"high":2,"value":0.5}],)"
+                        R"("waypoints":[[0.5],[1e-300]],"contacts":[1])"));
+  const auto message =
+      ParsePageMessage(R"({"type":"joints","scene":4,"values":[0.25,-1],"waypoint":null})");
+  ASSERT_TRUE(message.ok()) << message.status();
+  EXPECT_EQ(message->joints->scene, 4);
+  EXPECT_THAT(message->joints->values, ElementsAre(0.25, -1));
+  EXPECT_THAT(ErrorOf(R"({"type":"joints","scene":4,"values":["Infinity"]})"),
+              HasSubstr("\"values\" contains a value that is not a finite number"));
 }
 
 // Invalid UTF-8 would end the connection of the page.

@@ -36,6 +36,20 @@ TEST(ViewScene, TakesEachFormatOfAScene) {
               HasSubstr(wrong.path() + ":1: "));
 }
 
+TEST(ViewScene, ScenesAreRecognizedByTheirExtensionOrTheirFirstLine) {
+  constexpr char kScene[] = "# a scene\n\nplace: {left: {id: cube}}\n";
+  for (const char* name : {"scene.yaml", "scene.yml", "scene.txt", "scene", "scene.v2"}) {
+    EXPECT_TRUE(IsSceneFile(TempFile(name, kScene).path())) << name;
+  }
+  EXPECT_TRUE(IsSceneFile(TempFile("scene.txt", "{\"placements\": []}\n").path()));
+  EXPECT_TRUE(IsSceneFile(TempFile("scene.txt", "place left cube\n").path()));
+  EXPECT_FALSE(IsSceneFile(TempFile("points.txt", "# a cloud\n1 2 3\n").path()));
+  EXPECT_FALSE(IsSceneFile(TempFile("points.xyz", "nan 2 3\n").path()));
+  EXPECT_FALSE(IsSceneFile(TempFile("empty.txt", "").path()));
+  EXPECT_FALSE(IsSceneFile(TempFile("points.csv", "x:1,y,z\n1,2,3\n").path()));
+  EXPECT_FALSE(IsSceneFile("/no/such/file.txt"));
+}
+
 TEST(ViewScene, ABodyOfASceneIsOneObject) {
   const TempFile file("cell.yaml",
                       "prefix: cell/\nhulls: {leg: {box: [1, 1, 1]}}\n"

@@ -119,3 +119,78 @@ def test_malformed_tables_are_named(change: dict[str, Any], message: str) -> Non
     said = {name: column for name, column in said.items() if column is not None}
     with pytest.raises(ValueError, match=message):
         hulld.judge(said, hulls=HULLS)
+
+
+def slide(gaps: list[float], travel: float, **said: Any) -> dict[str, Any]:
+    """Cubes that approach along x from a gap, by `travel`."""
+    ends = [(1 + gap - travel, 0, 0) for gap in gaps]
+    return {**columns([1 + gap for gap in gaps], **said), "end_poses_b": ends}
+
+
+def test_times_of_contact_are_judged_against_the_proven_bracket(client: hulld.Client) -> None:
+    said = slide(
+        [1, 1, 1, 1, 3, 3, 1],
+        2.0,
+        colliding=[1, 1, 1, 0, 0, 1, 1],
+        contact_time=[0.5, 0.5625, 0.25, np.nan, np.nan, 0.75, 0.5078125],
+    )
+    judged = hulld.judge(said, hulls=HULLS, client=client, max_time_error=1e-2)
+    assert faults(judged) == {
+        1: ["TIME"],
+        2: ["TIME"],
+        3: ["MISS"],
+        5: ["FALSE_CONTACT"],
+    }
+    assert [(wrong.row, wrong.error) for wrong in judged.wrong] == [
+        (3, 0.5),
+        (2, 0.25),
+        (5, 0.25),
+        (1, 0.0625),
+    ]
+    assert judged.time_errors[6] == 0.0078125 and np.isnan(judged.time_errors[4])
+    assert "of a time 0.25" in repr(judged)
+    contact = judged.wrong[0].answer.first_contact
+    assert contact is not None and contact.contact_time == 0.5
+
+
+def test_motions_and_pairs_at_rest_share_a_table(
+    tmp_path: pathlib.Path, client: hulld.Client
+) -> None:
+    (tmp_path / "said.csv").write_text(
+        "a,b,b_x,b_to_x,b_to_y,distance,contact_time\n"
+        "cube,cube,3,,,2.5,\ncube,cube,3,0,,,0.75\ncube,cube,3,,2,,\n"
+    )
+    judged = hulld.judge(tmp_path / "said.csv", hulls=HULLS, client=client, max_time_error=1e-3)
+    assert faults(judged) == {0: ["DISTANCE"], 1: ["TIME"]}
+    assert judged.distance_errors[0] == pytest.approx(0.5)
+    assert judged.time_errors[1] == pytest.approx(1 / 12)
+
+
+def test_a_turning_motion_takes_the_shorter_way(client: hulld.Client) -> None:
+    # A quarter turn brings the bar into the cube; the quaternion is given with the other sign.
+    bar = np.array([[-3, -0.1, -0.1], [3, -0.1, -0.1], [-3, 0.1, 0.1], [3, 0.1, 0.1]])
+    said = {
+        "a": ["bar"],
+        "b": ["cube"],
+        "poses_b": [(0, 1.5, 0)],
+        "end_poses_a": [(-np.cos(np.pi / 4), 0, 0, -np.sin(np.pi / 4), 0, 0, 0)],
+        "end_poses_b": [(0, 1.5, 0)],
+        "colliding": [False],
+    }
+    judged = hulld.judge(said, hulls={**HULLS, "bar": bar}, client=client)
+    assert faults(judged) == {0: ["MISS"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"contact_time": [1.5]}, r"contact_time\[0\] is above 1"),
+        ({"contact_time": [-0.5]}, r"contact_time\[0\] is -0.5; it must be at least 0"),
+        ({"distance": [1]}, r"distance\[0\] is that of a motion"),
+        ({"contact_time": [0.5], "end_poses_b": [(1, 0, 0)]}, r"contact_time\[0\] is that of no"),
+    ],
+)
+def test_malformed_motions_are_named(change: dict[str, Any], message: str) -> None:
+    said = {**slide([0.0], 1.0, colliding=[True]), **change}
+    with pytest.raises(ValueError, match=message):
+        hulld.judge(said, hulls=HULLS)

@@ -51,7 +51,7 @@ export class Stage {
     this.frames = 0;
     this.before = [];
     this.after = [];
-    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    new ResizeObserver(() => this.resize()).observe(canvas);
     this.setUp('y');
     this.resize();
   }
@@ -101,7 +101,7 @@ export class Stage {
   }
 
   resize() {
-    const {clientWidth, clientHeight} = this.canvas.parentElement;
+    const {clientWidth, clientHeight} = this.canvas;
     if (!clientWidth || !clientHeight) return;
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;

@@ -16,6 +16,7 @@ export function bindKeys(actions) {
     [['R'], '', 'handles that turn', () => actions.mode('rotate')],
     [['X', 'Y', 'Z'], ' ', 'move the object a step along an axis; with Shift back', null],
     [['Backspace'], '', 'put the object back where it was', actions.reset],
+    [['.'], '', 'play the time line', actions.play],
     [['U'], '', 'undo the last motion; also Ctrl+Z', actions.undo],
     [['\u2190', '\u2191', '\u2193', '\u2192'], ' ', 'orbit; with Shift pan', null],
     [['+', '\u2212'], ' ', 'zoom', null],

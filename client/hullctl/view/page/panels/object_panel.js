@@ -153,7 +153,7 @@ export class ObjectPanel {
       inputMode: 'decimal',
       autocomplete: 'off',
       spellcheck: false,
-      readOnly: !this.live,
+      readOnly: !this.live || object.isJointed,
       'data-pose': i,
       'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
       onchange: () => this.typed(object, i),

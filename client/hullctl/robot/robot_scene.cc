@@ -1,0 +1,202 @@
+#include "client/hullctl/robot/robot_scene.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <numbers>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "client/formats/byte_source.h"
+#include "client/hullctl/body/hull_segment.h"
+#include "client/point_messages.h"
+#include "client/robot/joint_file.h"
+#include "client/robot/robot.h"
+#include "client/robot/srdf_file.h"
+
+namespace hulld {
+namespace {
+
+// Range of the slider of an unlimited joint in meters. A choice.
+constexpr double kReach = 2;
+
+// Returns the range of a variable without regard to the waypoints.
+std::array<double, 2> RangeOf(const RobotJoint& joint, const JointVariable& variable) {
+  if (joint.limits) return *joint.limits;
+  // The numbers of a floating joint are a quaternion and a translation, in this order.
+  const bool is_quaternion = joint.kind == JointKind::kFloating && variable.place < 4;
+  const bool is_angle = joint.kind == JointKind::kContinuous ||
+                        joint.kind == JointKind::kRevolute ||
+                        (joint.kind == JointKind::kPlanar && variable.place == 2);
+  const double reach = is_quaternion ? 1 : is_angle ? std::numbers::pi : kReach;
+  return {-reach, reach};
+}
+
+absl::StatusOr<std::vector<std::vector<double>>> ReadWaypoints(const std::string& path,
+                                                               const Robot& robot) {
+  std::vector<std::vector<double>> waypoints;
+  const auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  auto reader = WaypointReader::Open(source->get(), robot);
+  if (!reader.ok()) return reader.status();
+  std::vector<double> values;
+  while (true) {
+    const auto more = reader->Next(&values);
+    if (!more.ok()) return more.status();
+    if (!*more) break;
+    if (waypoints.size() == kMaxShownWaypoints) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, ":", reader->line(), ": the viewer shows up to ", kMaxShownWaypoints,
+                       " waypoints; remove the rest"));
+    }
+    waypoints.push_back(values);
+  }
+  if (!waypoints.empty()) return waypoints;
+  return absl::InvalidArgumentError(absl::StrCat(path, ": contains no waypoint"));
+}
+
+std::vector<Pose7> PosesAt(const RobotModel& model, const std::vector<double>& values) {
+  const std::vector<RigidPose> X_WL =
+      LinkPoses(model.robot, kNoMotion, AllJointValues(model.robot, values));
+  std::vector<Pose7> poses;
+  for (const RobotPart& part : model.parts) {
+    poses.push_back(Compose(X_WL[static_cast<size_t>(part.link)], part.X_LS));
+  }
+  return poses;
+}
+
+// Sets the joints of the scene to the first waypoint, or to rest.
+void AddJoints(const std::shared_ptr<const RobotModel>& model, ViewJoints* joints) {
+  const std::vector<double> start =
+      joints->waypoints.empty() ? RestValues(model->robot) : joints->waypoints.front();
+  const std::vector<JointVariable> variables = model->robot.Variables();
+  for (size_t i = 0; i < variables.size(); ++i) {
+    auto [low, high] =
+        RangeOf(model->robot.joints[static_cast<size_t>(variables[i].joint)], variables[i]);
+    for (const std::vector<double>& waypoint : joints->waypoints) {
+      low = std::min(low, waypoint[i]);
+      high = std::max(high, waypoint[i]);
+    }
+    joints->joints.push_back({variables[i].name, low, high, start[i]});
+  }
+  joints->poses = [model](const std::vector<double>& values) -> absl::StatusOr<std::vector<Pose7>> {
+    const std::string joint = JointWithoutRotation(model->robot, values);
+    if (joint.empty()) return PosesAt(*model, values);
+    return absl::InvalidArgumentError(
+        absl::StrCat("The quaternion of ", joint, " is zero; any other one is a rotation."));
+  };
+}
+
+// Adds an object for each part, with the surface of its mesh, if any.
+void AddParts(RobotModel* model, ViewScene* scene) {
+  for (RobotPart& part : model->parts) {
+    ViewObject& object = scene->objects.emplace_back();
+    object.name = part.name;
+    if (part.mesh.triangles.empty()) continue;
+    object.file = static_cast<int>(scene->files.size());
+    auto shape = std::make_shared<FileShape>();
+    shape->name = part.name;
+    shape->point_count = part.mesh.vertices.size();
+    for (const auto& vertex : part.mesh.vertices) {
+      shape->xyz.insert(shape->xyz.end(), vertex.begin(), vertex.end());
+    }
+    for (const auto& triangle : part.mesh.triangles) {
+      shape->triangles.insert(shape->triangles.end(), triangle.begin(), triangle.end());
+    }
+    scene->files.push_back(std::move(shape));
+  }
+}
+
+// Places the hulls of the parts at the start of the joints. Requires the IDs of the parts.
+void PlaceParts(const RobotModel& model, ViewScene* scene) {
+  std::vector<double> start;
+  for (const ViewJoints::Joint& joint : scene->joints.joints) start.push_back(joint.value);
+  const std::vector<Pose7> poses = PosesAt(model, start);
+  for (size_t i = 0; i < model.parts.size(); ++i) {
+    ViewObject& object = scene->objects[i];
+    object.hull_id = model.parts[i].hull_id;
+    object.pose = poses[i];
+    object.radius = model.parts[i].hull.radius;
+    object.is_jointed = true;
+  }
+}
+
+// Excludes pairs of parts of one link, and of the links in `left_out`.
+void AddRules(const RobotModel& model, const std::set<LinkPair>& left_out,
+              v1::FindCollisionsRequest* rules) {
+  for (const RobotPart& part : model.parts) rules->add_groups(static_cast<uint32_t>(part.link));
+  rules->set_ignore_same_group(true);
+  for (const LinkPair& pair : left_out) {
+    rules->add_ignored_group_pairs(static_cast<uint32_t>(pair.first));
+    rules->add_ignored_group_pairs(static_cast<uint32_t>(pair.second));
+  }
+}
+
+// Creates the hulls of the parts on the server, and sets their IDs.
+absl::Status RegisterParts(TemporaryHulls* temporary, RobotModel* model) {
+  std::set<std::string> taken;
+  for (RobotPart& part : model->parts) {
+    auto id = temporary->Add(
+        UniqueHullSegment(part.name, &taken),
+        [&part](const Client::PointSink& sink) { return SendInMessages(part.hull.xyz, sink); });
+    if (!id.ok()) return id.status();
+    part.hull_id = *std::move(id);
+    part.mesh = {};
+  }
+  return absl::OkStatus();
+}
+
+// Asks about every waypoint, with the rules of the scene.
+absl::Status FindContacts(const Client& client, ViewScene* scene) {
+  for (uint32_t i = 0; i < scene->joints.waypoints.size(); ++i) {
+    const auto poses = scene->joints.poses(scene->joints.waypoints[i]);
+    if (!poses.ok()) return poses.status();
+    v1::FindCollisionsRequest request = scene->rules;
+    v1::PackedPlacements& packed = *request.mutable_packed_placements();
+    for (uint32_t part = 0; part < poses->size(); ++part) {
+      packed.add_hull_ids(scene->objects[part].hull_id);
+      packed.add_hulls(part);
+      packed.add_radii(scene->objects[part].radius);
+      packed.mutable_poses()->Add((*poses)[part].begin(), (*poses)[part].end());
+    }
+    bool collides = false;
+    const absl::Status asked =
+        client.FindCollisions(request, [&collides](const v1::FindCollisionsResponse& answer) {
+          collides = collides || answer.pairs_size() > 0;
+          return absl::OkStatus();
+        });
+    if (!asked.ok()) return asked;
+    if (collides) scene->joints.contacts.push_back(i);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status AddRobot(const RobotSceneArguments& arguments, const Client& client,
+                      TemporaryHulls* temporary, ViewScene* scene) {
+  auto model = ReadRobot(arguments.robot);
+  if (!model.ok()) return model.status();
+  const absl::StatusOr<std::set<LinkPair>> left_out =
+      arguments.srdf.empty() ? AdjacentPairs(model->robot)
+                             : ReadDisabledPairs(arguments.srdf, model->robot);
+  if (!left_out.ok()) return left_out.status();
+  if (!arguments.joints.empty()) {
+    auto waypoints = ReadWaypoints(arguments.joints, model->robot);
+    if (!waypoints.ok()) return waypoints.status();
+    scene->joints.waypoints = *std::move(waypoints);
+  }
+  AddParts(&*model, scene);
+  absl::Status registered = RegisterParts(temporary, &*model);
+  if (!registered.ok()) return registered;
+  const auto shared = std::make_shared<const RobotModel>(*std::move(model));
+  AddJoints(shared, &scene->joints);
+  PlaceParts(*shared, scene);
+  AddRules(*shared, *left_out, &scene->rules);
+  return FindContacts(client, scene);
+}
+
+}  // namespace hulld

@@ -1,0 +1,53 @@
+// Sliders for the joints of a robot.
+import {element, short} from 'hulld/panels/dom.js';
+
+export class JointPanel {
+  // move(values, rest): moves the joints; rest: the slider was let go.
+  constructor(model, live, move) {
+    this.model = model;
+    this.live = live;
+    this.move = move;
+    this.root = document.getElementById('joints');
+  }
+
+  // Called when the scene changes.
+  rebuild() {
+    this.sliders = this.model.joints.map((joint) => this.slider(joint));
+    const title = element('h2', {}, 'Joints');
+    this.root.replaceChildren(
+        ...(this.sliders.length ? [title, ...this.sliders.map(({block}) => block)] : []));
+  }
+
+  slider(joint) {
+    const output = element('output', {className: 'number'});
+    const send = (rest) => {
+      joint.value = Number(input.value);
+      this.move(this.model.joints.map(({value}) => value), rest);
+      this.update();
+    };
+    const input = element('input', {
+      type: 'range',
+      min: joint.low,
+      max: joint.high,
+      step: (joint.high - joint.low) / 1000 || 1,
+      disabled: !this.live,
+      'aria-label': `Joint ${joint.name}`,
+      oninput: () => send(false),
+      onchange: () => send(true),
+    });
+    const block = element(
+        'div', {className: 'slider'}, element('label', {}, `${joint.name} `, output, input));
+    const update = () => {
+      input.value = joint.value;
+      output.textContent = short(joint.value);
+      output.title = String(joint.value);
+    };
+    update();
+    return {block, update};
+  }
+
+  // Called when the joints move by other means.
+  update() {
+    for (const {update} of this.sliders) update();
+  }
+}
