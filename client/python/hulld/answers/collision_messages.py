@@ -133,6 +133,7 @@ def _piece_certificates_of(messages: Iterable[Any]) -> tuple[PieceCertificate, .
             message.piece_b,
             enum_or_zero(Relation, message.relation),
             _certificate_of(message.certificate),
+            _intervals_of(message.intervals),
         )
         for message in messages
     )
