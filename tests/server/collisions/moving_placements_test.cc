@@ -557,7 +557,9 @@ TEST_F(MovingPlacements, BodiesAnswerAsTheirPieces) {
     }
     EXPECT_EQ(whole.first_contact().separated_until(), until);
     EXPECT_EQ(whole.first_contact().has_contact_time(), std::isfinite(contact));
-    if (std::isfinite(contact)) EXPECT_EQ(whole.first_contact().contact_time(), contact);
+    if (std::isfinite(contact)) {
+      EXPECT_EQ(whole.first_contact().contact_time(), contact);
+    }
     ++counts[whole.relation()];
     const auto batch = Ask(Batch({a, b}, {0, 1}));
     ASSERT_TRUE(batch.ok()) << batch.status();

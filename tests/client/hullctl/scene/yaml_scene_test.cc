@@ -140,7 +140,7 @@ TEST(YamlScene, PlacementsMoveOnTheShorterPath) {
   EXPECT_EQ(turns.end_pose().rotation().w(), 1);
   EXPECT_EQ(turns.end_pose().rotation().z(), -0.5);
   EXPECT_EQ(ErrorOf(head + "to: [0, 0, 0, 0, 1, 2, 3]}\n"),
-            "cell.yaml:4:21: to: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
+            "cell.yaml:4:20: to: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
   EXPECT_THAT(ErrorOf(head + "to: [1, 2]}\n"), HasSubstr("to"));
 }
 
