@@ -137,16 +137,17 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
   EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 10);
 }
 
-// One piece touches at half time, when the other overlaps: at one time, the strongest decides.
+// The point meets a triangle and a cube at half time, and only overlaps the cube.
 TEST(MovingBody, TheStrongestOfSimultaneousContactsDecides) {
   OwnMovingBody wall(Translation({0, 0, 0}, {0, 0, 0}));
-  wall.Add({{0, -5, -5}, {0, 5, -5}, {0, 0, 5}});
+  wall.Add({{1, -5, -5}, {1, 5, -5}, {1, 0, 5}});
   wall.Add(LatticeCube(2, 1));
-  OwnMovingBody probe(Translation({2, 0, 0}, {0, 0, 0}));
+  OwnMovingBody probe(Translation({2, 0.5, 0.5}, {0, 0.5, 0.5}));
   probe.Add({{0, 0, 0}});
   const absl::StatusOr<BodyContact> found = FindFirstContact(wall.moving(), probe.moving());
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(found->contact.contact_time, 0.5);
+  EXPECT_EQ(found->contact.relation, Relation::kOverlapping);
   EXPECT_EQ(found->of_body.pieces, (PiecePair{1, 0}));
 }
 
