@@ -582,7 +582,8 @@ class Client(ClientBase):
         origin + direction, so give directions as long as the rays.
 
         origins, directions: n x 3, or one of them 3 for all rays. placements: as in
-        check_collisions; not bodies. Pairs far apart are skipped in groups, as in find_collisions.
+        check_collisions; the pieces of a body must have its frame. Pairs far apart are skipped in
+        groups, as in find_collisions.
 
         HulldError: a placement has no answer, such as a hull that does not exist.
         """

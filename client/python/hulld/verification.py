@@ -418,9 +418,7 @@ class _MovingPiece:
             for constant, direction in zip(constants, directions)
         ]
         grown = (3 * s[0], s[0] + 2 * s[1], 2 * s[1] + s[2], 3 * s[2])
-        signs = [
-            _sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)
-        ]
+        signs = [_sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)]
         end_is_right = signs[3] < 0 or (may_end and signs[3] == 0)
         return signs[0] < 0 and signs[1] <= 0 and signs[2] <= 0 and end_is_right
 
@@ -529,10 +527,7 @@ def _check_first_contact(
 
 
 def _check_intervals(
-    intervals: Sequence[SeparatedInterval],
-    contact: FirstContact,
-    a: _MovingPiece,
-    b: _MovingPiece,
+    intervals: Sequence[SeparatedInterval], contact: FirstContact, a: _MovingPiece, b: _MovingPiece
 ) -> None:
     begin = 0.0
     meets = contact.contact_time is not None

@@ -86,9 +86,7 @@ def _axis_of(message: Any) -> Axis:
     )
 
 
-def _direction_of(
-    message: Any,
-) -> tuple[float, float, float] | tuple[int, int, int] | None:
+def _direction_of(message: Any) -> tuple[float, float, float] | tuple[int, int, int] | None:
     kind = message.WhichOneof("exact_direction")
     if kind == "direction":
         n = message.direction

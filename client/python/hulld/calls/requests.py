@@ -364,8 +364,8 @@ def find_collisions(
     wanted: Wanted,
     limit: int | None,
     tolerance: float,
-    first_only: bool,
-    every_piece: bool,
+    first_only: bool = False,
+    every_piece: bool = False,
 ) -> Call[ScenePart]:
     fixed = collision_pb2.FindCollisionsRequest(
         wanted=wanted.message(),

@@ -101,9 +101,10 @@ def test_batches_answer_as_single_calls(client: hulld.Client, cube: str) -> None
         verifier.check_row(placements, found, row)
         verifier.check(placements[a], placements[b], single)
     assert found.answers.contact_times is not None
-    assert np.isnan(found.answers.contact_times).sum() == (
-        found.answers.relations == hulld.Relation.SEPARATED
-    ).sum()
+    assert (
+        np.isnan(found.answers.contact_times).sum()
+        == (found.answers.relations == hulld.Relation.SEPARATED).sum()
+    )
     assert found.answers.separated_until is not None
     assert client.check_collisions([cube, cube]).answers.contact_times is None
 
@@ -218,6 +219,8 @@ def test_bodies_in_motion_are_proven(client: hulld.Client, cube: str, name: str)
         answer = client.check_collision(body, start, to_b=to, certificate=True)
         verifier.check(body, start, answer, to_b=to)
         assert len(answer.piece_certificates) == 2
+    hits = client.cast((-3, 0.5, 0.5), (12, 0, 0), body)
+    assert hits.times.tolist() == [0.25] and hits.normals.tolist() == [[-1, 0, 0]]
     answer = client.check_collision(body, start, to_b=(3, 0, 0), certificate=True)
     assert answer.piece_a is not None and answer.piece_a.index == 1
     for number in range(2):
