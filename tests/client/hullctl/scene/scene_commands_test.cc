@@ -120,7 +120,7 @@ TEST_F(HullctlScene, PlacementsMoveAndTheFirstContactIsFound) {
   ran = Ask({"scene", moving.path(), "--first"});
   EXPECT_EQ(ran.out, "a\tb\tOVERLAPPING\tcontact at 0.5\n# touching 0 overlapping 3 failed 0\n");
   ran = Ask({"scene", "check", cell_.path(), "--first"});
-  EXPECT_EQ(ran.code, 2);
+  EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("no placement has an end_pose"));
   const TempFile pairs("pairs.yaml",
                        "place: {a: {id: cube}, b: {id: cube, to: [1, 0, 0]}}\n"
@@ -216,9 +216,9 @@ TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
 
 TEST_F(HullctlSceneBodies, EveryPieceThatIsFoundHasARow) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
-  const Ran ran = Ask({"scene", cell_.path(), "--every-piece", "--clearance", "0.5"});
+  const Ran ran = Ask({"scene", cell_.path(), "--every-piece", "--clearance", "1"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("ell\tprobe\tSEPARATED\t0.25"));
+  EXPECT_THAT(ran.out, HasSubstr("ell\tprobe\tSEPARATED\t0.7"));
   EXPECT_THAT(ran.out, HasSubstr("\tpieces bar -\nell\tprobe\tOVERLAPPING\t-0.25"));
   EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\n# touching 0 overlapping 1 separated 1 "));
 }
