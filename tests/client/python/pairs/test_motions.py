@@ -219,7 +219,7 @@ def test_bodies_in_motion_are_proven(client: hulld.Client, cube: str, name: str)
         answer = client.check_collision(body, start, to_b=to, certificate=True)
         verifier.check(body, start, answer, to_b=to)
         assert len(answer.piece_certificates) == 2
-    hits = client.cast((-3, 0.5, 0.5), (12, 0, 0), body)
+    hits = client.cast((-3, 0.5, 0.5), (12, 0, 0), [body])
     assert hits.times.tolist() == [0.25] and hits.normals.tolist() == [[-1, 0, 0]]
     answer = client.check_collision(body, start, to_b=(3, 0, 0), certificate=True)
     assert answer.piece_a is not None and answer.piece_a.index == 1
