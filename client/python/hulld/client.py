@@ -637,7 +637,7 @@ class Client(ClientBase):
         answer follow, at most as many. first_only: only the pairs in motion that may be the first
         to touch, in ascending order of separated_until; none if no pair touches. The totals count
         every pair that meets. every_piece: a row for each pair of pieces that is found; the column
-        `pieces` tells the rows of two bodies apart.
+        `pieces` distinguishes the rows of two bodies.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
