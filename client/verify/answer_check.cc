@@ -72,11 +72,33 @@ absl::Status CheckProof(const CheckedAnswer& answer, const PlacedVertices& a,
 // Returns true if the deciding pieces named in the answer are proven to be in its relation.
 bool IsDecidingPairProven(const CheckedBodies& answer) {
   if (answer.relation == v1::RELATION_SEPARATED) return true;
-  return std::any_of(
-      answer.certificates.begin(), answer.certificates.end(), [&](const v1::PieceCertificate& of) {
-        return of.relation() == answer.relation && of.piece_a() == answer.piece_a.value_or(0) &&
-               of.piece_b() == answer.piece_b.value_or(0);
-      });
+  const auto decides = [&](const v1::PieceCertificate& of) {
+    // A translation may overlap later.
+    const bool shows = IsMoving(answer.a, answer.b) ? of.relation() != v1::RELATION_SEPARATED
+                                                    : of.relation() == answer.relation;
+    return shows && of.piece_a() == answer.piece_a.value_or(0) &&
+           of.piece_b() == answer.piece_b.value_or(0);
+  };
+  return std::any_of(answer.certificates.begin(), answer.certificates.end(), decides);
+}
+
+std::vector<MovingVertices> Moving(const std::vector<PlacedVertices>& pieces,
+                                   const v1::Placement& placement) {
+  std::vector<MovingVertices> moving;
+  for (const PlacedVertices& piece : pieces) moving.push_back(Moving(piece, placement));
+  return moving;
+}
+
+absl::Status CheckProof(const CheckedBodies& answer, const std::vector<PlacedVertices>& a,
+                        const std::vector<PlacedVertices>& b) {
+  if (!IsMoving(answer.a, answer.b)) {
+    return CheckPieceCertificates(answer.relation, answer.certificates, a, b);
+  }
+  if (answer.first_contact == nullptr) {
+    return ProofFails("the answer is about a motion, but has no first contact");
+  }
+  return CheckFirstContact(answer.relation, *answer.first_contact, answer.certificates,
+                           Moving(a, answer.a), Moving(b, answer.b), answer.max_time_error);
 }
 
 std::optional<uint32_t> IndexOf(bool has_piece, const v1::DecidingPiece& piece) {
@@ -213,7 +235,9 @@ absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionReques
     return Check(CheckedBodies{request.a(), request.b(), response.relation(), response.hull_a(),
                                response.hull_b(), response.piece_certificates(), hulls,
                                IndexOf(response.has_piece_a(), response.piece_a()),
-                               IndexOf(response.has_piece_b(), response.piece_b())});
+                               IndexOf(response.has_piece_b(), response.piece_b()),
+                               response.has_first_contact() ? &response.first_contact() : nullptr,
+                               MaxTimeError(request.wanted())});
   }
   if (response.has_piece_a() || response.has_piece_b()) {
     return Verification{Verdict::kCannotCheck, "the answer about bodies has no certificates"};
@@ -229,9 +253,6 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedBodies& answer) {
           Precluded(answer.relation, answer.a, answer.hull_a, answer.b, answer.hull_b)) {
     return *precluded;
   }
-  if (IsMoving(answer.a, answer.b)) {
-    return Verification{Verdict::kCannotCheck, "the motion of a body has no certificate"};
-  }
   Verification verification;
   const auto a = FetchPieces(answer.a, answer.hull_a, answer.piece_a.has_value(),
                              answer.piece_hulls, &verification);
@@ -241,7 +262,7 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedBodies& answer) {
                              answer.piece_hulls, &verification);
   if (!b.ok()) return b.status();
   if (!verification.reason.empty()) return verification;
-  const absl::Status checked = CheckPieceCertificates(answer.relation, answer.certificates, *a, *b);
+  const absl::Status checked = CheckProof(answer, *a, *b);
   if (!checked.ok() || IsDecidingPairProven(answer)) return FromStatus(checked);
   return Verification{
       Verdict::kInvalid,

@@ -64,6 +64,9 @@ struct CheckedBodies {
   // The deciding pieces; absent for a hull, and if the answer names none.
   std::optional<uint32_t> piece_a;
   std::optional<uint32_t> piece_b;
+  // As in CheckedAnswer.
+  const v1::FirstContact* first_contact = nullptr;
+  double max_time_error = 0;
 };
 
 // Checks answers against the points of inline shapes, and the hulls and bodies that GetHullMesh and

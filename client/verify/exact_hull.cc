@@ -141,7 +141,7 @@ ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const Common
     : xyz(hull.xyz),
       in_any_order(hull.in_any_order),
       vertices(std::move(given)),
-      radius(lengths.ToInteger(hull.radii[0])) {
+      radius(lengths.ToInteger(hull.radii[0]) + lengths.ToInteger(hull.radii[1])) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   for (int i = 0; i < 3; ++i) rows[i] = divisor * rotation.rows[i];
   scale = divisor * rotation.scale;

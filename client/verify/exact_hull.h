@@ -70,7 +70,8 @@ struct ExactHull {
   // the conversion.)
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
 
-  // p_W = rotation(p) + translation / divisor. Requires divisor > 0, and no piece of a body.
+  // p_W = rotation(p) + translation / divisor. Requires divisor > 0. The vertices of a piece are
+  // those in its body's frame.
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths,
             const BigRotation& rotation, const BigVector& translation, const BigInteger& divisor);
 

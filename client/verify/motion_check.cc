@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -48,6 +51,30 @@ std::array<BigInteger, count> Between(const std::array<BigInteger, count>& start
   return between;
 }
 
+// Vertices of a piece in the frame of its body, times `scale`: R(q) p + |q|^2 t for its pose there,
+// and 1 without a piece.
+struct BodyVertices {
+  BodyVertices(const PlacedVertices& hull, const CommonExponent& lengths)
+      : vertices(ToIntegers(hull.xyz, lengths)) {
+    if (hull.in_body == nullptr) return;
+    CommonExponent quaternion;
+    IncludeRotation(*hull.in_body, &quaternion);
+    const BigQuaternion q = RotationIn(*hull.in_body, quaternion);
+    const BigRotation rotation = RotationForm(q, q);
+    scale = rotation.scale;
+    const BigVector shift = scale * TranslationIn(*hull.in_body, lengths);
+    auto in_body = std::make_shared<std::vector<BigVector>>(*vertices);
+    for (BigVector& p : *in_body) {
+      p = BigVector{Dot(rotation.rows[0], p), Dot(rotation.rows[1], p), Dot(rotation.rows[2], p)} +
+          shift;
+    }
+    vertices = std::move(in_body);
+  }
+
+  BigVertices vertices;
+  BigInteger scale = 1;
+};
+
 // A motion in integers: all lengths at one power of two; the rotations of both ends at another,
 // because their relative length matters.
 class ExactMotion {
@@ -57,8 +84,9 @@ class ExactMotion {
   ExactMotion(const MovingVertices& moving, const CommonExponent& lengths)
       : given_(moving.start),
         lengths_(lengths),
-        vertices_(ToIntegers(moving.start.xyz, lengths)),
-        radius_(lengths.ToInteger(moving.start.radii[0])) {
+        vertices_(moving.start, lengths),
+        radius_(lengths.ToInteger(moving.start.radii[0]) +
+                lengths.ToInteger(moving.start.radii[1])) {
     CommonExponent quaternions;
     IncludeRotation(moving.start.pose, &quaternions);
     IncludeRotation(moving.end, &quaternions);
@@ -66,7 +94,9 @@ class ExactMotion {
     x_ = {TranslationIn(moving.start.pose, lengths), TranslationIn(moving.end, lengths)};
   }
 
-  const std::vector<BigVector>& vertices() const { return *vertices_; }
+  // Times scale().
+  const std::vector<BigVector>& vertices() const { return *vertices_.vertices; }
+  const BigInteger& scale() const { return vertices_.scale; }
   const BigInteger& radius() const { return radius_; }
   // Rotation and translation at a moment, times its divisor.
   BigQuaternion RotationAt(const Moment& moment) const { return Between(q_[0], q_[1], moment); }
@@ -75,7 +105,9 @@ class ExactMotion {
   ExactHull HullAt(double time) const {
     const Moment moment = MomentsOf<1>({time})[0];
     const BigQuaternion q = RotationAt(moment);
-    return ExactHull(given_, vertices_, lengths_, RotationForm(q, q), TranslationAt(moment),
+    BigRotation rotation = RotationForm(q, q);
+    rotation.scale *= scale();
+    return ExactHull(given_, vertices_.vertices, lengths_, rotation, TranslationAt(moment),
                      moment.divisor);
   }
 
@@ -95,7 +127,7 @@ class ExactMotion {
  private:
   PlacedVertices given_;
   const CommonExponent& lengths_;
-  BigVertices vertices_;
+  BodyVertices vertices_;
   BigInteger radius_;
   std::array<BigQuaternion, 2> q_;
   std::array<BigVector, 2> x_;
@@ -163,7 +195,7 @@ Cubic<Surd> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space
   Quadratic<BigInteger> scale;
   for (int i = 0; i < 3; ++i) {
     turned[i] = divisor * Combination(half_space.n, forms[i].rows);
-    scale[i] = forms[i].scale;
+    scale[i] = hull.scale() * forms[i].scale;
   }
   std::array<BigInteger, 2> shift;
   for (int i = 0; i < 2; ++i) {
@@ -254,10 +286,14 @@ absl::Status CheckInterval(const MovingPair& pair, const v1::SeparatedInterval& 
   return CheckPlane(pair, n, exponent, interval.offset(), times, may_end);
 }
 
-absl::Status CheckIntervals(const MovingPair& pair, const v1::FirstContact& contact) {
+using Intervals = google::protobuf::RepeatedPtrField<v1::SeparatedInterval>;
+
+// Checks intervals up to contact.separated_until.
+absl::Status CheckIntervals(const MovingPair& pair, const v1::FirstContact& contact,
+                            const Intervals& intervals) {
   double begin = 0;
-  for (int i = 0; i < contact.intervals_size(); ++i) {
-    const v1::SeparatedInterval& interval = contact.intervals(i);
+  for (int i = 0; i < intervals.size(); ++i) {
+    const v1::SeparatedInterval& interval = intervals[i];
     const std::string name = absl::StrCat("intervals[", i, "]");
     // A comparison with NaN is false.
     if (!(begin < interval.until() && interval.until() <= contact.separated_until())) {
@@ -336,6 +372,50 @@ absl::Status CheckContact(v1::Relation relation, const MovingPair& pair,
   return ProofFails("the hulls overlap, so they do not only touch");
 }
 
+// Includes the lengths of both ends.
+absl::Status IncludeMotion(const MovingVertices& hull, CommonExponent* lengths) {
+  for (const PlacedVertices& end : {hull.start, PlacedVertices{{}, hull.end}}) {
+    if (absl::Status s = CheckPlacement(end); !s.ok()) return s;
+    IncludeLengths(end, lengths);
+  }
+  return absl::OkStatus();
+}
+
+// The pieces of a body in motion.
+class MovingPieces {
+ public:
+  explicit MovingPieces(std::span<const MovingVertices> pieces)
+      : pieces_(pieces), exact_(pieces.size()) {}
+
+  size_t size() const { return pieces_.size(); }
+  bool empty(size_t i) const { return pieces_[i].start.xyz.empty(); }
+  absl::Status Include(CommonExponent* lengths) const {
+    for (size_t i = 0; i < size(); ++i) {
+      if (empty(i)) continue;
+      if (absl::Status s = IncludeMotion(pieces_[i], lengths); !s.ok()) return s;
+    }
+    return absl::OkStatus();
+  }
+  // Requires a piece that is not empty, and an exponent that covers all.
+  const ExactMotion& At(size_t i, const CommonExponent& lengths) {
+    if (!exact_[i]) exact_[i].emplace(pieces_[i], lengths);
+    return *exact_[i];
+  }
+  // True for a translation without radii.
+  bool IsPlain(const CommonExponent& lengths) {
+    for (size_t i = 0; i < size(); ++i) {
+      if (empty(i)) continue;
+      const ExactMotion& piece = At(i, lengths);
+      if (piece.radius() > 0 || !piece.KeepsRotation()) return false;
+    }
+    return true;
+  }
+
+ private:
+  std::span<const MovingVertices> pieces_;
+  std::vector<std::optional<ExactMotion>> exact_;
+};
+
 }  // namespace
 
 double MaxTimeError(const v1::Wanted& wanted) {
@@ -353,18 +433,64 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
   }
   CommonExponent lengths;
   for (const MovingVertices* hull : {&a, &b}) {
-    for (const PlacedVertices& end : {hull->start, PlacedVertices{{}, hull->end}}) {
-      if (absl::Status s = CheckPlacement(end); !s.ok()) return s;
-      IncludeLengths(end, &lengths);
-    }
+    if (absl::Status s = IncludeMotion(*hull, &lengths); !s.ok()) return s;
   }
   const ExactMotion motion_a(a, lengths);
   const ExactMotion motion_b(b, lengths);
   const MovingPair pair = {motion_a, motion_b, lengths};
-  if (absl::Status s = CheckIntervals(pair, contact); !s.ok()) return s;
+  if (absl::Status s = CheckIntervals(pair, contact, contact.intervals()); !s.ok()) return s;
   if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
   const absl::Status checked = CheckContact(relation, pair, contact, at_contact);
   if (!checked.ok()) return ProofFails(absl::StrCat("contact: ", checked.message()));
+  return CheckWidth(contact, max_time_error);
+}
+
+absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
+                               const PieceCertificates& certificates,
+                               std::span<const MovingVertices> a, std::span<const MovingVertices> b,
+                               double max_time_error) {
+  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  if (absl::Status s = CheckTimes(relation, contact); !s.ok()) return s;
+  MovingPieces pieces_a(a);
+  MovingPieces pieces_b(b);
+  CommonExponent lengths;
+  if (absl::Status s = pieces_a.Include(&lengths); !s.ok()) return s;
+  if (absl::Status s = pieces_b.Include(&lengths); !s.ok()) return s;
+  std::set<std::pair<uint32_t, uint32_t>> proven;
+  v1::Relation shown = v1::RELATION_SEPARATED;
+  for (const v1::PieceCertificate& of : certificates) {
+    const std::string name =
+        absl::StrCat("pieces ", of.piece_a(), " of A and ", of.piece_b(), " of B: ");
+    const bool is_known = of.piece_a() < a.size() && of.piece_b() < b.size() &&
+                          !pieces_a.empty(of.piece_a()) && !pieces_b.empty(of.piece_b());
+    if (!is_known || !proven.emplace(of.piece_a(), of.piece_b()).second) {
+      return ProofFails(absl::StrCat(name, "no such pieces, an empty one, or two certificates"));
+    }
+    const MovingPair pair = {pieces_a.At(of.piece_a(), lengths), pieces_b.At(of.piece_b(), lengths),
+                             lengths};
+    absl::Status checked = CheckIntervals(pair, contact, of.intervals());
+    if (checked.ok() && of.relation() != v1::RELATION_SEPARATED) {
+      checked = contact.has_contact_time()
+                    ? CheckContact(of.relation(), pair, contact, of.certificate())
+                    : ProofFails("they are in contact, but there is no contact_time");
+      shown = std::max(shown, of.relation());
+    }
+    if (!checked.ok()) return ProofFails(absl::StrCat(name, checked.message()));
+  }
+  const bool may_overlap_later = relation == v1::RELATION_OVERLAPPING &&
+                                 shown == v1::RELATION_TOUCHING && pieces_a.IsPlain(lengths) &&
+                                 pieces_b.IsPlain(lengths);
+  if (shown != relation && !may_overlap_later) {
+    return ProofFails(absl::StrCat("the certificates show ", v1::Relation_Name(shown), ", not ",
+                                   v1::Relation_Name(relation)));
+  }
+  for (uint32_t i = 0; i < a.size() && contact.separated_until() > 0; ++i) {
+    for (uint32_t j = 0; j < b.size(); ++j) {
+      if (pieces_a.empty(i) || pieces_b.empty(j) || proven.contains({i, j})) continue;
+      return ProofFails(absl::StrCat("pieces ", i, " of A and ", j, " of B have no certificate"));
+    }
+  }
+  if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
   return CheckWidth(contact, max_time_error);
 }
 

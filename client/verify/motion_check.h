@@ -3,13 +3,15 @@
 
 #include <absl/status/status.h>
 
+#include <span>
+
 #include "client/verify/exact_hull.h"
+#include "client/verify/piece_check.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
 
-// A hull in motion. `end` equals start.pose if it is at rest. start.in_body is null: the contract
-// has no proof of the motion of a body.
+// A hull or a piece of a body in motion. `end` equals start.pose if it is at rest.
 struct MovingVertices {
   PlacedVertices start;
   const v1::Pose& end;
@@ -34,6 +36,15 @@ double MaxTimeError(const v1::Wanted& wanted);
 absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error);
+
+// As above, for two bodies, each given by all of its pieces in order. Each pair of pieces, neither
+// of them empty, needs intervals up to contact.separated_until, and if the bodies meet, one pair
+// must be in contact, with the relation of the bodies. For translations without radii, that pair
+// may be TOUCHING although the bodies are OVERLAPPING at a later time.
+absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
+                               const PieceCertificates& certificates,
+                               std::span<const MovingVertices> a, std::span<const MovingVertices> b,
+                               double max_time_error);
 
 }  // namespace hulld
 

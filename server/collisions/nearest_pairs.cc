@@ -46,7 +46,7 @@ void NearestPairs::Add(const RankedPair& pair) {
   const std::lock_guard lock(mutex_);
   AddBounded(pair, limit_, &nearest_);
   if (nearest_.size() < limit_) return;
-  const double farthest = nearest_.front().separation;
+  const double farthest = nearest_.front().rank;
   bound_.store(farthest + max_error_ + kRelativeError * std::abs(farthest),
                std::memory_order_relaxed);
 }

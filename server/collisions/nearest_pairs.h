@@ -14,11 +14,11 @@
 
 namespace hulld::server {
 
-// Two placements, in the order of a scene with a limit. A pair without an answer is the last:
-// infinitely separated, which found pairs are not.
+// Two placements, in the order of a scene that ranks its pairs. A pair without an answer is the
+// last: its rank is infinite, which those of found pairs are not.
 struct RankedPair {
-  // As reported.
-  double separation;
+  // As reported: the separation or, in motion, separated_until.
+  double rank;
   uint32_t a;
   uint32_t b;
   v1::Relation relation;

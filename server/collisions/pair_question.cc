@@ -175,7 +175,9 @@ absl::Status PairQuestion::ReadMotion() {
   if (!a.ok()) return Prefixed("a.", a.status());
   const absl::StatusOr<Motion> b = DecodeMotion(X_W_[1], request.b());
   if (!b.ok()) return Prefixed("b.", b.status());
-  motion_ = MotionQuestion{{*a, *b}, MakeMotionOptions(request.wanted(), options_), {}};
+  motion_.emplace();
+  motion_->X_W = {*a, *b};
+  motion_->options = MakeMotionOptions(request.wanted(), options_);
   return absl::OkStatus();
 }
 
@@ -195,7 +197,6 @@ absl::Status PairQuestion::Place(Resolved resolved) {
   HullView& b = *resolved.hulls[subjects_[1] + (request.b().has_points() ? ids_.size() : 0)];
   has_body_ = a.body != nullptr || b.body != nullptr;
   if (has_body_) {
-    if (motion_.has_value()) return BodyInMotion();
     if (absl::Status s = ValidateForBodies(options_); !s.ok()) return s;
   }
   v1::CheckCollisionResponse& response = call_->response();
@@ -224,8 +225,8 @@ void PairQuestion::RunSlice(TaskPool& pool) {
 }
 
 absl::StatusOr<bool> PairQuestion::Advance(std::chrono::steady_clock::time_point end) {
+  if (motion_.has_value()) return has_body_ ? AdvanceMovingBodies(end) : AdvanceMotion();
   if (has_body_) return AdvanceBodies(end);
-  if (motion_.has_value()) return AdvanceMotion();
   if (is_textbook()) return AdvanceTextbook(end);
   absl::StatusOr<hulld::Answer> found = CheckCollision(a_->hull(), b_->hull(), options_);
   if (!found.ok()) return NameQueryLimit(found.status(), options_);
@@ -240,6 +241,33 @@ absl::StatusOr<bool> PairQuestion::AdvanceMotion() {
   if (!found.ok()) return found.status();
   motion_->contact = *std::move(found);
   return true;
+}
+
+absl::StatusOr<bool> PairQuestion::AdvanceMovingBodies(std::chrono::steady_clock::time_point end) {
+  MotionQuestion& motion = *motion_;
+  if (motion.search == nullptr) {
+    motion.bodies.reserve(2);
+    motion.bodies.push_back({a_->body().body(), motion.X_W[0], radii_[0]});
+    motion.bodies.push_back({b_->body().body(), motion.X_W[1], radii_[1]});
+    for (const MovingBody& body : motion.bodies) {
+      if (absl::Status s = body.Validate(); !s.ok()) return s;
+    }
+    motion.search =
+        std::make_unique<MovingBodySearch>(motion.bodies[0], motion.bodies[1], motion.options);
+  }
+  do {
+    // A step takes some microseconds at least.
+    const absl::StatusOr<bool> has_ended = motion.search->Advance(1);
+    if (!has_ended.ok()) {
+      return NameProofLimit(has_ended.status(), registry_.limits().request_memory);
+    }
+    if (!*has_ended) continue;
+    BodyContact found = motion.search->Take();
+    motion.contact = std::move(found.contact);
+    static_cast<PiecesAnswer&>(answer_) = std::move(found.of_body);
+    return true;
+  } while (std::chrono::steady_clock::now() < end);
+  return false;
 }
 
 absl::StatusOr<bool> PairQuestion::AdvanceTextbook(std::chrono::steady_clock::time_point end) {
@@ -275,21 +303,32 @@ absl::StatusOr<bool> PairQuestion::AdvanceBodies(std::chrono::steady_clock::time
   return false;
 }
 
-void PairQuestion::EncodeMotion() {
+void PairQuestion::EncodePieces() {
+  if (!answer_.pieces.has_value()) return;
+  v1::CheckCollisionResponse& response = call_->response();
+  const PiecePair pieces = *answer_.pieces;
+  if (a_->is_body()) EncodePiece(registry_.store(), *a_, pieces.a, response.mutable_piece_a());
+  if (b_->is_body()) EncodePiece(registry_.store(), *b_, pieces.b, response.mutable_piece_b());
+}
+
+absl::Status PairQuestion::EncodeMotion() {
   const FirstContact& contact = motion_->contact;
   v1::CheckCollisionResponse& response = call_->response();
   response.set_relation(EncodeRelation(contact.relation));
   EncodeFirstContact(contact, response.mutable_first_contact());
-  if (!contact.certificate.has_value()) return;
+  if (has_body_) {
+    EncodePieces();
+    if (!motion_->options.want_certificate) return absl::OkStatus();
+    return EncodeProof(registry_.store(), answer_.certificates, *a_, *b_, &response);
+  }
+  if (!contact.certificate.has_value()) return absl::OkStatus();
   EncodeCertificate(*contact.certificate, a_->hull().query_hull().hull(),
                     b_->hull().query_hull().hull(), response.mutable_certificate());
+  return absl::OkStatus();
 }
 
 absl::Status PairQuestion::Encode() {
-  if (motion_.has_value()) {
-    EncodeMotion();
-    return absl::OkStatus();
-  }
+  if (motion_.has_value()) return EncodeMotion();
   RungCounts counts;
   counts.Add(answer_.answer.rung);
   call_->call().metrics().CountPairs(counts);
@@ -299,14 +338,12 @@ absl::Status PairQuestion::Encode() {
     return EncodeAnswer(answer_.answer, a_->hull().query_hull(), b_->hull().query_hull(), wanted,
                         response);
   }
+  EncodePieces();
   const QueryHull* hull_a = &NoHull();
   const QueryHull* hull_b = &NoHull();
   if (answer_.pieces.has_value()) {
-    const PiecePair pieces = *answer_.pieces;
-    if (a_->is_body()) EncodePiece(registry_.store(), *a_, pieces.a, response->mutable_piece_a());
-    if (b_->is_body()) EncodePiece(registry_.store(), *b_, pieces.b, response->mutable_piece_b());
-    hull_a = &a_->HullOfPiece(pieces.a);
-    hull_b = &b_->HullOfPiece(pieces.b);
+    hull_a = &a_->HullOfPiece(answer_.pieces->a);
+    hull_b = &b_->HullOfPiece(answer_.pieces->b);
   }
   const absl::Status encoded = EncodeAnswer(answer_.answer, *hull_a, *hull_b, wanted, response);
   if (!encoded.ok() || !wanted.certificate()) return encoded;

@@ -17,6 +17,8 @@
 #include "core/query/body/placed_body.h"
 #include "core/query/collision.h"
 #include "core/query/motion/first_contact.h"
+#include "core/query/motion/moving_body.h"
+#include "core/query/motion/moving_body_search.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/unary_call.h"
@@ -58,6 +60,9 @@ struct MotionQuestion {
   std::array<Motion, 2> X_W;
   MotionOptions options;
   FirstContact contact;
+  // With a body: both sides, and the state between slices.
+  std::vector<MovingBody> bodies;
+  std::unique_ptr<MovingBodySearch> search;
 };
 
 // A CheckCollision call about two placements, each a hull or a body. It is answered in slices, so
@@ -94,9 +99,11 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   absl::StatusOr<bool> AdvanceTextbook(std::chrono::steady_clock::time_point end);
   absl::StatusOr<bool> AdvanceBodies(std::chrono::steady_clock::time_point end);
   absl::StatusOr<bool> AdvanceMotion();
+  absl::StatusOr<bool> AdvanceMovingBodies(std::chrono::steady_clock::time_point end);
   // Fill the response.
   absl::Status Encode();
-  void EncodeMotion();
+  absl::Status EncodeMotion();
+  void EncodePieces();
 
   Registry& registry_;
   CheckCall* const call_;

@@ -1,9 +1,11 @@
 #include "server/collisions/scene_stream.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <utility>
 
+#include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/wire/answer_columns.h"
@@ -108,6 +110,25 @@ absl::Status SceneStream::Validate() {
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
   options_.query = *std::move(options);
+  return ValidateChoice();
+}
+
+absl::Status SceneStream::ValidateChoice() const {
+  if (request().first_only() && request().has_limit()) {
+    return absl::InvalidArgumentError("first_only excludes a limit; leave out one of them");
+  }
+  if (request().first_only() && !table_.has_motions()) {
+    return absl::InvalidArgumentError(
+        "first_only orders pairs by their first contact, but no placement has an end_pose; set "
+        "one, or leave first_only out");
+  }
+  if (request().every_piece() && request().has_limit()) {
+    return absl::InvalidArgumentError("every_piece excludes a limit; leave out one of them");
+  }
+  if (request().every_piece() && table_.has_motions()) {
+    return absl::InvalidArgumentError(
+        "every_piece excludes end_pose; leave out one of them, or query the pairs of pieces");
+  }
   return request().has_limit() ? ValidateLimit() : absl::OkStatus();
 }
 
@@ -145,6 +166,14 @@ absl::Status SceneStream::Prepare() {
                                               options_.query.max_error.value_or(0));
     ranked_query_ = std::exchange(options_.query, WithoutDetails(options_.query));
   }
+  if (request().first_only()) {
+    first_ = std::make_unique<FirstPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
+    ranked_query_ = options_.query;
+    ranked_motion_ = motion_options_;
+    motion_options_.want_certificate = false;
+  }
+  piece_query_ = options_.query;
+  piece_query_.threads = 1;
   absl::StatusOr<SceneSearch> search =
       SceneSearch::Make(table_.placed(), options_, std::move(boxes));
   if (!search.ok()) return search.status();
@@ -175,6 +204,10 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
     if (piece.next == piece.end) break;
     const auto a = static_cast<uint32_t>(piece.next);
+    if (piece.bodies.has_value()) {
+      if (absl::Status s = AdvanceBodies(a, piece); !s.ok()) return s;
+      continue;
+    }
     if (!piece.has_candidates) {
       piece.candidates.Start(*search_, a);
       piece.has_candidates = true;
@@ -186,14 +219,20 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       ++piece.next;
       continue;
     }
+    if (request().every_piece() && (table_.is_body(a) || table_.is_body(*b))) {
+      OpenBodies(a, *b, piece);
+      continue;
+    }
     absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
     if (!found.ok()) return found.status();
     if (found->answer.ok() && !search_->IsFound(*found->answer)) continue;
-    if (nearest_ == nullptr) {
+    if (nearest_ == nullptr && first_ == nullptr) {
       Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
-    } else if (absl::Status s = Rank(a, *b, std::move(found->answer), piece); !s.ok()) {
-      return s;
+      continue;
     }
+    const absl::Status ranked = first_ != nullptr ? RankFirst(a, *b, *found, piece)
+                                                  : Rank(a, *b, std::move(found->answer), piece);
+    if (!ranked.ok()) return ranked;
   }
   piece.AddRows();
   piece.is_done = piece.next == piece.end;
@@ -203,7 +242,9 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
 absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end) {
   do {
     const RankedPair& pair = ranked_[piece.next - search_->size()];
-    PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, nullptr);
+    PlacedAnswer found = first_ != nullptr
+                             ? AskMoving(table_, pair.a, pair.b, ranked_motion_)
+                             : AskPlaced(table_, pair.a, pair.b, ranked_query_, nullptr);
     if (absl::IsCancelled(found.answer.status())) return found.answer.status();
     if (!found.answer.ok()) {
       found.answer = NameLimit(table_, pair.a, pair.b, found.answer.status(), ranked_query_);
@@ -256,11 +297,66 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> an
   return absl::OkStatus();
 }
 
+absl::Status SceneStream::RankFirst(uint32_t a, uint32_t b, const PlacedAnswer& answer,
+                                    ScenePiece& piece) {
+  const v1::Relation relation =
+      answer.answer.ok() ? EncodeRelation(answer.answer->relation) : v1::RELATION_UNSPECIFIED;
+  Count(relation, 1, &piece.totals);
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  const bool grew = answer.answer.ok()
+                        ? first_->Add({answer.contact->separated_until, a, b, relation},
+                                      answer.contact->contact_time.value_or(kNever))
+                        : first_->AddUnanswered(a, b);
+  return grew ? registry().CheckMemory(MemoryUse::kReading) : absl::OkStatus();
+}
+
+void SceneStream::OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const {
+  piece.totals.set_candidates(piece.totals.candidates() + 1);
+  const PlacedBody& body_a = table_.bodies()[a];
+  const PlacedBody& body_b = table_.bodies()[b];
+  const double reach = piece_query_.clearance.value_or(0);
+  piece.bodies.emplace(ScenePiece::Bodies{
+      b, MeetingPieces(
+             body_a.body(), body_b.body(),
+             [&body_a, reach](uint32_t i) {
+               return GrownBy(BoundingBox(PlacedPiece(body_a, i).placed()), reach);
+             },
+             [&body_b](uint32_t i) { return BoundingBox(PlacedPiece(body_b, i).placed()); })});
+}
+
+absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
+  const uint32_t b = piece.bodies->b;
+  const std::optional<PiecePair> pieces = piece.bodies->pieces.Next();
+  if (!pieces.has_value()) {
+    piece.bodies.reset();
+    return absl::OkStatus();
+  }
+  const PlacedPiece piece_a(table_.bodies()[a], pieces->a);
+  const PlacedPiece piece_b(table_.bodies()[b], pieces->b);
+  PlacedAnswer found = {CheckCollision(piece_a.placed(), piece_b.placed(), piece_query_)};
+  if (absl::IsCancelled(found.answer.status())) return found.answer.status();
+  if (found.answer.ok()) {
+    Answer& answer = *found.answer;
+    piece.rungs.Add(answer.rung);
+    if (!search_->IsFound(answer)) return absl::OkStatus();
+    found.of_body.pieces = pieces;
+    if (answer.certificate.has_value()) {
+      found.of_body.certificates.push_back(
+          {*pieces, answer.relation, *std::move(answer.certificate)});
+      answer.certificate = {};
+    }
+  } else {
+    found.answer = NameQueryLimit(found.answer.status(), piece_query_);
+  }
+  Count(AddFound(a, b, found, piece), 1, &piece.totals);
+  return absl::OkStatus();
+}
+
 uint64_t SceneStream::CountFollowingUnits() {
-  if (nearest_ == nullptr) return 0;
-  std::vector<RankedPair> nearest = nearest_->Take();
-  if (nearest.empty()) return 0;
-  ranked_ = std::move(nearest);
+  if (nearest_ == nullptr && first_ == nullptr) return 0;
+  std::vector<RankedPair> ranked = first_ != nullptr ? first_->Take() : nearest_->Take();
+  if (ranked.empty()) return 0;
+  ranked_ = std::move(ranked);
   return ranked_.size();
 }
 

@@ -11,9 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include "core/query/body/meeting_pieces.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/collisions/first_pairs.h"
 #include "server/collisions/nearest_pairs.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
@@ -24,11 +26,17 @@
 
 namespace hulld::server {
 
-// A range of placements, each to be queried against its successors, or of nearest pairs.
+// A range of placements, each to be queried against its successors, or of ranked pairs.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   // Remaining candidates of placement `next`, if it was started.
   bool has_candidates = false;
   SceneCandidates candidates;
+  // A candidate whose pairs of pieces are answered one by one.
+  struct Bodies {
+    uint32_t b;
+    MeetingPieces pieces;
+  };
+  std::optional<Bodies> bodies;
   // Rows of the next reply, and an upper estimate of their bytes.
   v1::FindCollisionsResponse rows;
   size_t row_bytes = 0;
@@ -36,7 +44,10 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   v1::SceneTotals totals;
   RungCounts rungs;
 
-  size_t held_bytes() const { return candidates.MemoryBytes() + row_bytes; }
+  size_t held_bytes() const {
+    return candidates.MemoryBytes() + row_bytes +
+           (bodies.has_value() ? bodies->pieces.MemoryBytes() : 0);
+  }
 
   void AddRows() {
     if (row_bytes > 0) Add(std::exchange(rows, {}));
@@ -46,8 +57,9 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
 
 // A FindCollisions call: resolves each hull a single time and builds the tree of boxes, on a reader
 // thread, then searches ranges of placements on all threads of the pool. Both gathering and
-// querying the candidates of a placement are split into slices. With a limit, this search only
-// ranks the pairs; the units that follow are the nearest pairs, which are then answered.
+// querying the candidates of a placement are split into slices. With a limit or first_only, this
+// search only ranks the pairs; the units that follow are the nearest or the first pairs, which are
+// then answered.
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
@@ -75,13 +87,20 @@ class SceneStream
   void OnAllDelivered() override;
 
   // Without the mutex.
+  absl::Status ValidateChoice() const;
   absl::Status ValidateLimit() const;
   absl::Status AdvanceRanked(ScenePiece& piece, Clock::time_point end);
+  // Starts on the pairs of pieces of a candidate.
+  void OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const;
+  // Answers one of them. CANCELLED.
+  absl::Status AdvanceBodies(uint32_t a, ScenePiece& piece);
   // Answers a candidate, in a scene with a limit by its relation and clearance alone, and counts
   // it. CANCELLED.
   absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece);
   // Ranks a found pair by its separation. CANCELLED.
   absl::Status Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer, ScenePiece& piece);
+  // Ranks a found pair by its first contact. RESOURCE_EXHAUSTED: --memory-limit.
+  absl::Status RankFirst(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece);
   // Adds a row; returns its relation.
   v1::Relation AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece);
 
@@ -93,10 +112,15 @@ class SceneStream
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;
   std::optional<SceneSearch> search_;
-  // With a limit: the query of the nearest pairs, and the pairs ranked so far.
+  // With every_piece: the query of a pair of pieces.
+  QueryOptions piece_query_;
+  // With a limit or first_only: the query of the pairs that are answered at the end, and the pairs
+  // ranked so far.
   QueryOptions ranked_query_;
+  MotionOptions ranked_motion_;
   std::unique_ptr<NearestPairs> nearest_;
-  // Written before the first piece of nearest pairs.
+  std::unique_ptr<FirstPairs> first_;
+  // Written before the first piece of ranked pairs.
   std::vector<RankedPair> ranked_;
 
   // Guarded by the mutex. The next row of the table of hulls to send.

@@ -221,7 +221,11 @@ void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, 
   message->set_piece_a(certificate.pieces.a);
   message->set_piece_b(certificate.pieces.b);
   message->set_relation(EncodeRelation(certificate.relation));
-  EncodeCertificate(certificate.certificate, a, b, message->mutable_certificate());
+  const Certificate& of_pair = certificate.certificate;
+  if (!of_pair.pairs.empty() || of_pair.direction.index() != 0) {
+    EncodeCertificate(of_pair, a, b, message->mutable_certificate());
+  }
+  EncodeIntervals(certificate.intervals, message->mutable_intervals());
 }
 
 void EncodeFirstContact(const FirstContact& contact, v1::FirstContact* message) {

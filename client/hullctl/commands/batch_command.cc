@@ -164,7 +164,9 @@ class BatchRun {
       return piece < 0 ? std::nullopt : std::optional(static_cast<uint32_t>(piece));
     };
     return checker_.Check(CheckedBodies{at_a, at_b, row.relation, a, b, row.proof->certificates(),
-                                        versions_, index(piece_a), index(piece_b)});
+                                        versions_, index(piece_a), index(piece_b),
+                                        row.first_contact ? &*row.first_contact : nullptr,
+                                        MaxTimeError(base_.wanted())});
   }
 
   // Returns the hull of a placement of the request, empty for an inline shape; null if the answer

@@ -66,17 +66,18 @@ void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
 
 // Returns the proof of the relation. For bodies it is a list intended for programs.
 std::string ProofText(const v1::CheckCollisionResponse& response) {
-  if (response.has_first_contact()) {
-    const auto count = static_cast<uint64_t>(response.first_contact().intervals_size());
-    const std::string separated = Counted(count, "interval");
-    if (!response.has_certificate()) return separated;
-    return separated + "; contact: " + CertificateText(response.certificate());
+  if (!response.piece_hulls().empty()) {
+    const int count = response.piece_certificates_size();
+    const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
+    const bool by_boxes =
+        response.relation() != v1::RELATION_OVERLAPPING && !response.has_first_contact();
+    return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes decide the rest" : "");
   }
-  if (response.piece_hulls().empty()) return CertificateText(response.certificate());
-  const int count = response.piece_certificates_size();
-  const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
-  const bool by_boxes = response.relation() != v1::RELATION_OVERLAPPING;
-  return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes decide the rest" : "");
+  if (!response.has_first_contact()) return CertificateText(response.certificate());
+  const auto count = static_cast<uint64_t>(response.first_contact().intervals_size());
+  const std::string separated = Counted(count, "interval");
+  if (!response.has_certificate()) return separated;
+  return separated + "; contact: " + CertificateText(response.certificate());
 }
 
 std::string FeatureText(const v1::Feature& feature) {

@@ -112,9 +112,12 @@ struct SceneArguments {
   QueryDetails details;
   // 0: all pairs.
   uint32_t nearest = 0;
+  bool first = false;
+  bool every_piece = false;
 };
 
-void AddNearestOption(Command command, SceneArguments* arguments) {
+// Options that choose pairs and rows.
+void AddChoiceOptions(Command command, SceneArguments* arguments) {
   command
       .AddNumber(
           "--nearest", 1, std::numeric_limits<uint32_t>::max(),
@@ -122,6 +125,10 @@ void AddNearestOption(Command command, SceneArguments* arguments) {
           "implies --separation. Without --clearance, among all pairs",
           [arguments](uint64_t number) { arguments->nearest = static_cast<uint32_t>(number); })
       .ValueName("N");
+  command.AddFlag("--first", &arguments->first,
+                  "Of pairs in motion, find only those that may be the first to touch");
+  command.AddFlag("--every-piece", &arguments->every_piece,
+                  "Print a row for every pair of pieces that is found, not only the deciding one");
 }
 
 // Reads a scene that must end the source.
@@ -147,6 +154,8 @@ ExitCode Find(const Invocation& run, const SceneArguments& arguments, Scene* rea
   arguments.details.Apply(read->request.mutable_wanted(), &tolerance);
   read->request.set_tolerance(tolerance);
   if (arguments.nearest > 0) SetNearest(arguments.nearest, &read->request);
+  if (arguments.first) read->request.set_first_only(true);
+  if (arguments.every_piece) read->request.set_every_piece(true);
   SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
   if (scene.failed() == 0) return ExitCode::kDone;
@@ -175,10 +184,14 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
   auto read = ReadWhole(arguments.file, arguments.details);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
-    if (arguments.nearest > 0) {
-      return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
-          arguments.file,
-          ": --nearest finds pairs itself, but the file names pairs; remove one of them")));
+    const char* const option = arguments.nearest > 0   ? "--nearest"
+                               : arguments.first       ? "--first"
+                               : arguments.every_piece ? "--every-piece"
+                                                       : nullptr;
+    if (option != nullptr) {
+      return run.FailUsage(absl::InvalidArgumentError(
+          absl::StrCat(arguments.file, ": ", option,
+                       " finds pairs itself, but the file names pairs; remove one of them")));
     }
     return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
   }
@@ -190,7 +203,7 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
   Command command = scene.AddCommand("check", "Answer the queries of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddWantedOptions(command, &arguments->details);
-  AddNearestOption(command, arguments.get());
+  AddChoiceOptions(command, arguments.get());
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "If the file names pairs, answers each, as 'hullctl batch' does. Otherwise finds all pairs\n"
@@ -213,7 +226,7 @@ void AddSceneCommand(Command program, Invocation* invocation) {
       program.AddCommand("scene", "Find all colliding pairs of a scene; manage scene files");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input");
   AddWantedOptions(command, &arguments->details);
-  AddNearestOption(command, arguments.get());
+  AddChoiceOptions(command, arguments.get());
   AddFreshnessOptions(command, invocation);
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\n"
@@ -221,7 +234,8 @@ void AddSceneCommand(Command program, Invocation* invocation) {
   command.SetExamples(
       {{"", "hullctl scene scene.yaml"},
        {"Pairs within a centimeter", "hullctl scene scene.yaml --clearance 0.01 --separation"},
-       {"The five nearest pairs", "hullctl scene scene.yaml --nearest 5"}});
+       {"The five nearest pairs", "hullctl scene scene.yaml --nearest 5"},
+       {"The first contact of a scene in motion", "hullctl scene scene.yaml --first"}});
   command.OnGiven([=] {
     // A subcommand has already set the action.
     if (invocation->action == nullptr) {

@@ -31,6 +31,7 @@ constexpr char kYamlHelp[] =
     "    floor: {hull: table, at: [0, 0, -0.05], group: building}\n"
     "    left: {body: corner, at: {xyz: [1, 0, 0], rpy: [0, 0, 1.57]}}\n"
     "    arm: {id: arm/upper}     # a hull or body of the server\n"
+    "    drop: {hull: wedge, at: [0, 0, 2], to: [0, 0, 1]}   # moves from time 0 to time 1\n"
     "  ignore: [[left, floor]]    # placements or groups\n"
     "  ask: {separation: true, clearance: 0.01}\n"
     "A pose is [x, y, z], [w, x, y, z, x, y, z] with a quaternion first, {xyz: ..., rpy: ...}, or\n"

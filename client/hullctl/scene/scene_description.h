@@ -50,6 +50,8 @@ struct PlacementDefinition {
   std::string hull_id;
   int body = -1;
   RigidPose X_WO = kNoMotion;
+  // The end of a motion.
+  std::optional<RigidPose> X_WO_end;
   double radius = 0;
   // Pairs within a group are never queried. Empty: no group.
   std::string group;

@@ -3,8 +3,10 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -163,18 +165,18 @@ class SceneParser {
     return absl::OkStatus();
   }
 
-  // Reads a translation, a quaternion and a translation, or both by name.
-  absl::StatusOr<RigidPose> PoseOf(const YAML::Node& node) const {
+  // Reads a translation, a quaternion and a translation, or both by name. Without a rotation, that
+  // of `pose` remains.
+  absl::StatusOr<RigidPose> PoseOf(const YAML::Node& node, const std::string& key_of_pose = "at",
+                                   RigidPose pose = kNoMotion) const {
     if (!node.IsMap()) {
-      const auto numbers = yaml_.Numbers(node, "at", {3, 7});
+      const auto numbers = yaml_.Numbers(node, key_of_pose, {3, 7});
       if (!numbers.ok()) return numbers.status();
-      RigidPose pose = kNoMotion;
       std::copy(numbers->begin(), numbers->end(), pose.end() - numbers->size());
-      return CheckedPose(node, pose);
+      return CheckedPose(node, key_of_pose, pose);
     }
-    const auto entries = yaml_.EntriesOf(node, "at", {"xyz", "rpy", "quaternion"});
+    const auto entries = yaml_.EntriesOf(node, key_of_pose, {"xyz", "rpy", "quaternion"});
     if (!entries.ok()) return entries.status();
-    RigidPose pose = kNoMotion;
     int rotations = 0;
     for (const auto& [key, value] : *entries) {
       const size_t count = key == "quaternion" ? 4 : 3;
@@ -192,14 +194,34 @@ class SceneParser {
         ++rotations;
       }
     }
-    if (rotations > 1) return yaml_.ErrorAt(node, "at takes rpy or a quaternion, not both");
-    return CheckedPose(node, pose);
+    if (rotations > 1) {
+      return yaml_.ErrorAt(node, key_of_pose + " takes rpy or a quaternion, not both");
+    }
+    return CheckedPose(node, key_of_pose, pose);
   }
 
-  absl::StatusOr<RigidPose> CheckedPose(const YAML::Node& node, const RigidPose& pose) const {
+  absl::StatusOr<RigidPose> CheckedPose(const YAML::Node& node, const std::string& key,
+                                        const RigidPose& pose) const {
     const bool turns = pose[0] != 0 || pose[1] != 0 || pose[2] != 0 || pose[3] != 0;
     if (turns) return pose;
-    return yaml_.ErrorAt(node, "at: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
+    return yaml_.ErrorAt(node, key + ": the quaternion is zero; use 1, 0, 0, 0 for no rotation");
+  }
+
+  // Reads the end of a motion from X_WO; a translation alone keeps the rotation. The quaternion
+  // gets the sign of the shorter path.
+  absl::StatusOr<RigidPose> EndOf(const YAML::Node& node, const RigidPose& X_WO) const {
+    RigidPose start = X_WO;
+    std::fill(start.begin() + 4, start.end(), 0);
+    auto end = PoseOf(node, "to", start);
+    if (!end.ok()) return end;
+    const auto largest = [](const RigidPose& pose) {
+      return std::max({std::abs(pose[0]), std::abs(pose[1]), std::abs(pose[2]), std::abs(pose[3])});
+    };
+    double cosine = 0;
+    for (size_t i = 0; i < 4; ++i)
+      cosine += start[i] / largest(start) * ((*end)[i] / largest(*end));
+    if (cosine < 0) std::transform(end->begin(), end->begin() + 4, end->begin(), std::negate<>());
+    return end;
   }
 
   // Reads a length of at least 0. YamlReader refuses numbers that are not finite.
@@ -313,10 +335,15 @@ class SceneParser {
   absl::Status TakePlace(const YAML::Node& node, PlacementDefinition* placement) const {
     const std::string what = absl::StrCat("placement ", Quoted(placement->name));
     const auto entries =
-        yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "radius", "group"});
+        yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "to", "radius", "group"});
     if (!entries.ok()) return entries.status();
     int objects = 0;
+    std::optional<YAML::Node> to;
     for (const auto& [key, value] : *entries) {
+      if (key == "to") {
+        to = value;
+        continue;
+      }
       if (key == "at") {
         const auto pose = PoseOf(value);
         if (!pose.ok()) return pose.status();
@@ -346,8 +373,14 @@ class SceneParser {
       if (!id.ok()) return id.status();
       placement->hull_id = *std::move(id);
     }
-    if (objects == 1) return absl::OkStatus();
-    return yaml_.ErrorAt(node, what + " takes exactly one of hull, body, and id");
+    if (objects != 1) {
+      return yaml_.ErrorAt(node, what + " takes exactly one of hull, body, and id");
+    }
+    if (!to.has_value()) return absl::OkStatus();
+    const auto end = EndOf(*to, placement->X_WO);
+    if (!end.ok()) return end.status();
+    placement->X_WO_end = *end;
+    return absl::OkStatus();
   }
 
   absl::StatusOr<int> BodyOf(const YAML::Node& node) const {
@@ -522,13 +555,10 @@ class Classes {
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
 };
 
-v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP, double radius) {
-  v1::Placement placement;
-  placement.set_hull_id(id);
-  placement.set_radius(radius);
-  if (X_WP == kNoMotion) return placement;
-  v1::Pose& pose = *placement.mutable_pose();
-  if (X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
+v1::Pose PoseMessage(const RigidPose& X_WP) {
+  v1::Pose pose;
+  // (w, 0, 0, 0) is the rotation of an absent quaternion, but its length matters in a motion.
+  if (X_WP[0] != 1 || X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
     v1::Quaternion& rotation = *pose.mutable_rotation();
     rotation.set_w(X_WP[0]);
     rotation.set_x(X_WP[1]);
@@ -539,6 +569,14 @@ v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP, double r
   translation.set_x(X_WP[4]);
   translation.set_y(X_WP[5]);
   translation.set_z(X_WP[6]);
+  return pose;
+}
+
+v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP, double radius) {
+  v1::Placement placement;
+  placement.set_hull_id(id);
+  placement.set_radius(radius);
+  if (X_WP != kNoMotion) *placement.mutable_pose() = PoseMessage(X_WP);
   return placement;
 }
 
@@ -546,25 +584,29 @@ v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP, double r
 std::vector<uint32_t> AddPlacement(const SceneDescription& from,
                                    const PlacementDefinition& placement, BodyForm form,
                                    Scene* scene) {
-  const auto add = [scene](const std::string& name, const std::string& id, const RigidPose& X_WP,
-                           double radius, int body) {
-    *scene->request.add_placements() = PlacementAt(id, X_WP, radius);
+  const auto add = [&](const std::string& name, const std::string& id, const RigidPose& X_OP,
+                       double radius, int body) {
+    v1::Placement& added = *scene->request.add_placements();
+    const auto placed = [&](const RigidPose& X_WO) {
+      return X_OP == kNoMotion ? X_WO : Compose(X_WO, X_OP);
+    };
+    added = PlacementAt(id, placed(placement.X_WO), radius);
+    if (placement.X_WO_end) *added.mutable_end_pose() = PoseMessage(placed(*placement.X_WO_end));
     scene->names.push_back(name);
     scene->body_of.push_back(body);
     return scene->size() - 1;
   };
   if (placement.body < 0) {
-    return {add(placement.name, placement.hull_id, placement.X_WO, placement.radius, -1)};
+    return {add(placement.name, placement.hull_id, kNoMotion, placement.radius, -1)};
   }
   const BodyDefinition& body = from.bodies[static_cast<size_t>(placement.body)];
   if (form == BodyForm::kWhole) {
-    return {add(placement.name, body.body_id, placement.X_WO, placement.radius, placement.body)};
+    return {add(placement.name, body.body_id, kNoMotion, placement.radius, placement.body)};
   }
   std::vector<uint32_t> indices;
   for (const PieceDefinition& piece : body.pieces) {
-    indices.push_back(add(absl::StrCat(placement.name, "/", piece.name), piece.hull_id,
-                          Compose(placement.X_WO, piece.X_BP), placement.radius + piece.radius,
-                          -1));
+    indices.push_back(add(absl::StrCat(placement.name, "/", piece.name), piece.hull_id, piece.X_BP,
+                          placement.radius + piece.radius, -1));
   }
   return indices;
 }

@@ -582,7 +582,8 @@ class Client(ClientBase):
         origin + direction, so give directions as long as the rays.
 
         origins, directions: n x 3, or one of them 3 for all rays. placements: as in
-        check_collisions; not bodies. Pairs far apart are skipped in groups, as in find_collisions.
+        check_collisions; the pieces of a body must have its frame. Pairs far apart are skipped in
+        groups, as in find_collisions.
 
         HulldError: a placement has no answer, such as a hull that does not exist.
         """
@@ -617,6 +618,8 @@ class Client(ClientBase):
         normal: bool = False,
         clearance: float | None = None,
         limit: int | None = None,
+        first_only: bool = False,
+        every_piece: bool = False,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         freshness: Freshness | None = None,
@@ -631,14 +634,19 @@ class Client(ClientBase):
         with a clearance, all pairs within it are found. limit: at most this many pairs, those of
         the least separation, in ascending order, with their separations; without a clearance,
         among all pairs. The totals still count every pair within the clearance. Pairs without an
-        answer follow, at most as many.
+        answer follow, at most as many. first_only: only the pairs in motion that may be the first
+        to touch, in ascending order of separated_until; none if no pair touches. The totals count
+        every pair that meets. every_piece: a row for each pair of pieces that is found; the column
+        `pieces` distinguishes the rows of two bodies.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
             axis, analysis, certificate, separation, max_error, witness, clearance, normal
         ).for_limit(limit)
-        call = requests.find_collisions(packed, scene, wanted, limit, tolerance)
+        call = requests.find_collisions(
+            packed, scene, wanted, limit, tolerance, first_only, every_piece
+        )
         return self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
 
     def iter_find_collisions(
@@ -658,6 +666,8 @@ class Client(ClientBase):
         normal: bool = False,
         clearance: float | None = None,
         limit: int | None = None,
+        first_only: bool = False,
+        every_piece: bool = False,
         tolerance: float = 0.0,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         freshness: Freshness | None = None,
@@ -670,7 +680,9 @@ class Client(ClientBase):
         wanted = Wanted(
             axis, analysis, certificate, separation, max_error, witness, clearance, normal
         ).for_limit(limit)
-        call = requests.find_collisions(packed, scene, wanted, limit, tolerance)
+        call = requests.find_collisions(
+            packed, scene, wanted, limit, tolerance, first_only, every_piece
+        )
         return self._parts(call, self._seconds(timeout), freshness)
 
     def stream_collisions(

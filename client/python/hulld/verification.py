@@ -129,7 +129,7 @@ class _Piece:
         self,
         vertices: npt.NDArray[np.float64],
         motions: Sequence[_Motion],
-        radii: Sequence[float],
+        radii: Sequence[float | Fraction],
         in_any_order: bool = False,
     ) -> None:
         self.radius = sum((Fraction(radius) for radius in radii), Fraction(0))
@@ -348,12 +348,21 @@ def _check_pieces(
 
 
 class _MovingPiece:
-    """A hull in motion."""
+    """A hull in motion, or a piece of a body in motion."""
 
-    def __init__(self, placement: Placement, vertices: npt.NDArray[np.float64]) -> None:
+    def __init__(
+        self,
+        placement: Placement,
+        vertices: npt.NDArray[np.float64],
+        piece: Placement | None = None,
+    ) -> None:
         self._vertices = vertices
         self._in_any_order = placement.shape is not None
         self.radius = Fraction(placement.radius)
+        self._inner: list[_Motion] = []
+        if piece is not None:
+            self.radius += Fraction(piece.radius)
+            self._inner = [_Motion.of(Pose() if piece.pose is None else piece.pose)]
         end = placement.pose if placement.end_pose is None else placement.end_pose
         self._ends = (_parts(placement.pose), _parts(end))
 
@@ -369,7 +378,8 @@ class _MovingPiece:
 
     def at(self, time: float) -> _Piece:
         motion = _Motion(*self._parts_at(Fraction(time)))
-        return _Piece(self._vertices, [motion], [float(self.radius)], self._in_any_order)
+        motions = [*self._inner, motion]
+        return _Piece(self._vertices, motions, [self.radius], self._in_any_order)
 
     def keeps_rotation(self) -> bool:
         """True if one quaternion is a positive multiple of the other."""
@@ -401,14 +411,14 @@ class _MovingPiece:
             for weights in ((3, 0, 0), (1, 2, 0), (0, 2, 1), (0, 0, 3))
         ]
         points = [_point(vertex) for vertex in self._vertices]
+        for motion in self._inner:
+            points = [motion(point) for point in points]
         b = [
             constant + max(sum(d * x for d, x in zip(direction, point)) for point in points)
             for constant, direction in zip(constants, directions)
         ]
         grown = (3 * s[0], s[0] + 2 * s[1], 2 * s[1] + s[2], 3 * s[2])
-        signs = [
-            _sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)
-        ]
+        signs = [_sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)]
         end_is_right = signs[3] < 0 or (may_end and signs[3] == 0)
         return signs[0] < 0 and signs[1] <= 0 and signs[2] <= 0 and end_is_right
 
@@ -511,11 +521,20 @@ def _check_first_contact(
         if relation != Relation.SEPARATED:
             raise VerificationError("a hull is empty, and so separated from everything")
         return
+    _check_intervals(contact.intervals, contact, a, b)
+    if relation != Relation.SEPARATED:
+        _check_contact(relation, contact, certificate, a, b)
+
+
+def _check_intervals(
+    intervals: Sequence[SeparatedInterval], contact: FirstContact, a: _MovingPiece, b: _MovingPiece
+) -> None:
     begin = 0.0
-    for index, interval in enumerate(contact.intervals):
+    meets = contact.contact_time is not None
+    for index, interval in enumerate(intervals):
         if not begin < interval.until <= contact.separated_until:
             raise VerificationError(f"interval {index} ends at {interval.until}")
-        may_end = relation != Relation.SEPARATED and interval.until == contact.separated_until
+        may_end = meets and interval.until == contact.separated_until
         try:
             _check_interval(interval, begin, a, b, may_end)
         except VerificationError as error:
@@ -523,8 +542,53 @@ def _check_first_contact(
         begin = interval.until
     if begin != contact.separated_until:
         raise VerificationError(f"the intervals end at {begin}, before separated_until")
-    if relation != Relation.SEPARATED:
-        _check_contact(relation, contact, certificate, a, b)
+
+
+def _check_moving_pieces(
+    relation: Relation,
+    contact: FirstContact | None,
+    proof: Sequence[PieceCertificate],
+    a: Sequence[_MovingPiece],
+    b: Sequence[_MovingPiece],
+    max_time_error: float,
+) -> None:
+    """Each pair of pieces needs intervals up to separated_until, and one of them the contact."""
+    if contact is None:
+        raise VerificationError("the answer is about a motion, but has no first contact")
+    _check_times(relation, contact, max_time_error)
+    proven = set()
+    shown = Relation.SEPARATED
+    for one in proof:
+        pair = (one.piece_a, one.piece_b)
+        name = f"pieces {one.piece_a} of A and {one.piece_b} of B"
+        if one.piece_a >= len(a) or one.piece_b >= len(b) or pair in proven:
+            raise VerificationError(f"{name} do not exist, or have two certificates")
+        proven.add(pair)
+        pieces = a[one.piece_a], b[one.piece_b]
+        if pieces[0].is_empty() or pieces[1].is_empty():
+            raise VerificationError(f"{name}: a hull is empty")
+        try:
+            _check_intervals(one.intervals, contact, *pieces)
+            if one.relation != Relation.SEPARATED:
+                if one.relation not in _STRENGTH:
+                    raise VerificationError(f"{one.relation.name} has no certificate")
+                _check_contact(one.relation, contact, one.certificate, *pieces)
+                if _STRENGTH[one.relation] > _STRENGTH[shown]:
+                    shown = one.relation
+        except VerificationError as error:
+            raise VerificationError(f"{name}: {error}") from None
+    # A translation that touches first may overlap later, which no certificate shows.
+    may_overlap = (relation, shown) == (Relation.OVERLAPPING, Relation.TOUCHING) and all(
+        piece.radius == 0 and piece.keeps_rotation() for piece in (*a, *b)
+    )
+    if shown != relation and not may_overlap:
+        raise VerificationError(f"the certificates show {shown.name}, not {relation.name}")
+    if contact.separated_until == 0:
+        return
+    for i, piece_a in enumerate(a):
+        for j, piece_b in enumerate(b):
+            if (i, j) not in proven and not (piece_a.is_empty() or piece_b.is_empty()):
+                raise VerificationError(f"pieces {i} of A and {j} of B have no certificate")
 
 
 class Verifier:
@@ -620,7 +684,10 @@ class Verifier:
             raise VerificationError("the answer is about different hulls")
         if a.end_pose is not None or b.end_pose is not None:
             if proof is not None:
-                raise VerificationError("the motion of a body has no certificate")
+                of_a = self._moving_pieces(a, versions[0], piece_hulls)
+                of_b = self._moving_pieces(b, versions[1], piece_hulls)
+                _check_moving_pieces(relation, contact, proof, of_a, of_b, max_time_error)
+                return
             moving = (self._moving(a, versions[0]), self._moving(b, versions[1]))
             _check_first_contact(relation, contact, certificate, *moving, max_time_error)
             return
@@ -657,6 +724,24 @@ class Verifier:
             return [self._hull(placement, version)]
         pieces = []
         outer = _Motion.of(placement.pose)
+        for piece, vertices in self._parts(placement, body, piece_hulls):
+            inner = _Motion.of(Pose() if piece.pose is None else piece.pose)
+            pieces.append(_Piece(vertices, [inner, outer], [placement.radius, piece.radius]))
+        return pieces
+
+    def _moving_pieces(
+        self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
+    ) -> list[_MovingPiece]:
+        body = self._body(version) if placement.shape is None else None
+        if body is None:
+            return [self._moving(placement, version)]
+        parts = self._parts(placement, body, piece_hulls)
+        return [_MovingPiece(placement, vertices, piece) for piece, vertices in parts]
+
+    def _parts(
+        self, placement: Placement, body: Body, piece_hulls: Mapping[str, HullVersion]
+    ) -> Iterator[tuple[Placement, npt.NDArray[np.float64]]]:
+        """The pieces of a body and their vertices."""
         for index in range(len(body.pieces)):
             piece = body.pieces[index]
             if piece.id is None or piece.id not in piece_hulls:
@@ -664,10 +749,7 @@ class Verifier:
                     f"piece {index} of body {placement.id} is hull {piece.id}, whose revision "
                     "the answer does not state"
                 )
-            inner = _Motion.of(Pose() if piece.pose is None else piece.pose)
-            vertices = self._vertices(piece_hulls[piece.id])
-            pieces.append(_Piece(vertices, [inner, outer], [placement.radius, piece.radius]))
-        return pieces
+            yield piece, self._vertices(piece_hulls[piece.id])
 
     def _vertices(self, version: HullVersion) -> npt.NDArray[np.float64]:
         if version.hull_id not in self._meshes:

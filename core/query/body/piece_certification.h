@@ -12,6 +12,7 @@
 #include "core/query/terms/certificate.h"
 #include "core/query/terms/query_options.h"
 #include "core/query/terms/relation.h"
+#include "core/query/terms/separated_interval.h"
 
 namespace hulld {
 
@@ -20,6 +21,8 @@ struct PieceCertificate {
   PiecePair pieces;
   Relation relation;
   Certificate certificate;
+  // Of bodies in motion (BodyContact): the certificate is empty except for the deciding pair.
+  std::vector<SeparatedInterval> intervals = {};
 };
 
 // Finds, in steps, the certificates that prove the relation of two bodies, in ascending order of

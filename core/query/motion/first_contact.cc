@@ -15,12 +15,12 @@
 namespace hulld {
 namespace {
 
-std::array<double, 15> ValuesOf(const MovingHull& moving) {
+std::array<double, 16> ValuesOf(const MovingHull& moving) {
   const Pose& start = moving.X_WH.start;
   const Pose& end = moving.X_WH.end;
-  return {start.q[0],  start.q[1],  start.q[2], start.q[3], start.t.x(),
-          start.t.y(), start.t.z(), end.q[0],   end.q[1],   end.q[2],
-          end.q[3],    end.t.x(),   end.t.y(),  end.t.z(),  moving.radius};
+  return {start.q[0],  start.q[1], start.q[2],    start.q[3],         start.t.x(), start.t.y(),
+          start.t.z(), end.q[0],   end.q[1],      end.q[2],           end.q[3],    end.t.x(),
+          end.t.y(),   end.t.z(),  moving.radius, moving.piece_radius};
 }
 
 // Returns true if (A, B) is in a total order by content, so that both orders of a pair yield the
@@ -91,7 +91,7 @@ absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingH
     return contact;
   }
   // With radii, the time of a translation is irrational in general.
-  const bool rounded = a.radius > 0 || b.radius > 0;
+  const bool rounded = a.is_rounded() || b.is_rounded();
   if (!rounded && IsTranslation(a.X_WH) && IsTranslation(b.X_WH)) {
     return TranslationSearch(a, b, options).Run();
   }

@@ -3,26 +3,30 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
-#include <variant>
 #include <vector>
 
 #include "core/base/boxed.h"
-#include "core/numeric/integer.h"
-#include "core/numeric/vector.h"
 #include "core/query/placed/query_hull.h"
 #include "core/query/terms/certificate.h"
 #include "core/query/terms/motion.h"
 #include "core/query/terms/relation.h"
+#include "core/query/terms/separated_interval.h"
 
 namespace hulld {
 
-// A hull in motion, plus a closed ball of the radius: finite and at least 0.
+// A hull in motion, plus a closed ball. Its radius is the exact sum of the radius and, for a piece
+// of a body, the radius of the piece, each finite and at least 0.
 struct MovingHull {
   const QueryHull& hull;
   Motion X_WH;
   double radius = 0;
+  double piece_radius = 0;
+
+  bool is_rounded() const { return radius > 0 || piece_radius > 0; }
 };
 
 struct MotionOptions {
@@ -32,7 +36,12 @@ struct MotionOptions {
   // may be kWithinTolerance. Absent: kDefaultRelativeResolution times the sizes of the hulls. Less
   // than kLeastRelativeResolution times the size of the pair counts as that.
   std::optional<double> resolution;
+  // Contacts after this time need not be found: if the pair is separated up to a later time, the
+  // relation may be kSeparated, with such a time as separated_until.
+  double latest = 1;
   bool want_certificate = false;
+  // The most pairs of pieces that a certificate of bodies may list.
+  uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
   // Polled in long loops; true ends the search with CANCELLED. May be empty.
   std::function<bool()> should_stop;
 };
@@ -50,21 +59,6 @@ inline constexpr double kLeastRelativeResolution = 0x1p-38;
 // negative or NaN.
 absl::Status ValidateMotionOptions(const MotionOptions& options);
 
-// Proof that a pair is separated from the end of the previous interval, or 0, up to `until`. The
-// direction n (world frame, from A toward B, not zero, of any length) and the offset are exact as
-// given.
-//
-// With an offset: n.p < offset - radius_A |n| for all points p of A, and n.p > offset + radius_B
-// |n| for all p of B. For a vertex v, |q(t)|^2 (n.p(t) - offset) is a cubic polynomial in t, and
-// its Bernstein coefficients over the interval all have this sign.
-// Without an offset, for translations: n.(b(t) - a(t)) > (radius_A + radius_B) |n| for all vertices
-// a and b at both ends, where equality is allowed at `until` of the last interval before a contact.
-struct SeparatedInterval {
-  double until = 1;
-  std::variant<Vector, IntegerVector> direction;
-  std::optional<double> offset;
-};
-
 // The first contact of a pair in motion. `relation`:
 // - kSeparated: the pair is separated at all times.
 // - kOverlapping, kTouching: the pair meets. If both motions are translations, kOverlapping if it
@@ -74,7 +68,7 @@ struct SeparatedInterval {
 struct FirstContact {
   Relation relation = Relation::kSeparated;
   // The pair is separated at all times before this; and at this time, unless it equals
-  // contact_time. 1 if kSeparated.
+  // contact_time. 1 if kSeparated, unless MotionOptions::latest ended the search.
   double separated_until = 1;
   // If the pair meets: it is in contact at some time of [separated_until, contact_time], and at
   // contact_time itself unless the contact of two translations ends before the next double. The

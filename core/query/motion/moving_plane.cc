@@ -96,6 +96,9 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   side.size = moving.hull.max_abs_coordinate() +
               std::max(start.t.cwiseAbs().maxCoeff(), end.t.cwiseAbs().maxCoeff());
   side.radius = moving.radius * kUnitLengthRoundUp;
+  if (moving.piece_radius > 0) {
+    side.radius = std::nextafter(side.radius + moving.piece_radius * kUnitLengthRoundUp, kInfinity);
+  }
   return side;
 }
 

@@ -49,7 +49,7 @@ class MovingPlane {
     Vector x1;
     // Sum of the largest absolute coordinates of the hull and of its translations.
     double size;
-    // At least the radius times the length of a direction.
+    // At least the sum of the radii times the length of a direction.
     double radius;
   };
   struct Bounds;

@@ -13,14 +13,19 @@ bool IsAtRest(const Motion& motion) {
 // Places a hull. A pose of the caller has fewer bits than the same pose as a time of a motion.
 void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& product,
              std::optional<PlacedHull>& placed) {
-  if (time == 0 || IsAtRest(moving.X_WH)) {
-    placed.emplace(moving.hull, moving.X_WH.start, moving.radius);
-  } else if (time == 1) {
-    placed.emplace(moving.hull, moving.X_WH.end, moving.radius);
+  const auto& [start, end] = moving.X_WH;
+  const bool is_given = time == 0 || time == 1 || IsAtRest(moving.X_WH);
+  const Pose& given = time == 1 ? end : start;
+  if (is_given && moving.piece_radius == 0) {
+    placed.emplace(moving.hull, given, moving.radius);
+    return;
+  }
+  if (is_given) {
+    product.emplace(given, Pose());
   } else {
     product.emplace(moving.X_WH, time);
-    placed.emplace(moving.hull, *product, moving.radius);
   }
+  placed.emplace(moving.hull, *product, moving.radius, moving.piece_radius);
 }
 
 }  // namespace

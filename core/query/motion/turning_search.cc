@@ -39,8 +39,10 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap)
 
 TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const MotionOptions& options)
     : a_(a), b_(b), options_(options), poll_(options.should_stop, 1), plane_(a, b) {
-  const double sizes =
-      (a.hull.max_abs_coordinate() + a.radius) + (b.hull.max_abs_coordinate() + b.radius);
+  const auto size_of = [](const MovingHull& moving) {
+    return moving.hull.max_abs_coordinate() + (moving.radius + moving.piece_radius);
+  };
+  const double sizes = size_of(a) + size_of(b);
   resolution_ = std::max(options.resolution.value_or(kDefaultRelativeResolution * sizes),
                          kLeastRelativeResolution * plane_.size());
 }
@@ -60,7 +62,9 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
     last_direction_ = *n;
     separated_ = step->until;
     if (options_.want_certificate) intervals_.push_back({separated_, *n, step->offset});
-    if (separated_ == 1) return WithoutContact(Relation::kSeparated);
+    if (separated_ == 1 || separated_ > options_.latest) {
+      return WithoutContact(Relation::kSeparated);
+    }
     // Contact is likely where the plane fails, and after it.
     const double latest = LatestContactTime();
     for (const double time : {step->failed, latest}) {

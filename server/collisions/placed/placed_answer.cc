@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/query/collision.h"
+#include "core/query/motion/moving_body_search.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
@@ -24,6 +25,14 @@ size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
   columns->add_pieces(pieces ? index(a, pieces->a) : -1);
   columns->add_pieces(pieces ? index(b, pieces->b) : -1);
   return kPiecesBytes;
+}
+
+// Adds the row of an answer, without its pieces and their certificates.
+size_t AddRow(const PlacementTable& table, const QueryHull& a, const QueryHull& b,
+              const PlacedAnswer& answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
+  if (answer.contact.has_value()) return AddFirstContact(*answer.contact, a, b, wanted, columns);
+  const size_t bytes = AddAnswer(answer.answer, a, b, wanted, columns);
+  return table.has_motions() ? bytes + AddNoTimes(columns) : bytes;
 }
 
 // Encodes the proof of the answer; returns its bytes.
@@ -48,15 +57,16 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   const QueryHull& nothing = table.HullOfPiece(a, 0);
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   v1::AnswerColumns row;
-  size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
-                           table.HullOfPiece(b, pieces.b), wanted, &row);
+  size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),
+                        answer, wanted, &row);
   v1::PieceProof* const proof = row.add_piece_proofs();
   bytes += EncodeProof(table, a, b, answer.of_body.certificates, proof);
   bool is_answered = row.pair_problems_size() == 0;
   if (is_answered && bytes > Config::kMaxRowProofBytes) {
     row.Clear();
-    bytes = AddAnswer(ProofTooLarge(answer.of_body.certificates.size(), Config::kMaxRowProofBytes),
-                      nothing, nothing, wanted, &row);
+    const absl::Status too_large =
+        ProofTooLarge(answer.of_body.certificates.size(), Config::kMaxRowProofBytes);
+    bytes = AddRow(table, nothing, nothing, {too_large}, wanted, &row);
     is_answered = false;
   }
   const auto number = static_cast<uint64_t>(columns->relations_size());
@@ -69,20 +79,6 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   columns->MergeFrom(row);
   return bytes +
          AddPieces(table, a, b, is_answered ? answer.of_body.pieces : std::nullopt, columns);
-}
-
-// Adds the row of an answer in a call with motions.
-size_t AddMovingAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const PlacedAnswer& answer, const v1::Wanted& wanted,
-                       v1::AnswerColumns* columns) {
-  const QueryHull& hull_a = table.HullAt(a);
-  const QueryHull& hull_b = table.HullAt(b);
-  const size_t bytes =
-      answer.contact.has_value()
-          ? AddFirstContact(*answer.contact, hull_a, hull_b, wanted, columns)
-          : AddAnswer(answer.answer, hull_a, hull_b, wanted, columns) + AddNoTimes(columns);
-  if (!table.has_bodies()) return bytes;
-  return bytes + AddPieces(table, a, b, std::nullopt, columns);
 }
 
 }  // namespace
@@ -108,28 +104,35 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
 
 PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
                        const MotionOptions& options) {
-  if (table.is_body(a) || table.is_body(b)) return {BodyInMotion()};
-  absl::StatusOr<FirstContact> found =
-      FindFirstContact(table.MovingAt(a), table.MovingAt(b), options);
-  if (!found.ok()) return {found.status()};
+  BodyContact found;
+  if (table.is_body(a) || table.is_body(b)) {
+    absl::StatusOr<BodyContact> of_bodies =
+        FindFirstContact(table.MovingBodyAt(a), table.MovingBodyAt(b), options);
+    if (!of_bodies.ok()) return {of_bodies.status()};
+    found = *std::move(of_bodies);
+  } else {
+    absl::StatusOr<FirstContact> of_hulls =
+        FindFirstContact(table.MovingAt(a), table.MovingAt(b), options);
+    if (!of_hulls.ok()) return {of_hulls.status()};
+    found.contact = *std::move(of_hulls);
+  }
   Answer answer;
-  answer.relation = found->relation;
-  return {std::move(answer), {}, *std::move(found)};
+  answer.relation = found.contact.relation;
+  return {std::move(answer), std::move(found.of_body), std::move(found.contact)};
 }
 
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
-  if (table.has_motions()) return AddMovingAnswer(table, a, b, answer, wanted, columns);
   if (!table.has_bodies()) {
-    return AddAnswer(answer.answer, table.HullAt(a), table.HullAt(b), wanted, columns);
+    return AddRow(table, table.HullAt(a), table.HullAt(b), answer, wanted, columns);
   }
   const bool is_proven =
       wanted.certificate() && answer.answer.ok() && (table.is_body(a) || table.is_body(b));
   if (is_proven) return AddProvenAnswer(table, a, b, answer, wanted, columns);
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
-  const size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
-                                 table.HullOfPiece(b, pieces.b), wanted, columns);
+  const size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),
+                              answer, wanted, columns);
   // Without an answer no pieces decided, although the relation alone may have been found.
   return bytes +
          AddPieces(table, a, b, answer.answer.ok() ? answer.of_body.pieces : std::nullopt, columns);

@@ -31,7 +31,7 @@ struct PlacedAnswer {
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// As AskPlaced for a call with motions. A pair with a body gets an error.
+// As AskPlaced for a call with motions.
 PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
                        const MotionOptions& options);
 

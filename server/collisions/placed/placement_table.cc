@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "core/query/scene/swept_box.h"
+#include "core/query/motion/swept_box.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -253,14 +253,9 @@ void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
   if (!valid.ok()) malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), valid));
 }
 
-// A body in motion is refused by the query, so its box meets all others.
 Box PlacementTable::SweptBoxOf(size_t i) const {
   if (!is_answerable(i)) return Box::Empty();
-  if (!is_body(i)) return SweptBox(MovingAt(i));
-  const Motion motion = MotionAt(i);
-  const bool is_at_rest = motion.start.q == motion.end.q && motion.start.t == motion.end.t;
-  if (is_at_rest) return BoundingBox(bodies_[i]);
-  return Box::All();
+  return is_body(i) ? SweptBox(MovingBodyAt(i)) : SweptBox(MovingAt(i));
 }
 
 size_t PlacementTable::MemoryBytes() const {

@@ -20,6 +20,7 @@
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/motion/first_contact.h"
+#include "core/query/motion/moving_body.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
@@ -85,6 +86,8 @@ class PlacementTable {
   bool has_motions() const { return !end_poses_.empty(); }
   // A placement of such a request in motion; an empty hull for a body.
   MovingHull MovingAt(size_t i) const { return {HullAt(i), MotionAt(i), RadiusAt(i)}; }
+  // As MovingAt, for a hull or body. Requires has_bodies().
+  MovingBody MovingBodyAt(size_t i) const { return {bodies_[i].body(), MotionAt(i), RadiusAt(i)}; }
   // Bounding box of a placement, world frame: BoundingBox; with motions, SweptBox.
   Box BoxOf(size_t i) const {
     if (has_motions()) return SweptBoxOf(i);

@@ -68,6 +68,7 @@ MotionOptions MakeMotionOptions(const v1::Wanted& wanted, const QueryOptions& op
   if (wanted.has_max_time_error()) motion.max_time_error = wanted.max_time_error();
   if (wanted.has_resolution()) motion.resolution = wanted.resolution();
   motion.want_certificate = options.want_certificate;
+  motion.max_piece_certificates = Config::kMaxPieceCertificates;
   motion.should_stop = options.should_stop;
   return motion;
 }
@@ -89,12 +90,6 @@ absl::Status ValidateForMotions(const QueryOptions& options) {
         name, " excludes end_pose; ask for the first contact alone, then at its pose"));
   }
   return absl::OkStatus();
-}
-
-absl::Status BodyInMotion() {
-  return absl::InvalidArgumentError(
-      "the pair has an end_pose and a body, and the first contact of a body is not supported; ask "
-      "for the motions of its pieces");
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {

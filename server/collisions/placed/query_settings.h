@@ -28,9 +28,6 @@ MotionOptions MakeMotionOptions(const v1::Wanted& wanted, const QueryOptions& op
 // INVALID_ARGUMENT, naming the field: an option that motions exclude.
 absl::Status ValidateForMotions(const QueryOptions& options);
 
-// INVALID_ARGUMENT: the error of a pair with a motion and a body.
-absl::Status BodyInMotion();
-
 // True if only relations are wanted and all placements are hulls at rest: the most frequent call,
 // which has a separate path.
 inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {

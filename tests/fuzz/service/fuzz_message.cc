@@ -91,6 +91,8 @@ class MessageFiller {
     if (name == "end_pose" || name == "max_time_error" || name == "resolution") {
       return in_.OneOf(32);
     }
+    // Most scenes have no limit, and no motion.
+    if (name == "first_only" || name == "every_piece") return in_.OneOf(16);
     if (field.has_optional_keyword() || name == "tolerance" || name == "simplification") {
       return in_.OneOf(4);
     }

@@ -166,19 +166,19 @@ std::string CheckLimitedTotals(uint32_t limit, const v1::SceneTotals& totals,
   return {};
 }
 
-// Position of a row in a scene: by pair or, with a limit, by separation, rows without an answer
-// last.
+// Position of a row in a scene: by pair or, with a limit or first_only, by separation or time, rows
+// without an answer last.
 using SceneKey = std::tuple<bool, double, int64_t, int64_t>;
 
 SceneKey KeyOf(const v1::FindCollisionsRequest& request, const v1::FindCollisionsResponse& part,
                int row) {
   SceneKey key(false, 0, part.pairs(2 * row), part.pairs(2 * row + 1));
   const v1::AnswerColumns& columns = part.columns();
-  if (!request.has_limit() || row >= columns.relations_size()) return key;
+  const bool is_ranked = request.has_limit() || request.first_only();
+  if (!is_ranked || row >= columns.relations_size()) return key;
+  const auto& ranks = request.has_limit() ? columns.separations() : columns.separated_until();
   std::get<0>(key) = columns.relations(row) == v1::RELATION_UNSPECIFIED;
-  if (!std::get<0>(key) && row < columns.separations_size()) {
-    std::get<1>(key) = columns.separations(row);
-  }
+  if (!std::get<0>(key) && row < ranks.size()) std::get<1>(key) = ranks[row];
   return key;
 }
 
@@ -345,7 +345,8 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     for (int row = 0; 2 * row < part.pairs_size(); ++row) {
       const SceneKey key = KeyOf(request, part, row);
       const auto [unanswered, separation, a, b] = key;
-      if (key <= before || a >= b || b >= PlacementCount(request)) {
+      const bool repeats = request.every_piece() && key == before;
+      if ((key <= before && !repeats) || a >= b || b >= PlacementCount(request)) {
         return "pairs of a scene are out of order or out of range";
       }
       before = key;
@@ -361,8 +362,9 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     }
   }
   const v1::SceneTotals& totals = parts.back().totals();
-  return request.has_limit() ? CheckLimitedTotals(request.limit(), totals, counted)
-                             : CheckSceneTotals(totals, counted);
+  if (request.has_limit()) return CheckLimitedTotals(request.limit(), totals, counted);
+  if (!request.first_only()) return CheckSceneTotals(totals, counted);
+  return CheckLimitedTotals(std::numeric_limits<uint32_t>::max(), totals, counted);
 }
 
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts) {

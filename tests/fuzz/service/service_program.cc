@@ -574,9 +574,9 @@ void ServiceProgram::FindCollisions() {
     return;
   }
   Note(CheckScene(sent, parts));
-  const bool comparable = request.placements_size() > 1 &&
-                          request.placements_size() <= kMostComparedPlacements &&
-                          request.tolerance() == 0 && !request.wanted().has_clearance();
+  const bool comparable =
+      request.placements_size() > 1 && request.placements_size() <= kMostComparedPlacements &&
+      request.tolerance() == 0 && !request.wanted().has_clearance() && !request.first_only();
   if (comparable && finding_.empty()) CompareSceneWithBatch(request, parts);
 }
 

@@ -167,9 +167,10 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
   };
   const Pieces a = pieces_of(request.a());
   const Pieces b = pieces_of(request.b());
-  // A body that is unknown or has another pose cannot be compared with its pieces.
-  const bool is_elsewhere = bodies_.contains(request.b().hull_id()) &&
-                            (request.b().has_pose() || request.b().radius() != 0);
+  // A body that is unknown, moves, or has another pose cannot be compared with its pieces.
+  const bool is_elsewhere =
+      request.b().has_end_pose() || (bodies_.contains(request.b().hull_id()) &&
+                                     (request.b().has_pose() || request.b().radius() != 0));
   const bool is_known =
       bodies_.contains(request.b().hull_id()) || hulls_.contains(request.b().hull_id());
   if (is_elsewhere || !is_known || a.size() * b.size() > kMostComparedPairs) return;

@@ -40,7 +40,7 @@ TEST(NearestPairs, OrderOfAdditionsDoesNotMatter) {
     std::shuffle(pairs.begin(), pairs.end(), random);
     NearestPairs nearest(25, {}, 0);
     for (const RankedPair& pair : pairs) {
-      const bool may_be_skipped = pair.separation > nearest.bound();
+      const bool may_be_skipped = pair.rank > nearest.bound();
       if (!may_be_skipped) nearest.Add(pair);
     }
     nearest.AddUnanswered(3, 9);

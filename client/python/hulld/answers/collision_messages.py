@@ -86,9 +86,7 @@ def _axis_of(message: Any) -> Axis:
     )
 
 
-def _direction_of(
-    message: Any,
-) -> tuple[float, float, float] | tuple[int, int, int] | None:
+def _direction_of(message: Any) -> tuple[float, float, float] | tuple[int, int, int] | None:
     kind = message.WhichOneof("exact_direction")
     if kind == "direction":
         n = message.direction
@@ -133,6 +131,7 @@ def _piece_certificates_of(messages: Iterable[Any]) -> tuple[PieceCertificate, .
             message.piece_b,
             enum_or_zero(Relation, message.relation),
             _certificate_of(message.certificate),
+            _intervals_of(message.intervals),
         )
         for message in messages
     )

@@ -208,12 +208,14 @@ class FirstContact:
 @dataclass(frozen=True)
 class PieceCertificate:
     """A proof of the relation of a piece of A and a piece of B, by index, 0 for a hull; each at the
-    product of the pose of its placement and its pose in the body."""
+    product of the pose of its placement and its pose in the body. intervals: of a pair in motion,
+    the proof that it is separated before the first contact of the bodies."""
 
     piece_a: int
     piece_b: int
     relation: Relation
     certificate: Certificate
+    intervals: Sequence[SeparatedInterval] = ()
 
 
 @dataclass(frozen=True)

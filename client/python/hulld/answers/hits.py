@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hulld.answers.collisions import Scene, SeparatedInterval
+from hulld.answers.collisions import Answers, Relation, Scene, SeparatedInterval
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,15 @@ def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
     return normal
 
 
-def hits_of(
-    found: Scene, origins: npt.NDArray[np.float64], ends: npt.NDArray[np.float64]
-) -> Hits:
+def _proof(answers: Answers, row: int) -> Sequence[SeparatedInterval]:
+    """The intervals of a row; of a body, those of the piece that is hit."""
+    for one in answers.piece_proofs.get(row, ()):
+        if one.relation != Relation.SEPARATED:
+            return one.intervals
+    return answers.motion_proofs.get(row, ())
+
+
+def hits_of(found: Scene, origins: npt.NDArray[np.float64], ends: npt.NDArray[np.float64]) -> Hits:
     """The hits in a scene of rays, and then other placements."""
     answers = found.answers
     all_times = np.empty(0) if answers.contact_times is None else answers.contact_times
@@ -68,7 +74,7 @@ def hits_of(
     rows = by_time[np.argsort(found.pairs[by_time, 0], kind="stable")]
     rays, times = found.pairs[rows, 0], all_times[rows]
     along = times[:, np.newaxis]
-    normals = [_normal(answers.motion_proofs.get(int(row), ())) for row in rows]
+    normals = [_normal(_proof(answers, int(row))) for row in rows]
     return Hits(
         rays,
         found.pairs[rows, 1] - np.uint32(len(origins)),

@@ -359,12 +359,20 @@ def _group_numbers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
 
 
 def find_collisions(
-    placements: Placements, scene: SceneFilter, wanted: Wanted, limit: int | None, tolerance: float
+    placements: Placements,
+    scene: SceneFilter,
+    wanted: Wanted,
+    limit: int | None,
+    tolerance: float,
+    first_only: bool = False,
+    every_piece: bool = False,
 ) -> Call[ScenePart]:
     fixed = collision_pb2.FindCollisionsRequest(
         wanted=wanted.message(),
         limit=arguments.optional_count(limit, "limit", least=1),
         tolerance=arguments.length(tolerance, "tolerance"),
+        first_only=first_only,
+        every_piece=every_piece,
     )
     scene.put(fixed, len(placements))
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())

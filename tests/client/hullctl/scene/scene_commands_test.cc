@@ -107,6 +107,31 @@ TEST_F(HullctlScene, CheckAnswersTheQuestionsOfTheFile) {
   }
 }
 
+TEST_F(HullctlScene, PlacementsMoveAndTheFirstContactIsFound) {
+  Put("cube", server::Cube());
+  const TempFile moving("moving.yaml",
+                        "place:\n  a: {id: cube}\n  b: {id: cube, at: [3, 0, 0], to: [-1, 0, 0]}\n"
+                        "  c: {id: cube, at: [0, 5, 0], to: [0, 0, 0]}\n");
+  Ran ran = Ask({"scene", "check", moving.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "a\tb\tOVERLAPPING\tcontact at 0.5\na\tc\tOVERLAPPING\tcontact at 0.8\n"
+            "b\tc\tOVERLAPPING\tcontact at 0.8\n# touching 0 overlapping 3 failed 0\n");
+  ran = Ask({"scene", moving.path(), "--first"});
+  EXPECT_EQ(ran.out, "a\tb\tOVERLAPPING\tcontact at 0.5\n# touching 0 overlapping 3 failed 0\n");
+  ran = Ask({"scene", "check", cell_.path(), "--first"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("no placement has an end_pose"));
+  const TempFile pairs("pairs.yaml",
+                       "place: {a: {id: cube}, b: {id: cube, to: [1, 0, 0]}}\n"
+                       "ask: {pairs: [[a, b]]}\n");
+  for (const char* option : {"--first", "--every-piece"}) {
+    ran = Ask({"scene", "check", pairs.path(), option});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, HasSubstr(std::string(option) + " finds pairs itself"));
+  }
+}
+
 TEST_F(HullctlScene, DeleteRemovesTheHullsAndBodiesOfTheFile) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Put("other", server::Cube());
@@ -187,6 +212,15 @@ TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
   EXPECT_THAT(Ask({"batch", cell_.path()}).out, HasSubstr("\tpieces cube -\n"));
   // The answers of a stream have the same names.
   EXPECT_THAT(Ask({"stream", cell_.path()}).out, HasSubstr("0\tell\tprobe\tOVERLAPPING"));
+}
+
+TEST_F(HullctlSceneBodies, EveryPieceThatIsFoundHasARow) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  const Ran ran = Ask({"scene", cell_.path(), "--every-piece", "--clearance", "1"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("ell\tprobe\tSEPARATED\t0.7"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces bar -\nell\tprobe\tOVERLAPPING\t-0.25"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\n# touching 0 overlapping 1 separated 1 "));
 }
 
 TEST_F(HullctlSceneBodies, BatchesProveBodiesAndWatchesReportThem) {

@@ -124,6 +124,26 @@ TEST(YamlScene, PiecesAndPlacementsHaveRadii) {
   EXPECT_EQ(ToScene(scene, "cell.yaml", BodyForm::kPieces)->PlacementOf(1).radius(), 0.75);
 }
 
+TEST(YamlScene, PlacementsMoveOnTheShorterPath) {
+  const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nplace:\n  a: {hull: h}\n  b: {hull: h, ";
+  const auto placement = [&](const std::string& poses) {
+    return ToScene(Parse(head + poses + "}\n"), "cell.yaml", BodyForm::kWhole)->PlacementOf(1);
+  };
+  EXPECT_FALSE(placement("at: [1, 2, 3]").has_end_pose());
+  // A translation keeps the rotation.
+  const v1::Placement slides = placement("to: [4, 5, 6], at: [0, 0, 0, -1, 1, 2, 3]");
+  EXPECT_EQ(slides.pose().translation().x(), 1);
+  EXPECT_EQ(slides.end_pose().translation().z(), 6);
+  EXPECT_EQ(slides.end_pose().rotation().z(), -1);
+  EXPECT_EQ(slides.end_pose().rotation().w(), 0);
+  const v1::Placement turns = placement("to: [-1, 0, 0, 0.5, 0, 0, 0]");
+  EXPECT_EQ(turns.end_pose().rotation().w(), 1);
+  EXPECT_EQ(turns.end_pose().rotation().z(), -0.5);
+  EXPECT_EQ(ErrorOf(head + "to: [0, 0, 0, 0, 1, 2, 3]}\n"),
+            "cell.yaml:4:20: to: the quaternion is zero; use 1, 0, 0, 0 for no rotation");
+  EXPECT_THAT(ErrorOf(head + "to: [1, 2]}\n"), HasSubstr("to"));
+}
+
 TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
   const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n";
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h}, b: {body: b}}"),

@@ -101,9 +101,10 @@ def test_batches_answer_as_single_calls(client: hulld.Client, cube: str) -> None
         verifier.check_row(placements, found, row)
         verifier.check(placements[a], placements[b], single)
     assert found.answers.contact_times is not None
-    assert np.isnan(found.answers.contact_times).sum() == (
-        found.answers.relations == hulld.Relation.SEPARATED
-    ).sum()
+    assert (
+        np.isnan(found.answers.contact_times).sum()
+        == (found.answers.relations == hulld.Relation.SEPARATED).sum()
+    )
     assert found.answers.separated_until is not None
     assert client.check_collisions([cube, cube]).answers.contact_times is None
 
@@ -205,3 +206,53 @@ def test_random_rays_agree_with_the_box(client: hulld.Client, cube: str) -> None
     np.testing.assert_allclose(hits.times, enters[expected], rtol=1e-13, atol=1e-15)
     faces = np.abs(hits.normals).max(axis=1)
     np.testing.assert_allclose(faces[~np.isnan(faces)], 1, rtol=1e-12)
+
+
+def test_bodies_in_motion_are_proven(client: hulld.Client, cube: str, name: str) -> None:
+    far = f"{name}/far"
+    client.append_points(far, np.asarray(CUBE) + (5, 0, 0), create=True)
+    body = f"{name}/body"
+    client.put_body(body, [far, cube])
+    verifier = hulld.Verifier(client)
+    start = (cube, (-3, 0, 0))
+    for to in [(3, 0, 0), hulld.Pose((1, 0, 0.25, 1), (3, 0, 0)), (-2, 0, 0)]:
+        answer = client.check_collision(body, start, to_b=to, certificate=True)
+        verifier.check(body, start, answer, to_b=to)
+        assert len(answer.piece_certificates) == 2
+    hits = client.cast((-3, 0.5, 0.5), (12, 0, 0), [body])
+    assert hits.times.tolist() == [0.25] and hits.normals.tolist() == [[-1, 0, 0]]
+    answer = client.check_collision(body, start, to_b=(3, 0, 0), certificate=True)
+    assert answer.piece_a is not None and answer.piece_a.index == 1
+    for number in range(2):
+        short = [*answer.piece_certificates]
+        short.pop(number)
+        with pytest.raises(hulld.VerificationError):
+            forged = dataclasses.replace(answer, piece_certificates=short)
+            verifier.check(body, start, forged, to_b=(3, 0, 0))
+
+
+def test_the_first_contacts_of_a_scene_are_found(client: hulld.Client, cube: str) -> None:
+    placements = hulld.Placements.of(
+        [
+            cube,
+            hulld.Placement(cube, (3, 0, 0), end_pose=(-1, 0, 0)),
+            hulld.Placement(cube, (0, 5, 0), end_pose=(0, 0, 0)),
+        ]
+    )
+    scene = client.find_collisions(placements, first_only=True, certificate=True)
+    assert scene.pairs.tolist() == [[0, 1]]
+    hulld.Verifier(client).check_row(placements, scene, 0)
+    parts = list(client.iter_find_collisions(placements, first_only=True))
+    assert sum(len(part.pairs) for part in parts) == 1
+    with pytest.raises(hulld.InvalidArgumentError, match="no placement has an end_pose"):
+        client.find_collisions([cube, cube], first_only=True)
+
+
+def test_every_pair_of_pieces_has_a_row(client: hulld.Client, cube: str, name: str) -> None:
+    row = f"{name}/row"
+    client.put_body(row, [(cube, (2 * i, 0, 0)) for i in range(3)])
+    scene = client.find_collisions([row, (row, (0, 1, 0))], every_piece=True, certificate=True)
+    assert scene.pairs.tolist() == [[0, 1]] * 3
+    assert scene.answers.pieces is not None
+    assert scene.answers.pieces.tolist() == [[0, 0], [1, 1], [2, 2]]
+    assert sorted(scene.answers.piece_proofs) == [0, 1, 2]

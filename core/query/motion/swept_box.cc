@@ -1,10 +1,12 @@
-#include "core/query/scene/swept_box.h"
+#include "core/query/motion/swept_box.h"
 
 #include <cmath>
 #include <limits>
 
+#include "core/query/body/placed_body.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/motion.h"
+#include "core/query/terms/pose.h"
 
 namespace hulld {
 namespace {
@@ -20,19 +22,32 @@ double Reach(const Box& box, const Vector& from) {
   return farthest.stableNorm() * kRoundedUp + std::numeric_limits<double>::min();
 }
 
-}  // namespace
-
-// A rotation about the frame's origin keeps the distance of each point from it.
-Box SweptBox(const MovingHull& moving) {
-  const auto& [start, end] = moving.X_WH;
-  const Box at_start = BoundingBox(PlacedHull(moving.hull, start, moving.radius));
+// A rotation about the frame's origin keeps the distance of each point from it. box_at: returns the
+// bounding box at a pose.
+template <typename BoxAt>
+Box Swept(const Motion& X_WB, const BoxAt& box_at) {
+  const auto& [start, end] = X_WB;
+  const Box at_start = box_at(start);
   if (at_start.IsEmpty()) return at_start;
-  if (IsTranslation(moving.X_WH)) {
-    return Union(at_start, BoundingBox(PlacedHull(moving.hull, end, moving.radius)));
-  }
+  if (IsTranslation(X_WB)) return Union(at_start, box_at(end));
   const double reach = Reach(at_start, start.t);
   if (!std::isfinite(reach)) return Box::All();
   return GrownBy(Union({start.t, start.t}, {end.t, end.t}), reach);
+}
+
+}  // namespace
+
+Box SweptBox(const MovingHull& moving) {
+  const Box box = Swept(moving.X_WH, [&](const Pose& X_WH) {
+    return BoundingBox(PlacedHull(moving.hull, X_WH, moving.radius));
+  });
+  return moving.piece_radius > 0 ? GrownBy(box, moving.piece_radius) : box;
+}
+
+Box SweptBox(const MovingBody& moving) {
+  return Swept(moving.X_WB, [&](const Pose& X_WB) {
+    return BoundingBox(PlacedBody(moving.body, X_WB, moving.radius));
+  });
 }
 
 }  // namespace hulld
