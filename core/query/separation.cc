@@ -115,7 +115,7 @@ class SeparationSearch {
     return AddExactWitness(answer);
   }
 
-  // Separated pairs only: floating point cannot tell two facets at about the same depth apart.
+  // Separated pairs only: floating point cannot order two facets at about the same depth.
   absl::Status AddNormal(SeparationAnswer& answer) {
     if (!nearest_ && core_ != Relation::kTouching) {
       if (AddFloatNormal(answer)) return absl::OkStatus();
