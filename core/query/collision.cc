@@ -200,7 +200,7 @@ absl::Status AddRoundedEvidence(const FloatPair& pair, uint64_t directions_tried
     if (pair.usable()) {
       SeparationGoal goal;
       goal.relative_error = kDefaultRelativeMaxError;
-      bounds = BoundDistance(pair, -pair.CenterDifference(), goal);
+      bounds = BoundDistance(pair, -pair.CenterDifference(), {}, goal);
     }
     ExactPair exact(pair, options.should_stop);
     absl::StatusOr<Certificate> made = MakeRoundedCertificate(
@@ -240,10 +240,11 @@ absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
   return answer;
 }
 
-PairCache Mirrored(PairCache cache) {
+// Converts the cache for (A, B) to the cache for (B, A), except the relative pose: the search that
+// compares it has the order of the search that stored it.
+void Mirror(PairCache& cache) {
   if (cache.axis) cache.axis = -*cache.axis;
-  for (VertexPair& pair : cache.pairs) std::swap(pair.a, pair.b);
-  return cache;
+  for (uint32_t i = 0; i < cache.pair_count; ++i) std::swap(cache.pairs[i].a, cache.pairs[i].b);
 }
 
 // Answers queries for the relation alone, the most common kind.
@@ -251,12 +252,12 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
   // The relation is symmetric; only the cache depends on the order.
   const bool swapped = !IsInOrder(a, b);
-  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  if (swapped && cache != nullptr) Mirror(*cache);
   Decision decision;
   const absl::Status decided =
       Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
              Purpose::kRelation, options.should_stop, decision);
-  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  if (swapped && cache != nullptr) Mirror(*cache);
   // All returns name this variable, so that the compiler constructs it in the caller's storage.
   absl::StatusOr<Answer> answer(absl::in_place);
   if (decided.ok()) {
@@ -272,9 +273,9 @@ absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const Placed
                                                const QueryOptions& options, PairCache* cache) {
   const auto search = IsRounded(a, b) ? SearchRounded : CertifiedSearch;
   if (IsInOrder(a, b)) return search(a, b, options, cache);
-  if (cache != nullptr) *cache = Mirrored(*cache);
+  if (cache != nullptr) Mirror(*cache);
   absl::StatusOr<Answer> answer = search(b, a, options, cache);
-  if (cache != nullptr) *cache = Mirrored(*cache);
+  if (cache != nullptr) Mirror(*cache);
   if (!answer.ok()) return answer;
   return Mirrored(*std::move(answer));
 }

@@ -6,6 +6,7 @@
 
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/expansion.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_search.h"
 #include "core/query/floating/float_search.h"
@@ -86,15 +87,27 @@ void Accept(const FloatSearchResult& found, Rung rung, Purpose purpose, Decision
   decision.rung = rung;
   if (purpose == Purpose::kRelation) return;
   if (found.verdict == FloatVerdict::kSeparated) decision.axis = found.axis;
-  if (found.verdict == FloatVerdict::kOverlapping) {
-    decision.pair_count = found.pair_count;
-    decision.pairs = found.pairs;
+  decision.pair_count = found.pair_count;
+  decision.pairs = found.pairs;
+}
+
+// Returns the relative pose; none for pieces of bodies, whose poses are products.
+std::optional<RelativePose> RelativePoseOf(const FloatPair& pair) {
+  if (pair.a().product() != nullptr || pair.b().product() != nullptr) return std::nullopt;
+  const Pose& X_WA = pair.a().X_WH();
+  const Pose& X_WB = pair.b().X_WH();
+  RelativePose relative{X_WA.q, X_WB.q, {}, {}};
+  for (int i = 0; i < 3; ++i) {
+    const SumWithError offset = TwoSum(X_WB.t[i], -X_WA.t[i]);
+    relative.offset[i] = offset.sum;
+    relative.offset_rest[i] = offset.error;
   }
+  return relative;
 }
 
 // Stores a suggestion for the next query of the pair.
 void Remember(const FloatSearchResult& found, PairCache& cache) {
-  cache = PairCache();
+  cache.Clear();
   if (found.verdict == FloatVerdict::kSeparated) cache.axis = found.axis;
   if (found.verdict == FloatVerdict::kOverlapping) {
     cache.pair_count = found.pair_count;
@@ -109,6 +122,13 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
                                              double tolerance, PairCache* cache, Purpose purpose,
                                              FloatSearchResult& found, Decision& decision) {
   if (cache != nullptr) {
+    // A tolerance or requested evidence needs more than the relation.
+    if (cache->touching && tolerance == 0 && purpose == Purpose::kRelation &&
+        RelativePoseOf(pair) == *cache->touching) {
+      decision.relation = Relation::kTouching;
+      decision.rung = Rung::kCached;
+      return true;
+    }
     const FloatSearchResult cached = TryCached(pair, *cache);
     decision.directions_tried += cached.directions_tried;
     if (cached.verdict != FloatVerdict::kUndecided) {
@@ -121,7 +141,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
     if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
       decision.relation = *relation;
       // The cached suggestion failed, and retrying it would cost more than these bounds.
-      if (cache != nullptr) *cache = PairCache();
+      if (cache != nullptr) cache->Clear();
       return true;
     }
   }
@@ -165,7 +185,11 @@ absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, P
     if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, found, decision)) {
       return absl::OkStatus();
     }
-    return DecideExactly(pair, &found, purpose, should_stop, decision);
+    const absl::Status status = DecideExactly(pair, &found, purpose, should_stop, decision);
+    if (cache != nullptr && status.ok() && decision.relation == Relation::kTouching) {
+      if (const std::optional<RelativePose> pose = RelativePoseOf(pair)) cache->touching = *pose;
+    }
+    return status;
   }
   return DecideExactly(pair, nullptr, purpose, should_stop, decision);
 }

@@ -25,6 +25,7 @@ struct Decision {
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
   ExactDirection axis;
+  // Separated: up to three pairs, whose differences are near the nearest point of A - B; a hint.
   // Overlapping: none, or four pairs; the hull of their differences contains 0 strictly inside.
   // Touching: none, or three pairs, repetitions included; the hull of their differences contains 0.
   uint32_t pair_count = 0;
@@ -39,7 +40,7 @@ enum class Purpose {
 };
 
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound
-// proves it: bounding spheres; the suggestion of the cache; for the relation alone, bounds of the
+// proves it: bounding spheres; the cache; for the relation alone, bounds of the
 // hulls along the line of their centers; the hulls in floating point; exact arithmetic. Fills
 // `decision`, which must be newly constructed. Requires: tolerance >= 0. Updates the cache, which
 // may be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,

@@ -89,9 +89,9 @@ class RoundedSearch {
     SeparationGoal goal;
     goal.threshold = radii_.value();
     goal.absolute_error = tolerance_ / 2;
-    bounds_ = BoundDistance(pair_, first, goal);
+    bounds_ = BoundDistance(pair_, first, {}, goal);
     ++decision_.directions_tried;
-    if (cache != nullptr) *cache = PairCache();
+    if (cache != nullptr) cache->Clear();
     if (bounds_.low > radii_.high()) {
       if (cache != nullptr) {
         cache->axis = bounds_.point.count == 0 ? first : TowardOrigin(pair_, bounds_);

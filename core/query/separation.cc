@@ -3,8 +3,10 @@
 #include <absl/status/statusor.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -22,6 +24,7 @@
 #include "core/query/floating/float_depth.h"
 #include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_search.h"
+#include "core/query/floating/nearest_part.h"
 #include "core/query/terms/length_sum.h"
 #include "core/query/terms/query_options.h"
 #include "core/query/terms/separation_bounds.h"
@@ -37,6 +40,13 @@ constexpr uint64_t kExpansionsPerPoll = 32;
 // relative to it. The angle is then at most kMaxNormalAngle / sqrt(2), and the rest is for
 // rounding.
 constexpr double kNormalRelativeError = kMaxNormalAngle * kMaxNormalAngle / 8;
+
+// The least singular value of a matrix of two differences of computed Minkowski vertices, from
+// below by the area that they span over the Frobenius norm: entries err by 2 * 128 u S + u * 8 S,
+// so the matrix by at most sqrt(6) * 264 u S = 647 u S, and a singular value by no more (Weyl
+// 1912); rounding of the area, the norm, and their ratio moves it by at most 20 u * 8 S. The
+// Frobenius norm of two differences of computed vertices of A errs by no more. Times S. Proven.
+constexpr double kSpanErrorFactor = 1024 * kUnitRoundoff;
 
 // Returns the absolute separation from its bounds: their midpoint, and half their width rounded up.
 // The midpoint is positive because the upper bound is.
@@ -71,7 +81,7 @@ class SeparationSearch {
         poll_(should_stop, kExpansionsPerPoll),
         size_(pair.a().query_hull().radius() + pair.b().query_hull().radius() + radii_.value()) {
     if (core_ == Relation::kTouching) {
-      start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
+      SetStart(decision.pairs, decision.pair_count);
     } else if (pair.usable()) {
       StartFrom(decision, cold);
     }
@@ -80,7 +90,9 @@ class SeparationSearch {
   absl::Status AddValues(const SeparationRequest& request, SeparationAnswer& answer) {
     if (relation_ == Relation::kTouching) {
       if (request.separation) answer.separation = Separation{0, 0};
-      return request.witness ? AddExactWitness(answer) : absl::OkStatus();
+      const double most = request.max_error.value_or(kDefaultRelativeMaxError * size_);
+      if (!request.witness || AddFloatContact(most, answer)) return absl::OkStatus();
+      return AddExactWitness(answer);
     }
     SeparationGoal goal;
     if (request.max_error) {
@@ -103,7 +115,7 @@ class SeparationSearch {
     return AddExactWitness(answer);
   }
 
-  // Separated pairs only: floating point cannot tell two facets at about the same depth apart.
+  // Separated pairs only: floating point cannot order two facets at about the same depth.
   absl::Status AddNormal(SeparationAnswer& answer) {
     if (!nearest_ && core_ != Relation::kTouching) {
       if (AddFloatNormal(answer)) return absl::OkStatus();
@@ -171,31 +183,37 @@ class SeparationSearch {
     return absl::OkStatus();
   }
 
-  // Chooses the start of the floating-point search: the axis that it found, or four pairs with
-  // differences that surround the origin. The choice does not depend on the suggestion of a cache.
+  // Chooses the start of the floating-point search: the axis and pairs that the search of the
+  // relation ended with, or four pairs with differences that surround the origin. The choice does
+  // not depend on the suggestion of a cache.
   void StartFrom(const Decision& decision, bool cold) {
     toward_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
       if (const Vector* n = std::get_if<Vector>(&decision.axis)) toward_ = *n;
-      start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
+      SetStart(decision.pairs, decision.pair_count);
       return;
     }
     const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference());
+    if (found.verdict == FloatVerdict::kUndecided) return;
     if (found.verdict == FloatVerdict::kSeparated) toward_ = found.axis;
-    if (found.verdict != FloatVerdict::kOverlapping) return;
-    start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
+    SetStart(found.pairs, found.pair_count);
   }
+
+  void SetStart(const std::array<VertexPair, 4>& pairs, uint32_t count) {
+    start_pairs_ = pairs;
+    start_count_ = count;
+  }
+  std::span<const VertexPair> start() const { return std::span(start_pairs_).first(start_count_); }
 
   // Finds bounds in floating point, as close to the goal as it allows. Exact arithmetic starts from
   // the vertices that this visits.
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (core_ == Relation::kSeparated) {
-      bounds_ = BoundDistance(pair_, toward_, goal);
-      seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
+      bounds_ = BoundDistance(pair_, toward_, start(), goal);
     } else {
       seed_.clear();
-      bounds_ = BoundDepth(pair_, start_, goal, want_point, poll_, seed_);
+      bounds_ = BoundDepth(pair_, start(), goal, want_point, poll_, seed_);
     }
   }
 
@@ -205,8 +223,10 @@ class SeparationSearch {
     absl::StatusOr<ExactNearest> nearest =
         core_ == Relation::kOverlapping
             ? FindDepthExactly(*exact_, seed_, max_depth_bytes_, should_stop_)
-        : core_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
-                                        : FindNearestExactly(*exact_, start_, should_stop_);
+        : core_ == Relation::kSeparated
+            ? FindNearestExactly(*exact_, std::span(bounds_.point.pairs).first(bounds_.point.count),
+                                 should_stop_)
+            : FindNearestExactly(*exact_, start(), should_stop_);
     if (!nearest.ok()) return nearest.status();
     nearest_ = *std::move(nearest);
     return absl::OkStatus();
@@ -301,6 +321,51 @@ class SeparationSearch {
     return true;
   }
 
+  // Adds a common point of touching cores. Returns false if its error may exceed `most`. The exact
+  // weights that combine the differences w_i of the pairs to 0 differ from the computed weights by
+  // d with |sum d_i (w_i - w_0)| = |v|, v being the computed combination. So |d| is at most |v|
+  // over the least singular value of the w_i - w_0, and the computed point of A misses the exact
+  // one, which is common, by at most |d| times the norm of the matrix of the a_i - a_0.
+  bool AddFloatContact(double most, SeparationAnswer& answer) const {
+    if (!radii_.is_zero() || start_count_ != 3 || !pair_.usable()) return false;
+    std::array<VertexPair, 3> pairs = {start_pairs_[0], start_pairs_[1], start_pairs_[2]};
+    const auto last =
+        static_cast<uint32_t>(std::unique(pairs.begin(), pairs.end()) - pairs.begin()) - 1;
+    // In units near the size.
+    const double unit = UnitOf(pair_.size());
+    const double size = pair_.size() / unit;
+    std::array<Vector, 3> a;
+    std::array<Vector, 3> w;
+    for (uint32_t i = 0; i <= last; ++i) {
+      a[i] = 1 / unit * pair_.PositionA(pairs[i].a);
+      w[i] = 1 / unit * pair_.Difference(pairs[i]);
+    }
+    double error = kCombinationErrorFactor * size;
+    Vector contact = a[0];
+    if (last > 0) {
+      const NearestPart part = NearestOnTriangle(w[0], w[1], w[last]);
+      contact = Vector::Zero();
+      for (uint32_t i = 0; i < part.count; ++i) {
+        contact += part.weights[i] * a[std::min<uint32_t>(part.corners[i], last)];
+      }
+      const Vector e = w[1] - w[0];
+      const Vector f = w[last] - w[0];
+      const double least =
+          last == 1 ? e.norm() : e.cross(f).norm() / std::sqrt(e.squaredNorm() + f.squaredNorm());
+      const double spread = std::sqrt((a[1] - a[0]).squaredNorm() + (a[last] - a[0]).squaredNorm());
+      const double slack = kSpanErrorFactor * size;
+      if (!(least > 2 * slack)) return false;
+      error += (Norm(part.point) + error) * (spread + slack) / (least - slack);
+    }
+    const Vector& t = pair_.a().X_WH().t;
+    const Vector p = unit * contact + t;
+    const double largest = std::max(p.cwiseAbs().maxCoeff(), t.cwiseAbs().maxCoeff());
+    error = unit * error * (1 + 32 * kUnitRoundoff) + 4 * kUnitRoundoff * largest;
+    if (!std::isfinite(error) || error > most) return false;
+    answer.witness = Witness{p, p, error};
+    return true;
+  }
+
   // Adds the normal of a separated pair: the direction from a point v of A - B, as computed, to the
   // origin. Returns false if its bound would exceed kMaxNormalAngle. Some point p of A - B is
   // within kCombinationErrorFactor of v and no longer than the upper bound, so the angle between p
@@ -379,7 +444,9 @@ class SeparationSearch {
   StopPoll poll_;
   const double size_;
   Vector toward_ = Vector::Zero();
-  std::vector<VertexPair> start_;
+  uint32_t start_count_ = 0;
+  std::array<VertexPair, 4> start_pairs_;
+  // Overlapping: the pairs of all vertices that the floating-point search visited.
   std::vector<VertexPair> seed_;
   SeparationBounds bounds_;
   std::optional<ExactPair> exact_;

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -38,17 +41,22 @@ struct FloatNormal {
   double error;
 };
 
-// The candidate axes of a pair, by index. Thread-safe after construction.
+// The candidate axes of a pair, by index. Tests are thread-safe after Prepare.
 class AxisTable {
  public:
-  AxisTable(ExactPair& exact, const FloatPair& filter)
-      : exact_(exact),
-        filter_(filter),
-        facets_a_(exact.a().hull().facet_count()),
-        facets_b_(exact.b().hull().facet_count()),
-        edges_b_(exact.b().hull().edges().size()),
-        edge_pairs_(exact.a().hull().edges().size() * edges_b_) {
-    span_ = SpanOf(exact_);
+  // Both arguments must outlive the table.
+  AxisTable(const FloatPair& filter, const std::function<bool()>& should_stop)
+      : filter_(filter),
+        should_stop_(should_stop),
+        a_(filter.a().hull()),
+        b_(filter.b().hull()),
+        facets_a_(a_.facet_count()),
+        facets_b_(b_.facet_count()),
+        edges_b_(b_.edges().size()),
+        edge_pairs_(a_.edges().size() * edges_b_) {
+    if (filter.a().query_hull().dimension() == 3 || filter.b().query_hull().dimension() == 3)
+      return;
+    span_ = SpanOf(exact_.emplace(filter_, should_stop_));
   }
 
   // Includes the axes of a flat difference. O(1).
@@ -56,23 +64,35 @@ class AxisTable {
 
   // Computes the data that the tests need. Call before any test.
   void Prepare() {
-    exact_.CacheAllVertices();
-    if (!exact_.stopped()) AppendFlatAxes();
-    for (uint32_t i = 0; i < exact_.a().hull().vertices().size(); ++i) {
-      positions_a_.push_back(filter_.PositionA(i));
-    }
-    for (uint32_t i = 0; i < exact_.b().hull().vertices().size(); ++i) {
-      positions_b_.push_back(filter_.PositionB(i));
-    }
+    if (span_.dimension < 3 && !exact().stopped()) AppendFlatAxes();
+    const size_t count_a = a_.vertices().size();
+    const size_t count_b = b_.vertices().size();
+    positions_a_.reserve(count_a);
+    positions_b_.reserve(count_b);
+    for (uint32_t i = 0; i < count_a; ++i) positions_a_.push_back(filter_.PositionA(i));
+    for (uint32_t i = 0; i < count_b; ++i) positions_b_.push_back(filter_.PositionB(i));
   }
+
+  // The pair in integers, with every vertex multiplied out. Made for the first axis that floating
+  // point leaves open. Thread-safe.
+  ExactPair& exact() {
+    std::call_once(multiplied_out_, [this] {
+      if (!exact_) exact_.emplace(filter_, should_stop_);
+      exact_->CacheAllVertices();
+      is_multiplied_out_.store(true, std::memory_order_release);
+    });
+    return *exact_;
+  }
+  // True if floating point left an axis open, or A - B is flat.
+  bool is_multiplied_out() const { return is_multiplied_out_.load(std::memory_order_acquire); }
 
   // Number of axes tested between two polls.
   uint64_t block() const {
-    const uint64_t vertices = exact_.a().point_count() + exact_.b().point_count();
+    const uint64_t vertices = a_.vertices().size() + b_.vertices().size();
     return std::clamp<uint64_t>(kVerticesPerPoll / vertices, 1, kAxesPerPoll);
   }
   // True if a test was interrupted; its result is then meaningless.
-  bool stopped() const { return exact_.stopped(); }
+  bool stopped() const { return is_multiplied_out() && exact_->stopped(); }
 
   AxisKind KindOf(uint64_t axis) const {
     if (axis < facets_a_) return AxisKind::kFacetA;
@@ -104,7 +124,8 @@ class AxisTable {
   }
 
   size_t MemoryBytes() const {
-    return exact_.MemoryBytes() + flat_axes_.capacity() * sizeof(IntegerVector) +
+    return (is_multiplied_out() ? exact_->MemoryBytes() : 0) +
+           flat_axes_.capacity() * sizeof(IntegerVector) +
            (positions_a_.capacity() + positions_b_.capacity()) * sizeof(Vector);
   }
 
@@ -112,7 +133,7 @@ class AxisTable {
   // Facet corners, or the ends of an edge of A and of an edge of B.
   std::pair<Edge, Edge> EdgePair(uint64_t axis) const {
     const uint64_t pair = axis - facets_a_ - facets_b_;
-    return {exact_.a().hull().edges()[pair / edges_b_], exact_.b().hull().edges()[pair % edges_b_]};
+    return {a_.edges()[pair / edges_b_], b_.edges()[pair % edges_b_]};
   }
 
   FloatNormal Filtered(uint64_t axis) const {
@@ -123,9 +144,9 @@ class AxisTable {
       f = v[facet[2]] - v[facet[0]];
     };
     if (axis < facets_a_) {
-      use_facet(exact_.a().hull().facet(axis), positions_a_);
+      use_facet(a_.facet(axis), positions_a_);
     } else if (axis < facets_a_ + facets_b_) {
-      use_facet(exact_.b().hull().facet(axis - facets_a_), positions_b_);
+      use_facet(b_.facet(axis - facets_a_), positions_b_);
     } else {
       const auto [edge_a, edge_b] = EdgePair(axis);
       e = positions_a_[edge_a.head] - positions_a_[edge_a.tail];
@@ -136,21 +157,26 @@ class AxisTable {
     return {e.cross(f), kNormalErrorFactor * d * (sizes + 3 * d)};
   }
 
+  auto VerticesOfA() {
+    return [&pair = exact()](uint32_t i) { return pair.VertexA(i); };
+  }
+  auto VerticesOfB() {
+    return [&pair = exact()](uint32_t i) { return pair.VertexB(i); };
+  }
+  template <typename VertexOf>
+  static IntegerVector Along(const Edge& edge, VertexOf vertex) {
+    return vertex(edge.head) - vertex(edge.tail);
+  }
+
   IntegerVector Exact(uint64_t axis) {
-    if (axis < facets_a_) {
-      const std::span<const uint32_t> facet = exact_.a().hull().facet(axis);
-      return Cross(exact_.VertexA(facet[1]) - exact_.VertexA(facet[0]),
-                   exact_.VertexA(facet[2]) - exact_.VertexA(facet[0]));
-    }
-    if (axis < facets_a_ + facets_b_) {
-      const std::span<const uint32_t> facet = exact_.b().hull().facet(axis - facets_a_);
-      return Cross(exact_.VertexB(facet[1]) - exact_.VertexB(facet[0]),
-                   exact_.VertexB(facet[2]) - exact_.VertexB(facet[0]));
-    }
+    const auto of_facet = [](std::span<const uint32_t> facet, auto vertex) -> IntegerVector {
+      return Cross(vertex(facet[1]) - vertex(facet[0]), vertex(facet[2]) - vertex(facet[0]));
+    };
+    if (axis < facets_a_) return of_facet(a_.facet(axis), VerticesOfA());
+    if (axis < facets_a_ + facets_b_) return of_facet(b_.facet(axis - facets_a_), VerticesOfB());
     if (axis < facets_a_ + facets_b_ + edge_pairs_) {
       const auto [edge_a, edge_b] = EdgePair(axis);
-      return Cross(exact_.VertexA(edge_a.head) - exact_.VertexA(edge_a.tail),
-                   exact_.VertexB(edge_b.head) - exact_.VertexB(edge_b.tail));
+      return Cross(Along(edge_a, VerticesOfA()), Along(edge_b, VerticesOfB()));
     }
     return flat_axes_[axis - facets_a_ - facets_b_ - edge_pairs_];
   }
@@ -173,9 +199,7 @@ class AxisTable {
   }
 
   // Returns the sign of min n.B - max n.A.
-  int SignOfGap(const IntegerVector& n) {
-    return Sign(Dot(n, exact_.VertexB(exact_.FarthestB(n)) - exact_.VertexA(exact_.FarthestA(n))));
-  }
+  int SignOfGap(const IntegerVector& n) { return -Sign(Dot(n, exact().Farthest(n).w)); }
 
   // Parallel edges have no axis.
   Gap ExactGap(const IntegerVector& n) {
@@ -186,7 +210,7 @@ class AxisTable {
 
   uint64_t flat_count() const {
     if (span_.dimension == 3) return 0;
-    return span_.dimension == 2 ? 1 + exact_.a().hull().edges().size() + edges_b_ : 3;
+    return span_.dimension == 2 ? 1 + a_.edges().size() + edges_b_ : 3;
   }
 
   void AppendFlatAxes() {
@@ -194,13 +218,11 @@ class AxisTable {
     if (span.dimension == 3) return;
     if (span.dimension == 2) {
       flat_axes_.push_back(span.direction);
-      for (const Edge& e : exact_.a().hull().edges()) {
-        flat_axes_.push_back(
-            Cross(span.direction, exact_.VertexA(e.head) - exact_.VertexA(e.tail)));
+      for (const Edge& edge : a_.edges()) {
+        flat_axes_.push_back(Cross(span.direction, Along(edge, VerticesOfA())));
       }
-      for (const Edge& e : exact_.b().hull().edges()) {
-        flat_axes_.push_back(
-            Cross(span.direction, exact_.VertexB(e.head) - exact_.VertexB(e.tail)));
+      for (const Edge& edge : b_.edges()) {
+        flat_axes_.push_back(Cross(span.direction, Along(edge, VerticesOfB())));
       }
       return;
     }
@@ -218,13 +240,18 @@ class AxisTable {
     }
   }
 
-  ExactPair& exact_;
   const FloatPair& filter_;
+  const std::function<bool()>& should_stop_;
+  const Hull& a_;
+  const Hull& b_;
   uint64_t facets_a_;
   uint64_t facets_b_;
   uint64_t edges_b_;
   uint64_t edge_pairs_;
-  MinkowskiSpan span_;
+  MinkowskiSpan span_ = {3, {0, 0, 0}};
+  std::once_flag multiplied_out_;
+  std::atomic<bool> is_multiplied_out_ = false;
+  std::optional<ExactPair> exact_;
   std::vector<IntegerVector> flat_axes_;
   std::vector<Vector> positions_a_;
   std::vector<Vector> positions_b_;
@@ -294,14 +321,10 @@ absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
 
 struct TextbookSearch::State {
   State(const PlacedHull& a, const PlacedHull& b, const QueryOptions& given_options)
-      : options(given_options),
-        filter(a, b),
-        exact(filter, options.should_stop),
-        axes(exact, filter) {}
+      : options(given_options), filter(a, b), axes(filter, options.should_stop) {}
 
   const QueryOptions& options;
   FloatPair filter;
-  ExactPair exact;
   AxisTable axes;
   Scan scan;
 };
@@ -323,7 +346,7 @@ absl::StatusOr<TextbookSearch> TextbookSearch::Begin(const PlacedHull& placed_a,
   auto state = std::make_unique<State>(placed_a, placed_b, options);
   if (absl::Status status = CheckCount(state->axes.size(), options); !status.ok()) return status;
   state->axes.Prepare();
-  if (state->exact.stopped()) return Stopped();
+  if (state->axes.stopped()) return Stopped();
   return TextbookSearch(std::move(state));
 }
 
@@ -361,7 +384,7 @@ absl::StatusOr<Answer> TextbookSearch::Finish() {
     answer.analysis = analysis;
   }
   if (options.want_axis && found != kNone) {
-    SeparatingAxis axis = DescribeAxis(state_->exact, axes.Oriented(found));
+    SeparatingAxis axis = DescribeAxis(axes.exact(), axes.Oriented(found));
     if (axes.stopped()) return Stopped();
     axis.kind = axes.KindOf(found);
     answer.axis = std::move(axis);

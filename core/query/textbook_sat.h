@@ -48,7 +48,8 @@ class TextbookSearch {
   // Requires: Advance returned true. CANCELLED: should_stop returned true.
   absl::StatusOr<Answer> Finish();
 
-  // Memory: every vertex of both hulls in integers, some 500 bytes each.
+  // Memory: positions of the vertices of both hulls. Once floating point leaves an axis open, also
+  // every vertex in integers, some 500 bytes each.
   size_t MemoryBytes() const;
 
  private:

@@ -243,7 +243,7 @@ absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
     if (!table_.query_hull_changed(i)) continue;
     // The cached points are of the former QueryHull. The cached axis remains a good guess.
     for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) {
-      pairs_[pairs_of_[k]].cache.pair_count = 0;
+      pairs_[pairs_of_[k]].cache.ForgetHulls();
     }
   }
   next_row_ = 0;

@@ -278,9 +278,9 @@ absl::StatusOr<bool> PairQuestion::AdvanceTextbook(std::chrono::steady_clock::ti
     absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(a_->hull(), b_->hull(), options_);
     if (!begun.ok()) return NameQueryLimit(begun.status(), options_);
     check_ = *std::move(begun);
-    charge_.Set(check_->MemoryBytes());
   }
   absl::StatusOr<bool> is_done = check_->Advance(end);
+  charge_.Set(check_->MemoryBytes());
   if (!is_done.ok() || !*is_done) return is_done;
   absl::StatusOr<hulld::Answer> found = check_->Finish();
   if (!found.ok()) return NameQueryLimit(found.status(), options_);

@@ -125,10 +125,10 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
       options_(&options),
       each_(OptionsOfEachPair(options)),
       wants_least_(each_.want_separation),
-      limit_(std::max(0.0, options.clearance.value_or(0))),
       gap_(*x_, *y_),
       poll_(options.should_stop, kStepsPerLook) {
   HULLD_DCHECK(ValidateBodyOptions(options).ok());
+  UpdateLimit();
   if (!x_->body().tree().empty() && !y_->body().tree().empty()) Push(0, 0);
 }
 
@@ -240,9 +240,16 @@ void BodySearch::TakeUp(const Answer& answer, PiecePair pieces) {
   // A separated pair within the clearance decides if no pair collides.
   if (is_stronger || (within && !decided_)) decided_ = pieces;
   if (is_stronger) relation_ = answer.relation;
+  if (!is_stronger && !within) return;
   within_clearance_ |= within;
-  const bool is_within_known = within_clearance_ || !options_->clearance.has_value();
-  found_ = relation_ == Relation::kOverlapping && is_within_known;
+  UpdateLimit();
+}
+
+void BodySearch::UpdateLimit() {
+  const bool is_relation_known = relation_ == Relation::kOverlapping;
+  if (within_clearance_) each_.clearance.reset();
+  limit_ = std::max(is_relation_known ? -kInfinity : 0, each_.clearance.value_or(-kInfinity));
+  found_ = is_relation_known && !each_.clearance.has_value();
 }
 
 void BodySearch::TakeUpSeparation(const Answer& answer, PiecePair pieces) {

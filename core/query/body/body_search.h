@@ -47,7 +47,9 @@ struct BodyCounts {
 // of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
 //
 // The search descends two box trees simultaneously, nearest boxes first. If only the relation and
-// the clearance are requested, it stops at the first pair that settles both, and names that pair.
+// the clearance are requested, it stops when both are known, and names the pair that settled the
+// relation or, if no pair collides, the clearance. While one is unknown, it excludes all pairs that
+// cannot change that one, so it visits no more boxes and pairs than a search for the separation.
 // If further details are requested, it names the pair with the least separation. Swapping A and B
 // mirrors the answer, and the named pair does not depend on threads.
 //
@@ -99,6 +101,9 @@ class BodySearch {
   double Gap(const Box& of_x, const Box& of_y);
   // Pairs farther apart than this cannot change the answer.
   double Limit() const { return wants_least_ ? least_high_ : limit_; }
+  // Excludes pairs that can change neither the relation nor within_clearance. For searches without
+  // details.
+  void UpdateLimit();
   void Descend(const Nodes& nodes);
   void Push(uint32_t x, uint32_t y);
   void EnterLeaves(const Nodes& nodes);
@@ -115,7 +120,7 @@ class BodySearch {
   const PlacedBody* x_;
   const PlacedBody* y_;
   const QueryOptions* options_;
-  // Options for each pair.
+  // Options for each pair. Without details, the clearance is removed after a pair meets it.
   QueryOptions each_;
   bool wants_least_;
   double limit_ = 0;

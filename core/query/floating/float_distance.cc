@@ -6,7 +6,9 @@
 
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/simd_path.h"
 #include "core/query/floating/nearest_part.h"
+#include "core/query/floating/small_pair.h"
 #include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
@@ -16,35 +18,43 @@ namespace {
 // 10000 vertices need fewer than 40.
 constexpr int kMaxSteps = 128;
 
-using Corner = MinkowskiVertex<Vector>;
+using Corner = MinkowskiVertex<PlainVector>;
 
 // Lower bound of the distance from the support along a unit vector.
-double LowOf(const FloatPair& pair, const FloatPair::Support& farthest) {
+template <typename Pair>
+double LowOf(const Pair& pair, const FloatPair::Support& farthest) {
   return -farthest.value - kReachErrorFactor * pair.size();
 }
 
-// The corners of the part of A - B that is nearest to the origin so far.
+// The corners of the part of A - B that is nearest to the origin so far. Pair: a FloatPair or a
+// SmallPair.
+template <typename Pair>
 class Walk {
  public:
-  Walk(const FloatPair& pair, const SeparationGoal& goal)
+  Walk(const Pair& pair, const SeparationGoal& goal)
       : pair_(pair), goal_(goal), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {}
 
-  SeparationBounds Run(Vector n) {
-    n /= n.cwiseAbs().maxCoeff();
+  SeparationBounds Run(const PlainVector& first, std::span<const VertexPair> start) {
+    const double largest = LargestComponent(first);
+    PlainVector n = {first.x / largest, first.y / largest, first.z / largest};
+    if (!start.empty()) {
+      for (const VertexPair& known : start) Add(known);
+      if (const NearestPart part = Nearest(); Accept(part)) n = part.toward;
+    }
     for (int step = 0; step < kMaxSteps; ++step) {
-      const double length = n.norm();
+      const double length = Norm(n);
       if (!(length > 0)) break;
-      n /= length;
+      n = (1 / length) * n;
       const FloatPair::Support farthest = pair_.Farthest(n);
       if (const double low = LowOf(pair_, farthest); low > bounds_.low) {
         bounds_.low = low;
         bounds_.direction = n;
       }
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
-      corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
+      Add(farthest.pair);
       const NearestPart part = Nearest();
       // In exact arithmetic every step comes nearer.
-      if (count_ == 0 || !Accept(part)) break;
+      if (!Accept(part)) break;
       n = part.toward;
       if (goal_.Met(bounds_.low, bounds_.high)) break;
     }
@@ -53,6 +63,8 @@ class Walk {
   }
 
  private:
+  void Add(VertexPair pair) { corners_[count_++] = {per_unit_ * pair_.Difference(pair), pair}; }
+
   bool Contains(VertexPair pair) const {
     return std::any_of(corners_.begin(), corners_.begin() + count_,
                        [&](const Corner& corner) { return corner.pair == pair; });
@@ -72,9 +84,9 @@ class Walk {
     // The nearest part includes the newest corner. A face away from the origin is never nearer than
     // a face toward it.
     NearestPart best = OnFace(3, 0, 1);
-    double least = best.point.squaredNorm();
+    double least = SquaredNorm(best.point);
     for (const NearestPart& part : {OnFace(3, 1, 2), OnFace(3, 2, 0)}) {
-      const double squared = part.point.squaredNorm();
+      const double squared = SquaredNorm(part.point);
       if (squared < least) {
         least = squared;
         best = part;
@@ -85,7 +97,7 @@ class Walk {
 
   // Keeps the part. Returns false if it is not nearer than the last.
   bool Accept(const NearestPart& part) {
-    const double length = part.point.norm();
+    const double length = Norm(part.point);
     if (!(length < nearest_)) return false;
     nearest_ = length;
     std::array<Corner, 4> kept;
@@ -102,7 +114,7 @@ class Walk {
     return true;
   }
 
-  const FloatPair& pair_;
+  const Pair& pair_;
   const SeparationGoal& goal_;
   const double unit_;
   const double per_unit_;
@@ -112,11 +124,47 @@ class Walk {
   SeparationBounds bounds_;
 };
 
+template <uint32_t kMostVertices>
+SeparationBounds WalkSmallPortably(const FloatPair& pair, const PlainVector& n,
+                                   std::span<const VertexPair> start, const SeparationGoal& goal) {
+  const SmallPair<kMostVertices> small(pair);
+  return Walk(small, goal).Run(n, start);
+}
+
+#ifdef HULLD_HAS_AVX2_PATH
+// The entire call tree is compiled for AVX2, so that lanes stay in registers.
+template <uint32_t kMostVertices>
+__attribute__((target("avx2"), flatten)) SeparationBounds WalkSmallAvx2(
+    const FloatPair& pair, const PlainVector& n, std::span<const VertexPair> start,
+    const SeparationGoal& goal) {
+  const SmallPair<kMostVertices> small(pair);
+  return Walk(small, goal).Run(n, start);
+}
+#else
+template <uint32_t kMostVertices>
+SeparationBounds WalkSmallAvx2(const FloatPair& pair, const PlainVector& n,
+                               std::span<const VertexPair> start, const SeparationGoal& goal) {
+  return WalkSmallPortably<kMostVertices>(pair, n, start, goal);
+}
+#endif
+
+template <uint32_t kMostVertices>
+SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
+                           std::span<const VertexPair> start, const SeparationGoal& goal) {
+  return CurrentSimdPath() == SimdPath::kAvx2
+             ? WalkSmallAvx2<kMostVertices>(pair, n, start, goal)
+             : WalkSmallPortably<kMostVertices>(pair, n, start, goal);
+}
+
 }  // namespace
 
-SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal) {
+SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
+                               std::span<const VertexPair> start, const SeparationGoal& goal) {
   HULLD_CHECK(pair.usable());
-  return Walk(pair, goal).Run(n);
+  HULLD_CHECK(start.size() <= 3);
+  if (SmallPair<8>::Fits(pair)) return WalkSmall<8>(pair, n, start, goal);
+  if (SmallPair<16>::Fits(pair)) return WalkSmall<16>(pair, n, start, goal);
+  return Walk(pair, goal).Run(n, start);
 }
 
 double DistanceAlong(const FloatPair& pair, const Vector& n) {
@@ -126,9 +174,9 @@ double DistanceAlong(const FloatPair& pair, const Vector& n) {
 
 double DistanceOfTriangle(const FloatPair& pair, const VertexPair* pairs) {
   const double unit = UnitOf(pair.size());
-  const auto corner = [&](int i) { return Vector(1 / unit * pair.Difference(pairs[i])); };
+  const auto corner = [&](int i) { return 1 / unit * pair.Difference(pairs[i]); };
   const NearestPart nearest = NearestOnTriangle(corner(0), corner(1), corner(2));
-  return nearest.point.norm() * unit + kCombinationErrorFactor * pair.size();
+  return Norm(nearest.point) * unit + kCombinationErrorFactor * pair.size();
 }
 
 Vector TowardOrigin(const FloatPair& pair, const SeparationBounds& bounds) {

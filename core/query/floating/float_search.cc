@@ -272,11 +272,9 @@ class FloatSearch {
     if (IsZero(n)) n = {1, 0, 0};
     while (result_.directions_tried < kMaxDirections && Explore(n)) {
     }
-    if (result_.verdict != FloatVerdict::kSeparated) {
-      result_.axis = along_;
-      result_.pair_count = simplex_.count();
-      for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.corner(i).pair;
-    }
+    if (result_.verdict != FloatVerdict::kSeparated) result_.axis = along_;
+    result_.pair_count = simplex_.count();
+    for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.corner(i).pair;
     return result_;
   }
 

@@ -19,7 +19,7 @@ struct FloatSearchResult {
   // hint.
   Vector axis = Vector::Zero();
   // Overlapping: four pairs; the hull of their differences contains the origin strictly inside.
-  // Otherwise the end of the search, a hint.
+  // Otherwise the end of the search, a hint; separated: at most three, without the last vertex.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
   uint64_t directions_tried = 0;

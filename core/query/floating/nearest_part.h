@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "core/numeric/nearest_on_triangle.h"
-#include "core/numeric/vector.h"
+#include "core/query/placed/plain_vector.h"
 
 namespace hulld {
 
@@ -16,31 +16,32 @@ struct NearestPart {
   // Indices and weights of the corners. Weights are not negative, with sum 1 up to rounding.
   std::array<uint8_t, 3> corners = {};
   std::array<double, 3> weights = {};
-  Vector point = Vector::Zero();
+  PlainVector point;
   // Direction toward the origin across the part, of any length; more accurate than -point.
-  Vector toward = Vector::Zero();
+  PlainVector toward;
 };
 
-inline NearestPart NearestOfVertex(const Vector& p) { return {1, {0}, {1}, p, -p}; }
+inline NearestPart NearestOfVertex(const PlainVector& p) { return {1, {0}, {1}, p, -p}; }
 
-inline NearestPart NearestOnEdge(const Vector& p, const Vector& q, uint8_t i, uint8_t j) {
-  const Vector e = q - p;
-  const double along = -e.dot(p);
-  const double length = e.squaredNorm();
+inline NearestPart NearestOnEdge(const PlainVector& p, const PlainVector& q, uint8_t i, uint8_t j) {
+  const PlainVector e = q - p;
+  const double along = -Dot(e, p);
+  const double length = SquaredNorm(e);
   if (!(along > 0)) return {1, {i}, {1}, p, -p};
   if (!(along < length)) return {1, {j}, {1}, q, -q};
   const double t = along / length;
-  const Vector point = (1 - t) * p + t * q;
+  const PlainVector point = (1 - t) * p + t * q;
   return {2, {i, j}, {1 - t, t}, point, -t * e - p};
 }
 
 // Finds the nearest part in floating point, up to rounding.
-inline NearestPart NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
-  const Vector e = b - a;
-  const Vector f = c - a;
+inline NearestPart NearestOnTriangle(const PlainVector& a, const PlainVector& b,
+                                     const PlainVector& c) {
+  const PlainVector e = b - a;
+  const PlainVector f = c - a;
   const TriangleNearest nearest = FindNearestOnTriangle([&](int corner) -> EdgeProjections {
-    const Vector& p = corner == 0 ? a : corner == 1 ? b : c;
-    return {-e.dot(p), -f.dot(p)};
+    const PlainVector& p = corner == 0 ? a : corner == 1 ? b : c;
+    return {-Dot(e, p), -Dot(f, p)};
   });
   switch (nearest.part) {
     case TrianglePart::kA:
@@ -65,9 +66,8 @@ inline NearestPart NearestOnTriangle(const Vector& a, const Vector& b, const Vec
   const double sum = x + y + z;
   if (!(sum > 0)) return {1, {0}, {1}, a, -a};
   const double u = x / sum, v = y / sum, w = z / sum;
-  const Vector normal = e.cross(f);
-  return {
-      3, {0, 1, 2}, {u, v, w}, u * a + v * b + w * c, normal.dot(a) > 0 ? Vector(-normal) : normal};
+  const PlainVector normal = Cross(e, f);
+  return {3, {0, 1, 2}, {u, v, w}, u * a + v * b + w * c, Dot(normal, a) > 0 ? -normal : normal};
 }
 
 }  // namespace hulld

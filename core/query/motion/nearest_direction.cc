@@ -22,7 +22,7 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
     // With radii, the gap may be any share of the distance.
     const bool rounded = pair.a().is_rounded() || pair.b().is_rounded();
     goal.relative_error = rounded ? 0 : kRelativeWidth;
-    const SeparationBounds bounds = BoundDistance(pair, first, goal);
+    const SeparationBounds bounds = BoundDistance(pair, first, {}, goal);
     if (point != nullptr) *point = bounds.point;
     return bounds.direction;
   }

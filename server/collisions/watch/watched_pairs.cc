@@ -115,7 +115,7 @@ absl::Status WatchedPairs::SelectPair(uint32_t a, uint32_t b) {
 }
 
 void WatchedPairs::ForgetPoints(uint32_t placement) {
-  for (const uint32_t number : pairs_of_[placement]) pairs_[number].cache.pair_count = 0;
+  for (const uint32_t number : pairs_of_[placement]) pairs_[number].cache.ForgetHulls();
 }
 
 void WatchedPairs::EndRound() {

@@ -12,9 +12,11 @@
 //
 //   relation  hulls at their poses -> colliding or not; "from poses": poses converted to the
 //             method's own types each time
-//   contact   depth, normal, and witness points of overlapping hulls; `none`: no depth was found
+//   contact   depth, normal, and witness points of overlapping or touching hulls; `none`: no depth
+//             was found
 //   distance  distance and witness points of separated hulls
-//   motion    the same pairs repeatedly, with a small motion each time, with and without a cache
+//   motion    the same pairs repeatedly, with a small motion each time, or at rest in contact; with
+//             and without a cache
 //   batch     all queries in one call on 1 or 2 threads; `ns` is real time, `cpu_ns` the processor
 //             time of all threads together
 //   scene     all colliding pairs among many hulls (scene_benchmark.h)
@@ -172,13 +174,14 @@ void Measure(benchmark::State& state, Subject& subject) {
 }
 
 // Frames of a motion: each rotates B by about a milliradian and moves it by about a thousandth of
-// its radius. The motion oscillates, so that it can last as long as the benchmark.
-std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set) {
+// its radius, or by nothing if `rests`. The motion oscillates, so that it can last as long as the
+// benchmark.
+std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set, bool rests) {
   constexpr int kFrames = 32;
   constexpr double kStep = 1e-3;
   std::vector<std::vector<PlacedHull>> frames(kFrames);
   for (int frame = 0; frame < kFrames; ++frame) {
-    const double phase = kStep * std::abs(kFrames / 2 - frame);
+    const double phase = rests ? 0 : kStep * std::abs(kFrames / 2 - frame);
     for (size_t i = 0; i < set.queries.size(); ++i) {
       const QuerySet::Query& query = set.queries[i];
       const QueryHull& b = set.query_hulls[query.hull_b];
@@ -194,7 +197,8 @@ std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set) {
 void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
   const QuerySet& set = workload.questions();
   if (set.queries.empty()) return state.SkipWithError("skipped: no data");
-  const std::vector<std::vector<PlacedHull>> frames = MakeFrames(set);
+  const std::vector<std::vector<PlacedHull>> frames =
+      MakeFrames(set, workload.regime() == Regime::kContact);
   std::vector<PairCache> caches(set.queries.size());
   const QueryOptions options;
   for (size_t i = 0; i < caches.size(); ++i) {
@@ -290,7 +294,8 @@ void RegisterRelations(const std::string& set, Regime regime) {
 
 void RegisterMeasures(const std::string& set, Regime regime,
                       const std::shared_ptr<Workload>& workload) {
-  const bool deep = regime == Regime::kDeep || regime == Regime::kGraze;
+  const bool deep =
+      regime == Regime::kDeep || regime == Regime::kGraze || regime == Regime::kContact;
   const bool apart = regime == Regime::kFar || regime == Regime::kClose || regime == Regime::kGap;
   for (const std::shared_ptr<QueryMethod>& method : MakeMethods()) {
     if (deep && method->knows_depth()) {
@@ -307,10 +312,9 @@ void RegisterMeasures(const std::string& set, Regime regime,
 void RegisterSequences(const std::string& set, Regime regime,
                        const std::shared_ptr<Workload>& workload) {
   // A motion leaves contact immediately.
-  const bool at_contact =
-      regime == Regime::kTouch || regime == Regime::kContact || regime == Regime::kGraze;
+  const bool is_left_at_once = regime == Regime::kTouch || regime == Regime::kGraze;
   for (const bool warm : {true, false}) {
-    if (at_contact) break;
+    if (is_left_at_once) break;
     benchmark::RegisterBenchmark(
         RowName("motion", set, regime, "hulld", warm ? " warm" : " cold").c_str(),
         [=](benchmark::State& state) { FollowMotion(state, *workload, warm); })

@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
@@ -72,6 +75,90 @@ TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
     EXPECT_EQ(CheckCollisions(placements, {&pair, 1}, {}, 1)[0]->rung, Rung::kBounds);
     EXPECT_EQ(CheckCollision(a, b)->relation, Relation::kSeparated);
   }
+}
+
+// Stacked boxes at rest.
+TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
+  const Hull cube = UnitCube();
+  const QueryHull query_cube(cube);
+  const auto ask = [&](const Pose& X_WA, const Pose& X_WB, PairCache* cache, double tolerance = 0) {
+    QueryOptions options;
+    options.tolerance = tolerance;
+    const Answer answer =
+        CheckCollision(PlacedHull(query_cube, X_WA), PlacedHull(query_cube, X_WB), options, cache)
+            .value();
+    return std::pair(answer.relation, answer.rung);
+  };
+  const std::pair from_cache(Relation::kTouching, Rung::kCached);
+  const std::pair exactly(Relation::kTouching, Rung::kExact);
+  // In both orders of content.
+  for (const double side : {1.0, -1.0}) {
+    PairCache cache;
+    const Pose X_WA = At(0.5, 0, 0);
+    const Pose X_WB = At(0.5 + side, 0.25, 0);
+    EXPECT_EQ(ask(X_WA, X_WB, &cache), exactly);
+    EXPECT_EQ(ask(X_WA, X_WB, &cache), from_cache);
+    // A conveyor moves both, as far as doubles allow without rounding.
+    EXPECT_EQ(ask(At(7.5, 0, 3), At(7.5 + side, 0.25, 3), &cache), from_cache);
+    // t_B - t_A rounds to the same double in both queries.
+    EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0), &cache), exactly);
+    EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0x1p-60), &cache), exactly);
+    EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0x1p-60), &cache), from_cache);
+    // A contact that ends by the least step.
+    const Pose apart = At(std::nextafter(0.5 + side, 4 * side), 0.25, 0);
+    EXPECT_EQ(ask(X_WA, apart, &cache).first, Relation::kSeparated);
+    const Pose into = At(std::nextafter(0.5 + side, 0.5), 0.25, 0);
+    EXPECT_EQ(ask(X_WA, into, &cache).first, Relation::kOverlapping);
+    EXPECT_EQ(ask(X_WA, X_WB, &cache).first, Relation::kTouching);
+    // Another quaternion of the same rotation is not recognized, and a tolerance asks for less.
+    Pose turned = X_WB;
+    turned.q = {2, 0, 0, 0};
+    EXPECT_EQ(ask(X_WA, turned, &cache), exactly);
+    EXPECT_EQ(ask(X_WA, turned, &cache, 0.125), ask(X_WA, turned, nullptr, 0.125));
+    // Another hull may take the place of one that touched.
+    EXPECT_EQ(ask(X_WA, turned, &cache).first, Relation::kTouching);
+    EXPECT_EQ(ask(X_WA, turned, &cache), from_cache);
+    cache.ForgetHulls();
+    EXPECT_EQ(ask(X_WA, turned, &cache), exactly);
+  }
+}
+
+TEST(Collision, ACacheOfTouchingHullsChangesNoDetail) {
+  const Hull cube = UnitCube();
+  const QueryHull query_cube(cube);
+  const PlacedHull a(query_cube, At(0, 0, 0));
+  const PlacedHull b(query_cube, At(0.25, 1, 0.5));
+  PairCache cache;
+  EXPECT_EQ(CheckCollision(a, b, {}, &cache)->relation, Relation::kTouching);
+  QueryOptions everything;
+  everything.want_axis = everything.want_separation = everything.want_witness = true;
+  everything.want_certificate = everything.want_normal = true;
+  const Answer cold = CheckCollision(a, b, everything).value();
+  const Answer warm = CheckCollision(a, b, everything, &cache).value();
+  EXPECT_EQ(warm.axis->direction, cold.axis->direction);
+  EXPECT_EQ(warm.witness->p_WA, cold.witness->p_WA);
+  EXPECT_EQ(warm.certificate->pairs, cold.certificate->pairs);
+  EXPECT_EQ(warm.rung, Rung::kExact);
+}
+
+TEST(Collision, TheTextbookMethodMakesIntegersOnlyForAxesThatFloatingPointLeavesOpen) {
+  std::vector<Vector> points;
+  for (int i = 0; i < 40; ++i) points.emplace_back(std::cos(i), std::sin(i), i % 2);
+  const Hull drum = BuildHull(points);
+  const QueryHull query_drum(drum);
+  const PlacedHull a(query_drum, Pose());
+  const QueryOptions options = Options(Method::kTextbookSat);
+  const auto memory = [&](const Pose& X_WB, Relation relation) {
+    const PlacedHull b(query_drum, X_WB);
+    TextbookCheck check = TextbookCheck::Begin(a, b, options).value();
+    EXPECT_TRUE(check.Advance(std::chrono::steady_clock::time_point::max()).value());
+    const size_t bytes = check.MemoryBytes();
+    EXPECT_EQ(check.Finish()->relation, relation);
+    return bytes;
+  };
+  const size_t far = memory(At(5, 0.5, 0.25), Relation::kSeparated);
+  EXPECT_LT(far, 8000u);
+  EXPECT_GT(memory(At(0, 0, 1), Relation::kTouching), far + 80 * 100);
 }
 
 TEST(Collision, RefusesInvalidPosesOfEitherHull) {

@@ -230,6 +230,36 @@ TEST(Separation, ACacheChangesNeitherValueNorBound) {
   EXPECT_GT(cached, kLargeRounds);
 }
 
+// SmallHullsOfEveryDimensionMatchBruteForce checks the errors.
+TEST(Separation, AContactPointNeedsExactArithmeticOnlyIfItsErrorMustBeLeast) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  const Hull wedge = BuildHull(std::vector<Vector>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+  SeparationCheck check;
+  for (const Hull* b : {&cube, &wedge}) {
+    // On a face, on an edge, and at a corner; in a body's frame and far from it.
+    for (const Vector& t : {Vector(0.25, 0.125, 1), Vector(-0.375, 1, 1), Vector(1, 1, 1)}) {
+      for (const Vector& far : {Vector(0, 0, 0), Vector(-1000, 3, 0.5)}) {
+        Pose X_WA;
+        X_WA.q = {1, 2, 0, 0};
+        X_WA.t = far;
+        Pose X_WB = X_WA;
+        // A rotation by 2 atan(2) about x, exactly.
+        X_WB.t += Vector(t.x(), -0.6 * t.y() - 0.8 * t.z(), 0.8 * t.y() - 0.6 * t.z());
+        EXPECT_TRUE(check.Ask(cube, X_WA, *b, X_WB));
+        const Pose unrotated = At(far.x() + t.x(), far.y() + t.y(), far.z() + t.z());
+        const Pose origin = At(far.x(), far.y(), far.z());
+        EXPECT_TRUE(check.Ask(cube, origin, *b, unrotated));
+        const Answer answer = Ask(cube, origin, *b, unrotated);
+        const Answer exact = Ask(cube, origin, *b, unrotated, 0);
+        ASSERT_EQ(answer.relation, Relation::kTouching);
+        EXPECT_EQ(answer.witness->p_WA, answer.witness->p_WB);
+        EXPECT_GT(answer.witness->error, exact.witness->error);
+        EXPECT_LE(answer.witness->error, 4e-12);
+      }
+    }
+  }
+}
+
 TEST(Separation, TheTextbookMethodGivesTheSame) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   QueryOptions textbook = WantSeparation();

@@ -232,6 +232,67 @@ TEST(BodySearch, FewNearPairsOfManyPiecesAreAllThatIsAskedAbout) {
   EXPECT_LT(counts.boxes, 10000u);
 }
 
+// Regression test: the search for the relation went on among all pairs within the clearance.
+TEST(BodySearch, AClearanceThatIsMetEndsWithTheFirstPairWithinIt) {
+  OwnBody grid;
+  FillGrid(10, 2, &grid);
+  QueryOptions options;
+  options.clearance = 100;
+  BodyCounts counts;
+  const auto answer = CheckBodies(grid.Placed(Pose()), grid.Placed(At(49, 0, 0)), options, &counts);
+  EXPECT_EQ(answer->answer.relation, Relation::kSeparated);
+  EXPECT_EQ(answer->answer.within_clearance, true);
+  EXPECT_TRUE(answer->pieces.has_value());
+  EXPECT_EQ(counts.pairs, 1u);
+  EXPECT_LT(counts.boxes, 400u);
+  // Only the pairs that share a face are left.
+  const auto touching =
+      CheckBodies(grid.Placed(Pose()), grid.Placed(At(19, 0, 0)), options, &counts);
+  EXPECT_EQ(touching->answer.relation, Relation::kTouching);
+  EXPECT_EQ(touching->answer.within_clearance, true);
+  EXPECT_EQ(counts.pairs, 100u);
+  // A negative clearance that no pair meets: once the relation is known, only pairs that may be as
+  // deep are left.
+  options.clearance = -0.75;
+  const auto shallow =
+      CheckBodies(grid.Placed(Pose()), grid.Placed(At(18.5, 0, 0)), options, &counts);
+  EXPECT_EQ(shallow->answer.relation, Relation::kOverlapping);
+  EXPECT_EQ(shallow->answer.within_clearance, false);
+  EXPECT_EQ(counts.pairs, 1u);
+}
+
+TEST(BodySearch, AClearanceTakesNoMoreWorkThanTheSeparation) {
+  Random random(TestSeed(9));
+  QueryOptions separation;
+  separation.want_separation = true;
+  OwnBody grid;
+  FillGrid(5, 1.5, &grid);
+  for (int round = 0; round < 60; ++round) {
+    OwnBody a, b;
+    Fill(random, random.Between(1, 30), &a);
+    Fill(random, random.Between(1, 30), &b);
+    const bool of_grids = round % 3 == 0;
+    Pose X_WB = At(random.Real(0, 14), random.Real(-2, 2), random.Real(-2, 2));
+    if (round % 2 == 0) X_WB.q = {3, 1, 0, random.Real(-1, 1)};
+    const PlacedBody placed_a = (of_grids ? grid : a).Placed(Pose());
+    const PlacedBody placed_b = (of_grids ? grid : b).Placed(X_WB);
+    BodyCounts most;
+    const auto answer = CheckBodies(placed_a, placed_b, separation, &most);
+    const double least = answer->answer.separation->value;
+    for (const double clearance :
+         {least - 1, least - 1e-6, least + 1e-6, least + 1, 100.0, kInfinity, -kInfinity}) {
+      QueryOptions options;
+      options.clearance = clearance;
+      BodyCounts counts;
+      const auto found = CheckBodies(placed_a, placed_b, options, &counts);
+      EXPECT_EQ(found->answer.relation, answer->answer.relation) << round;
+      EXPECT_EQ(found->answer.within_clearance, least <= clearance) << round;
+      EXPECT_LE(counts.pairs, most.pairs) << "round " << round << ", clearance " << clearance;
+      EXPECT_LE(counts.boxes, most.boxes) << "round " << round << ", clearance " << clearance;
+    }
+  }
+}
+
 TEST(BodySearch, AHullIsQueriedAgainstBodies) {
   OwnBody body;
   body.Add(LatticeCube(2, 1), At(0, 0, 0));
