@@ -240,10 +240,10 @@ absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
   return answer;
 }
 
-// Converts the cache for (A, B) to the cache for (B, A), except the relative pose: the search that
-// compares it has the order of the search that stored it.
+// Converts the cache for (A, B) to the cache for (B, A).
 void Mirror(PairCache& cache) {
   if (cache.axis) cache.axis = -*cache.axis;
+  if (cache.touching) cache.touching->Mirror();
   for (uint32_t i = 0; i < cache.pair_count; ++i) std::swap(cache.pairs[i].a, cache.pairs[i].b);
 }
 

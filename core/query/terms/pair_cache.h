@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/base/boxed.h"
 #include "core/numeric/vector.h"
@@ -19,6 +20,13 @@ struct RelativePose {
   // t_B - t_A is the exact sum of both.
   std::array<double, 3> offset;
   std::array<double, 3> offset_rest;
+
+  // Converts the pose of B relative to A to the pose of A relative to B.
+  void Mirror() {
+    std::swap(q_A, q_B);
+    for (double& x : offset) x = -x;
+    for (double& x : offset_rest) x = -x;
+  }
   friend bool operator==(const RelativePose&, const RelativePose&) = default;
 };
 

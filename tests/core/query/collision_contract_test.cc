@@ -123,6 +123,27 @@ TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
   }
 }
 
+// The same two poses, of the other hull each: a cube begins where the bar ended and the reverse.
+TEST(Collision, HullsThatTouchedAreDecidedAgainIfTheySwapPoses) {
+  const Hull cube = UnitCube();
+  std::vector<Vector> points(cube.vertices().begin(), cube.vertices().end());
+  for (Vector& v : points) {
+    if (v.x() > 0) v.x() *= 4;
+  }
+  const Hull bar = BuildHull(points);
+  const QueryHull query_cube(cube);
+  const QueryHull query_bar(bar);
+  const Pose left = At(0, 0, 0);
+  const Pose right = At(1, 0, 0);
+  PairCache cache;
+  EXPECT_EQ(CheckCollision(PlacedHull(query_cube, left), PlacedHull(query_bar, right), {}, &cache)
+                ->relation,
+            Relation::kTouching);
+  EXPECT_EQ(CheckCollision(PlacedHull(query_cube, right), PlacedHull(query_bar, left), {}, &cache)
+                ->relation,
+            Relation::kOverlapping);
+}
+
 TEST(Collision, ACacheOfTouchingHullsChangesNoDetail) {
   const Hull cube = UnitCube();
   const QueryHull query_cube(cube);
