@@ -135,8 +135,8 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/view/bridge",
     "client/hullctl/view",
     "client/hullctl/parts",
-    "client/hullctl/robot",
     "client/hullctl/pairs",
+    "client/hullctl/robot",
     "client/hullctl/commands",
     "client/hullctl",
 };

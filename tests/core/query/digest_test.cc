@@ -389,9 +389,9 @@ TEST_P(DigestTest, IsThatOfEveryProcessor) {
   for (const auto& [what, digest] : digests) hashes[what] = digest.hash();
   const std::map<std::string, uint64_t> expected = {
       {"questions", 7004395885791083578u}, {"snapshots", 13234861685057146501u},
-      {"answers", 16922643402919350732u},  {"large hulls", 2197151197249713923u},
-      {"growth", 18348015413602966233u},   {"bodies", 17247483824265767605u},
-      {"scenes", 2944089532299709696u},    {"simplifications", 1069768338281998344u},
+      {"answers", 5266656793038777644u},   {"large hulls", 816355231107481206u},
+      {"growth", 18348015413602966233u},   {"bodies", 8037201080533130467u},
+      {"scenes", 4486313835332567660u},    {"simplifications", 1069768338281998344u},
   };
   EXPECT_EQ(hashes, expected);
 }

@@ -555,16 +555,20 @@ TEST_F(MovingPlacements, BodiesAnswerAsTheirPieces) {
         contact = std::min(contact, one.first_contact().contact_time());
       }
     }
-    EXPECT_EQ(whole.first_contact().separated_until(), until);
+    // Brackets of one contact may differ, because rounding depends on the order of the vertices.
+    const auto is_near = [](double x, double y) { return std::abs(x - y) <= 0x1p-29; };
+    EXPECT_PRED2(is_near, whole.first_contact().separated_until(), until);
     EXPECT_EQ(whole.first_contact().has_contact_time(), std::isfinite(contact));
     if (std::isfinite(contact)) {
-      EXPECT_EQ(whole.first_contact().contact_time(), contact);
+      EXPECT_PRED2(is_near, whole.first_contact().contact_time(), contact);
+      EXPECT_LE(whole.first_contact().separated_until(), contact);
+      EXPECT_LE(until, whole.first_contact().contact_time());
     }
     ++counts[whole.relation()];
     const auto batch = Ask(Batch({a, b}, {0, 1}));
     ASSERT_TRUE(batch.ok()) << batch.status();
     EXPECT_EQ(batch->columns().relations(0), whole.relation());
-    EXPECT_EQ(batch->columns().separated_until(0), until);
+    EXPECT_PRED2(is_near, batch->columns().separated_until(0), until);
     if (std::isfinite(contact)) {
       EXPECT_EQ(batch->columns().pieces(0), static_cast<int32_t>(whole.piece_a().index()));
       EXPECT_EQ(batch->columns().pieces(1), static_cast<int32_t>(whole.piece_b().index()));
