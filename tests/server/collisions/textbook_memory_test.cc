@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <string>
 #include <thread>
@@ -14,6 +15,14 @@ namespace textbook_memory_test {
 
 using ::testing::HasSubstr;
 
+// Returns a square that touches the points from above in x. Floating point leaves the axis of its
+// facet, the first one, open, so all vertices are multiplied out in integers.
+Coordinates Beside(const Coordinates& points) {
+  double top = points[0];
+  for (size_t i = 3; i < points.size(); i += 3) top = std::max(top, points[i]);
+  return {top, -1, -1, top, 1, -1, top, 1, 1, top, -1, 1};
+}
+
 class TextbookMemory : public ServerTest {
  protected:
   // Puts a sphere with vertices that, multiplied out in integers, exceed the readers' share.
@@ -22,12 +31,15 @@ class TextbookMemory : public ServerTest {
     config.limits.memory_limit = 35'000'000;
     Restart(config);
     Put("large", Sphere(kVertices));
+    Put("beside", Beside(Sphere(kVertices)));
     Put("cube", Cube(-0.5));
     // Makes the canonical snapshots.
-    v1::CheckCollisionRequest request = Question("large", "cube");
-    request.set_method(v1::METHOD_UNSPECIFIED);
-    request.mutable_wanted()->set_certificate(true);
-    Check(request);
+    for (const char* other : {"beside", "cube"}) {
+      v1::CheckCollisionRequest request = Question("large", other);
+      request.set_method(v1::METHOD_UNSPECIFIED);
+      request.mutable_wanted()->set_certificate(true);
+      Check(request);
+    }
     before_ = HeldBytes();
   }
   static v1::CheckCollisionRequest Question(const std::string& a, const std::string& b) {
@@ -61,7 +73,7 @@ TEST_F(TextbookMemory, AStartedPairIsCountedAndFurtherOnesAreRefused) {
   std::atomic<bool> is_answered = false;
   std::thread first([&] {
     v1::CheckCollisionResponse response;
-    status = collisions_->CheckCollision(&context, Question("large", "cube"), &response);
+    status = collisions_->CheckCollision(&context, Question("beside", "large"), &response);
     is_answered = true;
   });
   while (!IsCounted() && !is_answered) std::this_thread::yield();
@@ -79,13 +91,14 @@ TEST_F(TextbookMemory, ABatchIsCountedFromSliceToSlice) {
   PutLarge();
   v1::BatchCheckCollisionsRequest request;
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("beside");
   *request.add_placements() = PlacementOf("large");
   *request.add_placements() = PlacementOf("cube");
   request.add_pairs(0);
   request.add_pairs(1);
   for (int pair = 0; pair < 100'000; ++pair) {
-    request.add_pairs(1);
-    request.add_pairs(1);
+    request.add_pairs(2);
+    request.add_pairs(2);
   }
   grpc::ClientContext context;
   const auto reader = collisions_->BatchCheckCollisions(&context, request);
@@ -111,27 +124,27 @@ TEST_F(TextbookMemory, ABatchBeginsOneLargePairAtATime) {
   config.limits.memory_limit = 16 << 20;
   Restart(config);
   Put("large", Sphere(5000));
-  Put("edge", {-0.25, 0, 0, 0.25, 0, 0});
+  Put("beside", Beside(Sphere(5000)));
   v1::BatchCheckCollisionsRequest request;
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("beside");
   *request.add_placements() = PlacementOf("large");
-  *request.add_placements() = PlacementOf("edge");
   for (int pair = 0; pair < 4; ++pair) {
     request.add_pairs(0);
     request.add_pairs(1);
   }
   grpc::ClientContext context;
   const auto reader = collisions_->BatchCheckCollisions(&context, request);
-  int overlapping = 0;
+  int touching = 0;
   v1::BatchCheckCollisionsResponse part;
   while (reader->Read(&part)) {
     for (const int relation : part.columns().relations()) {
-      overlapping += relation == v1::RELATION_OVERLAPPING ? 1 : 0;
+      touching += relation == v1::RELATION_TOUCHING ? 1 : 0;
     }
   }
   const grpc::Status status = reader->Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(overlapping, 4);
+  EXPECT_EQ(touching, 4);
 }
 
 }  // namespace textbook_memory_test
