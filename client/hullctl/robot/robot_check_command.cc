@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <deque>
-#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -191,7 +190,7 @@ class RobotCheck {
   // waypoints between which it was not decided.
   std::optional<ContinuousCheck::Event> first_event_;
   std::set<size_t> contacts_;
-  std::map<size_t, uint64_t> undecided_;
+  std::set<size_t> undecided_;
   // True for each pair that collided at the previous waypoint.
   std::vector<bool> collides_;
 };
@@ -443,10 +442,8 @@ void RobotCheck::TakeEvent(const ContinuousCheck::Event& event) {
     PrintEvent(event, arguments_.details.wanted.clearance() > 0 ? "NEAR" : "CONTACT");
     return;
   }
-  const auto [last, is_new] = undecided_.try_emplace(event.pair, event.waypoint);
-  // One line for consecutive waypoints.
-  if (is_new || last->second + 1 != event.waypoint) PrintEvent(event, "UNDECIDED");
-  last->second = event.waypoint;
+  undecided_.insert(event.pair);
+  PrintEvent(event, "UNDECIDED");
 }
 
 void RobotCheck::PrintEvent(const ContinuousCheck::Event& event, const char* name) {

@@ -26,6 +26,11 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
     if (point != nullptr) *point = bounds.point;
     return bounds.direction;
   }
+  return ExactNearestUnit(pair, should_stop);
+}
+
+absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair,
+                                        const std::function<bool()>& should_stop) {
   const absl::StatusOr<IntegerVector> n = ExactNearestDirection(pair, should_stop);
   if (!n.ok()) return n.status();
   if (IsZero(*n)) return Vector(Vector::Zero());

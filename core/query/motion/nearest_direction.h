@@ -21,6 +21,10 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
                                         const std::function<bool()>& should_stop,
                                         FloatCombination* point = nullptr);
 
+// Returns the same direction, exact but for the rounding to unit length. Errors: as above.
+absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair,
+                                        const std::function<bool()>& should_stop);
+
 // Returns the same direction exactly, of any length; zero if the pair meets. Errors: as above.
 absl::StatusOr<IntegerVector> ExactNearestDirection(const FloatPair& pair,
                                                     const std::function<bool()>& should_stop);

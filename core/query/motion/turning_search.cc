@@ -78,11 +78,11 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       const absl::StatusOr<bool> near = IsWithinResolution();
       if (!near.ok()) return near.status();
       if (!*near) continue;
-      const absl::StatusOr<bool> tolerable = RemainsTolerable(*n);
+      const absl::StatusOr<double> tolerable = TolerableUntil(*n);
       if (!tolerable.ok()) return tolerable.status();
       const absl::StatusOr<Relation> at_end = RelationAt(1);
       if (!at_end.ok()) return at_end.status();
-      if (*tolerable && *at_end == Relation::kSeparated) {
+      if (*tolerable == 1 && *at_end == Relation::kSeparated) {
         return WithoutContact(Relation::kWithinTolerance);
       }
       may_tolerate = false;
@@ -146,9 +146,9 @@ double TurningSearch::LatestContactTime() const {
   return latest > separated_ ? latest : std::nextafter(separated_, 2.0);
 }
 
-// Returns true if the separation is proven to be at least -resolution_ from separated_ on. `n`: the
-// direction at separated_.
-absl::StatusOr<bool> TurningSearch::RemainsTolerable(Vector n) {
+// Returns the time up to which the separation is proven to be at least -resolution_ from separated_
+// on, usually the latest such time. `n`: the direction at separated_.
+absl::StatusOr<double> TurningSearch::TolerableUntil(Vector n) {
   // Exceeds the rounding of the length of n.
   const double margin = -resolution_ / 2 * (1 - 0x1p-40);
   double time = separated_;
@@ -157,7 +157,7 @@ absl::StatusOr<bool> TurningSearch::RemainsTolerable(Vector n) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
     while (!plane_.Try(n, time, until, margin).proven) {
-      if (until - time < kShortestStep) return false;
+      if (until - time < kShortestStep) return time;
       until = time + (until - time) / 2;
     }
     length = until - time;
@@ -170,7 +170,7 @@ absl::StatusOr<bool> TurningSearch::RemainsTolerable(Vector n) {
       n = *nearest;
     }
   }
-  return true;
+  return time;
 }
 
 // No plane can be proven from separated_ on: the gap is below rounding, if not the rotation.
@@ -182,11 +182,14 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   const absl::StatusOr<bool> near = IsWithinResolution();
   if (!near.ok()) return near.status();
   if (*near) {
-    const Vector n = last_direction_.isZero(0) ? Vector(Vector::UnitX()) : last_direction_;
-    const absl::StatusOr<bool> tolerable = RemainsTolerable(n);
+    // Floating point may find no direction at such a distance.
+    const absl::StatusOr<Vector> n =
+        ExactNearestUnit(PairAt(a_, b_, separated_).pair(), options_.should_stop);
+    if (!n.ok()) return n.status();
+    const absl::StatusOr<double> tolerable = TolerableUntil(*n);
     if (!tolerable.ok()) return tolerable.status();
-    if (*tolerable) return WithoutContact(Relation::kWithinTolerance);
-    const absl::StatusOr<double> contact = FindLateContact();
+    if (*tolerable == 1) return WithoutContact(Relation::kWithinTolerance);
+    const absl::StatusOr<double> contact = FindLateContact(*tolerable);
     if (!contact.ok()) return contact.status();
     if (*contact <= 1) return Contact(*contact);
   }
@@ -196,12 +199,13 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
 }
 
 // Returns an early time of contact, or a time above 1 if none is found. The separation between
-// separated_ and it is below rounding, and not proven.
-absl::StatusOr<double> TurningSearch::FindLateContact() const {
+// separated_ and it is below rounding, and not proven. The hulls probably meet at `likely`.
+absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
   double apart = separated_;
   double contact = 2;
   for (double length = kShortestStep; contact > 1; length *= kGrowth) {
-    const double time = std::min(1.0, separated_ + length);
+    const bool passes = apart < likely && separated_ + length > likely;
+    const double time = passes ? likely : std::min(1.0, separated_ + length);
     const absl::StatusOr<Relation> relation = RelationAt(time);
     if (!relation.ok()) return relation.status();
     if (*relation != Relation::kSeparated) contact = time;

@@ -49,9 +49,9 @@ class TurningSearch {
   absl::StatusOr<Vector> DirectionAt(double time) const;
   std::optional<Step> FindStep(const Vector& n) const;
   double LatestContactTime() const;
-  absl::StatusOr<bool> RemainsTolerable(Vector n);
+  absl::StatusOr<double> TolerableUntil(Vector n);
   absl::StatusOr<FirstContact> ConcludeStuck();
-  absl::StatusOr<double> FindLateContact() const;
+  absl::StatusOr<double> FindLateContact(double likely) const;
   absl::StatusOr<FirstContact> Contact(double time);
   FirstContact WithoutContact(Relation relation);
 

@@ -151,6 +151,23 @@ TEST(MovingBody, TheStrongestOfSimultaneousContactsDecides) {
   EXPECT_EQ(found->of_body.pieces, (PiecePair{1, 0}));
 }
 
+// The first piece is within rounding of contact from the start.
+TEST(MovingBody, APieceThatIsNearlyTouchedHidesNoContactOfAnother) {
+  OwnMovingBody stairs(Translation({0, 0, 0}, {0, 0, 0}));
+  stairs.Add(LatticeCube(2, 1));
+  std::vector<Vector> step = LatticeCube(2, 1);
+  for (Vector& corner : step) corner += Vector(1.5, 0, 1);
+  stairs.Add(step);
+  OwnMovingBody cube(
+      {{{1, 0, 0, 0}, {0, 0, 1 + 0x1p-43}}, {{1, 0, 0, 0.1}, {1.5, 0, 1 + 0x1p-43}}});
+  cube.Add(LatticeCube(2, 1));
+  const absl::StatusOr<BodyContact> found = FindFirstContact(stairs.moving(), cube.moving());
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_EQ(found->contact.relation, Relation::kOverlapping);
+  EXPECT_EQ(found->of_body.pieces, (PiecePair{1, 0}));
+  EXPECT_NEAR(*found->contact.contact_time, 0.33482644, 1e-8);
+}
+
 TEST(MovingBody, EmptyBodiesAndPiecesNeverMeet) {
   OwnMovingBody empty(Translation({0, 0, 0}, {1, 0, 0}));
   OwnMovingBody hollow(Translation({0, 0, 0}, {1, 0, 0}));

@@ -189,6 +189,32 @@ TEST(Turning, PairsFartherApartThanTheResolutionAreDecided) {
   }
 }
 
+// No plane can be proven between them at the start.
+TEST(Turning, PairsThatStartWithinRoundingOfContactAreAnswered) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double gap : {1e-12, 0x1p-42, 1e-13, 0x1p-50}) {
+      SCOPED_TRACE(testing::Message() << "axis " << axis << ", gap " << gap);
+      const OwnMoving cube(Box(0.5, 0.5, 0.5), AtRest());
+      Motion turning = AtRest((1 + gap) * Vector::Unit(axis));
+      turning.end.q[static_cast<size_t>(axis) + 1] = 1;
+      EXPECT_NE(Find(cube, OwnMoving(Box(0.5, 0.5, 0.5), turning)).relation,
+                Relation::kOverlapping);
+      Motion leaving = turning;
+      leaving.end.t = 2 * Vector::Unit(axis);
+      const FirstContact left = Find(cube, OwnMoving(Box(0.5, 0.5, 0.5), leaving));
+      EXPECT_FALSE(left.contact_time.has_value());
+      Motion entering = turning;
+      entering.end.t = Vector::Zero();
+      const FirstContact met = Find(cube, OwnMoving(Box(0.5, 0.5, 0.5), entering));
+      EXPECT_EQ(met.relation, Relation::kOverlapping);
+      const Motion lifted = {{{1, 0, 0, 0}, (0.625 + gap) * Vector::Unit(axis)},
+                             {{1, 0, 0, 0}, 2 * Vector::Unit(axis)}};
+      const FirstContact ball = Find(cube, OwnMoving({{0, 0, 0}}, lifted, 0.125));
+      EXPECT_FALSE(ball.contact_time.has_value());
+    }
+  }
+}
+
 TEST(Turning, TheBracketIsAsNarrowAsRequested) {
   const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
   const OwnMoving wall(Box(0.5, 5, 5), AtRest({1.25 + 0.5, 0, 0}));
