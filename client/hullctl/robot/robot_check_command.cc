@@ -74,7 +74,7 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
       return absl::OkStatus();
     }
     return absl::InvalidArgumentError(
-        absl::StrCat(Quoted(name + "=" + text), " is not NAME=NUMBER"));
+        absl::StrCat(Quoted(absl::StrCat(name, "=", text)), " is not NAME=NUMBER"));
   }
   const int joint = robot.FindJoint(name);
   const RobotJoint* const loose = joint >= 0 && robot.joints[static_cast<size_t>(joint)].is_loose()

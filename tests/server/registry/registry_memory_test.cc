@@ -176,6 +176,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
   const std::vector<Vector> sphere = SpherePoints(1200);
   std::atomic<bool> ending = false;
   std::vector<std::thread> readers;
+  readers.reserve(2);
   for (int r = 0; r < 2; ++r) {
     readers.emplace_back([&, r] {
       for (int i = r; !ending; ++i) {
@@ -237,6 +238,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
         "h", "w", true, [](const absl::Status&) {}, std::move(done));
   });
   std::vector<Vector> line;
+  line.reserve(20'000);
   for (int i = 0; i < 20'000; ++i) line.emplace_back(i, 0, 0);
   const uint64_t line_bytes = line.size() * sizeof(Vector);
   const std::vector<Vector> waiting(3000, Vector(1, 2, 3));
