@@ -148,7 +148,7 @@ fi
 case $mode in
   quick)
     run_part "configure" cmake --preset release &&
-      run_part "build" build release "${core_targets[@]}" hulld hullctl &&
+      run_part "build" build release "${core_targets[@]}" print_constants hulld hullctl &&
       run_part "tests" run_tests release -L '^(core|core-threads|digest-threads|smoke)$' -LE "^(slow|$rare)$"
     ;;
   default)
