@@ -65,8 +65,8 @@ check_format() {
     { echo "Run clang-format-14 -i on the files above."; return 1; }
 }
 
-# build PRESET TARGET...: builds once more if the compiler itself crashes. g++ 12 does so about once in a
-# thousand files with a precompiled header.
+# build PRESET TARGET...: builds once more if the compiler itself crashes, as g++ 12 rarely does on a
+# file with a precompiled header.
 build() {
   local code=0
   for _ in first second; do

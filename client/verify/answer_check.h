@@ -64,7 +64,7 @@ struct CheckedBodies {
   // The deciding pieces; absent for a hull, and if the answer names none.
   std::optional<uint32_t> piece_a;
   std::optional<uint32_t> piece_b;
-  // As in CheckedAnswer.
+  // The contact and accuracy of pairs in motion; see CheckedAnswer.
   const v1::FirstContact* first_contact = nullptr;
   double max_time_error = 0;
 };

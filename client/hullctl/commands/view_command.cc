@@ -43,7 +43,7 @@ struct ViewArguments {
   PictureSize size;
   // Empty: chosen by Up.
   std::string up;
-  // Of the robot, if the only thing is one.
+  // Options of the robot, if a robot is shown.
   RobotSceneArguments robot;
 };
 

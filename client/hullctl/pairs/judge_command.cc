@@ -282,8 +282,8 @@ class JudgeRun {
              << ShortestText(time_error_) << "\n";
   }
 
-  // Plots the time and the error of the program beside those of this server, which depend on the
-  // wanted accuracy.
+  // Plots time against error: the program's as a point, this server's as a curve over the requested
+  // accuracy.
   absl::Status Plot(Answers resting) {
     TradePlot plot;
     for (const JudgedAnswer& answer : answers_) {

@@ -30,7 +30,7 @@ struct JudgedAnswer {
   std::optional<v1::Relation> relation;
   std::optional<double> distance;
   std::optional<double> depth;
-  // Of a pair that moves: from 0 to 1.
+  // Time at which a moving pair meets, from 0 to 1.
   std::optional<double> contact_time;
   // Duration of the call of the other program, in microseconds.
   std::optional<double> microseconds;
@@ -64,13 +64,13 @@ const char* FaultName(Fault fault);
 
 struct Judgement {
   std::vector<Fault> faults;
-  // The largest length by which the answer is wrong, of a motion the time; 0 for touching hulls
-  // mistaken.
+  // The length by which the answer is wrong, or the time for pairs in motion; 0 if it mistakes a
+  // touching pair.
   double error = 0;
   // |answer - separation| of a distance, and of a depth; 0 if none is given.
   double distance_error = 0;
   double depth_error = 0;
-  // Of a time of contact: how far it is outside of the proven bracket.
+  // The distance of a time of contact from the proven bracket; 0 inside.
   double time_error = 0;
 };
 

@@ -21,7 +21,7 @@ struct PieceCertificate {
   PiecePair pieces;
   Relation relation;
   Certificate certificate;
-  // Of bodies in motion (BodyContact): the certificate is empty except for the deciding pair.
+  // Filled for bodies in motion (BodyContact). Only the deciding pair then has a certificate.
   std::vector<SeparatedInterval> intervals = {};
 };
 

@@ -7,11 +7,11 @@
 
 namespace hulld {
 
-// Returns a box (world frame) that certainly contains the rounded hull at all times. Of a
-// translation, the least box around those of both ends, as by BoundingBox; with a rotation, the
-// hull may point in any direction. Empty for an empty hull. Requires a valid motion.
+// Returns a box (world frame) that certainly contains the rounded hull at all times. For a
+// translation, it is the least box around the boxes of both ends (BoundingBox); a rotation may turn
+// the hull in any direction. Empty for an empty hull. Requires a valid motion.
 Box SweptBox(const MovingHull& moving);
-// As above, of all pieces.
+// Returns a box that certainly contains all pieces of the body at all times; see above.
 Box SweptBox(const MovingBody& moving);
 
 }  // namespace hulld

@@ -79,8 +79,8 @@ std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
   return result;
 }
 
-// Returns the quaternion of a motion at a time, scaled by a power of two. Each component is rounded
-// once.
+// Returns the quaternion of a motion at a time, scaled by a power of two, with one rounding for
+// each component.
 Quaternion RoundedExactlyAt(const Motion& motion, double time) {
   const std::array<Integer, 4> q = QuaternionAt(motion, time);
   int largest = 0;

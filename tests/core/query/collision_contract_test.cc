@@ -123,7 +123,7 @@ TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
   }
 }
 
-// The same two poses, of the other hull each: a cube begins where the bar ended and the reverse.
+// The cube takes the pose of the bar, and the bar that of the cube.
 TEST(Collision, HullsThatTouchedAreDecidedAgainIfTheySwapPoses) {
   const Hull cube = UnitCube();
   std::vector<Vector> points(cube.vertices().begin(), cube.vertices().end());

@@ -372,7 +372,7 @@ TEST_P(MigrationTest, TheCommandLineIsChecked) {
 }
 
 #ifdef HULLD_SANITIZED
-// Every kind of store is the source once and the destination once.
+// Fewer cases: each kind of store is the source in one and the destination in the other.
 const auto kPlaces =
     ::testing::Values(std::tuple("rocksdb", "postgres"), std::tuple("postgres", "rocksdb"));
 #else

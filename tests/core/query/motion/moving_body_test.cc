@@ -34,7 +34,7 @@ struct OwnMovingBody {
   Motion motion;
   double radius;
   OwnBody body;
-  // Of pieces that are not empty.
+  // The pieces that are not empty.
   std::vector<OwnMoving> pieces;
 };
 

@@ -206,7 +206,7 @@ TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
   EXPECT_LE(mutex_.Statistics().most_lookups, kMostLookupsPerHold);
 }
 
-// Of two idle hulls and one in use, the idle ones lose their points.
+// Two idle hulls lose their points, and a hull in use keeps its own.
 TEST_F(HullTableTest, UnderPressureIdleHullsAreDroppedFirst) {
   Cube("a");
   Cube("b");
