@@ -83,6 +83,7 @@ std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
   const auto found = index_.find(id);
   if (found == index_.end()) return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
   Entry& entry = (*found)->second;
+  passes_since_use_ = 0;
   entry.is_used_ = true;
   entry.is_idle_ = false;
   if (entry.is_absent_) return nullptr;
@@ -157,6 +158,7 @@ HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullSta
 }
 
 void HullTable::Insert(const HullPointer& hull) {
+  passes_since_use_ = 0;
   Add(hull->committed().record.hull_id).awake_ = hull;
 }
 
@@ -189,6 +191,7 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
   // Takes longer than a lookup: the points are copied.
   constexpr uint64_t kMostRested = kMostLookupsPerHold / 4;
   uint64_t rested = 0;
+  if (cursor.empty() && passes_since_use_++ >= 2) return false;
   auto next = entries_.upper_bound(cursor);
   for (uint64_t visited = 0; visited < kMostLookupsPerHold && rested < kMostRested; ++visited) {
     if (next == entries_.end()) return false;
@@ -196,9 +199,14 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
     Entry& entry = next++->second;
     locked.NoteLookup();
     const bool was_idle = std::exchange(entry.is_idle_, true);
-    if (!was_idle || entry.awake_ == nullptr || entry.awake_.use_count() > 1) continue;
-    std::unique_ptr<CompactHull> compact = entry.awake_->Compact();
-    if (compact == nullptr) continue;
+    if (!was_idle || entry.awake_ == nullptr) continue;
+    std::unique_ptr<CompactHull> compact =
+        entry.awake_.use_count() > 1 ? nullptr : entry.awake_->Compact();
+    if (compact == nullptr) {
+      // In use, perhaps not at the next pass.
+      if (entry.awake_->is_small()) passes_since_use_ = 0;
+      continue;
+    }
     entry.resting_ = AtRest(*entry.awake_);
     entry.awake_->account.Close();
     locked.Discard(std::exchange(entry.awake_, nullptr));

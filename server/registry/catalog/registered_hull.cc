@@ -171,8 +171,7 @@ void RegisteredHull::DiscardBuilder(Locked& locked) {
 }
 
 void RegisteredHull::DiscardUnneededBuilder(Locked& locked) {
-  const bool is_small = committed().record.vertex_count <= kMostOfSmall;
-  if (!is_small || !state.quiet() || !watches.empty() || !chunks.empty()) return;
+  if (!is_small() || !state.quiet() || !watches.empty() || !chunks.empty()) return;
   DiscardBuilder(locked);
   in_flight_.revisions = nullptr;
 }
@@ -323,7 +322,7 @@ std::unique_ptr<CompactHull> RegisteredHull::Compact() const {
   if (!IsUnused() || IsRead()) return nullptr;
   auto compact = std::make_unique<CompactHull>();
   if (live() != nullptr) {
-    if (committed().record.vertex_count > kMostOfSmall) return nullptr;
+    if (!is_small()) return nullptr;
     compact->points = live()->PointsAt(committed_.mark);
     // Points that are vertices no longer are dropped by preparing.
     if (compact->points.size() > 2 * kMostOfSmall) return nullptr;

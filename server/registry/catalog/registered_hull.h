@@ -67,6 +67,7 @@ class RegisteredHull {
   // Maximum number of vertices of a small hull. Its builder takes more memory than the rest of it
   // and is rebuilt in some 20 us.
   static constexpr uint64_t kMostOfSmall = 64;
+  bool is_small() const { return committed().record.vertex_count <= kMostOfSmall; }
 
   // readable: true if the store can read the hull back.
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,

@@ -206,6 +206,15 @@ TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
   EXPECT_LE(mutex_.Statistics().most_lookups, kMostLookupsPerHold);
 }
 
+TEST_F(HullTableTest, AHullThatWasInUseForLongRestsAfterwards) {
+  auto used = Cube("a");
+  for (int i = 0; i < 3; ++i) PassTime();
+  EXPECT_TRUE(IsAwake("a"));
+  used = nullptr;
+  PassTime();
+  EXPECT_FALSE(IsAwake("a"));
+}
+
 // Two idle hulls lose their points, and a hull in use keeps its own.
 TEST_F(HullTableTest, UnderPressureIdleHullsAreDroppedFirst) {
   Cube("a");
