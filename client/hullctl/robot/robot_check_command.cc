@@ -22,6 +22,7 @@
 #include "client/hullctl/robot/continuous_check.h"
 #include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
+#include "client/hullctl/robot/waypoint_source.h"
 #include "client/hullctl/robot/waypoint_stream.h"
 #include "client/hullctl/scene/scene_file.h"
 #include "client/hullctl/view/view_scene.h"
@@ -61,45 +62,6 @@ bool AreJoined(const Robot& robot, const LinkPair& pair) {
   return hangs_on(pair.first, pair.second) || hangs_on(pair.second, pair.first);
 }
 
-// Sets a variable to a number, or all variables of a joint: a floating joint from a pose, a planar
-// one from x,y,theta.
-absl::Status SetJoint(const Robot& robot, const std::string& name, const std::string& text,
-                      const std::vector<JointVariable>& variables, std::vector<double>* values) {
-  std::vector<std::string> known;
-  for (size_t i = 0; i < variables.size(); ++i) {
-    known.push_back(variables[i].name);
-    if (variables[i].name != name) continue;
-    double* const value = &(*values)[i];
-    if (ParseDouble(text, value) == NumberText::kNumber && std::isfinite(*value)) {
-      return absl::OkStatus();
-    }
-    return absl::InvalidArgumentError(
-        absl::StrCat(Quoted(absl::StrCat(name, "=", text)), " is not NAME=NUMBER"));
-  }
-  const int joint = robot.FindJoint(name);
-  const RobotJoint* const loose = joint >= 0 && robot.joints[static_cast<size_t>(joint)].is_loose()
-                                      ? &robot.joints[static_cast<size_t>(joint)]
-                                      : nullptr;
-  if (loose == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is not a joint of ", robot.name,
-                                                   " with a value", Suggestion(name, known)));
-  }
-  JointValue value = {};
-  if (loose->kind == JointKind::kFloating) {
-    const auto pose = ParsePose(text);
-    if (!pose.ok()) return pose.status();
-    value = NumbersOf(*pose);
-  } else {
-    const auto triple = ParseTriple(text);
-    if (!triple.ok()) return triple.status();
-    std::copy(triple->begin(), triple->end(), value.begin());
-  }
-  for (size_t i = 0; i < variables.size(); ++i) {
-    if (variables[i].joint == joint) (*values)[i] = value[variables[i].place];
-  }
-  return absl::OkStatus();
-}
-
 // One run: the robot, its sequence of waypoints, and the output about them.
 class RobotCheck {
  public:
@@ -108,7 +70,8 @@ class RobotCheck {
         arguments_(arguments),
         model_(std::move(model)),
         client_(run.MakeClient()),
-        bar_(run.err, run.shows_progress, "checks", 0) {}
+        bar_(run.err, run.shows_progress, "checks", 0),
+        waypoints_(model_.robot, arguments.joint_values) {}
 
   ExitCode Run();
 
@@ -118,14 +81,9 @@ class RobotCheck {
     return absl::IsInvalidArgument(status) ? run_.FailUsage(status) : run_.Fail(status);
   }
 
-  using Waypoint = std::vector<double>;
-
   absl::Status AddScene();
   absl::Status ChoosePairs();
-  absl::StatusOr<Waypoint> GivenValues() const;
-  absl::Status OpenWaypoints();
-  absl::StatusOr<bool> ReadWaypoint(Waypoint* free_values);
-  absl::StatusOr<bool> NextWaypoint(Waypoint* free_values);
+  absl::Status OpenWaypoints() { return waypoints_.Open(arguments_.joints); }
   void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
   absl::Status CheckContinuousOptions();
   absl::StatusOr<std::vector<Waypoint>> ReadWaypoints(size_t most);
@@ -143,7 +101,6 @@ class RobotCheck {
   void PrintHead();
   void PrintTotals();
   void PrintMotionTotals();
-  std::string PlaceOf(uint64_t waypoint) const;
   const std::string& NameOf(size_t pair, size_t side) const {
     return names_[pairs_[2 * pair + side]];
   }
@@ -165,17 +122,12 @@ class RobotCheck {
   // Number of these that are adjacent through links without shapes.
   size_t left_out_bare_ = 0;
 
-  std::unique_ptr<ByteSource> source_;
-  std::optional<WaypointReader> reader_;
-  bool given_was_read_ = false;
-  // The first waypoints. They show if the file has more than one; only changes are then printed.
-  std::deque<Waypoint> pending_;
-  bool many_ = false;
-  std::vector<uint64_t> lines_;
+  WaypointSource waypoints_;
   std::atomic<bool> stopped_ = false;
 
   std::unordered_map<int, uint64_t> counts_;
-  uint64_t waypoints_ = 0;
+  // Number of waypoints read and checked.
+  uint64_t checked_ = 0;
   uint64_t failed_ = 0;
   uint64_t beyond_limits_ = 0;
   uint64_t in_contact_ = 0;
@@ -186,8 +138,7 @@ class RobotCheck {
     v1::Relation relation;
   };
   std::optional<Contact> first_;
-  // With --continuous: the first contact, the pairs in contact, and for each pair the last two
-  // waypoints between which it was not decided.
+  // With --continuous: the first contact, and the pairs in contact and not decided.
   std::optional<ContinuousCheck::Event> first_event_;
   std::set<size_t> contacts_;
   std::set<size_t> undecided_;
@@ -267,100 +218,27 @@ absl::Status RobotCheck::ChoosePairs() {
   return absl::InvalidArgumentError(absl::StrCat("no pair of links is left to check; ", hint));
 }
 
-// Returns the rest values, overridden by --joint.
-absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
-  Waypoint values = RestValues(model_.robot);
-  const std::vector<JointVariable> variables = model_.robot.Variables();
-  for (const std::string& given : arguments_.joint_values) {
-    const size_t equals = given.find('=');
-    const std::string name = given.substr(0, equals);
-    const std::string text = equals == std::string::npos ? "" : given.substr(equals + 1);
-    const auto set = SetJoint(model_.robot, name, text, variables, &values);
-    if (!set.ok()) {
-      const std::string message(set.message().data(), set.message().size());
-      return absl::InvalidArgumentError(absl::StrCat("--joint: ", message));
-    }
-  }
-  const std::string joint = JointWithoutRotation(model_.robot, values);
-  if (!joint.empty()) {
-    return absl::InvalidArgumentError(absl::StrCat("--joint: the quaternion of ", Quoted(joint),
-                                                   " is zero; use 1,0,0,0 for no rotation"));
-  }
-  return values;
-}
-
-absl::Status RobotCheck::OpenWaypoints() {
-  if (!arguments_.joints.empty()) {
-    auto source = ByteSource::Open(arguments_.joints);
-    if (!source.ok()) return source.status();
-    source_ = *std::move(source);
-    auto reader = WaypointReader::Open(source_.get(), model_.robot);
-    if (!reader.ok()) return reader.status();
-    reader_ = *std::move(reader);
-  }
-  Waypoint values;
-  while (pending_.size() < 2) {
-    const auto more = ReadWaypoint(&values);
-    if (!more.ok()) return more.status();
-    if (!*more) break;
-    pending_.push_back(values);
-  }
-  many_ = pending_.size() > 1;
-  if (!pending_.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": contains no waypoint"));
-}
-
-absl::StatusOr<bool> RobotCheck::ReadWaypoint(Waypoint* free_values) {
-  if (reader_.has_value()) {
-    auto more = reader_->Next(free_values);
-    if (more.ok() && *more) lines_.push_back(reader_->line());
-    return more;
-  }
-  if (given_was_read_) return false;
-  given_was_read_ = true;
-  auto given = GivenValues();
-  if (!given.ok()) return given.status();
-  *free_values = *std::move(given);
-  return true;
-}
-
-absl::StatusOr<bool> RobotCheck::NextWaypoint(Waypoint* free_values) {
-  if (pending_.empty()) return ReadWaypoint(free_values);
-  *free_values = std::move(pending_.front());
-  pending_.pop_front();
-  return true;
-}
-
-std::string RobotCheck::PlaceOf(uint64_t waypoint) const {
-  std::string place = absl::StrCat("waypoint ", waypoint + 1);
-  if (waypoint < lines_.size()) {
-    absl::StrAppend(&place, " (", source_->name(), ":", lines_[waypoint], ")");
-  }
-  return place;
-}
-
 void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
   const std::vector<std::string> problems =
       LimitProblems(model_.robot, AllJointValues(model_.robot, free_values));
   if (problems.empty()) return;
   if (beyond_limits_++ >= kMostWarnings) return;
   bar_.Clear();
+  const std::string line = waypoints_.LineOf(waypoint);
   for (const std::string& problem : problems) {
-    run_.err << "hullctl: warning: ";
-    if (reader_.has_value()) run_.err << source_->name() << ":" << lines_[waypoint] << ": ";
-    run_.err << problem << "\n";
+    run_.err << "hullctl: warning: " << line << (line.empty() ? "" : ": ") << problem << "\n";
   }
 }
 
 // Returns the next waypoints; empty at the end.
-absl::StatusOr<std::vector<RobotCheck::Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
+absl::StatusOr<std::vector<Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
   std::vector<Waypoint> waypoints;
   while (waypoints.size() < most) {
     Waypoint values;
-    const auto more = NextWaypoint(&values);
+    const auto more = waypoints_.Next(&values);
     if (!more.ok()) return more.status();
     if (!*more) break;
-    WarnOfLimits(waypoints_ + waypoints.size(), values);
+    WarnOfLimits(checked_ + waypoints.size(), values);
     waypoints.push_back(std::move(values));
   }
   return waypoints;
@@ -371,7 +249,7 @@ absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
   v1::Wanted wanted;
   arguments_.details.Apply(&wanted, &tolerance);
   // A single waypoint is examined in detail.
-  if (!many_ && tolerance == 0) wanted.set_separation(true);
+  if (!waypoints_.has_many() && tolerance == 0) wanted.set_separation(true);
   WaypointStream stream(client_, std::move(scope), std::move(wanted), tolerance,
                         [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
                                const std::string& problem) { Take(waypoint, pair, row, problem); });
@@ -385,15 +263,15 @@ absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
     }
     absl::Status asked = stream.Ask(waypoints->size(), poses);
     if (!asked.ok()) return asked;
-    waypoints_ += waypoints->size();
-    bar_.Update(waypoints_ * pairs_.size() / 2);
+    checked_ += waypoints->size();
+    bar_.Update(checked_ * pairs_.size() / 2);
   }
   return stream.Close();
 }
 
 absl::Status RobotCheck::CheckContinuousOptions() {
   if (!arguments_.continuous) return absl::OkStatus();
-  if (!many_) {
+  if (!waypoints_.has_many()) {
     return absl::InvalidArgumentError(
         "--continuous checks the motion between waypoints; pass two or more with --joints");
   }
@@ -422,8 +300,8 @@ absl::Status RobotCheck::CheckMotions(CheckScope scope) {
     absl::Status checked = check.Check(*waypoints);
     if (absl::IsCancelled(checked)) break;
     if (!checked.ok()) return checked;
-    waypoints_ += waypoints->size();
-    bar_.Update(waypoints_ * pairs_.size() / 2);
+    checked_ += waypoints->size();
+    bar_.Update(checked_ * pairs_.size() / 2);
   }
   return absl::OkStatus();
 }
@@ -482,7 +360,7 @@ void RobotCheck::PrintMotionTotals() {
     const size_t others = contacts_.size() + undecided_.size() + failed_;
     run_.out << "# free " << pairs_.size() / 2 - others << (clearance > 0 ? " near " : " contact ")
              << contacts_.size() << " undecided " << undecided_.size() << " failed " << failed_
-             << "\n# " << waypoints_ << " waypoints and the motion between them; free: ";
+             << "\n# " << checked_ << " waypoints and the motion between them; free: ";
     if (clearance > 0) {
       run_.out << "separated by more than " << ShortestText(clearance) << ", proven\n";
     } else {
@@ -495,7 +373,7 @@ void RobotCheck::PrintMotionTotals() {
   }
   if (first_event_.has_value()) {
     run_.out << "# first " << (clearance > 0 ? "approach" : "contact") << " after "
-             << PlaceOf(first_event_->waypoint) << ", at "
+             << waypoints_.PlaceOf(first_event_->waypoint) << ", at "
              << ShortestText(*first_event_->contact_time)
              << " of the way to the next: " << NameOf(first_event_->pair, 0) << " with "
              << NameOf(first_event_->pair, 1) << ", " << RelationText(first_event_->relation)
@@ -548,7 +426,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
   }
   if (row.relation == v1::RELATION_UNSPECIFIED) {
     PrintFailure(waypoint, pair, problem);
-  } else if (many_) {
+  } else if (waypoints_.has_many()) {
     TakeOfMany(waypoint, pair, row, collides);
   } else {
     PrintRow(waypoint, "", pair, row);
@@ -559,7 +437,7 @@ void RobotCheck::PrintFailure(uint64_t waypoint, size_t pair, const std::string&
   bar_.Clear();
   if (failed_++ >= kMostWarnings) return;
   run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
-           << PlaceOf(waypoint) << ": " << problem << "\n";
+           << waypoints_.PlaceOf(waypoint) << ": " << problem << "\n";
 }
 
 void RobotCheck::TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides) {
@@ -594,12 +472,12 @@ void RobotCheck::PrintTotals() {
     run_.out << " within_tolerance " << counts_[v1::RELATION_WITHIN_TOLERANCE];
   }
   run_.out << " failed " << failed_ << "\n";
-  if (!many_) return;
+  if (!waypoints_.has_many()) return;
   if (!arguments_.first) {
-    run_.out << "# " << in_contact_ << " of " << waypoints_ << " waypoints in contact\n";
+    run_.out << "# " << in_contact_ << " of " << checked_ << " waypoints in contact\n";
   }
   if (first_.has_value()) {
-    run_.out << "# first contact at " << PlaceOf(first_->waypoint) << ": "
+    run_.out << "# first contact at " << waypoints_.PlaceOf(first_->waypoint) << ": "
              << NameOf(first_->pair, 0) << " with " << NameOf(first_->pair, 1) << ", "
              << RelationText(first_->relation) << "\n";
   } else {
@@ -626,7 +504,7 @@ ExitCode RobotCheck::Run() {
   if (beyond_limits_ > kMostWarnings) {
     run_.err << "hullctl: warning: " << beyond_limits_ << " waypoints exceed limits of joints\n";
   }
-  if (stopped_) run_.err << "hullctl: stopped after " << waypoints_ << " waypoints\n";
+  if (stopped_) run_.err << "hullctl: stopped after " << checked_ << " waypoints\n";
   if (failed_ == 0) return stopped_ ? ExitCode::kRequestFailed : ExitCode::kDone;
   run_.err << "hullctl: " << failed_ << " checks failed\n";
   return ExitCode::kSomeFailed;
