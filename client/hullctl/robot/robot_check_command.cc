@@ -1,8 +1,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <atomic>
-#include <deque>
-#include <memory>
 #include <optional>
 #include <set>
 #include <unordered_map>
@@ -13,7 +11,6 @@
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/help/suggestion.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"

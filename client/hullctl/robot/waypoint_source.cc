@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/help/suggestion.h"
 

@@ -9,6 +9,7 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -72,8 +73,10 @@ TEST_F(MovingBodies, BodiesAnswerAsTheirPieces) {
   std::uniform_real_distribution<double> number(-4, 4);
   for (int i = 0; i < 6; ++i) {
     std::vector<double> points;
-    for (int k = 0; k < 18; ++k)
+    points.reserve(18);
+    for (int k = 0; k < 18; ++k) {
       points.push_back(number(random) / 4 + (k % 3 == i % 3 ? i / 2 : 0));
+    }
     Put(absl::StrCat("piece", i), points);
   }
   v1::PutBodyRequest rounded = BodyOf("b", {"piece3", "piece4", "piece5"});
@@ -229,6 +232,7 @@ TEST_F(MovingBodies, EveryPieceGivesARowToEachPairOfPieces) {
     }
     std::vector<std::tuple<uint32_t, uint32_t, int, int, v1::Relation>> found;
     const v1::AnswerColumns& columns = scene->columns();
+    found.reserve(static_cast<size_t>(columns.relations_size()));
     for (int i = 0; i < columns.relations_size(); ++i) {
       found.emplace_back(scene->pairs(2 * i), scene->pairs(2 * i + 1), columns.pieces(2 * i),
                          columns.pieces(2 * i + 1), columns.relations(i));
