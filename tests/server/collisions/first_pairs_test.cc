@@ -13,9 +13,8 @@
 #include "tests/server/collisions/moving_placements.h"
 
 namespace hulld::server {
-namespace first_pairs_test {
+namespace moving_placements {
 
-using namespace moving_placements;  // NOLINT: the fixture and its requests.
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -103,5 +102,5 @@ TEST_F(FirstPairsTest, FirstOnlyNamesTheFieldsThatItExcludes) {
   EXPECT_THAT(MessageOf(Find(request).status()), StartsWith("every_piece excludes end_pose"));
 }
 
-}  // namespace first_pairs_test
+}  // namespace moving_placements
 }  // namespace hulld::server

@@ -17,9 +17,8 @@
 #include "tests/server/collisions/moving_placements.h"
 
 namespace hulld::server {
-namespace moving_bodies_test {
+namespace moving_placements {
 
-using namespace moving_placements;  // NOLINT: the fixture and its requests.
 using ::testing::ElementsAre;
 using ::testing::StartsWith;
 
@@ -250,5 +249,5 @@ TEST_F(MovingBodies, EveryPieceGivesARowToEachPairOfPieces) {
   EXPECT_THAT(MessageOf(Find(limited).status()), StartsWith("every_piece excludes a limit"));
 }
 
-}  // namespace moving_bodies_test
+}  // namespace moving_placements
 }  // namespace hulld::server

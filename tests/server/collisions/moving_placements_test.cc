@@ -16,9 +16,8 @@
 #include "client/packed_placements.h"
 
 namespace hulld::server {
-namespace moving_placements_test {
+namespace moving_placements {
 
-using namespace moving_placements;  // NOLINT: the fixture and its requests.
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -326,5 +325,5 @@ TEST_F(MovingPlacements, EmptyHullsNeverMeet) {
   EXPECT_EQ(response.first_contact().separated_until(), 1);
 }
 
-}  // namespace moving_placements_test
+}  // namespace moving_placements
 }  // namespace hulld::server
