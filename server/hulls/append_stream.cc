@@ -136,22 +136,29 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   call().AddPoints(chunk->points.size());
   const auto self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
+  const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
   registry_.hulls().Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
-      [this, self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
+      [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {
         Locked([&] {
           --uncommitted_;
           if (result.ok()) call().EndMessage(arrival);
-          HandleResult(sequence, result);
+          results_.Take(number, {sequence, result},
+                        [this](const SequenceResult& each) { HandleResult(each); });
         });
       });
 }
 
-void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result) {
+void AppendStream::HandleResult(const SequenceResult& chunk) {
+  const auto& [sequence, result] = chunk;
   HULLD_DCHECK(unbuilt_ >= 0 && uncommitted_ >= 0);
-  if (!result.ok()) return FailAt(sequence, OrStopped(result.status()));
+  if (!result.ok()) {
+    const absl::Status status = OrStopped(result.status());
+    // The client may have half-closed before the chunk was refused.
+    return end().has_value() && end()->ok() ? OverrideEnd(status) : Fail(status);
+  }
   call().metrics().CountPoints(result->counts);
   if (!result->already_applied) {
     ++applied_chunks_;
@@ -181,15 +188,6 @@ void AppendStream::Fail(const absl::Status& status) {
   if (!status.ok() && session_.has_value()) {
     call().Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
   }
-}
-
-void AppendStream::FailAt(uint64_t sequence, const absl::Status& status) {
-  if (!end().has_value()) {
-    end_sequence_ = sequence;
-    return Fail(status);
-  }
-  // The client may have half-closed before the chunk was refused.
-  if (end()->ok() || end_sequence_ > sequence) OverrideEnd(status);
 }
 
 }  // namespace hulld::server

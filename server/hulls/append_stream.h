@@ -2,6 +2,7 @@
 #define HULLD_SERVER_HULLS_APPEND_STREAM_H_
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/queued_stream.h"
+#include "server/hulls/in_order.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -27,6 +29,11 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
                             Registry& registry);
 
  private:
+  struct SequenceResult {
+    uint64_t sequence = 0;
+    absl::StatusOr<ChunkResult> result;
+  };
+
   AppendStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry)
       : ReadingStream(context, admission, Rpc::kAppendPoints), registry_(registry) {}
 
@@ -41,10 +48,9 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   void HandleOpen(const v1::AppendOpen& open);
   void HandleChunk(const v1::AppendChunk& message);
   void HandleOpened(const absl::StatusOr<OpenResult>& opened);
-  void HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result);
+  void HandleResult(const SequenceResult& chunk);
   void LogApplied();
   void Fail(const absl::Status& status);
-  void FailAt(uint64_t sequence, const absl::Status& status);
 
   Registry& registry_;
   std::optional<AppendSession> session_;
@@ -58,9 +64,8 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   // Chunks that still hold their points, and chunks neither committed nor refused.
   int unbuilt_ = 0;
   int uncommitted_ = 0;
-  // Sequence of the chunk that caused the end, if any: the error of an earlier chunk is more
-  // specific.
-  uint64_t end_sequence_ = 0;
+  // Acks are cumulative, and the error of the earliest refused chunk is the most specific.
+  InOrder<SequenceResult> results_;
 };
 
 }  // namespace hulld::server

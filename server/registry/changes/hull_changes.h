@@ -86,13 +86,12 @@ class HullChanges : public PeerChangeListener {
   void CloseAppend(const AppendSession& session);
   // Queues a chunk. `on_built`, which may be empty, is called when its points are released and the
   // next chunk may be queued. `done` is called after it is committed or refused. Each is called
-  // exactly once, on another thread, in either order. Commits are reported in the order of the
-  // sequences; a refusal may precede earlier chunks. Refusals, which change nothing:
-  // FAILED_PRECONDITION: a gap in the sequence, or the hull is gone; ABORTED: if_revision does not
-  // match; INVALID_ARGUMENT: a point is not finite; RESOURCE_EXHAUSTED: --max-vertices-per-hull,
-  // --max-points-per-hull, --max-writers-per-hull, --memory-limit, or the disk is full;
-  // UNAVAILABLE: the store cannot be written; DATA_LOSS: the store is damaged; CANCELLED:
-  // should_stop returned true.
+  // exactly once, on another thread, in either order; `done` may be called before that of an
+  // earlier chunk. Refusals, which change nothing: FAILED_PRECONDITION: a gap in the sequence, or
+  // the hull is gone; ABORTED: if_revision does not match; INVALID_ARGUMENT: a point is not finite;
+  // RESOURCE_EXHAUSTED: --max-vertices-per-hull, --max-points-per-hull, --max-writers-per-hull,
+  // --memory-limit, or the disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the
+  // store is damaged; CANCELLED: should_stop returned true.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done);
 
