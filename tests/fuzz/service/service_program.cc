@@ -410,9 +410,10 @@ void ServiceProgram::AppendPoints() {
   stream->WritesDone();
   while (stream->Read(&response)) receive();
   const bool ok = Ended(Rpc::kAppendPoints, manner, stream->Finish());
+  const bool is_certain = doubtful_.count(hull_id) == 0 && !all_doubtful_;
   // A change overtaken by a refusal may be committed without an ack.
   if (!ok && (check.is_open() || manner.hurried || manner.cancelled)) Doubt(hull_id);
-  Note(check.Ended(ok));
+  Note(check.Ended(ok, is_certain));
   if (ok && check.is_open()) Reach("AppendPoints opened");
 }
 
