@@ -84,8 +84,8 @@ Arrows ArrowsBetweenFolders() {
   return arrows;
 }
 
-// The build shows each target only the headers of the targets that it names. Folders of one target
-// see each other, so cycles between folders must be looked for. Parent folders are no exception.
+// The build shows a target only the headers of the targets that it names, but the folders of a
+// target see each other. Parent folders are no exception.
 TEST(Includes, FoldersDependOnEachOtherInOneDirection) {
   Arrows arrows = ArrowsBetweenFolders();
   EXPECT_GT(arrows.size(), 50);

@@ -36,7 +36,7 @@ Operation CreateAt(uint64_t invoked, uint64_t returned) {
   return operation;
 }
 
-// A chunk of one new point.
+// A chunk with one new point.
 Operation AppendAt(uint64_t invoked, uint64_t returned, uint64_t revision, int point,
                    uint64_t vertex_count, const std::string& writer = "w", uint64_t sequence = 1) {
   Operation operation = AnsweredOf(Kind::kAppend, invoked, returned, revision);

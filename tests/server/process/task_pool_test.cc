@@ -35,7 +35,7 @@ class Order {
   std::vector<std::string> names_;
 };
 
-// A pool of one thread, blocked until Release.
+// A pool with one thread, blocked until Release.
 class HeldPool {
  public:
   HeldPool()
