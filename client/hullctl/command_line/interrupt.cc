@@ -17,6 +17,7 @@ constexpr uint64_t kEnd = uint64_t{1} << 32;
 
 // Event descriptor. The signal handler, which may call few functions, adds to its counter.
 std::atomic<int> event = -1;
+std::atomic<bool> arrived = false;
 
 void Count(uint64_t what) {
   const int before = errno;
@@ -24,11 +25,15 @@ void Count(uint64_t what) {
   errno = before;
 }
 
-extern "C" void HandleSignal(int) { Count(kSignal); }
+extern "C" void HandleSignal(int) {
+  arrived = true;
+  Count(kSignal);
+}
 
 }  // namespace
 
 Interrupt::Interrupt(std::function<void()> on_interrupt) {
+  arrived = false;
   event = eventfd(0, EFD_CLOEXEC);
   thread_ = std::thread([call = std::move(on_interrupt)] {
     while (true) {
@@ -54,5 +59,7 @@ Interrupt::~Interrupt() {
   close(event);
   event = -1;
 }
+
+bool Interrupt::has_arrived() const { return arrived; }
 
 }  // namespace hulld

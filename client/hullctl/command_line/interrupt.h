@@ -13,10 +13,13 @@ namespace hulld {
 // process. At most one instance may exist.
 class Interrupt {
  public:
-  explicit Interrupt(std::function<void()> on_interrupt);
+  explicit Interrupt(std::function<void()> on_interrupt = [] {});
   ~Interrupt();
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
+
+  // True after a signal; on the main thread, before a system call that it interrupted returns.
+  bool has_arrived() const;
 
  private:
   struct sigaction before_int_;

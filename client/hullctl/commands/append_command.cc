@@ -1,4 +1,3 @@
-#include <atomic>
 #include <memory>
 #include <optional>
 
@@ -40,8 +39,8 @@ class FileAppender {
     bool ok() const { return file.ok() && stream.ok(); }
   };
 
-  // A set `interrupted` ends the read with CANCELLED.
-  Outcome Read(ReadRequest request, const std::atomic<bool>& interrupted) {
+  // An interrupt ends the read with CANCELLED.
+  Outcome Read(ReadRequest request, const Interrupt& interrupt) {
     Outcome outcome;
     uint64_t file_bytes = 0;
     request.progress = [&](uint64_t bytes) {
@@ -49,7 +48,7 @@ class FileAppender {
       bar_.Update(bytes_before_ + bytes, appender_ ? appender_->totals().points_sent : 0);
     };
     const auto counts = ReadPoints(request, [&](const PointChunk& block) {
-      if (interrupted) return absl::CancelledError("interrupted");
+      if (interrupt.has_arrived()) return absl::CancelledError("interrupted");
       outcome.stream = Take(block);
       return outcome.stream;
     });
@@ -241,18 +240,17 @@ ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
-  std::atomic<bool> interrupted = false;
-  const Interrupt interrupt([&interrupted] { interrupted = true; });
+  const Interrupt interrupt;
   FileAppender files(run, arguments, total_bytes);
   FileAppender::Outcome outcome;
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
-    outcome = files.Read(*request, interrupted);
+    outcome = files.Read(*request, interrupt);
   }
   // Points before a file's error were already sent: waits for them, so that the summary is correct.
   const bool sent = files.appender() != nullptr;
   if (outcome.ok() || (sent && outcome.stream.ok())) outcome.stream = files.Finish();
   files.Clear();
-  if (interrupted && outcome.stream.ok()) return ReportInterrupt(run, arguments, files);
+  if (interrupt.has_arrived() && outcome.stream.ok()) return ReportInterrupt(run, arguments, files);
   if (!outcome.stream.ok()) return FailAppend(run, arguments, files, outcome);
   if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
     const bool whole = outcome.file.ok() && files.appender() != nullptr;

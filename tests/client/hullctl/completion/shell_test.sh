@@ -90,7 +90,7 @@ print -r -- ${answer%%>>*}
 EOF
     offers() {
       local line
-      line=$(timeout 20 zsh -f offers.zsh "$1")
+      line=$(timeout 300 zsh -f offers.zsh "$1")
       line=${line% }
       # A line without completion had no candidates.
       [[ $line == "$1" ]] || echo "${line##* }"
@@ -99,7 +99,7 @@ EOF
     ;;
   terminal)
     # on_terminal INPUT COMMAND: the output on a terminal.
-    on_terminal() { printf '%b' "$1" | timeout 20 script -qec "$2" /dev/null | tr -d '\r'; }
+    on_terminal() { printf '%b' "$1" | timeout 300 script -qec "$2" /dev/null | tr -d '\r'; }
     contains() { [[ $3 == *"$2"* ]] || expect "$1" "...$2..." "$3"; }
     contains "the question before a delete" "Delete 1 hull (arm/left)? [y/N]" \
       "$(on_terminal 'n\n' 'hullctl delete --prefix arm/')"
