@@ -67,7 +67,9 @@ inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 // 3 u, its reciprocal one rounding more, their product one: |error| <= 8 u + 50 u^2, because no
 // entry exceeds 1. If q is itself a product of two quaternions, with each component rounded once
 // (pose_product.h), a numerator changes by 2 u |q|^2 and the squared norm by 2 u of itself, 4 u of
-// an entry: 12 u + 100 u^2 < 16 u in total. Proven.
+// an entry: 12 u + 100 u^2 < 16 u in total. If its first factor is interpolated
+// (kInterpolationLeastRemainder), each component of the product errs by 2 * 18 u^2 |q_P| more, at
+// most 2^-7 u |q|, and entries by 8 times that. Proven.
 inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 
 // The translation of a product of two poses, R(q) t_P / |q|^2 + t_B in double-double arithmetic
@@ -78,6 +80,14 @@ inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 // (|t_P| + |t_B|); 256 u^2 leaves slack for higher powers of u. Times |t_P| + |t_B|, |.| the
 // largest component. Proven.
 inline constexpr double kProductTranslationError = 256 * kUnitRoundoff * kUnitRoundoff;
+
+// The same translation at a time of a motion. Its q is interpolated: each component errs by e = 18
+// u^2, and the largest, m, is at most |q|. Numerators of the entries and the squared norm change by
+// at most 4 e |q|, entries by 8 e / m: 432 u^2 / m |t_P| in total. The products of components err
+// by 5 u^2 of themselves, entries by 10 u^2: 30 u^2 |t_P|; t_B, interpolated between x0 and x1, by
+// 9 u^2 (|x0| + |x1|): both are within the slack of kProductTranslationError. Times |t_P| / m.
+// Proven.
+inline constexpr double kProductTurnError = 512 * kUnitRoundoff * kUnitRoundoff;
 
 // The difference of two translations, at least one of which belongs to a product of poses. The
 // difference of the rounded parts is exact as a sum of two doubles; the difference of the
@@ -236,6 +246,14 @@ inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 // at most 6 w |n| M + 3 w |n||x| + w |c| by 2 u of that. The total is below 400 u w (|n| (M + |x|)
 // + |c|). Proven.
 inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
+
+// The same coefficient for a piece of a body, with the position y of its frame in the body. A
+// direction, with errors of 112 u w |n| per component and a length of at most sqrt(3) w |n|, is
+// rotated into that frame: sqrt(3) * 112 u w |n|, entries add 3 * 16 u w |n|, sums 6 u w |n|, below
+// 250 u w |n| in total. Times a vertex: 750 u w |n| M, and 32 u w |n| M of the support value. The
+// direction times y errs by 3 * 112 u w |n||y| and 9 u w |n||y|. The sums, of one more term, err by
+// 3 u of 3 w |n| (M + |y| + |x|). The total is below 900 u w (|n| (M + |y| + |x|) + |c|). Proven.
+inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
 // with a radius errs by u more. The margins r |n| of the plane above enter its bound like c.

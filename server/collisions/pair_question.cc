@@ -249,9 +249,6 @@ absl::StatusOr<bool> PairQuestion::AdvanceMovingBodies(std::chrono::steady_clock
     motion.bodies.reserve(2);
     motion.bodies.push_back({a_->body().body(), motion.X_W[0], radii_[0]});
     motion.bodies.push_back({b_->body().body(), motion.X_W[1], radii_[1]});
-    for (const MovingBody& body : motion.bodies) {
-      if (absl::Status s = body.Validate(); !s.ok()) return s;
-    }
     motion.search =
         std::make_unique<MovingBodySearch>(motion.bodies[0], motion.bodies[1], motion.options);
   }

@@ -41,17 +41,20 @@ PoseAt At(const Motion& motion, const Rational& t) {
   return pose;
 }
 
-RationalVector Placed(const PoseAt& pose, const Point& p) {
-  const RationalVector own = {Rational(p[0]), Rational(p[1]), Rational(p[2])};
+RationalVector Placed(const PoseAt& pose, const RationalVector& p) {
   RationalVector placed;
-  for (int i = 0; i < 3; ++i) placed[i] = Product(pose.rows[i], own) / pose.norm + pose.x[i];
+  for (int i = 0; i < 3; ++i) placed[i] = Product(pose.rows[i], p) / pose.norm + pose.x[i];
   return placed;
 }
 
 std::vector<RationalVector> AllPlaced(const MovingPoints& moving, const Rational& t) {
   const PoseAt pose = At(moving.motion, t);
+  const PoseAt in_frame = At({moving.in_frame, moving.in_frame}, 0);
   std::vector<RationalVector> placed;
-  for (const Point& p : moving.points) placed.push_back(Placed(pose, p));
+  for (const Point& p : moving.points) {
+    const RationalVector own = {Rational(p[0]), Rational(p[1]), Rational(p[2])};
+    placed.push_back(Placed(pose, Placed(in_frame, own)));
+  }
   return placed;
 }
 
@@ -172,11 +175,11 @@ namespace {
 // Returns n.p over all points, |q|^2 (n.p - offset) if there is an offset, at a time.
 std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterval& interval,
                                const Rational& t) {
-  const PoseAt pose = At(moving.motion, t);
+  const Rational norm = At(moving.motion, t).norm;
   std::vector<Rational> values;
-  for (const Point& p : moving.points) {
-    const Rational along = Product(interval.direction, Placed(pose, p));
-    values.push_back(interval.offset ? pose.norm * (along - *interval.offset) : along);
+  for (const RationalVector& p : AllPlaced(moving, t)) {
+    const Rational along = Product(interval.direction, p);
+    values.push_back(interval.offset ? norm * (along - *interval.offset) : along);
   }
   return values;
 }

@@ -23,11 +23,13 @@ struct Motion {
   Placement end;
 };
 
-// Points, their motion, and the radius of a ball around each.
+// Points, their motion, and the radius of a ball around each. The points are at a pose in the frame
+// that moves.
 struct MovingPoints {
   std::span<const Point> points;
   Motion motion;
   double radius = 0;
+  Placement in_frame = {};
 };
 
 // Returns both point sets at a time, directly from the definition.

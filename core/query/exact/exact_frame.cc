@@ -124,8 +124,10 @@ std::array<const Pose*, 2> PosesOf(const PlacedHull& placed) {
 
 int TranslationExponent(const PlacedHull& placed, int otherwise) {
   if (placed.product() != nullptr && placed.product()->motion() != nullptr) {
-    return std::min(otherwise,
-                    TranslationExponentAt(*placed.product()->motion(), placed.product()->time()));
+    const PoseProduct& product = *placed.product();
+    return LowestBitExponent(
+        product.X_BP().t,
+        std::min(otherwise, TranslationExponentAt(*product.motion(), product.time())));
   }
   for (const Pose* pose : PosesOf(placed)) otherwise = LowestBitExponent(pose->t, otherwise);
   return otherwise;

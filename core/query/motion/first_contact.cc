@@ -15,12 +15,14 @@
 namespace hulld {
 namespace {
 
-std::array<double, 16> ValuesOf(const MovingHull& moving) {
-  const Pose& start = moving.X_WH.start;
-  const Pose& end = moving.X_WH.end;
-  return {start.q[0],  start.q[1], start.q[2],    start.q[3],         start.t.x(), start.t.y(),
-          start.t.z(), end.q[0],   end.q[1],      end.q[2],           end.q[3],    end.t.x(),
-          end.t.y(),   end.t.z(),  moving.radius, moving.piece_radius};
+std::array<double, 23> ValuesOf(const MovingHull& moving) {
+  std::array<double, 23> values = {moving.radius, moving.piece_radius};
+  auto next = values.begin() + 2;
+  for (const Pose* pose : {&moving.X_WB.start, &moving.X_WB.end, &moving.X_BH}) {
+    next = std::copy(pose->q.begin(), pose->q.end(), next);
+    next = std::copy(pose->t.begin(), pose->t.end(), next);
+  }
+  return values;
 }
 
 // Returns true if (A, B) is in a total order by content, so that both orders of a pair yield the
@@ -54,7 +56,7 @@ FirstContact Mirrored(FirstContact contact) {
 }
 
 absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
-  const absl::Status status = ValidateMotion(moving.X_WH);
+  const absl::Status status = ValidateMotion(moving.X_WB);
   if (!status.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": ", status.message()));
   }
@@ -92,7 +94,7 @@ absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingH
   }
   // With radii, the time of a translation is irrational in general.
   const bool rounded = a.is_rounded() || b.is_rounded();
-  if (!rounded && IsTranslation(a.X_WH) && IsTranslation(b.X_WH)) {
+  if (!rounded && IsTranslation(a.X_WB) && IsTranslation(b.X_WB)) {
     return TranslationSearch(a, b, options).Run();
   }
   return TurningSearch(a, b, options).Run();

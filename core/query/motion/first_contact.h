@@ -13,17 +13,21 @@
 #include "core/query/placed/query_hull.h"
 #include "core/query/terms/certificate.h"
 #include "core/query/terms/motion.h"
+#include "core/query/terms/pose.h"
 #include "core/query/terms/relation.h"
 #include "core/query/terms/separated_interval.h"
 
 namespace hulld {
 
-// A hull in motion, plus a closed ball. Its radius is the exact sum of the radius and, for a piece
-// of a body, the radius of the piece, each finite and at least 0.
+// A hull in motion, plus a closed ball: a hull by itself, or a piece of a body B in motion. Its
+// pose at a time is the product X_WB(t) X_BH, without rounding. The radius of the ball is the exact
+// sum of both radii, each finite and at least 0.
 struct MovingHull {
   const QueryHull& hull;
-  Motion X_WH;
+  Motion X_WB;
   double radius = 0;
+  // Of a piece. Requires: a valid pose (ValidatePose).
+  Pose X_BH = {};
   double piece_radius = 0;
 
   bool is_rounded() const { return radius > 0 || piece_radius > 0; }

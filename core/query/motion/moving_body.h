@@ -1,8 +1,6 @@
 #ifndef HULLD_CORE_QUERY_MOTION_MOVING_BODY_H_
 #define HULLD_CORE_QUERY_MOTION_MOVING_BODY_H_
 
-#include <absl/status/status.h>
-
 #include <cstdint>
 
 #include "core/query/body/query_body.h"
@@ -19,8 +17,6 @@ struct MovingBody {
   double radius = 0;
 
   bool is_rounded() const;
-  // Returns OK, or INVALID_ARGUMENT: a piece has a pose other than the identity.
-  absl::Status Validate() const;
   // Requires: a valid body, and the index of a piece.
   MovingHull Piece(uint32_t index) const;
 };

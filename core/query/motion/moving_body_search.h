@@ -100,7 +100,7 @@ class MovingBodySearch {
   BodyContact result_;
 };
 
-// Runs a whole search. INVALID_ARGUMENT: MovingBody::Validate, ValidateMotionOptions. Otherwise as
+// Runs a whole search. INVALID_ARGUMENT: ValidateMotionOptions. Otherwise as
 // MovingBodySearch::Advance.
 absl::StatusOr<BodyContact> FindFirstContact(const MovingBody& a, const MovingBody& b,
                                              const MotionOptions& options = {});

@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "core/base/check.h"
 #include "core/numeric/double_double.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
+#include "core/query/placed/rotation.h"
+#include "core/query/terms/pose.h"
 
 namespace hulld {
 namespace {
@@ -84,16 +88,18 @@ MovingPlane::MovingPlane(const MovingHull& a, const MovingHull& b)
 
 MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   HULLD_DCHECK(!moving.hull.empty());
-  const Pose& start = moving.X_WH.start;
-  const Pose& end = moving.X_WH.end;
-  Side side{&moving.hull, start.q, end.q, start.t, end.t, 0, 0};
+  const Pose& start = moving.X_WB.start;
+  const Pose& end = moving.X_WB.end;
+  const Pose& X_BH = moving.X_BH;
+  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0};
+  if (!IsIdentity(X_BH)) side.piece = {PlacedHull(moving.hull, X_BH).R_WH(), X_BH.t};
   int exponent = 0;
   std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
   for (int i = 0; i < 4; ++i) {
     side.q0[i] = std::ldexp(start.q[i], -exponent);
     side.q1[i] = std::ldexp(end.q[i], -exponent);
   }
-  side.size = moving.hull.max_abs_coordinate() +
+  side.size = (moving.hull.max_abs_coordinate() + X_BH.t.cwiseAbs().maxCoeff()) +
               std::max(start.t.cwiseAbs().maxCoeff(), end.t.cwiseAbs().maxCoeff());
   side.radius = moving.radius * kUnitLengthRoundUp;
   if (moving.piece_radius > 0) {
@@ -120,8 +126,8 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, dou
   const PlainVector first = TurnedBack(p, p, n);
   const PlainVector middle = TurnedBack(p, q, n);
   const PlainVector last = TurnedBack(q, q, n);
-  const PlainVector turned[4] = {first, 1.0 / 3 * (first + 2 * middle),
-                                 1.0 / 3 * (2 * middle + last), last};
+  PlainVector turned[4] = {first, 1.0 / 3 * (first + 2 * middle), 1.0 / 3 * (2 * middle + last),
+                           last};
   const auto along = [&](double t) {
     PlainVector x;
     x.x = Interpolated(side.x0.x(), side.x1.x(), t).high;
@@ -129,13 +135,19 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, dou
     x.z = Interpolated(side.x0.z(), side.x1.z(), t).high;
     return hulld::Dot(PlainVector(n), x);
   };
-  const Cubic moved = Product(norms, along(start), along(end));
+  Cubic moved = Product(norms, along(start), along(end));
+  if (side.piece) {
+    for (int i = 0; i < 4; ++i) {
+      moved[i] += hulld::Dot(turned[i], PlainVector(side.piece->p_BH));
+      turned[i] = TransposedProduct(side.piece->R_BH, turned[i]);
+    }
+  }
   for (int i = 0; i < 4; ++i) {
     bounds.most[i] = ReachAlong(*side.hull, turned[i]) + moved[i];
     bounds.least[i] = moved[i] - ReachAlong(*side.hull, -turned[i]);
   }
-  bounds.error = kMotionPlaneErrorFactor * bounds.weight * LargestComponent(n) *
-                 std::max(side.size, kMotionMinSize);
+  const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
+  bounds.error = factor * bounds.weight * LargestComponent(n) * std::max(side.size, kMotionMinSize);
   return bounds;
 }
 

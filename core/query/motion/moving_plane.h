@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_
 
 #include <array>
+#include <optional>
 
 #include "core/numeric/vector.h"
 #include "core/query/motion/first_contact.h"
@@ -16,7 +17,9 @@ namespace hulld {
 // both ends. Elevated to degree 3, they are four directions in the hull's frame, and the largest
 // value of a Bernstein coefficient over all vertices is the hull's support value along one of them.
 // So four support values of each hull prove a plane for all vertices and all times of the interval
-// (Farouki and Rajan 1987). The offset may be chosen last: each coefficient bounds it.
+// (Farouki and Rajan 1987). The offset may be chosen last: each coefficient bounds it. The pose of
+// a piece in its body does not depend on time: it turns the four directions into the piece's frame,
+// and adds a constant to each support value.
 class MovingPlane {
  public:
   // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), neither is empty.
@@ -40,14 +43,21 @@ class MovingPlane {
   Result Try(const Vector& n, double start, double end, double margin = 0) const;
 
  private:
+  // The pose of a piece in its body.
+  struct PieceFrame {
+    Eigen::Matrix3d R_BH;
+    Vector p_BH;
+  };
   struct Side {
     const QueryHull* hull;
+    // None if it is the identity.
+    std::optional<PieceFrame> piece;
     // Quaternions at both ends of the motion, at a common power of two.
     std::array<double, 4> q0;
     std::array<double, 4> q1;
     Vector x0;
     Vector x1;
-    // Sum of the largest absolute coordinates of the hull and of its translations.
+    // Sum of the largest absolute coordinates of the hull and of each of its translations.
     double size;
     // At least the sum of the radii times the length of a direction.
     double radius;

@@ -1,6 +1,7 @@
 #include "core/query/motion/pair_at.h"
 
 #include "core/query/collision.h"
+#include "core/query/terms/pose.h"
 #include "core/query/terms/query_options.h"
 
 namespace hulld {
@@ -13,17 +14,17 @@ bool IsAtRest(const Motion& motion) {
 // Places a hull. A pose of the caller has fewer bits than the same pose as a time of a motion.
 void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& product,
              std::optional<PlacedHull>& placed) {
-  const auto& [start, end] = moving.X_WH;
-  const bool is_given = time == 0 || time == 1 || IsAtRest(moving.X_WH);
+  const auto& [start, end] = moving.X_WB;
+  const bool is_given = time == 0 || time == 1 || IsAtRest(moving.X_WB);
   const Pose& given = time == 1 ? end : start;
-  if (is_given && moving.piece_radius == 0) {
+  if (is_given && IsIdentity(moving.X_BH) && moving.piece_radius == 0) {
     placed.emplace(moving.hull, given, moving.radius);
     return;
   }
   if (is_given) {
-    product.emplace(given, Pose());
+    product.emplace(given, moving.X_BH);
   } else {
-    product.emplace(moving.X_WH, time);
+    product.emplace(moving.X_WB, time, moving.X_BH);
   }
   placed.emplace(moving.hull, *product, moving.radius, moving.piece_radius);
 }

@@ -7,6 +7,7 @@
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
+#include "core/query/terms/pose_product.h"
 
 namespace hulld {
 namespace {
@@ -38,10 +39,10 @@ Box Swept(const Motion& X_WB, const BoxAt& box_at) {
 }  // namespace
 
 Box SweptBox(const MovingHull& moving) {
-  const Box box = Swept(moving.X_WH, [&](const Pose& X_WH) {
-    return BoundingBox(PlacedHull(moving.hull, X_WH, moving.radius));
+  return Swept(moving.X_WB, [&](const Pose& X_WB) {
+    const PoseProduct X_WH(X_WB, moving.X_BH);
+    return BoundingBox(PlacedHull(moving.hull, X_WH, moving.radius, moving.piece_radius));
   });
-  return moving.piece_radius > 0 ? GrownBy(box, moving.piece_radius) : box;
 }
 
 Box SweptBox(const MovingBody& moving) {

@@ -80,7 +80,7 @@ TranslationSearch::Middle::Middle(const MovingHull& a, const MovingHull& b,
         ToInteger(motion.end.t, pair.exponent()) - ToInteger(motion.start.t, pair.exponent());
     return IntegerVector{step.x / 2, step.y / 2, step.z / 2};
   };
-  half = pair.norm() * (half_of(b.X_WH) - half_of(a.X_WH));
+  half = pair.norm() * (half_of(b.X_WB) - half_of(a.X_WB));
 }
 
 TranslationSearch::Middle& TranslationSearch::middle() {
@@ -96,7 +96,7 @@ absl::StatusOr<FirstContact> TranslationSearch::Run() {
 }
 
 absl::Status TranslationSearch::AdvanceInFloatingPoint() {
-  const Vector displacement = DisplacementOf(b_.X_WH) - DisplacementOf(a_.X_WH);
+  const Vector displacement = DisplacementOf(b_.X_WB) - DisplacementOf(a_.X_WB);
   Vector toward = Vector::Zero();
   for (int step = 0; step < kMostFloatSteps; ++step) {
     if (poll_.Step()) return MotionStopped();

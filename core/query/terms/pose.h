@@ -27,6 +27,11 @@ inline bool IsValidPose(const Pose& pose) {
   return zero == 0 && (w != 0 || x != 0 || y != 0 || z != 0);
 }
 
+// Returns true if the pose has neither a rotation nor a translation.
+inline bool IsIdentity(const Pose& pose) {
+  return pose.q[1] == 0 && pose.q[2] == 0 && pose.q[3] == 0 && pose.t.isZero(0);
+}
+
 // Returns OK, or INVALID_ARGUMENT "rotation.x is NaN", "translation.z is infinite", "rotation is
 // zero".
 absl::Status ValidatePose(const Pose& pose);

@@ -16,6 +16,12 @@ namespace hulld {
 namespace {
 
 using Quaternion = std::array<double, 4>;
+using LongQuaternion = std::array<DoubleDouble, 4>;
+
+// Products of components: exact, or in double-double arithmetic.
+DoubleDouble Times(double x, double y) { return ExactProduct(x, y); }
+DoubleDouble Times(const DoubleDouble& x, double y) { return x * DoubleDouble{y, 0}; }
+DoubleDouble Times(const DoubleDouble& x, const DoubleDouble& y) { return x * y; }
 
 // Returns true if the rotation angle is zero.
 bool IsScalar(const Quaternion& q) { return q[1] == 0 && q[2] == 0 && q[3] == 0; }
@@ -43,23 +49,24 @@ bool IsScaled(const Quaternion& q) {
 }
 
 // Returns Hamilton's product, with each component rounded once except for terms of the size of u^2.
-// Requires: both factors scaled.
-Quaternion Product(const Quaternion& p, const Quaternion& q) {
-  HULLD_DCHECK(IsScaled(p) && IsScaled(q));
+// Requires: q scaled, p scaled or interpolated.
+template <typename Number>
+Quaternion Product(const std::array<Number, 4>& p, const Quaternion& q) {
+  HULLD_DCHECK(IsScaled(q));
   const auto sum = [](DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
     return ((a + b) + (c + d)).high;
   };
-  const auto times = [&](int i, int j) { return ExactProduct(p[i], q[j]); };
+  const auto times = [&](int i, int j) { return Times(p[i], q[j]); };
   return {sum(times(0, 0), -times(1, 1), -times(2, 2), -times(3, 3)),
           sum(times(0, 1), times(1, 0), times(2, 3), -times(3, 2)),
           sum(times(0, 2), -times(1, 3), times(2, 0), times(3, 1)),
           sum(times(0, 3), times(1, 2), -times(2, 1), times(3, 0))};
 }
 
-// Returns R(q) v / |q|^2. Requires: q scaled.
-std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
-  HULLD_DCHECK(IsScaled(q));
-  const auto times = [&](int i, int j) { return ExactProduct(q[i], q[j]); };
+// Returns R(q) v / |q|^2. Requires: q scaled or interpolated.
+template <typename Number>
+std::array<DoubleDouble, 3> Rotated(const std::array<Number, 4>& q, const Vector& v) {
+  const auto times = [&](int i, int j) { return Times(q[i], q[j]); };
   const auto twice = [](const DoubleDouble& x) { return DoubleDouble{2 * x.high, 2 * x.low}; };
   const DoubleDouble ww = times(0, 0), xx = times(1, 1), yy = times(2, 2), zz = times(3, 3);
   const DoubleDouble wx = times(0, 1), wy = times(0, 2), wz = times(0, 3);
@@ -79,59 +86,79 @@ std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
   return result;
 }
 
-// Returns the quaternion of a motion at a time, scaled by a power of two, with one rounding for
-// each component.
-Quaternion RoundedExactlyAt(const Motion& motion, double time) {
+double LargestOf(const LongQuaternion& q) {
+  double largest = 0;
+  for (const DoubleDouble& component : q) largest = std::max(largest, std::abs(component.high));
+  return largest;
+}
+
+// Returns the quaternion of a motion at a time, scaled so that its largest component is in [1, 2),
+// and cut off below 2^-106.
+LongQuaternion CutAt(const Motion& motion, double time) {
+  constexpr int kBits = 106;
   const std::array<Integer, 4> q = QuaternionAt(motion, time);
   int largest = 0;
   for (const Integer& component : q) {
     if (component != 0) largest = std::max(largest, static_cast<int>(msb(abs(component))));
   }
-  Quaternion rounded;
-  for (int i = 0; i < 4; ++i) rounded[i] = RoundToNearest(q[i], 1, -largest).value;
-  return rounded;
+  LongQuaternion cut;
+  for (int i = 0; i < 4; ++i) {
+    const Integer bits =
+        largest > kBits ? Integer(q[i] >> (largest - kBits)) : Integer(q[i] << (kBits - largest));
+    const double high = RoundToNearest(bits, 1, -kBits).value;
+    cut[i] = {high, RoundToNearest(bits - ToInteger(high, -kBits), 1, -kBits).value};
+  }
+  return cut;
 }
 
-// Returns the quaternion of a motion at a time, scaled by a positive number. The error of each
-// component is at most u times the largest component, up to terms in u^2.
-Quaternion RoundedAt(const Motion& motion, double time) {
+// Returns the quaternion of a motion at a time, scaled by a positive number. Components are below 2
+// and err by at most 18 u^2; the largest is at least kInterpolationLeastRemainder.
+LongQuaternion InterpolatedAt(const Motion& motion, double time) {
   const Quaternion& q0 = motion.start.q;
   const Quaternion& q1 = motion.end.q;
   double largest = 0;
   for (int i = 0; i < 4; ++i) largest = std::max({largest, std::abs(q0[i]), std::abs(q1[i])});
   int exponent = 0;
   std::frexp(largest, &exponent);
-  Quaternion q;
-  double remaining = 0;
+  LongQuaternion q;
   for (int i = 0; i < 4; ++i) {
-    q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time).high;
-    remaining = std::max(remaining, std::abs(q[i]));
+    q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time);
   }
-  if (remaining < kInterpolationLeastRemainder) return RoundedExactlyAt(motion, time);
+  if (LargestOf(q) < kInterpolationLeastRemainder) return CutAt(motion, time);
   return q;
 }
 
 }  // namespace
 
-PoseProduct::PoseProduct(const Motion& motion, double time) : motion_(&motion), time_(time) {
-  HULLD_DCHECK(ValidateMotion(motion).ok() && time >= 0 && time <= 1);
-  rounded_.q = RoundedAt(motion, time);
+PoseProduct::PoseProduct(const Motion& motion, double time, const Pose& X_BP)
+    : motion_(&motion), time_(time), X_BP_(X_BP) {
+  HULLD_DCHECK(ValidateMotion(motion).ok() && time >= 0 && time <= 1 && IsValidPose(X_BP));
+  const LongQuaternion q = InterpolatedAt(motion, time);
+  X_WB_.q = {q[0].high, q[1].high, q[2].high, q[3].high};
+  rounded_.q = IsScalar(X_BP.q) ? X_WB_.q : Product(q, Scaled(X_BP.q));
+
   const Vector& x0 = motion.start.t;
   const Vector& x1 = motion.end.t;
-  const double size = x0.cwiseAbs().maxCoeff() + x1.cwiseAbs().maxCoeff();
-  if (size <= kProductMaxTranslation) {
-    for (int i = 0; i < 3; ++i) {
-      const DoubleDouble x = Interpolated(x0[i], x1[i], time);
-      rounded_.t[i] = x.high;
-      translation_rest_[i] = x.low;
-    }
-    translation_error_ = kProductTranslationError * size + kProductUnderflow;
-  } else {
+  const double reach = X_BP.t.cwiseAbs().maxCoeff();
+  const double size = (x0.cwiseAbs().maxCoeff() + x1.cwiseAbs().maxCoeff()) + reach;
+  if (!(size <= kProductMaxTranslation)) {
     // Any value in range: only exact arithmetic will use this pose.
-    rounded_.t = (x0 / 2 + x1 / 2).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
+    X_WB_.t = (x0 / 2 + x1 / 2).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
+    rounded_.t = X_WB_.t;
     translation_error_ = std::numeric_limits<double>::infinity();
+    return;
   }
-  X_WB_ = rounded_;
+  std::array<DoubleDouble, 3> turned;
+  if (reach > 0) turned = Rotated(q, X_BP.t);
+  for (int i = 0; i < 3; ++i) {
+    const DoubleDouble x = Interpolated(x0[i], x1[i], time);
+    const DoubleDouble sum = reach > 0 ? turned[i] + x : x;
+    X_WB_.t[i] = x.high;
+    rounded_.t[i] = sum.high;
+    translation_rest_[i] = sum.low;
+  }
+  translation_error_ = kProductTranslationError * size + kProductUnderflow;
+  if (reach > 0) translation_error_ += kProductTurnError / LargestOf(q) * reach;
 }
 
 PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP_(X_BP) {

@@ -10,14 +10,16 @@ namespace hulld {
 // X_WP = X_WB X_BP, the pose of a piece P of a body B in the world: p_W = R(q_B) (R(q_P) p_P /
 // |q_P|^2 + t_P) / |q_B|^2 + t_B over the reals for the given doubles. The product is rational, and
 // in general no pose of doubles represents it. Exact arithmetic uses the two factors; floating
-// point uses a rounding with a known error. So is the pose of a motion at a time, X_WB = X_WB(t).
+// point uses a rounding with a known error. A factor X_WB(t), a motion at a time, is no pose of
+// doubles either, and is treated alike.
 class PoseProduct {
  public:
   // Requires: both poses valid (ValidatePose). Cost: about 100 ns, less if one has no rotation.
   PoseProduct(const Pose& X_WB, const Pose& X_BP);
-  // X_WB(time), with an identity X_BP. `motion` must outlive the result. Requires: a valid motion
-  // (ValidateMotion), and a time in [0, 1]. Cost: about 100 ns.
-  PoseProduct(const Motion& motion, double time);
+  // X_WB(time) X_BP. `motion` must outlive the result. Requires: a valid motion (ValidateMotion), a
+  // time in [0, 1], and a valid pose (ValidatePose). Cost: about 100 ns, 300 ns unless X_BP is the
+  // identity.
+  PoseProduct(const Motion& motion, double time, const Pose& X_BP = {});
 
   // Null if X_WB is a pose; otherwise it is this motion at time().
   const Motion* motion() const { return motion_; }

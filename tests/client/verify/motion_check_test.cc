@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -47,6 +48,7 @@ struct Moving {
   v1::Pose start;
   v1::Pose end;
   double radius = 0;
+  std::optional<v1::Pose> in_body = std::nullopt;
 };
 
 Moving Shifted(Numbers xyz, const Numbers& from, const Numbers& to) {
@@ -124,7 +126,8 @@ Claim Overlaps() { return {kOverlapping}; }
 
 absl::Status Check(const Claim& claim, const Moving& a, const Moving& b) {
   const auto moving = [](const Moving& of) -> MovingVertices {
-    return {{of.xyz, of.start, nullptr, false, {of.radius}}, of.end};
+    const v1::Pose* const in_body = of.in_body ? &*of.in_body : nullptr;
+    return {{of.xyz, of.start, in_body, false, {of.radius}}, of.end};
   };
   return CheckFirstContact(claim.relation, claim.contact, claim.certificate, moving(a), moving(b),
                            claim.width);
@@ -395,6 +398,31 @@ TEST(MotionCheck, RadiiAreExactInRotations) {
   };
   EXPECT_THAT(std::string(check(0.0625).message()), HasSubstr("contact: "));
   EXPECT_THAT(std::string(check(0.25).message()), HasSubstr("intervals[1]: B does not stay"));
+}
+
+// A piece of length 3 that lies along the rod's outer part, by a quarter turn in its body.
+TEST(MotionCheck, ThePoseOfAPieceIsExact) {
+  Moving piece = Turned({0, 0, 0, 0, 3, 0}, kNoTurn, {1, 0, 0, 1});
+  piece.in_body = PoseOf({3, 0, 0, -3}, {2, 0, 0});
+  ExpectValid(RodTouches(), kCeiling, piece);
+  piece.in_body = PoseOf({3, 0, 0, -3}, {std::nextafter(2, 3), 0, 0});
+  ExpectInvalid(RodTouches(), kCeiling, piece, "contact: ");
+  piece.in_body = PoseOf({3, 0, 0, -3}, {2.25, 0, 0});
+  ExpectInvalid(RodTouches(), kCeiling, piece, "intervals[1]: B does not stay");
+  piece.in_body = PoseOf({3, 0, 0, 3}, {2, 0, 0});
+  ExpectInvalid(RodTouches(), kCeiling, piece, "contact: ");
+  // A quarter turn about x and 1 along y keep the cube in its place, with other corners.
+  const auto coming = [](double z) {
+    Moving cube = Coming(5, -3);
+    cube.in_body = PoseOf({5, 5, 0, 0}, {0, 1, z});
+    return cube;
+  };
+  const Claim meets = Overlaps().Until(0.5, {1, 0, 0}).Touching(0.5, {1, 0, 0}, 4, 1);
+  ExpectValid(meets, kCube, coming(0));
+  ExpectInvalid(meets, kCube, coming(0.25), "contact: ");
+  const Claim passes = Separated().Until(1, {0, 0, 1});
+  ExpectValid(passes, kCube, coming(1.25));
+  ExpectInvalid(passes, kCube, coming(0), "does not separate");
 }
 
 TEST(MotionCheck, NegativeRadiiAreRefused) {

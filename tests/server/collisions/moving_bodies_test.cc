@@ -31,7 +31,7 @@ std::vector<double> CubeFrom(double x) {
   return corners;
 }
 
-// A body of these hulls, all in its own frame.
+// A body of these hulls, each in the frame of the body.
 v1::PutBodyRequest BodyOf(const std::string& id, const std::vector<std::string>& hulls) {
   v1::PutBodyRequest body;
   body.set_body_id(id);
@@ -161,25 +161,119 @@ TEST_F(MovingBodies, FlawedCertificatesOfMovingBodiesAreRejected) {
             Verdict::kInvalid);
 }
 
-TEST_F(MovingBodies, PiecesWithAPoseOfTheirOwnDoNotMoveYet) {
+TEST_F(MovingBodies, PiecesWithPosesOfTheirOwnMove) {
   Put("cube", Cube());
   v1::PutBodyRequest body = BodyOf("body", {"cube", "cube"});
-  body.mutable_pieces(1)->mutable_pose()->mutable_translation()->set_x(2);
+  // By a quarter turn about z of any length: a cube from x = 3 to 4.
+  v1::Pose* const pose = body.mutable_pieces(1)->mutable_pose();
+  Turn(3, 0, 0, 3, pose);
+  pose->mutable_translation()->set_x(4);
   ASSERT_TRUE(client().PutBody(body).ok());
-  ExpectRefused(Pair(MovingTo(PlacementOf("body"), 1), PlacementOf("cube")),
-                "piece 1 of the body has a pose of its own");
+
+  const v1::Placement coming = MovingTo(PlacementOf("cube", 8), 0);
+  const v1::CheckCollisionResponse one = Proven(Pair(PlacementOf("body"), coming));
+  EXPECT_EQ(one.relation(), kOverlapping);
+  EXPECT_EQ(one.first_contact().contact_time(), 0.5);
+  EXPECT_EQ(one.first_contact().separated_until(), 0.5);
+  EXPECT_EQ(one.piece_a().index(), 1u);
+  EXPECT_EQ(one.piece_certificates_size(), 2);
+  const v1::CheckCollisionResponse moved =
+      Proven(Pair(MovingTo(PlacementOf("body"), -8), PlacementOf("cube", -2)));
+  EXPECT_EQ(moved.first_contact().contact_time(), 0.125);
+  EXPECT_EQ(moved.piece_a().index(), 0u);
+  const v1::CheckCollisionResponse through =
+      Proven(Pair(MovingTo(PlacementOf("body"), 0, 9), PlacementOf("cube", 1.5)));
+  EXPECT_EQ(through.relation(), kSeparated);
+  // The far piece, on an arm of length 4, turns into a cube that starts at y = 3.5 with its corner
+  // (4, 1): 4 sin a + cos a = 3.5 at tan(a / 2) = t.
+  v1::Placement turning = PlacementOf("body");
+  Turn(1, 0, 0, 1, turning.mutable_end_pose());
+  const v1::CheckCollisionResponse turned = Proven(Pair(turning, PlacementOf("cube", 1.75, 3.5)));
+  EXPECT_EQ(turned.relation(), kOverlapping);
+  EXPECT_EQ(turned.piece_a().index(), 1u);
+  const double angle = std::asin(3.5 / std::sqrt(17.0)) - std::atan2(1, 4);
+  EXPECT_NEAR(turned.first_contact().contact_time(), std::tan(angle / 2), 1e-8);
+
   const auto batch =
-      Ask(Batch({PlacementOf("body"), MovingTo(PlacementOf("cube", 3), -1), PlacementOf("cube")},
-                {0, 1, 1, 2}));
+      Ask(Batch({PlacementOf("body"), coming, PlacementOf("cube"), turning}, {0, 1, 1, 2, 3, 1}));
   ASSERT_TRUE(batch.ok()) << batch.status();
-  EXPECT_THAT(batch->columns().relations(), ElementsAre(v1::RELATION_UNSPECIFIED, kOverlapping));
-  EXPECT_THAT(batch->columns().pieces(), ElementsAre(-1, -1, -1, -1));
-  ASSERT_EQ(batch->columns().pair_problems_size(), 1);
-  EXPECT_THAT(batch->columns().pair_problems(0).message(), StartsWith("piece 1 of the body"));
+  EXPECT_EQ(batch->columns().pair_problems_size(), 0);
+  EXPECT_EQ(batch->columns().contact_times(0), 0.5);
+  EXPECT_EQ(batch->columns().pieces(0), 1);
+  EXPECT_EQ(batch->columns().contact_times(1), 0.875);
+  v1::FindCollisionsRequest scene;
+  *scene.add_placements() = PlacementOf("body", 0, 0);
+  *scene.add_placements() = coming;
+  *scene.add_placements() = PlacementOf("cube", 0, 9);
+  scene.mutable_wanted()->set_certificate(true);
+  const auto found = Find(scene);
+  ASSERT_TRUE(found.ok()) << found.status();
+  EXPECT_THAT(found->pairs(), ElementsAre(0, 1));
+  EXPECT_EQ(found->columns().contact_times(0), 0.5);
 
   *body.add_pieces() = MovingTo(PlacementOf("cube"), 1);
   EXPECT_THAT(MessageOf(client().PutBody(body).status()),
               StartsWith("pieces[2].end_pose is set; a piece is at rest"));
+}
+
+// Quarter turns and translations of these points are exact in doubles, so that a posed piece is
+// also a hull in the body's frame.
+TEST_F(MovingBodies, PosedPiecesAnswerAsHullsInTheFrameOfTheBody) {
+  std::mt19937 random(5);
+  const auto between = [&](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
+  for (const std::string name : {"a", "b"}) {
+    v1::PutBodyRequest posed = BodyOf(name + "-posed", {});
+    v1::PutBodyRequest plain = BodyOf(name + "-plain", {});
+    for (int piece = 0; piece < 3; ++piece) {
+      const std::string id = absl::StrCat(name, piece);
+      v1::Placement placement = PlacementOf(id, between(-2, 2), between(-2, 2));
+      if (piece > 0) Turn(5, 0, 0, piece == 1 ? 5 : -5, placement.mutable_pose());
+      placement.set_radius(piece == 2 ? 0.25 : 0);
+      const v1::Vector3& t = placement.pose().translation();
+      std::vector<double> points;
+      std::vector<double> moved;
+      for (int i = 0; i < 5; ++i) {
+        const double x = between(-3072, 3072) / 1024.0;
+        const double y = between(-3072, 3072) / 1024.0;
+        const double z = between(-3072, 3072) / 1024.0;
+        points.insert(points.end(), {x, y, z});
+        const double turned_x = piece == 0 ? x : piece == 1 ? -y : y;
+        const double turned_y = piece == 0 ? y : piece == 1 ? x : -x;
+        moved.insert(moved.end(), {turned_x + t.x(), turned_y + t.y(), z});
+      }
+      Put(id, points);
+      Put(id + "-moved", moved);
+      *posed.add_pieces() = placement;
+      *plain.add_pieces() = PlacementOf(id + "-moved");
+      plain.mutable_pieces(piece)->set_radius(placement.radius());
+    }
+    ASSERT_TRUE(client().PutBody(posed).ok());
+    ASSERT_TRUE(client().PutBody(plain).ok());
+  }
+  int counts[v1::Relation_ARRAYSIZE] = {};
+  for (int round = 0; round < 24; ++round) {
+    SCOPED_TRACE(round);
+    v1::Placement a =
+        MovingTo(PlacementOf("a-posed", between(-9, 9), between(-9, 9)), between(-9, 9), 0, 1);
+    v1::Placement b = MovingTo(PlacementOf("b-posed", between(-9, 9), between(-9, 9)),
+                               between(-9, 9), between(-9, 9));
+    if (round % 2 == 0) Turn(2, 0, between(-1, 1), 1, b.mutable_end_pose());
+    const v1::CheckCollisionResponse posed = Proven(Pair(a, b));
+    a.set_hull_id("a-plain");
+    b.set_hull_id("b-plain");
+    const v1::CheckCollisionResponse plain = Proven(Pair(a, b));
+    EXPECT_EQ(posed.relation(), plain.relation());
+    EXPECT_NEAR(posed.first_contact().separated_until(), plain.first_contact().separated_until(),
+                0x1p-29);
+    EXPECT_EQ(posed.first_contact().has_contact_time(), plain.first_contact().has_contact_time());
+    EXPECT_NEAR(posed.first_contact().contact_time(), plain.first_contact().contact_time(),
+                0x1p-29);
+    ++counts[posed.relation()];
+  }
+  EXPECT_GT(counts[kSeparated], 3);
+  EXPECT_GT(counts[kOverlapping], 3);
 }
 
 TEST_F(MovingBodies, EveryPieceGivesARowToEachPairOfPieces) {

@@ -84,6 +84,38 @@ def test_each_part_of_a_proof_is_checked(client: hulld.Client, cube: str) -> Non
         verifier.check(a, b, dataclasses.replace(answer, certificate=None), to_b=to)
 
 
+@pytest.mark.parametrize("end", [(-4, 0, 0), (1, 0, 0.25, 0.5, -4, 0, 0)])
+def test_pieces_of_bodies_move_with_their_poses(
+    client: hulld.Client, name: str, cube: str, end: tuple[float, ...]
+) -> None:
+    body = f"{name}/body"
+    pieces = [(cube, (-5, 0, 0)), (cube, (1, 2, 2, 0, 1, 2, 3)), (cube, (3, 0, 0, 3, 2, 0, 0))]
+    client.put_body(body, pieces)
+    a, b = cube, (body, (4, 0, 0))
+    answer = client.check_collision(a, b, to_b=end, certificate=True)
+    contact = answer.first_contact
+    assert contact is not None and contact.contact_time is not None
+    assert answer.relation is hulld.Relation.OVERLAPPING
+    verifier = hulld.Verifier(client)
+    verifier.check(a, b, answer, to_b=end)
+    found = client.check_collisions([a, hulld.Placement(body, (4, 0, 0), end_pose=end)])
+    assert found[0].first_contact is not None
+    assert found[0].first_contact.contact_time == contact.contact_time
+    # Each pair of pieces is proven at the poses of the pieces.
+    assert len(answer.piece_certificates) == len(pieces)
+    for index, one in enumerate(answer.piece_certificates):
+        intervals = [dataclasses.replace(part, direction=(0, 1, 0)) for part in one.intervals]
+        proof = list(answer.piece_certificates)
+        proof[index] = dataclasses.replace(one, intervals=tuple(intervals))
+        forged = dataclasses.replace(answer, piece_certificates=tuple(proof))
+        with pytest.raises(hulld.VerificationError, match=f"pieces 0 of A and {index} of B"):
+            verifier.check(a, b, forged, to_b=end)
+    client.put_body(body, [cube, cube, cube])
+    with pytest.raises(hulld.VerificationError) as moved:
+        hulld.Verifier(client).check(a, b, answer, to_b=end)
+    assert moved.value.moved
+
+
 def test_batches_answer_as_single_calls(client: hulld.Client, cube: str) -> None:
     rng = np.random.default_rng(31)
     starts = np.hstack([rng.normal(size=(12, 4)), rng.uniform(-2, 2, size=(12, 3))])

@@ -21,8 +21,9 @@ using RationalPoint = std::array<Rational, 3>;
 // Outermost pose first: p_W = poses[0] (poses[1] p).
 using PoseChain = std::vector<Pose>;
 
-// R(q) / |q|^2.
-inline std::array<RationalPoint, 3> RationalRotation(const std::array<double, 4>& q) {
+// Returns R(q) / |q|^2. Number: double or Rational.
+template <typename Number>
+std::array<RationalPoint, 3> RationalRotation(const std::array<Number, 4>& q) {
   const Rational w(q[0]), x(q[1]), y(q[2]), z(q[3]);
   const Rational n = w * w + x * x + y * y + z * z;
   return {RationalPoint{(w * w + x * x - y * y - z * z) / n, 2 * (x * y - w * z) / n,

@@ -3,32 +3,39 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/hull/hull.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/placed/query_hull.h"
+#include "core/query/terms/pose.h"
 #include "tests/core/checks/certificate_bridge.h"
 #include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
 #include "tests/oracle/moving_points.h"
 
 namespace hulld {
 
-// A hull in motion that owns its hull and its points for the oracle.
+// A hull or piece in motion that owns its hull and its points for the oracle.
 class OwnMoving {
  public:
-  OwnMoving(const std::vector<Vector>& points, const Motion& motion, double radius = 0)
+  OwnMoving(const std::vector<Vector>& points, const Motion& motion, double radius = 0,
+            const Pose& X_BH = {})
       : hull_(std::make_unique<Hull>(BuildHull(points))),
         query_(std::make_unique<QueryHull>(*hull_)),
         motion_(motion),
         radius_(radius),
+        X_BH_(X_BH),
         vertices_(ToOracle(hull_->vertices())) {}
 
-  MovingHull moving() const { return {*query_, motion_, radius_}; }
+  MovingHull moving() const { return {*query_, motion_, radius_, X_BH_}; }
   oracle::MovingPoints ForOracle() const {
-    return {vertices_, {ToOracle(motion_.start), ToOracle(motion_.end)}, radius_};
+    return {vertices_, {ToOracle(motion_.start), ToOracle(motion_.end)}, radius_, ToOracle(X_BH_)};
   }
 
  private:
@@ -36,8 +43,43 @@ class OwnMoving {
   std::unique_ptr<QueryHull> query_;
   Motion motion_;
   double radius_;
+  Pose X_BH_;
   std::vector<oracle::Point> vertices_;
 };
+
+inline Vector LatticeVector(Random& random, int most) {
+  return {static_cast<double>(random.Between(-most, most)),
+          static_cast<double>(random.Between(-most, most)),
+          static_cast<double>(random.Between(-most, most))};
+}
+
+// Returns a pose of a piece: one of a few rotations of any length, and a lattice vector.
+inline Pose LatticePiecePose(Random& random, int most) {
+  constexpr std::array<std::array<double, 4>, 6> kRotations = {
+      {{1, 1, 0, 0}, {1, 2, 2, 0}, {0, 3, 0, 4}, {2, 0, -1, 1}, {-3, 0, 0, 0}, {1, -1, 1, 1}}};
+  return {kRotations[random.Below(kRotations.size())], LatticeVector(random, most)};
+}
+
+// Returns a pose with a rotation about any axis.
+inline Pose RandomPose(Random& random, double length) {
+  Pose pose;
+  for (double& component : pose.q) component = random.Real(-1, 1);
+  for (int i = 0; i < 3; ++i) pose.t[i] = random.Real(-length, length);
+  return pose;
+}
+
+// True if the bracket is the first time if that is a double, and otherwise the doubles around it.
+inline testing::AssertionResult IsBracketOf(const FirstContact& contact,
+                                            const oracle::Rational& first) {
+  if (!contact.contact_time) return testing::AssertionFailure() << "no contact";
+  const oracle::Rational low(contact.separated_until);
+  const oracle::Rational high(*contact.contact_time);
+  if (low == first && high == first) return testing::AssertionSuccess();
+  const bool adjacent = std::nextafter(contact.separated_until, 2.0) == *contact.contact_time;
+  if (low < first && first < high && adjacent) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << contact.separated_until << " .. " << *contact.contact_time
+                                     << " is not around " << first;
+}
 
 // Converts intervals for the oracle.
 inline std::vector<oracle::SeparatedInterval> ToOracle(

@@ -16,15 +16,15 @@ namespace moving_body_test {
 
 using oracle::Rational;
 
-// A body in motion whose pieces share its frame, and each piece by itself.
+// A body in motion, and each piece by itself.
 struct OwnMovingBody {
   explicit OwnMovingBody(const Motion& X_WB, double radius_in = 0)
       : motion(X_WB), radius(radius_in) {}
 
   // Requires: radii with an exact sum.
-  void Add(const std::vector<Vector>& points, double piece_radius = 0) {
-    body.Add(points, Pose(), piece_radius);
-    if (!points.empty()) pieces.emplace_back(points, motion, radius + piece_radius);
+  void Add(const std::vector<Vector>& points, double piece_radius = 0, const Pose& X_BP = {}) {
+    body.Add(points, X_BP, piece_radius);
+    if (!points.empty()) pieces.emplace_back(points, motion, radius + piece_radius, X_BP);
   }
   MovingBody moving() {
     if (!body.query) body.Finish();
@@ -97,8 +97,13 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
       const int pieces = random.Between(1, 4);
       for (int i = 0; i < pieces; ++i) {
         std::vector<Vector> points = RandomInBall(random, random.Between(4, 6), 0.75);
-        for (Vector& p : points) p += Vector(i - 1, 0, 0);
-        body->Add(points, round % 5 == 4 && i == 1 ? 0.25 : 0);
+        Pose X_BP = At(i - 1, 0, 0);
+        if (round % 3 != 0) X_BP.q = RandomPose(random, 0).q;
+        if (round % 3 == 1) {
+          for (Vector& p : points) p += X_BP.t;
+          X_BP = Pose();
+        }
+        body->Add(points, round % 5 == 4 && i == 1 ? 0.25 : 0, X_BP);
       }
     }
     MotionOptions options;
@@ -186,15 +191,47 @@ TEST(MovingBody, EmptyBodiesAndPiecesNeverMeet) {
   }
 }
 
-TEST(MovingBody, APieceWithAPoseOfItsOwnIsRefused) {
-  OwnBody body;
-  body.Add(LatticeCube(2, 1), Pose());
-  body.Add(LatticeCube(2, 1), At(2, 0, 0));
-  body.Finish();
-  const MovingBody moving = {*body.query, Translation({0, 0, 0}, {1, 0, 0})};
-  const absl::Status refused = FindFirstContact(moving, moving).status();
-  EXPECT_TRUE(absl::IsInvalidArgument(refused));
-  EXPECT_EQ(refused.message().substr(0, 41), "piece 1 of the body has a pose of its own");
+// Each pair of pieces against brute force over event times.
+TEST(MovingBody, TranslationsOfPosedPiecesAreExact) {
+  Random random(TestSeed(2));
+  std::array<int, 3> relations = {};
+  for (int round = 0; round < 25; ++round) {
+    SCOPED_TRACE(round);
+    OwnMovingBody a(Translation({0, 0, 0}, LatticeVector(random, 2)));
+    OwnMovingBody b(Translation(LatticeVector(random, 7), LatticeVector(random, 7)));
+    a.motion.start.q = a.motion.end.q = LatticePiecePose(random, 0).q;
+    b.motion.start.q = {1, 2, 2, 0};
+    b.motion.end.q = {2, 4, 4, 0};
+    for (OwnMovingBody* body : {&a, &b}) {
+      for (int i = 0; i < 2; ++i) {
+        body->Add(RandomLatticePoints(random, random.Between(1, 4), 3), 0,
+                  LatticePiecePose(random, 3));
+      }
+    }
+    std::optional<Rational> first;
+    Relation strongest = Relation::kSeparated;
+    for (const OwnMoving& piece_a : a.pieces) {
+      for (const OwnMoving& piece_b : b.pieces) {
+        const oracle::TranslationContact expected =
+            oracle::BruteForceTranslation(piece_a.ForOracle(), piece_b.ForOracle());
+        strongest = std::max(strongest, FromOracle(expected.relation));
+        if (expected.first && (!first || *expected.first < *first)) first = expected.first;
+      }
+    }
+    MotionOptions options;
+    options.want_certificate = true;
+    const absl::StatusOr<BodyContact> found = FindFirstContact(a.moving(), b.moving(), options);
+    ASSERT_TRUE(found.ok()) << found.status();
+    EXPECT_EQ(found->contact.relation, strongest);
+    EXPECT_EQ(found->contact.contact_time.has_value(), first.has_value());
+    if (first) {
+      EXPECT_TRUE(IsBracketOf(found->contact, *first));
+    }
+    EXPECT_EQ(FaultOf(a, b, *found), "");
+    ++relations[static_cast<size_t>(strongest)];
+  }
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 4);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 4);
 }
 
 TEST(MovingBody, TooManyCertificatesAreRefused) {

@@ -49,24 +49,6 @@ FirstContact Find(const OwnMoving& a, const OwnMoving& b) {
   return *std::move(contact);
 }
 
-// True if the bracket is the first time if that is a double, and otherwise the doubles around it.
-testing::AssertionResult IsBracketOf(const FirstContact& contact, const Rational& first) {
-  if (!contact.contact_time) return testing::AssertionFailure() << "no contact";
-  const Rational low(contact.separated_until);
-  const Rational high(*contact.contact_time);
-  if (low == first && high == first) return testing::AssertionSuccess();
-  const bool adjacent = std::nextafter(contact.separated_until, 2.0) == *contact.contact_time;
-  if (low < first && first < high && adjacent) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << contact.separated_until << " .. " << *contact.contact_time
-                                     << " is not around " << first;
-}
-
-Vector LatticeVector(Random& random, int most) {
-  return {static_cast<double>(random.Between(-most, most)),
-          static_cast<double>(random.Between(-most, most)),
-          static_cast<double>(random.Between(-most, most))};
-}
-
 // Tallies of a sweep.
 struct Counts {
   std::array<int, 3> relations = {};
@@ -122,6 +104,30 @@ TEST(Translation, TurnedPairsAgreeWithBruteForce) {
     if (HasFatalFailure()) return;
   }
   EXPECT_GT(counts.relations[static_cast<size_t>(Relation::kOverlapping)], 2);
+}
+
+TEST(Translation, PiecesWithAPoseAgreeWithBruteForce) {
+  Random random(TestSeed(4));
+  Counts counts;
+  for (int round = 0; round < 80; ++round) {
+    SCOPED_TRACE(round);
+    const std::array<double, 4> q_A = LatticePiecePose(random, 0).q;
+    const std::array<double, 4> q_B = round % 2 == 0 ? q_A : LatticePiecePose(random, 0).q;
+    const Pose X_AP = LatticePiecePose(random, 2);
+    // A common rotation makes faces and edges parallel.
+    const Pose X_BP =
+        round % 4 == 0 ? Pose{X_AP.q, LatticeVector(random, 2)} : LatticePiecePose(random, 2);
+    const OwnMoving a(RandomLatticePoints(random, random.Between(2, 4), 3),
+                      Straight(LatticeVector(random, 1), LatticeVector(random, 2), q_A), 0, X_AP);
+    const OwnMoving b(RandomLatticePoints(random, random.Between(1, 3), 4),
+                      Straight(LatticeVector(random, 5), LatticeVector(random, 5), q_B), 0,
+                      round % 5 == 4 ? Pose() : X_BP);
+    CheckAgainstBruteForce(a, b, counts);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(counts.relations[static_cast<size_t>(Relation::kSeparated)], 4);
+  EXPECT_GT(counts.relations[static_cast<size_t>(Relation::kOverlapping)], 4);
+  EXPECT_GT(counts.between, 4);
 }
 
 // The contacts of a point with a polygon or of two segments last no time; most are between doubles.
@@ -255,12 +261,53 @@ TEST(Translation, ScaledPairsMeetAtTheSameTime) {
   }
 }
 
+TEST(Translation, ScaledPiecesMeetAtTheSameTime) {
+  Random random(TestSeed(5));
+  int met = 0;
+  for (int round = 0; round < 6; ++round) {
+    const std::vector<Vector> points_a = RandomLatticePoints(random, 6, 4);
+    const std::vector<Vector> points_b = RandomLatticePoints(random, 6, 4);
+    const Pose X_AP = LatticePiecePose(random, 3);
+    const Pose X_BP = LatticePiecePose(random, 3);
+    const auto find = [&](int exponent) {
+      const double scale = std::ldexp(1.0, exponent);
+      const auto scaled = [&](Pose pose) {
+        pose.t *= scale;
+        return pose;
+      };
+      return Find(
+          OwnMoving(Scaled(points_a, scale),
+                    Straight(Vector::Zero(), Vector(scale * Vector(1, 2, 3)), {1, 2, 0, 2}), 0,
+                    scaled(X_AP)),
+          OwnMoving(Scaled(points_b, scale),
+                    Straight(Vector(scale * Vector(20, 1, 0)), Vector(scale * Vector(-20, 1, 3))),
+                    0, scaled(X_BP)));
+    };
+    const FirstContact unscaled = find(0);
+    met += unscaled.contact_time.has_value() ? 1 : 0;
+    for (const int exponent : {-900, -300, 300, 900}) {
+      SCOPED_TRACE(exponent);
+      const FirstContact contact = find(exponent);
+      EXPECT_EQ(contact.relation, unscaled.relation);
+      EXPECT_EQ(contact.separated_until, unscaled.separated_until);
+      EXPECT_EQ(contact.contact_time, unscaled.contact_time);
+    }
+  }
+  EXPECT_GT(met, 1);
+}
+
 TEST(Translation, DistantOffsetsCostNoAccuracy) {
   const Vector far(0x1p40, -0x1p41, 0x1p40);
   const OwnMoving a(Cube(1), Straight(far, Vector(far + Vector(1, 0, 0))));
   const OwnMoving b(Cube(1),
                     Straight(Vector(far + Vector(4, 1, 1)), Vector(far + Vector(2, 1, 1))));
   EXPECT_TRUE(IsBracketOf(Find(a, b), Rational(2, 3)));
+  // A piece far from the origin of its body, back near the origin.
+  const Pose X_AP = {{1, 1, 0, 0}, far};
+  const Pose X_WA = {{1, -1, 0, 0}, -Vector(far.x(), far.z(), -far.y())};
+  const OwnMoving piece(Cube(1), {X_WA, {X_WA.q, X_WA.t + Vector(1, 0, 0)}}, 0, X_AP);
+  const OwnMoving near(Cube(1), Straight({4, 1, 1}, {2, 1, 1}));
+  EXPECT_TRUE(IsBracketOf(Find(piece, near), Rational(2, 3)));
 }
 
 TEST(Translation, LargeHullsAgreeWithTheirSupport) {

@@ -60,13 +60,6 @@ testing::AssertionResult AgreesWithSamples(const OwnMoving& a, const OwnMoving& 
   return testing::AssertionSuccess();
 }
 
-Pose RandomPose(Random& random, double length) {
-  Pose pose;
-  for (double& component : pose.q) component = random.Real(-1, 1);
-  for (int i = 0; i < 3; ++i) pose.t[i] = random.Real(-length, length);
-  return pose;
-}
-
 // Returns the motion between two poses on the shorter of its two paths.
 Motion Between(const Pose& start, Pose end) {
   double dot = 0;
@@ -96,6 +89,41 @@ TEST(Turning, RandomMotionsAgreeWithSamples) {
   EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
 }
 
+TEST(Turning, PiecesWithAPoseAgreeWithSamples) {
+  Random random(TestSeed(3));
+  std::array<int, 4> relations = {};
+  for (int round = 0; round < 40; ++round) {
+    SCOPED_TRACE(round);
+    const Pose X_AP = round % 4 == 0 ? Pose{{3, 0, 0, 0}, Vector(1, 0, 0)} : RandomPose(random, 1);
+    const OwnMoving a(RandomInBall(random, random.Between(4, 6), 1),
+                      Between(RandomPose(random, 0.2), RandomPose(random, 1)),
+                      round % 5 == 4 ? 0.125 : 0, X_AP);
+    const OwnMoving b(RandomInBall(random, random.Between(1, 6), 1),
+                      Between(RandomPose(random, 2.5), RandomPose(random, 2.5)), 0,
+                      round % 3 == 0 ? Pose() : RandomPose(random, 1));
+    const FirstContact contact = Find(a, b);
+    ASSERT_NE(contact.relation, Relation::kWithinTolerance);
+    ASSERT_TRUE(AgreesWithSamples(a, b, contact, 32));
+    ++relations[static_cast<size_t>(contact.relation)];
+  }
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 5);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
+}
+
+// A cube on an arm of length 5, which turns about the origin by 90 degrees, meets a wall at y = 4
+// with the edge that is farthest along y.
+TEST(Turning, APieceOnAnArmMeetsAWallOnTime) {
+  const Motion quarter = {{{1, 0, 0, 0}, Vector::Zero()}, {{1, 0, 0, 1}, Vector::Zero()}};
+  const OwnMoving arm(Box(1, 1, 1), quarter, 0, {{1, 0, 0, 1}, Vector(5, 0, 0)});
+  const OwnMoving wall(Box(9, 1, 9), AtRest({0, 5, 0}));
+  const FirstContact contact = Find(arm, wall);
+  EXPECT_EQ(contact.relation, Relation::kOverlapping);
+  // (6, 1) at the angle a: 6 sin a + cos a = 4; q(t) = (1, 0, 0, t) has tan(a / 2) = t.
+  const double angle = std::asin(4 / std::sqrt(37.0)) - std::atan2(1, 6);
+  EXPECT_NEAR(*contact.contact_time, std::tan(angle / 2), 1e-8);
+  EXPECT_TRUE(AgreesWithSamples(arm, wall, contact, 64));
+}
+
 TEST(Turning, PairsAtATimeHaveTheExactRelation) {
   Random random(TestSeed(2));
   std::array<int, 3> relations = {};
@@ -109,7 +137,8 @@ TEST(Turning, PairsAtATimeHaveTheExactRelation) {
   for (int round = 0; round < 80; ++round) {
     SCOPED_TRACE(round);
     const OwnMoving a(RandomLatticePoints(random, 4, 3), {lattice_pose(1), lattice_pose(1)});
-    const OwnMoving b(RandomLatticePoints(random, 4, 3), {lattice_pose(3), lattice_pose(3)});
+    const OwnMoving b(RandomLatticePoints(random, 4, 3), {lattice_pose(3), lattice_pose(3)}, 0,
+                      round % 2 == 0 ? Pose() : LatticePiecePose(random, 2));
     for (const double time : {0.5, 1 / 3.0, 0x1p-60}) {
       const Relation expected =
           FromOracle(oracle::RelationAt(a.ForOracle(), b.ForOracle(), Rational(time)));
@@ -316,11 +345,13 @@ TEST(Turning, RotationsThatNearlyVanishAreRefusedOrDecided) {
   // Half a turn within 1e-16 of the time.
   const Motion flip = {{{1, 0, 0, 0}, {0, 0, 0}}, {{-1, 1e-16, 0, 0}, {0, 0, 0}}};
   ASSERT_TRUE(ValidateMotion(flip).ok());
-  const OwnMoving a(Box(1, 2, 3), flip);
   const OwnMoving b(Box(1, 1, 1), AtRest({0, 0, 4.5}));
-  const absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving());
-  if (!contact.ok()) {
-    EXPECT_EQ(contact.status().code(), absl::StatusCode::kInvalidArgument);
+  for (const Pose& X_AP : {Pose(), Pose{{1, 2, 2, 0}, Vector(1, 0, 0)}}) {
+    const OwnMoving a(Box(1, 2, 3), flip, 0, X_AP);
+    const absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving());
+    if (!contact.ok()) {
+      EXPECT_EQ(contact.status().code(), absl::StatusCode::kInvalidArgument);
+    }
   }
 }
 

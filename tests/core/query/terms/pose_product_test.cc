@@ -10,6 +10,7 @@
 #include "core/numeric/error_bounds.h"
 #include "core/query/collision.h"
 #include "core/query/placed/placed_hull.h"
+#include "core/query/terms/motion.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/body/rational_world.h"
 #include "tests/test_size.h"
@@ -89,6 +90,59 @@ TEST(PoseProduct, RoundsWithinItsBounds) {
       }
     }
   }
+}
+
+TEST(PoseProduct, TimesOfAMotionRoundWithinTheirBounds) {
+  Random random(TestSeed(7));
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  const QueryHull query_cube(cube);
+  int finite = 0;
+  for (int round = 0; round < TestSize(300, 60); ++round) {
+    SCOPED_TRACE(round);
+    const double length = std::ldexp(1.0, random.Between(-300, 300));
+    Motion motion = {RandomPose(random, length), RandomPose(random, length)};
+    Pose inner = RandomPose(random, std::ldexp(1.0, random.Between(-300, 300)));
+    double time = random.Unit();
+    // Opposite but for one component, so that the rotation nearly vanishes at half time.
+    if (round % 3 == 0) {
+      for (int i = 0; i < 4; ++i) motion.end.q[i] = -motion.start.q[i];
+      motion.end.q[random.Below(4)] += std::ldexp(random.Real(0.5, 1), -random.Between(1, 60));
+      time = 0.5;
+    }
+    if (round % 5 == 0) motion.end.q[random.Below(4)] *= std::ldexp(1.0, random.Between(-900, 900));
+    if (round % 7 == 0) inner.q = {-2, 0, 0, 0};
+    if (round % 11 == 0) inner.t = Vector::Zero();
+    if (round % 13 == 0) inner.q[random.Below(4)] *= 0x1p-300;
+    if (round % 17 == 0) time = random.Real(0, 0x1p-60);
+    if (!ValidateMotion(motion).ok()) continue;
+    const PoseProduct product(motion, time, inner);
+    const Rational t(time);
+    std::array<Rational, 4> q;
+    for (int i = 0; i < 4; ++i) {
+      q[i] = (1 - t) * Rational(motion.start.q[i]) + t * Rational(motion.end.q[i]);
+    }
+    const std::array<RationalPoint, 3> outer = RationalRotation(q);
+    const std::array<RationalPoint, 3> turn = RationalRotation(inner.q);
+    const PlacedHull placed(query_cube, product);
+    const auto turned = [&](int i, const RationalPoint& p) {
+      return outer[i][0] * p[0] + outer[i][1] * p[1] + outer[i][2] * p[2];
+    };
+    finite += std::isfinite(product.translation_error()) ? 1 : 0;
+    for (int i = 0; i < 3; ++i) {
+      if (std::isfinite(product.translation_error())) {
+        const Rational x = (1 - t) * Rational(motion.start.t[i]) + t * Rational(motion.end.t[i]);
+        const Rational error = x + turned(i, ToRational(inner.t)) -
+                               Rational(product.rounded().t[i]) -
+                               Rational(product.translation_rest()[i]);
+        EXPECT_LE(abs(error), Rational(product.translation_error()));
+      }
+      for (int j = 0; j < 3; ++j) {
+        const Rational entry = turned(i, {turn[0][j], turn[1][j], turn[2][j]});
+        EXPECT_LE(abs(entry - Rational(placed.R_WH()(i, j))), Rational(kRotationEntryError));
+      }
+    }
+  }
+  EXPECT_GT(finite, 40);
 }
 
 TEST(PoseProduct, WithoutAPoseOfThePieceIsThePoseOfTheBody) {
