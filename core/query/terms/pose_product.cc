@@ -124,7 +124,7 @@ LongQuaternion InterpolatedAt(const Motion& motion, double time) {
   for (int i = 0; i < 4; ++i) {
     q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time);
   }
-  if (LargestOf(q) < kInterpolationLeastRemainder) return CutAt(motion, time);
+  if (LargestOf(q) < kInterpolationLeastRemainder) q = CutAt(motion, time);
   return q;
 }
 
@@ -148,17 +148,20 @@ PoseProduct::PoseProduct(const Motion& motion, double time, const Pose& X_BP)
     translation_error_ = std::numeric_limits<double>::infinity();
     return;
   }
-  std::array<DoubleDouble, 3> turned;
-  if (reach > 0) turned = Rotated(q, X_BP.t);
   for (int i = 0; i < 3; ++i) {
     const DoubleDouble x = Interpolated(x0[i], x1[i], time);
-    const DoubleDouble sum = reach > 0 ? turned[i] + x : x;
-    X_WB_.t[i] = x.high;
+    X_WB_.t[i] = rounded_.t[i] = x.high;
+    translation_rest_[i] = x.low;
+  }
+  translation_error_ = kProductTranslationError * size + kProductUnderflow;
+  if (reach == 0) return;
+  const std::array<DoubleDouble, 3> turned = Rotated(q, X_BP.t);
+  for (int i = 0; i < 3; ++i) {
+    const DoubleDouble sum = turned[i] + DoubleDouble{rounded_.t[i], translation_rest_[i]};
     rounded_.t[i] = sum.high;
     translation_rest_[i] = sum.low;
   }
-  translation_error_ = kProductTranslationError * size + kProductUnderflow;
-  if (reach > 0) translation_error_ += kProductTurnError / LargestOf(q) * reach;
+  translation_error_ += kProductTurnError / LargestOf(q) * reach;
 }
 
 PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP_(X_BP) {

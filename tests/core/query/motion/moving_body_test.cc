@@ -198,14 +198,15 @@ TEST(MovingBody, TranslationsOfPosedPiecesAreExact) {
   for (int round = 0; round < 25; ++round) {
     SCOPED_TRACE(round);
     OwnMovingBody a(Translation({0, 0, 0}, LatticeVector(random, 2)));
-    OwnMovingBody b(Translation(LatticeVector(random, 7), LatticeVector(random, 7)));
+    const Vector from = LatticeVector(random, 7);
+    OwnMovingBody b(Translation(from, Vector(LatticeVector(random, 1) - from)));
     a.motion.start.q = a.motion.end.q = LatticePiecePose(random, 0).q;
     b.motion.start.q = {1, 2, 2, 0};
     b.motion.end.q = {2, 4, 4, 0};
     for (OwnMovingBody* body : {&a, &b}) {
       for (int i = 0; i < 2; ++i) {
-        body->Add(RandomLatticePoints(random, random.Between(1, 4), 3), 0,
-                  LatticePiecePose(random, 3));
+        body->Add(RandomLatticePoints(random, random.Between(2, 4), 4), 0,
+                  LatticePiecePose(random, 2));
       }
     }
     std::optional<Rational> first;

@@ -113,15 +113,16 @@ TEST(Translation, PiecesWithAPoseAgreeWithBruteForce) {
     SCOPED_TRACE(round);
     const std::array<double, 4> q_A = LatticePiecePose(random, 0).q;
     const std::array<double, 4> q_B = round % 2 == 0 ? q_A : LatticePiecePose(random, 0).q;
-    const Pose X_AP = LatticePiecePose(random, 2);
+    const Pose X_AP = LatticePiecePose(random, 1);
+    Pose X_BP = LatticePiecePose(random, 1);
     // A common rotation makes faces and edges parallel.
-    const Pose X_BP =
-        round % 4 == 0 ? Pose{X_AP.q, LatticeVector(random, 2)} : LatticePiecePose(random, 2);
-    const OwnMoving a(RandomLatticePoints(random, random.Between(2, 4), 3),
-                      Straight(LatticeVector(random, 1), LatticeVector(random, 2), q_A), 0, X_AP);
+    if (round % 4 == 0) X_BP.q = X_AP.q;
+    if (round % 5 == 4) X_BP = Pose();
+    const Vector from = LatticeVector(random, 6);
+    const OwnMoving a(RandomLatticePoints(random, random.Between(2, 4), 4),
+                      Straight({0, 0, 0}, LatticeVector(random, 1), q_A), 0, X_AP);
     const OwnMoving b(RandomLatticePoints(random, random.Between(1, 3), 4),
-                      Straight(LatticeVector(random, 5), LatticeVector(random, 5), q_B), 0,
-                      round % 5 == 4 ? Pose() : X_BP);
+                      Straight(from, Vector(LatticeVector(random, 1) - from), q_B), 0, X_BP);
     CheckAgainstBruteForce(a, b, counts);
     if (HasFatalFailure()) return;
   }
@@ -263,37 +264,29 @@ TEST(Translation, ScaledPairsMeetAtTheSameTime) {
 
 TEST(Translation, ScaledPiecesMeetAtTheSameTime) {
   Random random(TestSeed(5));
-  int met = 0;
   for (int round = 0; round < 6; ++round) {
-    const std::vector<Vector> points_a = RandomLatticePoints(random, 6, 4);
-    const std::vector<Vector> points_b = RandomLatticePoints(random, 6, 4);
-    const Pose X_AP = LatticePiecePose(random, 3);
-    const Pose X_BP = LatticePiecePose(random, 3);
+    const Pose X_AP = LatticePiecePose(random, 1);
+    const Pose X_BP = LatticePiecePose(random, 1);
     const auto find = [&](int exponent) {
       const double scale = std::ldexp(1.0, exponent);
-      const auto scaled = [&](Pose pose) {
-        pose.t *= scale;
-        return pose;
+      const auto moving = [&](const Motion& motion, const Pose& piece) {
+        const auto scaled = [&](const Pose& pose) { return Pose{pose.q, scale * pose.t}; };
+        return OwnMoving(Scaled(Cube(4), scale), {scaled(motion.start), scaled(motion.end)}, 0,
+                         scaled(piece));
       };
-      return Find(
-          OwnMoving(Scaled(points_a, scale),
-                    Straight(Vector::Zero(), Vector(scale * Vector(1, 2, 3)), {1, 2, 0, 2}), 0,
-                    scaled(X_AP)),
-          OwnMoving(Scaled(points_b, scale),
-                    Straight(Vector(scale * Vector(20, 1, 0)), Vector(scale * Vector(-20, 1, 3))),
-                    0, scaled(X_BP)));
+      return Find(moving(Straight({0, 0, 0}, {1, 2, 3}, {1, 2, 0, 2}), X_AP),
+                  moving(Straight({20, 1, 0}, {-20, 1, 3}), X_BP));
     };
     const FirstContact unscaled = find(0);
-    met += unscaled.contact_time.has_value() ? 1 : 0;
+    EXPECT_EQ(unscaled.relation, Relation::kOverlapping);
     for (const int exponent : {-900, -300, 300, 900}) {
       SCOPED_TRACE(exponent);
       const FirstContact contact = find(exponent);
-      EXPECT_EQ(contact.relation, unscaled.relation);
+      EXPECT_EQ(contact.relation, Relation::kOverlapping);
       EXPECT_EQ(contact.separated_until, unscaled.separated_until);
       EXPECT_EQ(contact.contact_time, unscaled.contact_time);
     }
   }
-  EXPECT_GT(met, 1);
 }
 
 TEST(Translation, DistantOffsetsCostNoAccuracy) {

@@ -103,7 +103,7 @@ TEST(Turning, PiecesWithAPoseAgreeWithSamples) {
                       round % 3 == 0 ? Pose() : RandomPose(random, 1));
     const FirstContact contact = Find(a, b);
     ASSERT_NE(contact.relation, Relation::kWithinTolerance);
-    ASSERT_TRUE(AgreesWithSamples(a, b, contact, 32));
+    ASSERT_TRUE(AgreesWithSamples(a, b, contact, 16));
     ++relations[static_cast<size_t>(contact.relation)];
   }
   EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 5);
