@@ -89,7 +89,7 @@ def test_pieces_of_bodies_move_with_their_poses(
     client: hulld.Client, name: str, cube: str, end: tuple[float, ...]
 ) -> None:
     body = f"{name}/body"
-    pieces = [(cube, (-5, 0, 0)), (cube, (1, 2, 2, 0, 1, 2, 3)), (cube, (3, 0, 0, 3, 2, 0, 0))]
+    pieces = [(cube, (-7, 0, 0)), (cube, (1, 2, 2, 0, 1, 2, 3)), (cube, (3, 0, 0, 3, 2, 0, 0))]
     client.put_body(body, pieces)
     a, b = cube, (body, (4, 0, 0))
     answer = client.check_collision(a, b, to_b=end, certificate=True)
@@ -104,9 +104,12 @@ def test_pieces_of_bodies_move_with_their_poses(
     # Each pair of pieces is proven at the poses of the pieces.
     assert len(answer.piece_certificates) == len(pieces)
     for index, one in enumerate(answer.piece_certificates):
-        intervals = [dataclasses.replace(part, direction=(0, 1, 0)) for part in one.intervals]
+        first, *rest = one.intervals
+        assert first.direction is not None
+        x, y, z = first.direction
+        first = dataclasses.replace(first, direction=(-x, -y, -z))
         proof = list(answer.piece_certificates)
-        proof[index] = dataclasses.replace(one, intervals=tuple(intervals))
+        proof[index] = dataclasses.replace(one, intervals=(first, *rest))
         forged = dataclasses.replace(answer, piece_certificates=tuple(proof))
         with pytest.raises(hulld.VerificationError, match=f"pieces 0 of A and {index} of B"):
             verifier.check(a, b, forged, to_b=end)
