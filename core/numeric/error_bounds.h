@@ -251,8 +251,8 @@ inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
 // direction, with errors of 112 u w |n| per component and a length of at most sqrt(3) w |n|, is
 // rotated into that frame: sqrt(3) * 112 u w |n|, entries add 3 * 16 u w |n|, sums 6 u w |n|, below
 // 250 u w |n| in total. Times a vertex: 750 u w |n| M, and 32 u w |n| M of the support value. The
-// direction times y errs by 3 * 112 u w |n||y| and 9 u w |n||y|. The sums, of one more term, err by
-// 3 u of 3 w |n| (M + |y| + |x|). The total is below 900 u w (|n| (M + |y| + |x|) + |c|). Proven.
+// direction times y errs by 3 * 112 u w |n||y| and 9 u w |n||y|. The final sums err by 3 u of 3 w
+// |n| (M + |y| + |x|). The total is below 900 u w (|n| (M + |y| + |x|) + |c|). Proven.
 inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product

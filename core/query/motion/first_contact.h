@@ -20,8 +20,8 @@
 namespace hulld {
 
 // A hull in motion, plus a closed ball: a hull by itself, or a piece of a body B in motion. Its
-// pose at a time is the product X_WB(t) X_BH, without rounding. The radius of the ball is the exact
-// sum of both radii, each finite and at least 0.
+// pose is the product X_WB(t) X_BH, without rounding. The radius of the ball is the exact sum of
+// both radii, each finite and at least 0.
 struct MovingHull {
   const QueryHull& hull;
   Motion X_WB;

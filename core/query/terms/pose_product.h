@@ -17,7 +17,7 @@ class PoseProduct {
   // Requires: both poses valid (ValidatePose). Cost: about 100 ns, less if one has no rotation.
   PoseProduct(const Pose& X_WB, const Pose& X_BP);
   // X_WB(time) X_BP. `motion` must outlive the result. Requires: a valid motion (ValidateMotion), a
-  // time in [0, 1], and a valid pose (ValidatePose). Cost: about 100 ns, 300 ns unless X_BP is the
+  // time in [0, 1], and a valid pose (ValidatePose). Cost: about 100 ns, 500 ns unless X_BP is the
   // identity.
   PoseProduct(const Motion& motion, double time, const Pose& X_BP = {});
 
