@@ -70,7 +70,7 @@ class BulletMotion final : public MotionMethod {
     const Eigen::Matrix3d R = RotationOf(X_WA);
     const btMatrix3x3 basis(R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1),
                             R(2, 2));
-    return {basis, ToBullet(X_WA.t)};
+    return btTransform(basis, ToBullet(X_WA.t));
   }
 
   double scale_;

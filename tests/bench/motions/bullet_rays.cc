@@ -40,7 +40,7 @@ BulletRays::BulletRays(const RayScene& scene) : world_(new World) {
                             R(2, 2));
     auto object = std::make_unique<btCollisionObject>();
     object->setCollisionShape(world_->shapes[target.hull].get());
-    object->setWorldTransform({basis, PointOf(target.X_WH.t)});
+    object->setWorldTransform(btTransform(basis, PointOf(target.X_WH.t)));
     world_->collision.addCollisionObject(object.get());
     world_->objects.push_back(std::move(object));
   }

@@ -93,8 +93,8 @@ void ReportFaults(benchmark::State& state, const std::vector<MotionTruth>& truth
     if (*truth[i].meets && impact.verdict == Impact::Verdict::kApart) ++missed;
     if (!*truth[i].meets && impact.verdict == Impact::Verdict::kMeets) ++invented;
     if (!*truth[i].meets || impact.verdict != Impact::Verdict::kMeets) continue;
-    error = std::max({error, truth[i].separated_until - impact.time,
-                      impact.time - truth[i].contact_time});
+    error = std::max(
+        {error, truth[i].separated_until - impact.time, impact.time - truth[i].contact_time});
     bracket = std::max(bracket, impact.bracket);
   }
   state.counters["missed"] = missed;

@@ -32,9 +32,9 @@ std::span<const double> CoordinatesOf(const Hull& hull) {
 MotionTruth ProvenTruth(const MotionSet& set, const MotionSet::Question& question) {
   MotionOptions options;
   options.want_certificate = true;
-  const FirstContact contact = *FindFirstContact(
-      {set.query_a(question), {question.X_WA, question.X_WA}},
-      {set.query_b(question), question.X_WB}, options);
+  const FirstContact contact =
+      *FindFirstContact({set.query_a(question), {question.X_WA, question.X_WA}},
+                        {set.query_b(question), question.X_WB}, options);
   v1::FirstContact message;
   server::EncodeFirstContact(contact, &message);
   v1::Certificate certificate;
@@ -44,10 +44,10 @@ MotionTruth ProvenTruth(const MotionSet& set, const MotionSet::Question& questio
   const v1::Pose at_rest = ToMessage(question.X_WA);
   const v1::Pose start = ToMessage(question.X_WB.start);
   const v1::Pose end = ToMessage(question.X_WB.end);
-  const absl::Status status = CheckFirstContact(
-      server::EncodeRelation(contact.relation), message, certificate,
-      {{CoordinatesOf(set.a(question)), at_rest}, at_rest},
-      {{CoordinatesOf(set.b(question)), start}, end}, options.max_time_error);
+  const absl::Status status =
+      CheckFirstContact(server::EncodeRelation(contact.relation), message, certificate,
+                        {{CoordinatesOf(set.a(question)), at_rest}, at_rest},
+                        {{CoordinatesOf(set.b(question)), start}, end}, options.max_time_error);
   if (!status.ok()) {
     std::fprintf(stderr, "motion_benchmark: a wrong certificate: %s\n", status.ToString().c_str());
     std::exit(1);

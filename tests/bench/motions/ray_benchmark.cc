@@ -150,8 +150,8 @@ struct Row {
   double length;
   const char* answer;
   std::function<uint64_t()> cast;
-  std::vector<double> seconds;
-  std::vector<double> cores;
+  std::vector<double> seconds = {};
+  std::vector<double> cores = {};
   uint64_t hits = 0;
 };
 
@@ -165,8 +165,8 @@ int Run(int argc, char** argv) {
                             "--store", "memory", "--log-level", "info"});
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);
-  const auto channel = grpc::CreateCustomChannel(server.address(),
-                                                 grpc::InsecureChannelCredentials(), arguments);
+  const auto channel =
+      grpc::CreateCustomChannel(server.address(), grpc::InsecureChannelCredentials(), arguments);
   const auto stub = v1::CollisionService::NewStub(channel);
   const RayScene scene = MakeScene();
   PutHulls(channel, scene);
@@ -175,8 +175,8 @@ int Run(int argc, char** argv) {
   for (const double length : {3.0, 30.0}) {
     const auto rays = std::make_shared<std::vector<RayScene::Ray>>(MakeRays(length));
     for (const bool want_certificate : {false, true}) {
-      const auto request = std::make_shared<v1::FindCollisionsRequest>(
-          MakeRequest(scene, *rays, want_certificate));
+      const auto request =
+          std::make_shared<v1::FindCollisionsRequest>(MakeRequest(scene, *rays, want_certificate));
       rows.push_back({length, want_certificate ? "certificates" : "times",
                       [=, &stub] { return CastInOneCall(*stub, *request); }});
     }
