@@ -153,27 +153,13 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(Vector n) {
   const double margin = -resolution_ / 2 * (1 - 0x1p-40);
   double time = separated_;
   double length = last_length_;
-  bool is_exact = false;
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
-    bool is_proven = plane_.Try(n, time, until, margin).proven;
-    while (!is_proven && until - time >= kShortestStep) {
+    while (!plane_.Try(n, time, until, margin).proven) {
+      if (until - time < kShortestStep) return time;
       until = time + (until - time) / 2;
-      is_proven = plane_.Try(n, time, until, margin).proven;
     }
-    if (!is_proven) {
-      if (is_exact) return time;
-      // So near to contact, the direction may be no better than rounding allows.
-      const absl::StatusOr<Vector> exact =
-          ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
-      if (!exact.ok()) return exact.status();
-      if (exact->isZero(0)) return time;
-      n = *exact;
-      is_exact = true;
-      continue;
-    }
-    is_exact = false;
     length = until - time;
     time = until;
     const absl::StatusOr<Vector> nearest = DirectionAt(time);

@@ -11,6 +11,8 @@ namespace hulld::bench {
 namespace {
 
 constexpr double kTurn = M_PI / 6;
+// To about 1e-7 of the sizes: below the passages, and above the resolution of answers.
+constexpr int kBisections = 23;
 
 std::array<double, 4> Turned(const std::array<double, 4>& q, const Vector& axis, double angle) {
   const Eigen::Quaterniond turned =
@@ -31,7 +33,7 @@ double ShiftToMiss(const QueryHull& a, const Pose& X_WA, const QueryHull& b, con
                    const Vector& direction, double reach) {
   double meets = 0;
   double misses = 1.01 * reach;
-  for (int i = 0; i < 40; ++i) {
+  for (int i = 0; i < kBisections; ++i) {
     const double middle = 0.5 * (meets + misses);
     const FirstContact contact =
         *FindFirstContact({a, {X_WA, X_WA}}, {b, Shifted(X_WB, middle * direction)});

@@ -158,33 +158,6 @@ TEST(Turning, GrazesAreNeitherMissedNorInvented) {
   EXPECT_EQ(Find(box, wall, options).relation, Relation::kOverlapping);
 }
 
-// The shift at which a pair that turns grazes another, to the last bit.
-TEST(Turning, GrazesWithinRoundingAreAnswered) {
-  Random random(31);
-  for (int round = 0; round < 12; ++round) {
-    SCOPED_TRACE(round);
-    const std::vector<Vector> points_a = RandomOnSphere(random, 8, 1);
-    const std::vector<Vector> points_b = RandomOnSphere(random, 8, 1);
-    Motion motion = Between(RandomPose(random, 0), RandomPose(random, 0));
-    motion.start.t = {-4, 0, 0};
-    motion.end.t = {4, 0, 0};
-    const OwnMoving a(points_a, AtRest());
-    double meets = 0;
-    double misses = 2.5;
-    for (double middle = 1.25; meets < middle && middle < misses; middle = (meets + misses) / 2) {
-      motion.start.t.y() = motion.end.t.y() = middle;
-      const OwnMoving b(points_b, motion);
-      MotionOptions options;
-      options.want_certificate = misses - meets < 1e-9;
-      const absl::StatusOr<FirstContact> contact =
-          FindFirstContact(a.moving(), b.moving(), options);
-      ASSERT_TRUE(contact.ok()) << contact.status() << " at " << middle;
-      if (options.want_certificate) EXPECT_TRUE(ContactIsProven(a, b, *contact));
-      (contact->contact_time ? meets : misses) = middle;
-    }
-  }
-}
-
 TEST(Turning, AFinerResolutionSeparatesNearerMisses) {
   const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
   const OwnMoving wall(Box(0.5, 5, 5), AtRest({std::sqrt(2.0) + 1e-4 + 0.5, 0, 0}));
