@@ -288,7 +288,7 @@ function passages(kind, method,   r, key, text) {
 
 function first_contact(   k, v, m, n, kinds, sizes, methods, kind, text) {
   read_rows("first_contact_" machine)
-  head("| motion, vertices | hulld | FCL | Bullet | Bullet, scaled | Bullet, cast | 10 poses | 100 poses | 1000 poses |")
+  head("| motion, vertices | hulld | FCL, libccd | Bullet | Bullet, scaled | Bullet, cast | 10 poses | 100 poses | 1000 poses |")
   split("translation,rotation", kinds, ",")
   split("8,64,512,10000", sizes, ",")
   n = split("hulld,FCL,Bullet,Bullet scaled,Bullet cast,10 poses,100 poses,1000 poses", methods, ",")
@@ -311,7 +311,9 @@ function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, 
   read_rows("first_contact_" machine)
   head("| method | translations: missed | false contacts | error of time | rotations: missed | false contacts | error of time |")
   split("translation,rotation", kinds, ",")
-  n = split("hulld,FCL,Bullet,Bullet scaled,Bullet cast,10 poses,100 poses,1000 poses", methods, ",")
+  peer_names()
+  name["FCL"] = name["FCL libccd"]; name["Bullet scaled"] = "Bullet, scaled"; name["Bullet cast"] = "Bullet, cast"
+  n = split("hulld,FCL,FCL indep,Bullet,Bullet scaled,Bullet cast,10 poses,100 poses,1000 poses", methods, ",")
   for (i = 1; i <= rows; i++) {
     key = order[i]
     split(key, part, /:|\034/)
@@ -322,7 +324,7 @@ function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, 
     if (cell[key, "time_error"] + 0 > error[m]) error[m] = cell[key, "time_error"] + 0
   }
   for (i = 1; i <= n; i++) {
-    printf "| %s |", methods[i]
+    printf "| %s |", named(methods[i])
     for (k = 1; k <= 2; k++) {
       m = kinds[k] SUBSEP methods[i]
       if (m in asked) printf " %d | %d | %s |", missed[m], invented[m], (error[m] > 0 ? sprintf("%.0e", error[m]) : "0")

@@ -6,7 +6,7 @@
 // writes medians (CsvReporter). An iteration answers all motions of a set. Columns: `questions` in
 // the set, `ns` per motion (processor time), and, compared with FindTruth on the method's own path:
 // `missed` contacts, `false_contacts`, motions left `open`, the largest `time_error` of a contact,
-// and the widest `bracket` of one.
+// and its widest `bracket`.
 //
 // Rows "static:V gap" are hulld's static query of pairs 1e-6 apart, as many as motions in a set.
 

@@ -7,10 +7,10 @@
 // sends it. Rows of CSV, one for each length of the rays and kind of answer; medians of kRounds
 // rounds, in which the rows alternate:
 //
-//   times          the time of each hit
+//   times          the time of each hit, 0 for a ray that starts inside
 //   certificates   also its certificate, from which a client takes the facet
 //   Bullet         every hit of btCollisionWorld::rayTest, a call per ray, on one thread in this
-//                  process
+//                  process; it omits rays that start inside
 //
 // Columns: `hits`, pairs of a ray and a hull; `rays_per_second`, by the wall clock; `cores`, the
 // processor time of the server over the time of the call.
@@ -44,7 +44,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int kHulls = 1000;
 constexpr int kVertices = 64;
 constexpr size_t kRays = 100'000;
-constexpr int kRounds = 7;
+constexpr int kRounds = 3;
 // Half the side of the cube that holds the hulls, about three radii of room for each.
 constexpr double kHalf = 15;
 
@@ -175,6 +175,8 @@ int Run(int argc, char** argv) {
   for (const double length : {3.0, 30.0}) {
     const auto rays = std::make_shared<std::vector<RayScene::Ray>>(MakeRays(length));
     for (const bool want_certificate : {false, true}) {
+      // Those of long rays take minutes.
+      if (want_certificate && length > 3) continue;
       const auto request =
           std::make_shared<v1::FindCollisionsRequest>(MakeRequest(scene, *rays, want_certificate));
       rows.push_back({length, want_certificate ? "certificates" : "times",
