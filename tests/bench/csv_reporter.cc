@@ -35,6 +35,11 @@ constexpr const char* kCounters[] = {"points",
                                      "wrong",
                                      "none",
                                      "largest_error",
+                                     "missed",
+                                     "false_contacts",
+                                     "open",
+                                     "time_error",
+                                     "bracket",
                                      "cached_share",
                                      "pairs"};
 

@@ -276,6 +276,91 @@ function motion(   s, r, at) {
   measured()
 }
 
+# Returns nanoseconds of a method by passage, "-" without rows.
+function passages(kind, method,   r, key, text) {
+  for (r = 1; r <= split("hit,graze,near miss,miss", passage, ","); r++) {
+    key = kind " " passage[r] SUBSEP method
+    if (!((key, "ns") in cell)) return "-"
+    text = text (r > 1 ? " / " : "") short(cell[key, "ns"])
+  }
+  return text
+}
+
+function first_contact(   k, v, m, n, kinds, sizes, methods, kind, text) {
+  read_rows("first_contact_" machine)
+  head("| motion, vertices | hulld | FCL, libccd | Bullet | Bullet, scaled | Bullet, cast | 10 poses | 100 poses | 1000 poses |")
+  split("translation,rotation", kinds, ",")
+  split("8,64,512,10000", sizes, ",")
+  n = split("hulld,FCL,Bullet,Bullet scaled,Bullet cast,10 poses,100 poses,1000 poses", methods, ",")
+  for (k = 1; k <= 2; k++) {
+    for (v = 1; v <= 4; v++) {
+      kind = kinds[k] ":" sizes[v]
+      printf "| %s, %d |", kinds[k], sizes[v]
+      for (m = 1; m <= n; m++) {
+        text = passages(kind, methods[m])
+        printf " %s |", m == 1 ? "**" text "**" : text
+      }
+      print ""
+    }
+  }
+  measured()
+}
+
+# Sums over sizes and passages.
+function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, invented, error, asked) {
+  read_rows("first_contact_" machine)
+  head("| method | translations: missed | false contacts | error of time | rotations: missed | false contacts | error of time |")
+  split("translation,rotation", kinds, ",")
+  peer_names()
+  name["FCL"] = name["FCL libccd"]; name["Bullet scaled"] = "Bullet, scaled"; name["Bullet cast"] = "Bullet, cast"
+  n = split("hulld,FCL,FCL indep,Bullet,Bullet scaled,Bullet cast,10 poses,100 poses,1000 poses", methods, ",")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    split(key, part, /:|\034/)
+    m = part[1] SUBSEP part[3]
+    asked[m] += cell[key, "questions"]
+    missed[m] += cell[key, "missed"]
+    invented[m] += cell[key, "false_contacts"]
+    if (cell[key, "time_error"] + 0 > error[m]) error[m] = cell[key, "time_error"] + 0
+  }
+  for (i = 1; i <= n; i++) {
+    printf "| %s |", named(methods[i])
+    for (k = 1; k <= 2; k++) {
+      m = kinds[k] SUBSEP methods[i]
+      if (m in asked) printf " %d | %d | %s |", missed[m], invented[m], (error[m] > 0 ? sprintf("%.0e", error[m]) : "0")
+      else printf " - | - | - |"
+    }
+    print ""
+  }
+  measured()
+}
+
+function first_contact_resolution(   m, n, r, methods, labels, key, open, widest) {
+  read_rows("first_contact_" machine)
+  head("| resolution | hit / graze / near miss / miss, ns | open | widest bracket |")
+  n = split("hulld 1e-2,hulld 1e-4,hulld 1e-6,hulld", methods, ",")
+  split("1e-2,1e-4,1e-6,defaults", labels, ",")
+  for (m = 1; m <= n; m++) {
+    open = widest = 0
+    for (r = 1; r <= split("hit,graze,near miss,miss", passage, ","); r++) {
+      key = "rotation:64 " passage[r] SUBSEP methods[m]
+      open += cell[key, "open"]
+      if (cell[key, "bracket"] + 0 > widest) widest = cell[key, "bracket"] + 0
+    }
+    printf "| %s | %s | %d | %.0e |\n", labels[m], passages("rotation:64", methods[m]), open, widest
+  }
+  measured()
+}
+
+function rays(   fields) {
+  head("| length of a ray | answer | hits | rays a second | cores of the server |")
+  while (next_row("first_contact_rays_" machine, fields)) {
+    printf "| %s | %s | %d | %s | %s |\n", fields[1], fields[2], fields[5], short(fields[7]),
+           (fields[2] == "Bullet" ? "-" : fields[8])
+  }
+  measured()
+}
+
 function scenes(   s, n, ours, theirs) {
   read_rows("query_scene_" machine)
   head("| scene | colliding pairs | hulld, ms | FCL, tree, ms | FCL / hulld |")
@@ -515,6 +600,10 @@ BEGIN {
   else if (table == "depth") lengths("contact")
   else if (table == "distance") lengths("distance")
   else if (table == "motion") motion()
+  else if (table == "first-contact") first_contact()
+  else if (table == "first-contact-faults") first_contact_faults()
+  else if (table == "first-contact-resolution") first_contact_resolution()
+  else if (table == "rays") rays()
   else if (table == "scenes") scenes()
   else if (table == "trade") trade()
   else if (table == "network") network()

@@ -9,13 +9,18 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_search.h"
+#include "core/query/floating/float_pair.h"
 #include "core/query/ladder.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/sweep.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/pose.h"
+#include "core/query/terms/pose_product.h"
 
 namespace hulld {
 namespace {
@@ -26,6 +31,10 @@ constexpr double kLeastRelativeGap = 0x1p-46;
 constexpr int kMostFloatSteps = 24;
 // Share of the gap that a step in floating point leaves open, more than rounding takes. A choice.
 constexpr double kOpenShare = 0x1p-10;
+// Bound of the rounding of a gap at a later time, relative to the pair and its displacements: far
+// above that of centers (kMinkowskiErrorFactor), of displacements, and of products with a
+// direction.
+constexpr double kLaterGapError = 0x1p-44;
 // Factor between the strides of successive exact queries. A choice.
 constexpr int64_t kStrideFactor = 16;
 
@@ -69,6 +78,14 @@ IntegerVector ToExact(const std::variant<Vector, IntegerVector>& direction) {
 
 Vector DisplacementOf(const Motion& motion) { return motion.end.t - motion.start.t; }
 
+// Returns the direction of the point of a path that is nearest to the origin, of unit length up to
+// rounding. Zero if it is the origin.
+Vector NearestOnPath(const Vector& start, const Vector& displacement) {
+  const double squared = displacement.squaredNorm();
+  const double time = squared > 0 ? std::clamp(-start.dot(displacement) / squared, 0.0, 1.0) : 0;
+  return (start + time * displacement).normalized();
+}
+
 }  // namespace
 
 // The unit of the pair at time 1/2 divides half of each translation.
@@ -96,30 +113,64 @@ absl::StatusOr<FirstContact> TranslationSearch::Run() {
 }
 
 absl::Status TranslationSearch::AdvanceInFloatingPoint() {
-  const Vector displacement = DisplacementOf(b_.X_WB) - DisplacementOf(a_.X_WB);
-  Vector toward = Vector::Zero();
+  const PairAt at_start(a_, b_, 0);
+  const FloatPair& start = at_start.pair();
+  const Vector of_a = DisplacementOf(a_.X_WB);
+  const Vector of_b = DisplacementOf(b_.X_WB);
+  const Vector displacement = of_b - of_a;
+  const double size = start.size() + of_a.cwiseAbs().maxCoeff() + of_b.cwiseAbs().maxCoeff();
+  if (!start.usable() || !IsFilterSize(size)) return absl::OkStatus();
+  // Lower bounds of the gap along a direction of about unit length at time 0, and at a later time.
+  const auto gap_at_start = [&](const Vector& n) {
+    return -start.Farthest(n).value - start.SupportError(n);
+  };
+  const auto gap_at = [&](double gap_before, const Vector& n, double time) {
+    return gap_before + time * n.dot(displacement) - kLaterGapError * size;
+  };
+  Vector toward = -Vector(start.CenterDifference());
+  if (toward.isZero(0)) return absl::OkStatus();
+  if (const Vector n = NearestOnPath(toward, displacement); !n.isZero(0)) {
+    // Balls around the hulls, then the hulls.
+    const double reach = a_.hull.radius() + b_.hull.radius();
+    const auto separates = [&](double gap) {
+      return gap_at(gap, n, 0) > 0 && gap_at(gap, n, 1) > 0;
+    };
+    if (separates(n.dot(toward) - reach) || separates(gap_at_start(n))) {
+      TakeSeparatedFrom(0, n);
+      return absl::OkStatus();
+    }
+  }
+  std::optional<PoseProduct> product;
+  std::optional<PlacedHull> moved;
+  std::optional<FloatPair> later;
   for (int step = 0; step < kMostFloatSteps; ++step) {
     if (poll_.Step()) return MotionStopped();
-    const PairAt start(a_, b_, lower_);
-    if (!start.pair().usable()) return absl::OkStatus();
-    if (step == 0) toward = -Vector(start.pair().CenterDifference());
-    if (toward.isZero(0)) return absl::OkStatus();
+    if (step > 0) {
+      // Rounded: every claim is about `start`.
+      const Pose& before = b_.X_WB.start;
+      const Pose X_WB{before.q, before.t + lower_ * displacement};
+      if (IsIdentity(b_.X_BH)) {
+        moved.emplace(b_.hull, X_WB);
+      } else {
+        product.emplace(X_WB, b_.X_BH);
+        moved.emplace(b_.hull, *product);
+      }
+      later.emplace(start.a(), *moved);
+      if (!later->usable()) return absl::OkStatus();
+    }
     const absl::StatusOr<Vector> found =
-        NearestDirection(start.pair(), toward, options_.should_stop, &nearest_);
+        NearestDirection(step > 0 ? *later : start, toward, options_.should_stop, &nearest_);
     if (!found.ok()) return found.status();
     const Vector& n = *found;
     if (n.isZero(0)) return absl::OkStatus();
-    const auto gap_at = [&](const PairAt& at) {
-      return -at.pair().Farthest(n).value - at.pair().SupportError(n);
-    };
-    const double gap = gap_at(start);
-    if (!(gap > kLeastRelativeGap * start.pair().size())) return absl::OkStatus();
+    const double gap_before = gap_at_start(n);
+    const double gap = gap_at(gap_before, n, lower_);
+    if (!(gap > kLeastRelativeGap * size)) return absl::OkStatus();
     lower_excluded_ = true;
     const double speed = -n.dot(displacement);
     const double until = lower_ + gap / speed * (1 - kOpenShare);
     const bool to_end = !(speed > 0) || !(until < 1);
-    const PairAt end(a_, b_, to_end ? 1 : until);
-    if (!end.pair().usable() || !(gap_at(end) > 0)) return absl::OkStatus();
+    if (!(gap_at(gap_before, n, to_end ? 1 : until) > 0)) return absl::OkStatus();
     if (to_end) {
       TakeSeparatedFrom(lower_, n);
       return absl::OkStatus();
