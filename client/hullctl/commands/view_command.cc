@@ -391,8 +391,10 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "? on the page for its keys. --png runs chromium or another browser of its family.\n"
       "\n"
       "A scene is YAML or JSON, as for 'hullctl scene'; with --local, its hulls and bodies are\n"
-      "created, too. A robot has a slider for each joint and, with --joints, a time line that\n"
-      "marks the waypoints in contact. Its pairs are those of 'hullctl robot check'.");
+      "created, too. If placements move ('to'), a slider plays the motion and marks the first\n"
+      "contact of the selected pair. A robot has a slider for each joint and, with --joints, a\n"
+      "time line that marks the waypoints in contact. Its pairs are those of 'hullctl robot\n"
+      "check'.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},

@@ -61,6 +61,16 @@ std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
   return absl::StrCat("[", pair.first, ",", pair.second, "]");
 }
 
+std::string ProblemOfPair(const char* type, std::pair<uint32_t, uint32_t> pair, uint64_t update,
+                          const absl::Status& status) {
+  return JsonObject()
+      .Add("type", type)
+      .AddJson("update", std::to_string(update))
+      .AddJson("pair", PairJson(pair))
+      .Add("problem", std::string_view(status.message().data(), status.message().size()))
+      .Close();
+}
+
 std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                           const ViewObject& b, uint64_t update, bool rest,
                           const v1::HullVersion& version_a, const v1::HullVersion& version_b,
@@ -149,6 +159,15 @@ v1::Placement PlacementOf(const ViewObject& object) {
   return placement;
 }
 
+// As PlacementOf, from the start of a motion to its end.
+v1::Placement MotionOf(const ViewObject& object) {
+  v1::Placement placement = PlacementOf(object);
+  if (!object.motion) return placement;
+  *placement.mutable_pose() = ToPose(object.motion->start);
+  *placement.mutable_end_pose() = ToPose(object.motion->end);
+  return placement;
+}
+
 // Packs the objects that have a hull; `objects` receives their indices.
 v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint32_t>* objects) {
   google::protobuf::RepeatedPtrField<v1::Placement> placements;
@@ -188,6 +207,26 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
   if (response.has_witness()) row.witness = response.witness();
   return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(), row,
                        tolerant_json);
+}
+
+std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b) {
+  if (a.hull_id.empty() || b.hull_id.empty() || !(a.motion || b.motion)) return std::nullopt;
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = MotionOf(a);
+  *request.mutable_b() = MotionOf(b);
+  return request;
+}
+
+std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
+                             const absl::StatusOr<v1::CheckCollisionResponse>& response) {
+  if (!response.ok()) return ProblemOfPair("motion", pair, update, response.status());
+  return JsonObject()
+      .Add("type", "motion")
+      .AddJson("update", std::to_string(update))
+      .AddJson("pair", PairJson(pair))
+      .Add("relation", v1::Relation_Name(response->relation()))
+      .AddJson("firstContact", MessageJson(response->first_contact()))
+      .Close();
 }
 
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
@@ -259,7 +298,7 @@ void AnswerFeed::Ask(const ViewQuestion& question) {
 void AnswerFeed::HullsChanged() {
   {
     const std::lock_guard lock(mutex_);
-    question_.hulls_changed = true;
+    question_.motion_is_stale = true;
     asked_ = true;
   }
   changed_.notify_all();
@@ -274,9 +313,10 @@ void AnswerFeed::Run() {
       if (ended_) return;
       question = question_;
       asked_ = false;
-      question_.hulls_changed = false;
+      question_.motion_is_stale = false;
     }
     if (question.pair && !AnswerPair(question)) return;
+    if (!AnswerMotion(question)) return;
     if (!question.rest && question.objects.size() > kMostObjectsInMotion) continue;
     if (!AnswerScene(question)) return;
   }
@@ -288,13 +328,7 @@ bool AnswerFeed::AnswerPair(const Question& question) {
   const auto answer = question.rest ? RestingAnswer(question) : MovingAnswer(question);
   if (answer.ok()) return page_->SendText(*answer);
   stream_.reset();
-  const std::string message(answer.status().message().data(), answer.status().message().size());
-  return page_->SendText(JsonObject()
-                             .Add("type", "answer")
-                             .AddJson("update", std::to_string(question.update))
-                             .AddJson("pair", PairJson(*question.pair))
-                             .Add("problem", message)
-                             .Close());
+  return page_->SendText(ProblemOfPair("answer", *question.pair, question.update, answer.status()));
 }
 
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
@@ -371,6 +405,19 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
   }
   return AnswerMessage(*question.pair, a, b, question.update, /*rest=*/false, streamed_version_a_,
                        streamed_version_b_, RowAt(columns, 0));
+}
+
+bool AnswerFeed::AnswerMotion(const Question& question) {
+  const auto request = question.pair ? MotionRequest(question.objects[question.pair->first],
+                                                     question.objects[question.pair->second])
+                                     : std::nullopt;
+  std::string asked =
+      request ? absl::StrCat(PairJson(*question.pair), request->SerializeAsString()) : "";
+  const bool is_known = asked == asked_motion_ && !question.motion_is_stale;
+  asked_motion_ = std::move(asked);
+  if (!request || is_known) return true;
+  return page_->SendText(
+      MotionAnswerJson(*question.pair, question.update, client_.CheckCollision(*request)));
 }
 
 bool AnswerFeed::AnswerScene(const Question& question) const {

@@ -249,15 +249,17 @@ std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
   std::string json = "[";
   for (size_t i = from; i < objects.size(); ++i) {
     const ViewObject& object = objects[i];
-    absl::StrAppend(&json, i > from ? "," : "",
-                    JsonObject()
-                        .Add("name", object.name)
-                        .Add("hullId", object.hull_id)
-                        .AddJson("file", std::to_string(object.file))
-                        .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
-                        .AddJson("radius", NumberJson(object.radius))
-                        .AddJson("isJointed", object.is_jointed ? "true" : "false")
-                        .Close());
+    absl::StrAppend(
+        &json, i > from ? "," : "",
+        JsonObject()
+            .Add("name", object.name)
+            .Add("hullId", object.hull_id)
+            .AddJson("file", std::to_string(object.file))
+            .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
+            .AddJson("radius", NumberJson(object.radius))
+            .AddJson("isJointed", object.is_jointed ? "true" : "false")
+            .AddJson("endPose", object.motion ? PosesJson({object.motion->end}) : "null")
+            .Close());
   }
   return json + "]";
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,15 @@ struct FileShape {
 };
 inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
+// A motion over the time t in [0, 1], as of a Placement with an end pose.
+struct ViewMotion {
+  Pose7 start = kIdentityPose;
+  Pose7 end = kIdentityPose;
+};
+
+// Returns the pose at time t, rounded: each number is (1 - t) start + t end, as in page/pose.js.
+Pose7 PoseAt(const ViewMotion& motion, double t);
+
 // A displayed object: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
   std::string name;
@@ -47,6 +57,8 @@ struct ViewObject {
   std::shared_ptr<const HullMesh> hull = nullptr;
   // Moved by the joints of the scene only.
   bool is_jointed = false;
+  // Moved by the time of the scene only; `pose` is its pose at that time.
+  std::optional<ViewMotion> motion = std::nullopt;
 };
 
 // Joints that move objects of a scene, and a trajectory of them.

@@ -153,7 +153,7 @@ export class ObjectPanel {
       inputMode: 'decimal',
       autocomplete: 'off',
       spellcheck: false,
-      readOnly: !this.live || object.isJointed,
+      readOnly: !this.live || object.isDriven,
       'data-pose': i,
       'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
       onchange: () => this.typed(object, i),
