@@ -88,19 +88,13 @@ std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& 
   return message.Close();
 }
 
-// Collects the pairs of a FindCollisions call.
+// Collects the pairs of a FindCollisions call, or of a batch.
 class SceneAnswer {
  public:
   explicit SceneAnswer(std::vector<uint32_t> objects) : objects_(std::move(objects)) {}
 
   absl::Status Take(const v1::FindCollisionsResponse& part) {
-    if (part.has_header()) revision_ = part.header().revision();
-    for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      AddProblem(problem.message());
-    }
-    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      AddProblem(problem.message());
-    }
+    TakeHead(part);
     if (part.has_totals()) totals_ = part.totals();
     const int count = part.pairs_size() / 2;
     if (!AreParallel(part.columns(), static_cast<size_t>(count))) {
@@ -112,10 +106,31 @@ class SceneAnswer {
       if (a >= objects_.size() || b >= objects_.size()) {
         return absl::InternalError("the answer names a placement that does not exist");
       }
-      const v1::Relation relation = part.columns().relations(i);
-      if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) continue;
-      absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
-                      QuoteJson(v1::Relation_Name(relation)), "]");
+      AddPair(a, b, part.columns().relations(i));
+    }
+    return absl::OkStatus();
+  }
+
+  // Takes the rows of named pairs that collide, and counts them.
+  absl::Status Take(const v1::BatchCheckCollisionsResponse& part,
+                    const std::vector<uint32_t>& pairs) {
+    TakeHead(part);
+    const auto& relations = part.columns().relations();
+    if (2 * (part.first_pair() + static_cast<uint64_t>(relations.size())) > pairs.size()) {
+      return absl::InternalError("the answer has more rows than pairs were asked about");
+    }
+    const uint32_t* pair = pairs.data() + 2 * part.first_pair();
+    for (const int number : relations) {
+      const auto relation = static_cast<v1::Relation>(number);
+      totals_.set_touching(totals_.touching() + (relation == v1::RELATION_TOUCHING ? 1 : 0));
+      totals_.set_overlapping(totals_.overlapping() +
+                              (relation == v1::RELATION_OVERLAPPING ? 1 : 0));
+      totals_.set_within_tolerance(totals_.within_tolerance() +
+                                   (relation == v1::RELATION_WITHIN_TOLERANCE ? 1 : 0));
+      if (relation != v1::RELATION_SEPARATED) {
+        AddPair(std::min(pair[0], pair[1]), std::max(pair[0], pair[1]), relation);
+      }
+      pair += 2;
     }
     return absl::OkStatus();
   }
@@ -129,6 +144,23 @@ class SceneAnswer {
   }
 
  private:
+  template <typename Response>
+  void TakeHead(const Response& part) {
+    if (part.has_header()) revision_ = part.header().revision();
+    for (const v1::PlacementProblem& problem : part.placement_problems()) {
+      AddProblem(problem.message());
+    }
+    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+      AddProblem(problem.message());
+    }
+  }
+
+  void AddPair(uint32_t a, uint32_t b, v1::Relation relation) {
+    if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) return;
+    absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
+                    QuoteJson(v1::Relation_Name(relation)), "]");
+  }
+
   void AddProblem(const std::string& message) {
     constexpr int kMostProblems = 20;
     if (problem_count_++ >= kMostProblems) return;
@@ -231,6 +263,7 @@ std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update
 
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const v1::FindCollisionsRequest& rules,
+                                            const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update) {
   v1::FindCollisionsRequest request = rules;
@@ -239,6 +272,17 @@ absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
   if (tolerance > 0) request.set_tolerance(tolerance);
   SceneAnswer answer(std::move(placed));
   if (request.packed_placements().hulls_size() < 2) return answer.Json(update);
+  if (pairs) {
+    v1::BatchCheckCollisionsRequest batch;
+    batch.mutable_packed_placements()->Swap(request.mutable_packed_placements());
+    batch.mutable_pairs()->Add(pairs->begin(), pairs->end());
+    batch.set_tolerance(request.tolerance());
+    const absl::Status status = client.BatchCheckCollisions(
+        batch,
+        [&](const v1::BatchCheckCollisionsResponse& part) { return answer.Take(part, *pairs); });
+    if (!status.ok()) return status;
+    return answer.Json(update);
+  }
   const absl::Status status = client.FindCollisions(
       request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
   if (!status.ok()) return status;
@@ -263,6 +307,7 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   question_ = Question();
   question_.objects = scene.objects;
   question_.rules = scene.rules;
+  question_.pairs = scene.pairs;
   // The page asks after it receives the scene.
   asked_ = false;
 }
@@ -421,8 +466,8 @@ bool AnswerFeed::AnswerMotion(const Question& question) {
 }
 
 bool AnswerFeed::AnswerScene(const Question& question) const {
-  const auto answer = SceneAnswerJson(client_, question.rules, question.objects, question.tolerance,
-                                      question.update);
+  const auto answer = SceneAnswerJson(client_, question.rules, question.pairs, question.objects,
+                                      question.tolerance, question.update);
   if (answer.ok()) return page_->SendText(*answer);
   return page_->SendText(
       ProblemMessage(absl::StrCat("Colliding pairs are unknown: ", answer.status().message())));

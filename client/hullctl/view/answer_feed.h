@@ -38,6 +38,7 @@ class AnswerFeed {
   struct Question {
     std::vector<ViewObject> objects;
     v1::FindCollisionsRequest rules;
+    std::optional<std::vector<uint32_t>> pairs;
     std::optional<std::pair<uint32_t, uint32_t>> pair;
     double tolerance = 0;
     bool certificate = false;
@@ -98,9 +99,10 @@ std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, cons
 std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
                              const absl::StatusOr<v1::CheckCollisionResponse>& response);
 
-// Returns the message `collisions` for a scene.
+// Returns the message `collisions` for a scene; rules, pairs: as in ViewScene.
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const v1::FindCollisionsRequest& rules,
+                                            const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update);
 

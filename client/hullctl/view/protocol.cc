@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -293,16 +294,18 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
   const auto values_json = [](const std::vector<double>& values) {
     return NumbersJson(values.data(), values.size());
   };
-  return TextMessage("scene",
-                     {{"number", std::to_string(number)},
-                      {"key", QuoteJson(scene.key)},
-                      {"title", QuoteJson(scene.title)},
-                      {"note", QuoteJson(scene.note)},
-                      {"files", files + "]"},
-                      {"objects", ObjectsJson(scene.objects)},
-                      {"joints", joined(scene.joints.joints, joint_json)},
-                      {"waypoints", joined(scene.joints.waypoints, values_json)},
-                      {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"}});
+  std::vector<uint32_t> named = scene.pairs.value_or(std::vector<uint32_t>());
+  named.resize(std::min<size_t>(named.size(), 2));
+  return TextMessage("scene", {{"number", std::to_string(number)},
+                               {"key", QuoteJson(scene.key)},
+                               {"title", QuoteJson(scene.title)},
+                               {"note", QuoteJson(scene.note)},
+                               {"files", files + "]"},
+                               {"objects", ObjectsJson(scene.objects)},
+                               {"joints", joined(scene.joints.joints, joint_json)},
+                               {"waypoints", joined(scene.joints.waypoints, values_json)},
+                               {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"},
+                               {"named", "[" + absl::StrJoin(named, ",") + "]"}});
 }
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {

@@ -43,11 +43,12 @@ namespace hulld {
 //   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: true if the page
 //              may change hulls.
 //   scene      {number, key, title, note, files: [{name}], objects: [OBJECT], joints: [{name, low,
-//              high, value}], waypoints: [values], contacts}: replaces all previous content. OBJECT
-//              is {name, hullId, file, pose, radius, isJointed, endPose}: hullId is that of a hull
-//              or a body, "" if absent; file is -1 if absent; isJointed: moved by the joints only;
-//              endPose: the end of its motion, null if it has none. Later messages name objects and
-//              files by their index here. contacts: the waypoints with a colliding pair.
+//              high, value}], waypoints: [values], contacts, named}: replaces all previous content.
+//              OBJECT is {name, hullId, file, pose, radius, isJointed, endPose}: hullId is that of
+//              a hull or a body, "" if absent; file is -1 if absent; isJointed: moved by the joints
+//              only; endPose: the end of its motion, null if it has none. Later messages name
+//              objects and files by their index here. contacts: the waypoints with a colliding
+//              pair. named: the first pair that the file names; empty if it names none.
 //   objects    {scene, objects}: appends objects to that scene.
 //   hull       {event}: a HullEvent of the contract: a hull or a body changed, appeared, or was
 //              deleted.
@@ -60,7 +61,7 @@ namespace hulld {
 //              pair, if it moves: the result of CheckCollision for the motions from start to end.
 //              Not repeated while it stays the same.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
-//              of the scene that collide (FindCollisions), a < b.
+//              of the scene that collide (FindCollisions), a < b, or those of its named pairs.
 //   poses      {scene, poses}: of all jointed objects, seven numbers each.
 //   edited     {hullId, done, message}: result of an edit; message is for people.
 //   problem    {message}: an error, for people.

@@ -80,10 +80,10 @@ std::string AllMotions(const Client& client, const std::vector<ViewObject>& obje
 }
 
 // Returns the poses of the jointed objects, and the answers about all of them.
-absl::StatusOr<std::string> State(const Client& client, const v1::FindCollisionsRequest& rules,
+absl::StatusOr<std::string> State(const Client& client, const ViewScene& scene,
                                   const std::vector<ViewObject>& objects, double time,
                                   bool with_answers) {
-  const auto collisions = SceneAnswerJson(client, rules, objects, 0, 0);
+  const auto collisions = SceneAnswerJson(client, scene.rules, scene.pairs, objects, 0, 0);
   if (!collisions.ok()) return collisions.status();
   const auto answers = AllPairs(client, with_answers ? objects : std::vector<ViewObject>());
   if (!answers.ok()) return answers.status();
@@ -125,7 +125,7 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
         if (object.is_jointed) object.pose = *pose++;
       }
     }
-    const auto state = State(client, scene.rules, objects, time, with_answers);
+    const auto state = State(client, scene, objects, time, with_answers);
     if (!state.ok()) return state.status();
     absl::StrAppend(&states, i > 0 ? "," : "", *state);
   }

@@ -201,6 +201,7 @@ absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
     shapes.push_back(std::move(*placement.mutable_points()));
   }
   if (absl::Status added = AddShapes(indices, shapes, scene); !added.ok()) return added;
+  scene->pairs = std::move(file->pairs);
   scene->rules = std::move(file->request);
   scene->rules.clear_placements();
   scene->rules.clear_packed_placements();

@@ -51,7 +51,7 @@ struct ViewObject {
   // Index into ViewScene::files, -1: none.
   int file = -1;
   Pose7 pose = kIdentityPose;
-  // Placement.radius. Only the hull is drawn; answers and proofs take it into account.
+  // Placement.radius.
   double radius = 0;
   // FileShape::hull of its file; null for an ID.
   std::shared_ptr<const HullMesh> hull = nullptr;
@@ -94,6 +94,9 @@ struct ViewScene {
   // Selection of the queried pairs: groups and movers of a scene file or a robot. Without
   // placements.
   v1::FindCollisionsRequest rules;
+  // The queried pairs, two indices of objects each, if the scene file names them. Then every object
+  // has a hull, and the rules do not apply.
+  std::optional<std::vector<uint32_t>> pairs;
   // Empty unless the scene is a robot.
   ViewJoints joints;
 };

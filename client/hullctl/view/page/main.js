@@ -345,10 +345,13 @@ class Viewer {
     this.stage.isFitted = true;
     const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);
     const [moving] = model.moving;
+    const [first, second] = model.named;
     if (hulls.length === 2)
       model.select(hulls[1].index, hulls[0].index);
     else if (model.objects.length === 1)
       model.select(0);
+    else if (second !== undefined)
+      model.select(second, first);
     else if (moving)
       model.select(moving.index);
     else if (model.collisions.pairs.length)
@@ -451,8 +454,9 @@ class Viewer {
 
   rebuildViews() {
     const {model, stage} = this;
-    const isSingle = ({index, opacity, file}) => !model.isCrowd || index === model.selected ||
-        index === model.other || opacity < 1 || (file >= 0 && model.show.mesh);
+    const isSingle = (object) => !model.isCrowd || object.index === model.selected ||
+        object.index === model.other || object.opacity < 1 ||
+        (object.file >= 0 && model.show.mesh) || model.roundedOf(object);
     const single = model.objects.filter(isSingle);
     const wanted = new Set(single.map(({index}) => index));
     for (const [index, view] of this.views) {

@@ -1,7 +1,8 @@
 // The displayed scene and the user's choices, without drawing. Parts of the page listen to its
 // changes.
 import {CROWD_COLOR, OBJECT_COLORS} from 'hulld/palette.js';
-import {poseAt, samePose, toWorld} from 'hulld/pose.js';
+import {IDENTITY, poseAt, samePose, toWorld} from 'hulld/pose.js';
+import {RoundedShape} from 'hulld/rounded_shape.js';
 
 // Maximum number of objects drawn individually; more are drawn as a crowd, in few draw calls.
 const MOST_SINGLE_OBJECTS = 24;
@@ -57,6 +58,8 @@ export class Model extends EventTarget {
     this.joints = [];
     this.waypoints = [];
     this.contacts = [];
+    // The first pair that the file of the scene names; empty if it names none.
+    this.named = [];
     // The time t of a scene with motions; null in other scenes.
     this.time = null;
     // The last message about the motion of a pair.
@@ -75,9 +78,9 @@ export class Model extends EventTarget {
     for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
   }
 
-  load({number, files, objects, joints, waypoints, contacts}) {
+  load({number, files, objects, joints, waypoints, contacts, named}) {
     this.clear();
-    Object.assign(this, {number, files, joints, waypoints, contacts});
+    Object.assign(this, {number, files, joints, waypoints, contacts, named});
     this.addObjects(objects);
     this.show.mesh = files.length > 0;
     this.time = this.moving.length ? 0 : null;
@@ -130,6 +133,31 @@ export class Model extends EventTarget {
   // Returns the hull, or all pieces of a body; undefined while in flight.
   hullOf(object) {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
+  }
+
+  // Returns [{hull, pose, radius}]: the hull of an object, or the pieces of a body that are here.
+  partsOf(object) {
+    const {radius = 0, hullId} = object;
+    const pieces = this.bodyOf(object)?.pieces ?? [{hullId, pose: IDENTITY}];
+    return pieces.filter((piece) => this.hulls.has(piece.hullId))
+        .map((piece) => ({
+               hull: this.hulls.get(piece.hullId),
+               pose: piece.pose,
+               radius: radius + (piece.radius ?? 0),
+             }));
+  }
+
+  // Returns the surface of an object with a radius; null if it has none, and for a piece of a large
+  // scene.
+  roundedOf(object) {
+    const shape = this.hullOf(object);
+    if (!shape || shape.isEmpty || this.isNameless) return null;
+    if (object.rounded?.shape !== shape) {
+      const parts = this.partsOf(object).filter(({hull}) => !hull.isEmpty);
+      const isRounded = parts.some(({radius}) => radius > 0);
+      object.rounded = {shape, made: isRounded ? new RoundedShape(parts, shape.center) : null};
+    }
+    return object.rounded.made;
   }
 
   bodyOf(object) {
@@ -197,20 +225,21 @@ export class Model extends EventTarget {
   }
 
   radiusOf(object) {
-    return this.shapeOf(object)?.radius || 0;
+    return (this.roundedOf(object) ?? this.shapeOf(object))?.radius || 0;
   }
 
   // Returns world points that enclose an object at a pose: its vertices if few, otherwise the
   // corners of its box.
   cornersOf(object, pose = object.pose) {
     const {xyz, vertexCount} = this.shapeOf(object);
-    if (vertexCount > MOST_CORNERS || this.isCrowd) return this.boxCornersOf(object, pose);
+    if (vertexCount > MOST_CORNERS || this.isCrowd || this.roundedOf(object))
+      return this.boxCornersOf(object, pose);
     return Array.from(
         {length: vertexCount}, (_, i) => toWorld(pose, xyz.subarray(3 * i, 3 * i + 3)));
   }
 
   boxCornersOf(object, pose) {
-    const {low, high} = this.shapeOf(object);
+    const {low, high} = this.roundedOf(object) ?? this.shapeOf(object);
     const corners = [];
     for (let i = 0; i < 8; ++i) {
       corners.push(toWorld(pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));

@@ -158,7 +158,7 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
       HasSubstr(
           R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0],"radius":0,)"
           R"("isJointed":false,"endPose":null})"));
-  EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[])"));
+  EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[],"named":[])"));
 }
 
 TEST(Protocol, MotionsTravelWithTheirEnd) {

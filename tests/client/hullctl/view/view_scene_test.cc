@@ -65,6 +65,20 @@ TEST(ViewScene, ABodyOfASceneIsOneObject) {
   EXPECT_EQ(scene.objects[1].hull_id, "cell/leg");
 }
 
+TEST(ViewScene, NamedPairsAreThoseOfTheFile) {
+  const TempFile all("all.yaml", "place: {a: {id: cube}, b: {id: cube}, c: {id: cube}}\n");
+  const TempFile named("named.yaml",
+                       "place: {a: {id: cube}, b: {id: cube}, c: {id: cube}}\n"
+                       "ask: {pairs: [[c, a], [a, b]]}\n");
+  ViewScene scene;
+  ASSERT_TRUE(AddSceneFile(all.path(), &scene).ok());
+  EXPECT_FALSE(scene.pairs.has_value());
+  ViewScene some;
+  ASSERT_TRUE(AddSceneFile(named.path(), &some).ok());
+  ASSERT_TRUE(some.pairs.has_value());
+  EXPECT_THAT(*some.pairs, ElementsAre(2, 0, 0, 1));
+}
+
 TEST(ViewScene, MotionsStartAtTheirPose) {
   const TempFile file("moving.yaml",
                       "place: {wall: {id: cube, at: [9, 0, 0], to: [9, 0, 0]},\n"

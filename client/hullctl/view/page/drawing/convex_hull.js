@@ -4,6 +4,8 @@
 // Points nearer to a facet than this part of the extent do not count as outside.
 const RELATIVE_TOLERANCE = 1e-9;
 
+const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
+
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross =
@@ -18,6 +20,35 @@ function farthest(points, measure) {
     if (value > most) [best, most] = [i, value];
   });
   return best;
+}
+
+// Returns unit vectors that are spread evenly. Source: the golden spiral, Swinbank and Purser 2006.
+export function directions(count) {
+  return Array.from({length: count}, (_, i) => {
+    const z = 1 - (2 * i + 1) / count;
+    const r = Math.sqrt(1 - z * z);
+    return [r * Math.cos(GOLDEN_ANGLE * i), r * Math.sin(GOLDEN_ANGLE * i), z];
+  });
+}
+
+// Returns the index of the vertex of {xyz} that is farthest in a direction.
+export function extremeVertex({xyz}, [x, y, z]) {
+  let best = 0;
+  let most = -Infinity;
+  for (let i = 0; i < xyz.length; i += 3) {
+    const height = x * xyz[i] + y * xyz[i + 1] + z * xyz[i + 2];
+    if (height > most) [best, most] = [i / 3, height];
+  }
+  return best;
+}
+
+// Returns vertices of {xyz} as [x, y, z]: all, or if there are more than `most`, those that are
+// extreme in as many directions.
+export function fewVertices({xyz}, most) {
+  const at = (i) => [xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]];
+  const count = xyz.length / 3;
+  if (count <= most) return Array.from({length: count}, (_, i) => at(i));
+  return [...new Set(directions(most).map((d) => extremeVertex({xyz}, d)))].map(at);
 }
 
 // Returns the corners of the triangles of the hull of `points` ([x, y, z] each) as indices,

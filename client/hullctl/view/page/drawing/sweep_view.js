@@ -3,9 +3,9 @@
 //
 // A swept shape is the union of the hulls of consecutive sampled positions. It is exact for a
 // translation; for a rotation it is a picture of the motion, from slightly inside.
-import {hullTriangles} from 'hulld/drawing/convex_hull.js';
+import {fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
-import {geometryOf} from 'hulld/drawing/object_view.js';
+import {edgeWeight, geometryOf} from 'hulld/drawing/object_view.js';
 import {THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {angleBetween, poseAt, toWorld, unitQuaternion} from 'hulld/pose.js';
@@ -13,7 +13,7 @@ import {angleBetween, poseAt, toWorld, unitQuaternion} from 'hulld/pose.js';
 // Largest rotation between two samples, in radians, and the greatest number of halvings.
 const MOST_ANGLE = Math.PI / 16;
 const MOST_HALVINGS = 6;
-// Larger shapes are represented by their extreme vertices in this many directions.
+// Larger shapes are represented by their extreme vertices.
 const MOST_VERTICES = 160;
 // Bodies of more pieces are swept as one hull.
 const MOST_PIECES = 12;
@@ -21,26 +21,6 @@ const MOST_PIECES = 12;
 const MOST_SWEEPS = 24;
 // With more edges, outlines would hide the surface.
 const MOST_EDGES = 20000;
-const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
-
-// Returns at most MOST_VERTICES vertices of a shape.
-function fewVertices({xyz, vertexCount}) {
-  const at = (i) => [xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]];
-  if (vertexCount <= MOST_VERTICES) return Array.from({length: vertexCount}, (_, i) => at(i));
-  const chosen = new Set();
-  for (let k = 0; k < MOST_VERTICES; ++k) {
-    const z = 1 - (2 * k + 1) / MOST_VERTICES;
-    const [x, y] = [Math.cos, Math.sin].map((f) => Math.sqrt(1 - z * z) * f(GOLDEN_ANGLE * k));
-    let best = 0;
-    let most = -Infinity;
-    for (let i = 0; i < xyz.length; i += 3) {
-      const height = x * xyz[i] + y * xyz[i + 1] + z * xyz[i + 2];
-      if (height > most) [best, most] = [i / 3, height];
-    }
-    chosen.add(best);
-  }
-  return [...chosen].map(at);
-}
 
 // Returns sampled poses of a motion, at least both ends.
 function sampledPoses({start, endPose}) {
@@ -96,12 +76,11 @@ export class SweepView extends DrawnGroup {
 
   // Returns the vertices of the shape, or of each piece of a body.
   partsOf(object, shape) {
-    const body = this.model.bodyOf(object);
-    const pieces = body?.pieces.filter(({hullId}) => this.model.hulls.has(hullId)) ?? [];
-    if (!pieces.length || pieces.length > MOST_PIECES) return [fewVertices(shape)];
-    return pieces.map(
-        ({hullId, pose}) =>
-            fewVertices(this.model.hulls.get(hullId)).map((p) => toWorld(pose, p)));
+    const rounded = this.model.roundedOf(object);
+    const parts = rounded?.parts ?? this.model.partsOf(object);
+    if (parts.length > MOST_PIECES) return [fewVertices(rounded ?? shape, MOST_VERTICES)];
+    return parts.map(
+        ({hull, pose}) => fewVertices(hull, MOST_VERTICES).map((p) => toWorld(pose, p)));
   }
 
   geometryOf(object, shape) {
@@ -157,11 +136,16 @@ export class SweepView extends DrawnGroup {
       if (!object.endPose || !hull || !model.isShown(object) || hull.edges.length > 2 * MOST_EDGES)
         continue;
       const pose = poseAt(object.start, object.endPose, contact.contactTime);
-      const material = new THREE.LineBasicMaterial({color: lit, transparent: true});
+      const material = new THREE.LineBasicMaterial({
+        color: lit,
+        transparent: true,
+        opacity: edgeWeight(8 * hull.edgeCount),
+        depthTest: false,
+      });
       const outline = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
       const [w, x, y, z] = unitQuaternion(pose);
       outline.quaternion.set(x, y, z, w);
-      this.add(outline, toWorld(pose, hull.center), 9);
+      this.add(outline, toWorld(pose, hull.center), 13);
     }
   }
 

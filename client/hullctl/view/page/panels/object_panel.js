@@ -63,6 +63,7 @@ export class ObjectPanel {
       [body ? 'body' : 'hull', object.hullId || null],
       ['revision', info?.revision],
       ['pieces', body && grouped(body.pieces.length)],
+      ['radius', object.radius ? rounded(object.radius) : null],
       ['dimension', body ? null : info?.dimension],
       ['vertices', hull && grouped(hull.vertexCount)],
       ['edges', isSolid ? grouped(hull.edgeCount) : null],
