@@ -135,6 +135,8 @@ class SceneAnswer {
     return absl::OkStatus();
   }
 
+  bool has_pairs() const { return !pairs_.empty(); }
+
   std::string Json(uint64_t update) const {
     return TextMessage("collisions", {{"update", std::to_string(update)},
                                       {"revision", QuoteJson(std::to_string(revision_))},
@@ -168,7 +170,7 @@ class SceneAnswer {
   }
 
   // Object of each placement.
-  const std::vector<uint32_t> objects_;
+  std::vector<uint32_t> objects_;
   std::string pairs_;
   std::string problems_;
   size_t shown_ = 0;
@@ -209,6 +211,34 @@ v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint3
     objects->push_back(i);
   }
   return PackPlacements(placements);
+}
+
+// Asks about the named pairs, or about all that the rules select.
+absl::StatusOr<SceneAnswer> AskScene(const Client& client, const v1::FindCollisionsRequest& rules,
+                                     const std::optional<std::vector<uint32_t>>& pairs,
+                                     const std::vector<ViewObject>& objects, double tolerance) {
+  std::vector<uint32_t> placed;
+  v1::PackedPlacements placements = Pack(objects, &placed);
+  SceneAnswer answer(std::move(placed));
+  if (placements.hulls_size() < 2 || (pairs && pairs->empty())) return answer;
+  absl::Status status;
+  if (pairs) {
+    v1::BatchCheckCollisionsRequest request;
+    *request.mutable_packed_placements() = std::move(placements);
+    request.mutable_pairs()->Add(pairs->begin(), pairs->end());
+    request.set_tolerance(tolerance);
+    status = client.BatchCheckCollisions(
+        request,
+        [&](const v1::BatchCheckCollisionsResponse& part) { return answer.Take(part, *pairs); });
+  } else {
+    v1::FindCollisionsRequest request = rules;
+    *request.mutable_packed_placements() = std::move(placements);
+    if (tolerance > 0) request.set_tolerance(tolerance);
+    status = client.FindCollisions(
+        request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
+  }
+  if (!status.ok()) return status;
+  return answer;
 }
 
 }  // namespace
@@ -266,27 +296,17 @@ absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update) {
-  v1::FindCollisionsRequest request = rules;
-  std::vector<uint32_t> placed;
-  *request.mutable_packed_placements() = Pack(objects, &placed);
-  if (tolerance > 0) request.set_tolerance(tolerance);
-  SceneAnswer answer(std::move(placed));
-  if (request.packed_placements().hulls_size() < 2) return answer.Json(update);
-  if (pairs) {
-    v1::BatchCheckCollisionsRequest batch;
-    batch.mutable_packed_placements()->Swap(request.mutable_packed_placements());
-    batch.mutable_pairs()->Add(pairs->begin(), pairs->end());
-    batch.set_tolerance(request.tolerance());
-    const absl::Status status = client.BatchCheckCollisions(
-        batch,
-        [&](const v1::BatchCheckCollisionsResponse& part) { return answer.Take(part, *pairs); });
-    if (!status.ok()) return status;
-    return answer.Json(update);
-  }
-  const absl::Status status = client.FindCollisions(
-      request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
-  if (!status.ok()) return status;
-  return answer.Json(update);
+  const auto answer = AskScene(client, rules, pairs, objects, tolerance);
+  if (!answer.ok()) return answer.status();
+  return answer->Json(update);
+}
+
+absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
+                                 const std::optional<std::vector<uint32_t>>& pairs,
+                                 const std::vector<ViewObject>& objects) {
+  const auto answer = AskScene(client, rules, pairs, objects, 0);
+  if (!answer.ok()) return answer.status();
+  return answer->has_pairs();
 }
 
 AnswerFeed::AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page)

@@ -106,6 +106,11 @@ absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update);
 
+// Returns true if a pair of the scene collides.
+absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
+                                 const std::optional<std::vector<uint32_t>>& pairs,
+                                 const std::vector<ViewObject>& objects);
+
 }  // namespace hulld
 
 #endif  // HULLD_CLIENT_HULLCTL_VIEW_ANSWER_FEED_H_

@@ -61,7 +61,7 @@ namespace hulld {
 //              pair, if it moves: the result of CheckCollision for the motions from start to end.
 //              Not repeated while it stays the same.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
-//              of the scene that collide (FindCollisions), a < b, or those of its named pairs.
+//              of the scene that collide (FindCollisions), or all named pairs that do, a < b.
 //   poses      {scene, poses}: of all jointed objects, seven numbers each.
 //   edited     {hullId, done, message}: result of an edit; message is for people.
 //   problem    {message}: an error, for people.

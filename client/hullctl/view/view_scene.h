@@ -91,11 +91,11 @@ struct ViewScene {
   std::vector<std::string> prefixes;
   // Hulls under the prefixes that are shown only as pieces of bodies.
   std::vector<std::string> pieces;
-  // Selection of the queried pairs: groups and movers of a scene file or a robot. Without
-  // placements.
+  // Selection of the queried pairs, unless `pairs` names them: groups and movers of a scene file.
+  // Without placements.
   v1::FindCollisionsRequest rules;
-  // The queried pairs, two indices of objects each, if the scene file names them. Then every object
-  // has a hull, and the rules do not apply.
+  // The queried pairs, two indices of objects each, if a scene file or a robot names them. Requires
+  // a hull of every object.
   std::optional<std::vector<uint32_t>> pairs;
   // Empty unless the scene is a robot.
   ViewJoints joints;

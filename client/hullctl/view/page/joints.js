@@ -1,5 +1,5 @@
-// The joints of a robot, and the time line of its trajectory: the configuration between two waypoints
-// is interpolated linearly in each joint.
+// The joints of a robot, and the time line of its trajectory: the configuration between two
+// waypoints is interpolated linearly in each joint.
 import {JointPanel} from 'hulld/panels/joint_panel.js';
 
 // Time from one waypoint to the next while playing, within limits for the whole.
@@ -26,8 +26,7 @@ export class Joints {
   constructor(model, connection) {
     this.model = model;
     this.connection = connection;
-    this.panel =
-        new JointPanel(model, connection.live, (values, rest) => this.move(values, rest));
+    this.panel = new JointPanel(model, connection.live, (values, rest) => this.move(values, rest));
   }
 
   // Called when the scene changes.

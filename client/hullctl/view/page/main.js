@@ -350,7 +350,7 @@ class Viewer {
       model.select(hulls[1].index, hulls[0].index);
     else if (model.objects.length === 1)
       model.select(0);
-    else if (second !== undefined)
+    else if (second !== undefined && !model.joints.length)
       model.select(second, first);
     else if (moving)
       model.select(moving.index);

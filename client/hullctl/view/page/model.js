@@ -155,7 +155,8 @@ export class Model extends EventTarget {
     if (object.rounded?.shape !== shape) {
       const parts = this.partsOf(object).filter(({hull}) => !hull.isEmpty);
       const isRounded = parts.some(({radius}) => radius > 0);
-      object.rounded = {shape, made: isRounded ? new RoundedShape(parts, shape.center) : null};
+      const made = isRounded ? new RoundedShape(parts, shape.center, this.objects.length) : null;
+      object.rounded = {shape, made};
     }
     return object.rounded.made;
   }
@@ -259,10 +260,9 @@ export class Model extends EventTarget {
     const corners =
         objects
             .filter(
-                (object) => this.isShown(object) && this.shapeOf(object) &&
-                    !this.shapeOf(object).isEmpty)
-            .flatMap(
-                (object) => posesOf(object).flatMap((pose) => this.cornersOf(object, pose)));
+                (object) =>
+                    this.isShown(object) && this.shapeOf(object) && !this.shapeOf(object).isEmpty)
+            .flatMap((object) => posesOf(object).flatMap((pose) => this.cornersOf(object, pose)));
     if (!corners.length) return null;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];

@@ -30,8 +30,8 @@ export function toWorld(pose, p) {
   return [x + pose[4], y + pose[5], z + pose[6]];
 }
 
-// Returns the pose at time t of a motion, rounded: as PoseAt of client/hullctl/view/view_scene.h, to
-// the last bit.
+// Returns the pose at time t of a motion, rounded: as PoseAt of client/hullctl/view/view_scene.h,
+// to the last bit.
 export const poseAt = (start, end, t) => start.map((value, i) => (1 - t) * value + t * end[i]);
 
 // Returns the angle in radians between two rotations.

@@ -3,11 +3,11 @@ import {directions, extremeVertex, fewVertices, hullTriangles} from 'hulld/drawi
 import {toWorld} from 'hulld/pose.js';
 import {Shape} from 'hulld/shape.js';
 
-// Points of the round parts: of a hull, and of all pieces of a body.
+// Directions in which the surface of a hull is sampled, and those of all hulls of a scene.
 const MOST_DIRECTIONS = 400;
 const MOST_IN_ALL = 8000;
 const LEAST_DIRECTIONS = 40;
-// Hulls of more triangles have no facets that are worth to be exact.
+// The facets of hulls with more triangles are too small to be seen as flat.
 const MOST_TRIANGLES = 100;
 // Larger hulls are represented by their extreme vertices.
 const MOST_VERTICES = 300;
@@ -25,12 +25,12 @@ function pointsAround(hull, radius, count) {
   const moved = (p, n) => p.map((value, k) => value + radius * n[k]);
   const few = fewVertices(hull, MOST_VERTICES);
   const xyz = Float64Array.from(few.flat());
-  const points = directions(count).map((d) => moved(few[extremeVertex({xyz}, d)], d));
+  const points = directions(count).map((d) => moved(few[extremeVertex(xyz, d)], d));
   const {triangles} = hull;
   if (triangles.length > 3 * MOST_TRIANGLES) return points;
   for (let t = 0; t < triangles.length; t += 3) {
-    const corners = [...triangles.subarray(t, t + 3)].map(
-        (i) => [...hull.xyz.subarray(3 * i, 3 * i + 3)]);
+    const corners =
+        [...triangles.subarray(t, t + 3)].map((i) => [...hull.xyz.subarray(3 * i, 3 * i + 3)]);
     const n = normalOf(corners);
     points.push(...corners.map((p) => moved(p, n)));
     // A polygon has two sides.
@@ -40,10 +40,12 @@ function pointsAround(hull, radius, count) {
 }
 
 export class RoundedShape extends Shape {
-  // parts: [{hull, pose, radius}]; center: that of the hulls alone.
-  constructor(parts, center) {
+  // parts: [{hull, pose, radius}]; center: that of the hulls alone; share: the number of objects
+  // that share the directions.
+  constructor(parts, center, share) {
     const count = Math.min(
-        MOST_DIRECTIONS, Math.max(LEAST_DIRECTIONS, Math.floor(MOST_IN_ALL / parts.length)));
+        MOST_DIRECTIONS,
+        Math.max(LEAST_DIRECTIONS, Math.floor(MOST_IN_ALL / share / parts.length)));
     const points = [];
     const triangles = [];
     const rounded = parts.map(({hull, pose, radius}) => {
@@ -52,12 +54,11 @@ export class RoundedShape extends Shape {
       points.push(...own.map((p) => toWorld(pose, p)));
       return {hull: {xyz: Float64Array.from(own.flat())}, pose};
     });
-    super(
-        Float64Array.from(points.flat()), Uint32Array.from(triangles), new Uint32Array());
+    super(Float64Array.from(points.flat()), Uint32Array.from(triangles), new Uint32Array());
     // [{hull: {xyz}, pose}].
     this.parts = rounded;
     this.center = center;
-    this.radius = Math.max(
-        ...points.map((p) => Math.hypot(...p.map((value, k) => value - center[k]))));
+    this.radius =
+        Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - center[k]))));
   }
 }

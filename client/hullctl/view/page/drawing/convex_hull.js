@@ -31,8 +31,8 @@ export function directions(count) {
   });
 }
 
-// Returns the index of the vertex of {xyz} that is farthest in a direction.
-export function extremeVertex({xyz}, [x, y, z]) {
+// Returns the index of the vertex that is farthest in a direction.
+export function extremeVertex(xyz, [x, y, z]) {
   let best = 0;
   let most = -Infinity;
   for (let i = 0; i < xyz.length; i += 3) {
@@ -42,13 +42,13 @@ export function extremeVertex({xyz}, [x, y, z]) {
   return best;
 }
 
-// Returns vertices of {xyz} as [x, y, z]: all, or if there are more than `most`, those that are
-// extreme in as many directions.
+// Returns the vertices of {xyz} as [x, y, z] or, if there are more than `most`, the extreme ones in
+// that many directions.
 export function fewVertices({xyz}, most) {
   const at = (i) => [xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]];
   const count = xyz.length / 3;
   if (count <= most) return Array.from({length: count}, (_, i) => at(i));
-  return [...new Set(directions(most).map((d) => extremeVertex({xyz}, d)))].map(at);
+  return [...new Set(directions(most).map((d) => extremeVertex(xyz, d)))].map(at);
 }
 
 // Returns the corners of the triangles of the hull of `points` ([x, y, z] each) as indices,

@@ -1,8 +1,8 @@
-// Draws the motions: the swept shape of each moving object, the path of its center, and the outlines
-// of the pair at its first contact.
+// Draws the motions: the swept shape of each moving object, the path of its center, and the
+// outlines of the pair at its first contact.
 //
-// A swept shape is the union of the hulls of consecutive sampled positions. It is exact for a
-// translation; for a rotation it is a picture of the motion, from slightly inside.
+// A swept shape is the union of the hulls of consecutive sampled positions: exact for a
+// translation, slightly too small for a rotation.
 import {fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {edgeWeight, geometryOf} from 'hulld/drawing/object_view.js';

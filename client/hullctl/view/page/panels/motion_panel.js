@@ -1,6 +1,6 @@
 // The first contact of the pair during its motion, by the server's answer.
-import {element, facts, rounded} from 'hulld/panels/dom.js';
 import {RELATIONS} from 'hulld/palette.js';
+import {element, facts, rounded} from 'hulld/panels/dom.js';
 import {poseText} from 'hulld/pose.js';
 
 const LEGEND = 'The swept shapes are hulls of sampled positions: a picture, not a proof. ' +
@@ -41,8 +41,8 @@ export class MotionPanel {
     const {word, sign, style} = RELATIONS[pairMotion.relation];
     const {separatedUntil, contactTime} = pairMotion.firstContact;
     const text = contactTime !== undefined ? `${sign} ${word}` :
-        separatedUntil === 1               ? `${sign} ${word} throughout` :
-                                             `${sign} ${word}: nearly in contact`;
+        separatedUntil === 1 ? `${sign} ${word} throughout` :
+                               `${sign} ${word}: nearly in contact`;
     return [
       element('p', {}, element('b', {id: 'motion-relation', className: style}, text)),
       element('div', {id: 'motion-facts'}, facts([
