@@ -34,7 +34,8 @@ namespace {
 struct ViewArguments {
   std::vector<std::string> things;
   bool demo = false;
-  std::string scene_key;
+  // A key of --demo, or the file of the surroundings of a robot.
+  std::string scene;
   uint16_t port = 0;
   bool no_open = false;
   bool edit = false;
@@ -136,8 +137,8 @@ class Viewing {
       if (key == kGrowingSceneKey) growing_->Restart();
     };
     // Pages start with the first scene.
-    if (!arguments_.scene_key.empty()) {
-      const size_t chosen = static_cast<size_t>(arguments_.scene_key[0] - '0');
+    if (!arguments_.scene.empty()) {
+      const size_t chosen = static_cast<size_t>(arguments_.scene[0] - '0');
       std::rotate(program_.scenes.begin(), program_.scenes.begin() + chosen,
                   program_.scenes.begin() + chosen + 1);
     }
@@ -176,19 +177,23 @@ class Viewing {
   absl::Status AddTheRobot(ViewScene* scene) {
     RobotSceneArguments robot = arguments_.robot;
     robot.robot.urdf = arguments_.things[0];
+    robot.scene = arguments_.scene;
+    const absl::Status put = robot.scene.empty() ? absl::OkStatus() : PutSceneIfLocal(robot.scene);
+    if (!put.ok()) return put;
     return AddRobot(robot, program_.client, &temporary_, scene);
   }
 
-  // With --local, the server receives the hulls and bodies that the scene defines.
   absl::Status AddTheScene(ViewScene* scene) {
     const std::string& path = arguments_.things[0];
-    if (run_.local) {
-      const auto description = ReadYamlScene(path);
-      const absl::Status put =
-          description.ok() ? PutAll(program_.client, *description) : absl::OkStatus();
-      if (!put.ok()) return put;
-    }
-    return AddSceneFile(path, scene);
+    const absl::Status put = PutSceneIfLocal(path);
+    return put.ok() ? AddSceneFile(path, scene) : put;
+  }
+
+  // With --local, the server receives the hulls and bodies that the scene defines.
+  absl::Status PutSceneIfLocal(const std::string& path) {
+    if (!run_.local) return absl::OkStatus();
+    const auto description = ReadYamlScene(path);
+    return description.ok() ? PutAll(program_.client, *description) : absl::OkStatus();
   }
 
   // Takes the shape from the file. Its hull is registered on the server of --local; any other
@@ -300,12 +305,18 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   }
   const bool is_robot = arguments.things.size() == 1 && IsRobot(arguments.things[0]);
   if (!is_robot && !(arguments.robot.joints.empty() && arguments.robot.srdf.empty() &&
-                     arguments.robot.robot.packages.empty())) {
+                     arguments.robot.ignored.empty() && arguments.robot.robot.packages.empty())) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--joints, --srdf, and --package need a robot: name one .urdf file"));
+        "--joints, --srdf, --ignore, and --package need a robot: name one .urdf file"));
   }
-  if (!arguments.demo && !arguments.scene_key.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("--scene needs --demo"));
+  const std::string& scene = arguments.scene;
+  if (!scene.empty() && !arguments.demo && !is_robot) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--scene needs --demo, or a robot that stands in it: name one .urdf file"));
+  }
+  if (!scene.empty() && arguments.demo && (scene.size() != 1 || scene[0] < '0' || scene[0] > '7')) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        absl::StrCat("--scene: ", Quoted(scene), " is no scene of the demo; give 0 to 7")));
   }
   const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
   if (files == 2) {
@@ -316,7 +327,7 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
         absl::InvalidArgumentError("--edit cannot be combined with --html or --png"));
   }
   const bool is_temporary =
-      arguments.demo || (!arguments.things.empty() &&
+      arguments.demo || (!arguments.things.empty() && scene.empty() &&
                          std::ranges::all_of(arguments.things, [](const std::string& thing) {
                            return IsFile(thing) && !IsScene(thing);
                          }));
@@ -340,6 +351,10 @@ void AddRobotOptions(Command command, RobotSceneArguments* robot) {
                "Exclude exactly the pairs of links that this semantic description disables")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
+  command
+      .AddRepeated("--ignore", &robot->ignored,
+                   "Exclude two links, or a link and a placement; repeatable")
+      .ValueName("NAME,NAME");
   command.AddRepeated("--package", &robot->robot.packages, "Folder of a package; repeatable")
       .ValueName("NAME=DIR");
 }
@@ -356,8 +371,12 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kPlaced);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the demo scenes, keys 0 to 7, with temporary hulls");
-  command.AddText("--scene", &arguments->scene_key, "First scene of --demo")
-      .OneOf({"0", "1", "2", "3", "4", "5", "6", "7"});
+  command
+      .AddText("--scene", &arguments->scene,
+               "Scene around a robot, as for 'hullctl robot check'; or the first scene of --demo, "
+               "0 to 7")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   command.AddNumber("--port", 0, 65535, "Port on 127.0.0.1 (default 0: any free one)",
                     [arguments](uint64_t port) { arguments->port = static_cast<uint16_t>(port); });
   command.AddFlag("--no-open", &arguments->no_open, "Print the address and open no browser");
@@ -391,14 +410,18 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "? on the page for its keys. --png runs chromium or another browser of its family.\n"
       "\n"
       "A scene is YAML or JSON, as for 'hullctl scene'; with --local, its hulls and bodies are\n"
-      "created, too. A robot has a slider for each joint and, with --joints, a time line that\n"
-      "marks the waypoints in contact. Its pairs are those of 'hullctl robot check'.");
+      "created, too. If placements move ('to'), a slider plays the motion and marks the first\n"
+      "contact of the selected pair. A robot has a slider for each joint and, with --joints, a\n"
+      "time line that marks the waypoints in contact. Its pairs are those of 'hullctl robot\n"
+      "check', with --scene also those of its parts and the placements of that file, whose hulls\n"
+      "are on the server, or created with --local.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
        {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
        {"A scene", "hullctl view scene.json"},
        {"A robot on its way", "hullctl view arm.urdf --joints path.csv"},
+       {"A robot in its cell", "hullctl view arm.urdf --scene cell.yaml --ignore base,floor"},
        {"A file to share", "hullctl view arm --html arm.html"},
        {"A picture for a report", "hullctl view scene.yaml --png scene.png --size 1200x800"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });

@@ -1,6 +1,10 @@
 #include "client/hullctl/robot/check_scope.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <utility>
+
+#include "client/formats/text_number.h"
 
 namespace hulld {
 
@@ -30,6 +34,34 @@ CheckScope MakeCheckScope(const RobotModel& model, const Surroundings& around,
   }
   for (size_t i = 0; i < around.hulls.size(); ++i) add_id(around.hulls[i], around.radii[i]);
   return scope;
+}
+
+absl::Status RemoveIgnored(const std::vector<std::string>& ignored, const RobotModel& model,
+                           const std::vector<std::string>& names, std::vector<uint32_t>* pairs) {
+  const auto is = [&](uint32_t part, const std::string& name) {
+    return names[part] == name ||
+           (part < model.parts.size() &&
+            model.robot.links[static_cast<size_t>(model.parts[part].link)].name == name);
+  };
+  for (const std::string& entry : ignored) {
+    const size_t comma = entry.find(',');
+    const std::string one = entry.substr(0, comma);
+    const std::string other = comma == std::string::npos ? "" : entry.substr(comma + 1);
+    std::vector<uint32_t> kept;
+    for (size_t i = 0; i < pairs->size(); i += 2) {
+      const uint32_t a = (*pairs)[i];
+      const uint32_t b = (*pairs)[i + 1];
+      if ((is(a, one) && is(b, other)) || (is(a, other) && is(b, one))) continue;
+      kept.insert(kept.end(), {a, b});
+    }
+    if (kept.size() == pairs->size()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--ignore: ", Quoted(entry), " is not a checked pair; give two ",
+                       "names of links or placements, as in forearm_link,table"));
+    }
+    *pairs = std::move(kept);
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace hulld

@@ -1,6 +1,8 @@
 #ifndef HULLD_CLIENT_HULLCTL_ROBOT_CHECK_SCOPE_H_
 #define HULLD_CLIENT_HULLCTL_ROBOT_CHECK_SCOPE_H_
 
+#include <absl/status/status.h>
+
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -34,6 +36,12 @@ struct CheckScope {
 // Requires a prepared model (PrepareHulls).
 CheckScope MakeCheckScope(const RobotModel& model, const Surroundings& around,
                           std::vector<uint32_t> pairs);
+
+// Removes the pairs that --ignore excludes. ignored: "NAME,NAME" each, of a link, a part, or a
+// placement; names: those of the parts, then of the surroundings; pairs: two of these each.
+// INVALID_ARGUMENT: an entry excludes no pair.
+absl::Status RemoveIgnored(const std::vector<std::string>& ignored, const RobotModel& model,
+                           const std::vector<std::string>& names, std::vector<uint32_t>* pairs);
 
 }  // namespace hulld
 

@@ -183,29 +183,8 @@ absl::Status RobotCheck::ChoosePairs() {
   for (uint32_t a = 0; a < robot_parts; ++a) {
     for (uint32_t b = robot_parts; b < names_.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
   }
-  for (const std::string& ignored : arguments_.ignored) {
-    const size_t comma = ignored.find(',');
-    const std::string one = ignored.substr(0, comma);
-    const std::string other = comma == std::string::npos ? "" : ignored.substr(comma + 1);
-    std::vector<uint32_t> kept;
-    for (size_t i = 0; i < pairs_.size(); i += 2) {
-      const auto is = [&](uint32_t part, const std::string& name) {
-        return names_[part] == name ||
-               (part < robot_parts &&
-                model_.robot.links[static_cast<size_t>(model_.parts[part].link)].name == name);
-      };
-      const uint32_t a = pairs_[i];
-      const uint32_t b = pairs_[i + 1];
-      if ((is(a, one) && is(b, other)) || (is(a, other) && is(b, one))) continue;
-      kept.insert(kept.end(), {a, b});
-    }
-    if (kept.size() == pairs_.size()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("--ignore: ", Quoted(ignored), " is not a checked pair; give two ",
-                       "names of links or placements, as in forearm_link,table"));
-    }
-    pairs_ = std::move(kept);
-  }
+  const absl::Status removed = RemoveIgnored(arguments_.ignored, model_, names_, &pairs_);
+  if (!removed.ok()) return removed;
   if (!pairs_.empty()) return absl::OkStatus();
   const std::string hint = !arguments_.ignored.empty() ? "--ignore excludes all of them"
                            : left_out_ == 0 ? "a pair needs two links with shapes, or --scene"

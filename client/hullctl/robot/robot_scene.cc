@@ -12,6 +12,8 @@
 
 #include "client/formats/byte_source.h"
 #include "client/hullctl/body/hull_segment.h"
+#include "client/hullctl/robot/check_scope.h"
+#include "client/hullctl/view/answer_feed.h"
 #include "client/point_messages.h"
 #include "client/robot/joint_file.h"
 #include "client/robot/robot.h"
@@ -124,15 +126,39 @@ void PlaceParts(const RobotModel& model, ViewScene* scene) {
   }
 }
 
-// Excludes pairs of parts of one link, and of the links in `left_out`.
-void AddRules(const RobotModel& model, const std::set<LinkPair>& left_out,
-              v1::FindCollisionsRequest* rules) {
-  for (const RobotPart& part : model.parts) rules->add_groups(static_cast<uint32_t>(part.link));
-  rules->set_ignore_same_group(true);
-  for (const LinkPair& pair : left_out) {
-    rules->add_ignored_group_pairs(static_cast<uint32_t>(pair.first));
-    rules->add_ignored_group_pairs(static_cast<uint32_t>(pair.second));
+// Appends the placements of a scene file, which stand still.
+absl::Status AddSurroundings(const std::string& path, ViewScene* scene) {
+  ViewScene around;
+  const absl::Status read = AddSceneFile(path, &around);
+  if (!read.ok()) return read;
+  const int files = static_cast<int>(scene->files.size());
+  for (ViewObject& object : around.objects) {
+    if (object.motion) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, ": ", object.name,
+                       " moves, but the surroundings of a robot stand still; remove its \"to\""));
+    }
+    if (object.file >= 0) object.file += files;
+    scene->objects.push_back(std::move(object));
   }
+  scene->files.insert(scene->files.end(), around.files.begin(), around.files.end());
+  return absl::OkStatus();
+}
+
+// Names the pairs of 'hullctl robot check': of parts of different links, except for links in
+// `left_out`, and of a part and a placement of the surroundings.
+absl::Status NamePairs(const RobotModel& model, const std::set<LinkPair>& left_out,
+                       const std::vector<std::string>& ignored, ViewScene* scene) {
+  std::vector<uint32_t> pairs = model.PairsWithout(left_out);
+  const auto parts = static_cast<uint32_t>(model.parts.size());
+  for (uint32_t a = 0; a < parts; ++a) {
+    for (uint32_t b = parts; b < scene->objects.size(); ++b) pairs.insert(pairs.end(), {a, b});
+  }
+  std::vector<std::string> names;
+  for (const ViewObject& object : scene->objects) names.push_back(object.name);
+  const absl::Status removed = RemoveIgnored(ignored, model, names, &pairs);
+  scene->pairs = std::move(pairs);
+  return removed;
 }
 
 // Creates the hulls of the parts on the server, and sets their IDs.
@@ -149,27 +175,16 @@ absl::Status RegisterParts(TemporaryHulls* temporary, RobotModel* model) {
   return absl::OkStatus();
 }
 
-// Asks about every waypoint, with the rules of the scene.
+// Asks about every waypoint.
 absl::Status FindContacts(const Client& client, ViewScene* scene) {
+  std::vector<ViewObject> objects = scene->objects;
   for (uint32_t i = 0; i < scene->joints.waypoints.size(); ++i) {
     const auto poses = scene->joints.poses(scene->joints.waypoints[i]);
     if (!poses.ok()) return poses.status();
-    v1::FindCollisionsRequest request = scene->rules;
-    v1::PackedPlacements& packed = *request.mutable_packed_placements();
-    for (uint32_t part = 0; part < poses->size(); ++part) {
-      packed.add_hull_ids(scene->objects[part].hull_id);
-      packed.add_hulls(part);
-      packed.add_radii(scene->objects[part].radius);
-      packed.mutable_poses()->Add((*poses)[part].begin(), (*poses)[part].end());
-    }
-    bool collides = false;
-    const absl::Status asked =
-        client.FindCollisions(request, [&collides](const v1::FindCollisionsResponse& answer) {
-          collides = collides || answer.pairs_size() > 0;
-          return absl::OkStatus();
-        });
-    if (!asked.ok()) return asked;
-    if (collides) scene->joints.contacts.push_back(i);
+    for (size_t part = 0; part < poses->size(); ++part) objects[part].pose = (*poses)[part];
+    const auto collides = AnyCollides(client, scene->rules, scene->pairs, objects);
+    if (!collides.ok()) return collides.status();
+    if (*collides) scene->joints.contacts.push_back(i);
   }
   return absl::OkStatus();
 }
@@ -195,8 +210,10 @@ absl::Status AddRobot(const RobotSceneArguments& arguments, const Client& client
   const auto shared = std::make_shared<const RobotModel>(*std::move(model));
   AddJoints(shared, &scene->joints);
   PlaceParts(*shared, scene);
-  AddRules(*shared, *left_out, &scene->rules);
-  return FindContacts(client, scene);
+  absl::Status added =
+      arguments.scene.empty() ? absl::OkStatus() : AddSurroundings(arguments.scene, scene);
+  if (added.ok()) added = NamePairs(*shared, *left_out, arguments.ignored, scene);
+  return added.ok() ? FindContacts(client, scene) : added;
 }
 
 }  // namespace hulld

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <string>
+#include <vector>
 
 #include "client/client.h"
 #include "client/hullctl/robot/robot_model.h"
@@ -19,11 +20,15 @@ struct RobotSceneArguments {
   std::string srdf;
   // Table of waypoints; empty: none.
   std::string joints;
+  // File of the surroundings; empty: none.
+  std::string scene;
+  // Excluded pairs, as for RemoveIgnored.
+  std::vector<std::string> ignored;
 };
 
-// Adds the parts of the robot to an empty scene, with its joints and its trajectory, and checks the
-// waypoints. The hulls of the parts are temporary. INVALID_ARGUMENT and NOT_FOUND name the file and
-// its defect; errors of the calls.
+// Adds the parts of the robot to an empty scene, with its joints, its trajectory, and its
+// surroundings, and checks the waypoints. The hulls of the parts are temporary. INVALID_ARGUMENT
+// and NOT_FOUND name the file and its defect; errors of the calls.
 absl::Status AddRobot(const RobotSceneArguments& arguments, const Client& client,
                       TemporaryHulls* temporary, ViewScene* scene);
 

@@ -61,6 +61,16 @@ std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
   return absl::StrCat("[", pair.first, ",", pair.second, "]");
 }
 
+std::string ProblemOfPair(const char* type, std::pair<uint32_t, uint32_t> pair, uint64_t update,
+                          const absl::Status& status) {
+  return JsonObject()
+      .Add("type", type)
+      .AddJson("update", std::to_string(update))
+      .AddJson("pair", PairJson(pair))
+      .Add("problem", std::string_view(status.message().data(), status.message().size()))
+      .Close();
+}
+
 std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                           const ViewObject& b, uint64_t update, bool rest,
                           const v1::HullVersion& version_a, const v1::HullVersion& version_b,
@@ -78,19 +88,13 @@ std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& 
   return message.Close();
 }
 
-// Collects the pairs of a FindCollisions call.
+// Collects the pairs of a FindCollisions call, or of a batch.
 class SceneAnswer {
  public:
   explicit SceneAnswer(std::vector<uint32_t> objects) : objects_(std::move(objects)) {}
 
   absl::Status Take(const v1::FindCollisionsResponse& part) {
-    if (part.has_header()) revision_ = part.header().revision();
-    for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      AddProblem(problem.message());
-    }
-    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      AddProblem(problem.message());
-    }
+    TakeHead(part);
     if (part.has_totals()) totals_ = part.totals();
     const int count = part.pairs_size() / 2;
     if (!AreParallel(part.columns(), static_cast<size_t>(count))) {
@@ -102,13 +106,36 @@ class SceneAnswer {
       if (a >= objects_.size() || b >= objects_.size()) {
         return absl::InternalError("the answer names a placement that does not exist");
       }
-      const v1::Relation relation = part.columns().relations(i);
-      if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) continue;
-      absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
-                      QuoteJson(v1::Relation_Name(relation)), "]");
+      AddPair(a, b, part.columns().relations(i));
     }
     return absl::OkStatus();
   }
+
+  // Takes the rows of named pairs that collide, and counts them.
+  absl::Status Take(const v1::BatchCheckCollisionsResponse& part,
+                    const std::vector<uint32_t>& pairs) {
+    TakeHead(part);
+    const auto& relations = part.columns().relations();
+    if (2 * (part.first_pair() + static_cast<uint64_t>(relations.size())) > pairs.size()) {
+      return absl::InternalError("the answer has more rows than pairs were asked about");
+    }
+    const uint32_t* pair = pairs.data() + 2 * part.first_pair();
+    for (const int number : relations) {
+      const auto relation = static_cast<v1::Relation>(number);
+      totals_.set_touching(totals_.touching() + (relation == v1::RELATION_TOUCHING ? 1 : 0));
+      totals_.set_overlapping(totals_.overlapping() +
+                              (relation == v1::RELATION_OVERLAPPING ? 1 : 0));
+      totals_.set_within_tolerance(totals_.within_tolerance() +
+                                   (relation == v1::RELATION_WITHIN_TOLERANCE ? 1 : 0));
+      if (relation != v1::RELATION_SEPARATED) {
+        AddPair(std::min(pair[0], pair[1]), std::max(pair[0], pair[1]), relation);
+      }
+      pair += 2;
+    }
+    return absl::OkStatus();
+  }
+
+  bool has_pairs() const { return !pairs_.empty(); }
 
   std::string Json(uint64_t update) const {
     return TextMessage("collisions", {{"update", std::to_string(update)},
@@ -119,6 +146,23 @@ class SceneAnswer {
   }
 
  private:
+  template <typename Response>
+  void TakeHead(const Response& part) {
+    if (part.has_header()) revision_ = part.header().revision();
+    for (const v1::PlacementProblem& problem : part.placement_problems()) {
+      AddProblem(problem.message());
+    }
+    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+      AddProblem(problem.message());
+    }
+  }
+
+  void AddPair(uint32_t a, uint32_t b, v1::Relation relation) {
+    if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) return;
+    absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
+                    QuoteJson(v1::Relation_Name(relation)), "]");
+  }
+
   void AddProblem(const std::string& message) {
     constexpr int kMostProblems = 20;
     if (problem_count_++ >= kMostProblems) return;
@@ -126,7 +170,7 @@ class SceneAnswer {
   }
 
   // Object of each placement.
-  const std::vector<uint32_t> objects_;
+  std::vector<uint32_t> objects_;
   std::string pairs_;
   std::string problems_;
   size_t shown_ = 0;
@@ -149,6 +193,15 @@ v1::Placement PlacementOf(const ViewObject& object) {
   return placement;
 }
 
+// As PlacementOf, from the start of a motion to its end.
+v1::Placement MotionOf(const ViewObject& object) {
+  v1::Placement placement = PlacementOf(object);
+  if (!object.motion) return placement;
+  *placement.mutable_pose() = ToPose(object.motion->start);
+  *placement.mutable_end_pose() = ToPose(object.motion->end);
+  return placement;
+}
+
 // Packs the objects that have a hull; `objects` receives their indices.
 v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint32_t>* objects) {
   google::protobuf::RepeatedPtrField<v1::Placement> placements;
@@ -158,6 +211,34 @@ v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint3
     objects->push_back(i);
   }
   return PackPlacements(placements);
+}
+
+// Asks about the named pairs, or about all that the rules select.
+absl::StatusOr<SceneAnswer> AskScene(const Client& client, const v1::FindCollisionsRequest& rules,
+                                     const std::optional<std::vector<uint32_t>>& pairs,
+                                     const std::vector<ViewObject>& objects, double tolerance) {
+  std::vector<uint32_t> placed;
+  v1::PackedPlacements placements = Pack(objects, &placed);
+  SceneAnswer answer(std::move(placed));
+  if (placements.hulls_size() < 2 || (pairs && pairs->empty())) return answer;
+  absl::Status status;
+  if (pairs) {
+    v1::BatchCheckCollisionsRequest request;
+    *request.mutable_packed_placements() = std::move(placements);
+    request.mutable_pairs()->Add(pairs->begin(), pairs->end());
+    request.set_tolerance(tolerance);
+    status = client.BatchCheckCollisions(
+        request,
+        [&](const v1::BatchCheckCollisionsResponse& part) { return answer.Take(part, *pairs); });
+  } else {
+    v1::FindCollisionsRequest request = rules;
+    *request.mutable_packed_placements() = std::move(placements);
+    if (tolerance > 0) request.set_tolerance(tolerance);
+    status = client.FindCollisions(
+        request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
+  }
+  if (!status.ok()) return status;
+  return answer;
 }
 
 }  // namespace
@@ -190,20 +271,42 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
                        tolerant_json);
 }
 
+std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b) {
+  if (a.hull_id.empty() || b.hull_id.empty() || !(a.motion || b.motion)) return std::nullopt;
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = MotionOf(a);
+  *request.mutable_b() = MotionOf(b);
+  return request;
+}
+
+std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
+                             const absl::StatusOr<v1::CheckCollisionResponse>& response) {
+  if (!response.ok()) return ProblemOfPair("motion", pair, update, response.status());
+  return JsonObject()
+      .Add("type", "motion")
+      .AddJson("update", std::to_string(update))
+      .AddJson("pair", PairJson(pair))
+      .Add("relation", v1::Relation_Name(response->relation()))
+      .AddJson("firstContact", MessageJson(response->first_contact()))
+      .Close();
+}
+
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const v1::FindCollisionsRequest& rules,
+                                            const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update) {
-  v1::FindCollisionsRequest request = rules;
-  std::vector<uint32_t> placed;
-  *request.mutable_packed_placements() = Pack(objects, &placed);
-  if (tolerance > 0) request.set_tolerance(tolerance);
-  SceneAnswer answer(std::move(placed));
-  if (request.packed_placements().hulls_size() < 2) return answer.Json(update);
-  const absl::Status status = client.FindCollisions(
-      request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
-  if (!status.ok()) return status;
-  return answer.Json(update);
+  const auto answer = AskScene(client, rules, pairs, objects, tolerance);
+  if (!answer.ok()) return answer.status();
+  return answer->Json(update);
+}
+
+absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
+                                 const std::optional<std::vector<uint32_t>>& pairs,
+                                 const std::vector<ViewObject>& objects) {
+  const auto answer = AskScene(client, rules, pairs, objects, 0);
+  if (!answer.ok()) return answer.status();
+  return answer->has_pairs();
 }
 
 AnswerFeed::AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page)
@@ -224,6 +327,7 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   question_ = Question();
   question_.objects = scene.objects;
   question_.rules = scene.rules;
+  question_.pairs = scene.pairs;
   // The page asks after it receives the scene.
   asked_ = false;
 }
@@ -259,7 +363,7 @@ void AnswerFeed::Ask(const ViewQuestion& question) {
 void AnswerFeed::HullsChanged() {
   {
     const std::lock_guard lock(mutex_);
-    question_.hulls_changed = true;
+    question_.motion_is_stale = true;
     asked_ = true;
   }
   changed_.notify_all();
@@ -274,9 +378,10 @@ void AnswerFeed::Run() {
       if (ended_) return;
       question = question_;
       asked_ = false;
-      question_.hulls_changed = false;
+      question_.motion_is_stale = false;
     }
     if (question.pair && !AnswerPair(question)) return;
+    if (!AnswerMotion(question)) return;
     if (!question.rest && question.objects.size() > kMostObjectsInMotion) continue;
     if (!AnswerScene(question)) return;
   }
@@ -288,13 +393,7 @@ bool AnswerFeed::AnswerPair(const Question& question) {
   const auto answer = question.rest ? RestingAnswer(question) : MovingAnswer(question);
   if (answer.ok()) return page_->SendText(*answer);
   stream_.reset();
-  const std::string message(answer.status().message().data(), answer.status().message().size());
-  return page_->SendText(JsonObject()
-                             .Add("type", "answer")
-                             .AddJson("update", std::to_string(question.update))
-                             .AddJson("pair", PairJson(*question.pair))
-                             .Add("problem", message)
-                             .Close());
+  return page_->SendText(ProblemOfPair("answer", *question.pair, question.update, answer.status()));
 }
 
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
@@ -373,9 +472,22 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
                        streamed_version_b_, RowAt(columns, 0));
 }
 
+bool AnswerFeed::AnswerMotion(const Question& question) {
+  const auto request = question.pair ? MotionRequest(question.objects[question.pair->first],
+                                                     question.objects[question.pair->second])
+                                     : std::nullopt;
+  std::string asked =
+      request ? absl::StrCat(PairJson(*question.pair), request->SerializeAsString()) : "";
+  const bool is_known = asked == asked_motion_ && !question.motion_is_stale;
+  asked_motion_ = std::move(asked);
+  if (!request || is_known) return true;
+  return page_->SendText(
+      MotionAnswerJson(*question.pair, question.update, client_.CheckCollision(*request)));
+}
+
 bool AnswerFeed::AnswerScene(const Question& question) const {
-  const auto answer = SceneAnswerJson(client_, question.rules, question.objects, question.tolerance,
-                                      question.update);
+  const auto answer = SceneAnswerJson(client_, question.rules, question.pairs, question.objects,
+                                      question.tolerance, question.update);
   if (answer.ok()) return page_->SendText(*answer);
   return page_->SendText(
       ProblemMessage(absl::StrCat("Colliding pairs are unknown: ", answer.status().message())));

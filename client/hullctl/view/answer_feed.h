@@ -38,12 +38,14 @@ class AnswerFeed {
   struct Question {
     std::vector<ViewObject> objects;
     v1::FindCollisionsRequest rules;
+    std::optional<std::vector<uint32_t>> pairs;
     std::optional<std::pair<uint32_t, uint32_t>> pair;
     double tolerance = 0;
     bool certificate = false;
     uint64_t update = 0;
     bool rest = true;
-    bool hulls_changed = false;
+    // True if a hull or the scene changed since the last answer about the motion.
+    bool motion_is_stale = true;
   };
 
   void Run();
@@ -53,6 +55,8 @@ class AnswerFeed {
   absl::StatusOr<std::string> RestingAnswer(const Question& question) const;
   // Returns the pair's answer with the tolerance, as JSON.
   absl::StatusOr<std::string> TolerantAnswer(const Question& question) const;
+  // Sends the first contact of the pair, if it moves, unless the page has it.
+  bool AnswerMotion(const Question& question);
   bool AnswerScene(const Question& question) const;
 
   const Client& client_;
@@ -65,6 +69,8 @@ class AnswerFeed {
   bool streamed_certificate_ = false;
   v1::HullVersion streamed_version_a_;
   v1::HullVersion streamed_version_b_;
+  // The pair and the request of the last question about a motion; empty if there was none.
+  std::string asked_motion_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -86,11 +92,24 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
 // Returns the request for that answer, with or without a proof.
 v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate);
 
-// Returns the message `collisions` for a scene.
+// Returns the request for the first contact of a pair; nothing if neither moves.
+std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b);
+
+// Returns the message `motion` for its response or error.
+std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
+                             const absl::StatusOr<v1::CheckCollisionResponse>& response);
+
+// Returns the message `collisions` for a scene; rules, pairs: as in ViewScene.
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const v1::FindCollisionsRequest& rules,
+                                            const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update);
+
+// Returns true if a pair of the scene collides.
+absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
+                                 const std::optional<std::vector<uint32_t>>& pairs,
+                                 const std::vector<ViewObject>& objects);
 
 }  // namespace hulld
 

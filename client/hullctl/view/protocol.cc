@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -249,15 +250,17 @@ std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
   std::string json = "[";
   for (size_t i = from; i < objects.size(); ++i) {
     const ViewObject& object = objects[i];
-    absl::StrAppend(&json, i > from ? "," : "",
-                    JsonObject()
-                        .Add("name", object.name)
-                        .Add("hullId", object.hull_id)
-                        .AddJson("file", std::to_string(object.file))
-                        .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
-                        .AddJson("radius", NumberJson(object.radius))
-                        .AddJson("isJointed", object.is_jointed ? "true" : "false")
-                        .Close());
+    absl::StrAppend(
+        &json, i > from ? "," : "",
+        JsonObject()
+            .Add("name", object.name)
+            .Add("hullId", object.hull_id)
+            .AddJson("file", std::to_string(object.file))
+            .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
+            .AddJson("radius", NumberJson(object.radius))
+            .AddJson("isJointed", object.is_jointed ? "true" : "false")
+            .AddJson("endPose", object.motion ? PosesJson({object.motion->end}) : "null")
+            .Close());
   }
   return json + "]";
 }
@@ -291,16 +294,18 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
   const auto values_json = [](const std::vector<double>& values) {
     return NumbersJson(values.data(), values.size());
   };
-  return TextMessage("scene",
-                     {{"number", std::to_string(number)},
-                      {"key", QuoteJson(scene.key)},
-                      {"title", QuoteJson(scene.title)},
-                      {"note", QuoteJson(scene.note)},
-                      {"files", files + "]"},
-                      {"objects", ObjectsJson(scene.objects)},
-                      {"joints", joined(scene.joints.joints, joint_json)},
-                      {"waypoints", joined(scene.joints.waypoints, values_json)},
-                      {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"}});
+  std::vector<uint32_t> named = scene.pairs.value_or(std::vector<uint32_t>());
+  named.resize(std::min<size_t>(named.size(), 2));
+  return TextMessage("scene", {{"number", std::to_string(number)},
+                               {"key", QuoteJson(scene.key)},
+                               {"title", QuoteJson(scene.title)},
+                               {"note", QuoteJson(scene.note)},
+                               {"files", files + "]"},
+                               {"objects", ObjectsJson(scene.objects)},
+                               {"joints", joined(scene.joints.joints, joint_json)},
+                               {"waypoints", joined(scene.joints.waypoints, values_json)},
+                               {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"},
+                               {"named", "[" + absl::StrJoin(named, ",") + "]"}});
 }
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {

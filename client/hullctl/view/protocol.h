@@ -27,11 +27,12 @@ namespace hulld {
 //   geometry   {hullIds, files}: requests hulls and bodies by ID and files by index; one frame
 //              answers each. From then on `hull` reports their changes, as for objects.
 //   simplify   {hullId, side: "inside"|"outside", maxError, maxVertices}: a frame answers it.
-//   question   {scene, update, objects, poses, pair, tolerance, certificate, rest}: for scene
-//              number `scene`: new poses of some objects (seven numbers each, as in Pose), the pair
-//              to report in detail (two indices, or none), the scene's tolerance, true if the
-//              pair's certificate is wanted, and true if nothing moves now. A new question replaces
-//              the pending one and keeps its poses. `answer` and `collisions` answer it.
+//   question   {scene, update, objects, poses, time, pair, tolerance, certificate, rest}: for scene
+//              number `scene`: new poses of some objects (seven numbers each, as in Pose), the time
+//              of these poses in a scene with motions, the pair to report in detail (two indices,
+//              or none), the scene's tolerance, true if the pair's certificate is wanted, and true
+//              if nothing moves now. A new question replaces the pending one and keeps its poses.
+//              `answer`, `motion`, and `collisions` answer it.
 //   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
 //              numbers each. Refused unless `hello` permits it. `edited` answers it; pending edits
 //              of a hull may share an answer.
@@ -42,11 +43,12 @@ namespace hulld {
 //   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: true if the page
 //              may change hulls.
 //   scene      {number, key, title, note, files: [{name}], objects: [OBJECT], joints: [{name, low,
-//              high, value}], waypoints: [values], contacts}: replaces all previous content. OBJECT
-//              is {name, hullId, file, pose, radius, isJointed}: hullId is that of a hull or a
-//              body, "" if absent; file is -1 if absent; isJointed: moved by the joints only. Later
-//              messages name objects and files by their index here. contacts: the waypoints with a
-//              colliding pair.
+//              high, value}], waypoints: [values], contacts, named}: replaces all previous content.
+//              OBJECT is {name, hullId, file, pose, radius, isJointed, endPose}: hullId is that of
+//              a hull or a body, "" if absent; file is -1 if absent; isJointed: moved by the joints
+//              only; endPose: the end of its motion, null if it has none. Later messages name
+//              objects and files by their index here. contacts: the waypoints with a colliding
+//              pair. named: the first pair that the file names; empty if it names none.
 //   objects    {scene, objects}: appends objects to that scene.
 //   hull       {event}: a HullEvent of the contract: a hull or a body changed, appeared, or was
 //              deleted.
@@ -55,8 +57,11 @@ namespace hulld {
 //              pair; with a body, for the deciding pieces. The result of CheckCollision at rest, of
 //              StreamCollisions otherwise. tolerant, at rest and with a tolerance:
 //              {tolerance, relation, rung}, the result of CheckCollision with it.
+//   motion     {update, pair, relation, firstContact} or {update, pair, problem}: for the requested
+//              pair, if it moves: the result of CheckCollision for the motions from start to end.
+//              Not repeated while it stays the same.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
-//              of the scene that collide (FindCollisions), a < b.
+//              of the scene that collide (FindCollisions), or all named pairs that do, a < b.
 //   poses      {scene, poses}: of all jointed objects, seven numbers each.
 //   edited     {hullId, done, message}: result of an edit; message is for people.
 //   problem    {message}: an error, for people.
@@ -73,8 +78,9 @@ namespace hulld {
 //              part.
 //   {kind: "missing", hullId | file, message}: it does not exist.
 //
-// A recording, for a page without a bridge, is {hello, scene, frames: [base64], states: [{poses,
-// collisions, answers: [answer]}]}: the state at the start or, if the scene has waypoints, at each.
+// A recording, for a page without a bridge, is {hello, scene, frames: [base64], motions: [motion],
+// states: [{time, poses, collisions, answers: [answer]}]}: the state at the start, at each
+// waypoint, or at several times of the motions, among them those of all first contacts.
 
 // A parsed message of the page.
 struct ViewQuestion {

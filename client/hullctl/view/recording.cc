@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/view/answer_feed.h"
 #include "client/hullctl/view/geometry_feed.h"
@@ -58,10 +59,31 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<Vie
   return answers + "]";
 }
 
+// Returns the messages `motion` of all pairs that move, and adds the ends of their brackets to
+// `times`.
+std::string AllMotions(const Client& client, const std::vector<ViewObject>& objects,
+                       std::set<double>* times) {
+  std::string motions = "[";
+  for (uint32_t a = 0; a < objects.size(); ++a) {
+    for (uint32_t b = a + 1; b < objects.size(); ++b) {
+      const auto request = MotionRequest(objects[a], objects[b]);
+      if (!request) continue;
+      const auto response = client.CheckCollision(*request);
+      absl::StrAppend(&motions, motions.size() > 1 ? "," : "",
+                      MotionAnswerJson({a, b}, 0, response));
+      if (!response.ok() || !response->first_contact().has_contact_time()) continue;
+      times->insert(response->first_contact().separated_until());
+      times->insert(response->first_contact().contact_time());
+    }
+  }
+  return motions + "]";
+}
+
 // Returns the poses of the jointed objects, and the answers about all of them.
-absl::StatusOr<std::string> State(const Client& client, const v1::FindCollisionsRequest& rules,
-                                  const std::vector<ViewObject>& objects, bool with_answers) {
-  const auto collisions = SceneAnswerJson(client, rules, objects, 0, 0);
+absl::StatusOr<std::string> State(const Client& client, const ViewScene& scene,
+                                  const std::vector<ViewObject>& objects, double time,
+                                  bool with_answers) {
+  const auto collisions = SceneAnswerJson(client, scene.rules, scene.pairs, objects, 0, 0);
   if (!collisions.ok()) return collisions.status();
   const auto answers = AllPairs(client, with_answers ? objects : std::vector<ViewObject>());
   if (!answers.ok()) return answers.status();
@@ -70,18 +92,31 @@ absl::StatusOr<std::string> State(const Client& client, const v1::FindCollisions
     if (object.is_jointed) poses.push_back(object.pose);
   }
   return JsonObject()
+      .AddJson("time", ShortestText(time))
       .AddJson("poses", PosesJson(poses))
       .AddJson("collisions", *collisions)
       .AddJson("answers", *answers)
       .Close();
 }
 
-absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& scene) {
+size_t PairCount(const ViewScene& scene) {
+  const size_t count = scene.objects.size();
+  return count * (count - 1) / 2;
+}
+
+// Returns the state at the start, at each waypoint, or at each of the `times` of a scene with
+// motions.
+absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& scene,
+                                      const std::vector<double>& times) {
   std::vector<ViewObject> objects = scene.objects;
-  const size_t count = std::max<size_t>(1, scene.joints.waypoints.size());
-  const size_t pairs = objects.size() * (objects.size() - 1) / 2;
+  const size_t count = std::max(times.size(), scene.joints.waypoints.size());
+  const bool with_answers = count * PairCount(scene) <= kMostRecordedAnswers;
   std::string states = "[";
   for (size_t i = 0; i < count; ++i) {
+    const double time = i < times.size() ? times[i] : 0;
+    for (ViewObject& object : objects) {
+      if (object.motion) object.pose = PoseAt(*object.motion, time);
+    }
     if (!scene.joints.waypoints.empty()) {
       const auto poses = scene.joints.poses(scene.joints.waypoints[i]);
       if (!poses.ok()) return poses.status();
@@ -90,7 +125,7 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
         if (object.is_jointed) object.pose = *pose++;
       }
     }
-    const auto state = State(client, scene.rules, objects, count * pairs <= kMostRecordedAnswers);
+    const auto state = State(client, scene, objects, time, with_answers);
     if (!state.ok()) return state.status();
     absl::StrAppend(&states, i > 0 ? "," : "", *state);
   }
@@ -100,12 +135,20 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
 }  // namespace
 
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene) {
-  const auto states = AllStates(program.client, scene);
+  std::set<double> times = {0};
+  const auto moves = [](const ViewObject& object) { return object.motion.has_value(); };
+  if (std::ranges::any_of(scene.objects, moves)) {
+    for (int step = 1; step <= kRecordedSteps; ++step) times.insert(1.0 * step / kRecordedSteps);
+  }
+  const bool is_small = PairCount(scene) <= kMostRecordedAnswers;
+  const std::string motions = is_small ? AllMotions(program.client, scene.objects, &times) : "[]";
+  const auto states = AllStates(program.client, scene, {times.begin(), times.end()});
   if (!states.ok()) return states.status();
   return JsonObject()
       .AddJson("hello", HelloMessage(program))
       .AddJson("scene", SceneMessage(scene, 1))
       .AddJson("frames", AllFrames(program.client, scene))
+      .AddJson("motions", motions)
       .AddJson("states", *states)
       .Close();
 }

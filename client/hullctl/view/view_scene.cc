@@ -64,6 +64,14 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
 
 }  // namespace
 
+Pose7 PoseAt(const ViewMotion& motion, double t) {
+  Pose7 pose;
+  for (size_t i = 0; i < pose.size(); ++i) {
+    pose[i] = (1 - t) * motion.start[i] + t * motion.end[i];
+  }
+  return pose;
+}
+
 std::string ShownName(const std::string& path) {
   return Printable(std::filesystem::path(path).filename().string());
 }
@@ -182,12 +190,18 @@ absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
     v1::Placement placement = file->PlacementOf(i);
     const std::string& name =
         file->names.empty() && !placement.has_points() ? hull_id : file->NameOf(i);
-    scene->objects.push_back({name, hull_id, -1, NumbersOf(placement.pose()), placement.radius()});
+    ViewObject& object = scene->objects.emplace_back(
+        ViewObject{name, hull_id, -1, NumbersOf(placement.pose()), placement.radius()});
+    if (placement.has_end_pose()) {
+      const ViewMotion motion{object.pose, NumbersOf(placement.end_pose())};
+      if (motion.start != motion.end) object.motion = motion;
+    }
     if (!placement.has_points()) continue;
     indices.push_back(scene->objects.size() - 1);
     shapes.push_back(std::move(*placement.mutable_points()));
   }
   if (absl::Status added = AddShapes(indices, shapes, scene); !added.ok()) return added;
+  scene->pairs = std::move(file->pairs);
   scene->rules = std::move(file->request);
   scene->rules.clear_placements();
   scene->rules.clear_packed_placements();

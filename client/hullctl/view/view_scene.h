@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,15 @@ struct FileShape {
 };
 inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
+// A motion over the time t in [0, 1], as of a Placement with an end pose.
+struct ViewMotion {
+  Pose7 start = kIdentityPose;
+  Pose7 end = kIdentityPose;
+};
+
+// Returns the pose at time t, rounded: each number is (1 - t) start + t end, as in page/pose.js.
+Pose7 PoseAt(const ViewMotion& motion, double t);
+
 // A displayed object: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
   std::string name;
@@ -41,12 +51,14 @@ struct ViewObject {
   // Index into ViewScene::files, -1: none.
   int file = -1;
   Pose7 pose = kIdentityPose;
-  // Placement.radius. Only the hull is drawn; answers and proofs take it into account.
+  // Placement.radius.
   double radius = 0;
   // FileShape::hull of its file; null for an ID.
   std::shared_ptr<const HullMesh> hull = nullptr;
   // Moved by the joints of the scene only.
   bool is_jointed = false;
+  // Moved by the time of the scene only; `pose` is its pose at that time.
+  std::optional<ViewMotion> motion = std::nullopt;
 };
 
 // Joints that move objects of a scene, and a trajectory of them.
@@ -79,9 +91,12 @@ struct ViewScene {
   std::vector<std::string> prefixes;
   // Hulls under the prefixes that are shown only as pieces of bodies.
   std::vector<std::string> pieces;
-  // Selection of the queried pairs: groups and movers of a scene file or a robot. Without
-  // placements.
+  // Selection of the queried pairs, unless `pairs` names them: groups and movers of a scene file.
+  // Without placements.
   v1::FindCollisionsRequest rules;
+  // The queried pairs, two indices of objects each, if a scene file or a robot names them. Requires
+  // a hull of every object.
+  std::optional<std::vector<uint32_t>> pairs;
   // Empty unless the scene is a robot.
   ViewJoints joints;
 };

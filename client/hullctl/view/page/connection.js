@@ -35,7 +35,8 @@ class BridgeConnection {
   }
 }
 
-// Answers from a recording, at the waypoint last asked for; unrecorded questions get no answer.
+// Answers from a recording, at the waypoint or time last asked for; unrecorded questions get no
+// answer.
 class Recording {
   constructor(handlers, recording) {
     this.live = false;
@@ -53,16 +54,26 @@ class Recording {
     });
   }
 
-  send({type, scene, waypoint, pair, update}) {
+  send({type, scene, waypoint, time, pair, update}) {
+    const {states, motions} = this.recording;
     if (type === 'joints') {
-      this.state = this.recording.states[waypoint];
+      this.state = states[waypoint];
       this.handlers.poses({scene, poses: this.state.poses});
       this.handlers.collisions(this.state.collisions);
     }
     if (type !== 'question' || !pair) return;
+    const state = time === null ? this.state : states.find((each) => each.time === time);
+    if (!state) return;
+    if (state !== this.state) {
+      this.state = state;
+      this.handlers.collisions(state.collisions);
+    }
     const [a, b] = pair;
-    const answer = this.state.answers.find(({pair}) => pair[0] === a && pair[1] === b);
+    const ofPair = ({pair}) => pair[0] === a && pair[1] === b;
+    const answer = state.answers.find(ofPair);
     if (answer) this.handlers.answer({...answer, update});
+    const motion = motions.find(ofPair);
+    if (motion) this.handlers.motion({...motion, update});
   }
 }
 

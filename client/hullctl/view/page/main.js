@@ -1,21 +1,21 @@
 // Connects the page: messages change the model, the model notifies the parts, the parts draw.
 import {connect} from 'hulld/connection.js';
+import {Controls} from 'hulld/controls.js';
 import {Crowd} from 'hulld/drawing/crowd.js';
 import {Gizmo} from 'hulld/drawing/gizmo.js';
 import {Ground} from 'hulld/drawing/ground.js';
 import {Labels} from 'hulld/drawing/labels.js';
 import {Marks} from 'hulld/drawing/marks.js';
 import {ObjectView} from 'hulld/drawing/object_view.js';
-import {pick} from 'hulld/drawing/picking.js';
-import {keepPicture, savePicture} from 'hulld/drawing/picture.js';
+import {keepPicture} from 'hulld/drawing/picture.js';
 import {Ruler} from 'hulld/drawing/ruler.js';
 import {ShellView} from 'hulld/drawing/shell_view.js';
 import {Stage} from 'hulld/drawing/stage.js';
+import {Joints} from 'hulld/joints.js';
 import {Model} from 'hulld/model.js';
+import {Motion} from 'hulld/motion.js';
 import {AnswerPanel} from 'hulld/panels/answer_panel.js';
 import {element, grouped} from 'hulld/panels/dom.js';
-import {JointPanel} from 'hulld/panels/joint_panel.js';
-import {bindKeys} from 'hulld/panels/keys.js';
 import {ObjectPanel} from 'hulld/panels/object_panel.js';
 import {TimeLine} from 'hulld/panels/time_line.js';
 import {Tree} from 'hulld/panels/tree.js';
@@ -49,10 +49,11 @@ class Viewer {
       objects: (message) => this.moreObjects(message),
       hull: (message) => this.hullChanged(message.event),
       answer: (message) => this.answer(message),
+      motion: (message) => this.isCurrent(message) && this.motion.arrived(message),
       collisions: (message) => this.collisions(message),
       poses: (message) => this.posesCame(message),
       problem: (message) => {
-        this.joining = false;
+        this.joints.failed();
         this.say(message.message);
       },
       edited: (message) => this.edited(message),
@@ -63,14 +64,11 @@ class Viewer {
     this.objectPanel = new ObjectPanel(
         this.model, this.connection.live, (...wish) => this.simplify(...wish),
         (edit) => this.connection.send({type: 'edit', ...edit}));
-    this.jointPanel = new JointPanel(
-        this.model, this.connection.live, (values, rest) => this.moveJoints(values, rest));
-    this.timeLine = new TimeLine(this.model, this.connection.live, (...where) => {
-      this.moveJoints(...where);
-      this.jointPanel.update();
-    });
+    this.timeLine = new TimeLine();
+    this.joints = new Joints(this.model, this.connection);
     this.listen();
-    this.bindControls();
+    this.motion = new Motion(this.model, this.stage, this.connection, this.timeLine);
+    this.controls = new Controls(this);
     this.stage.beforeFrame(
         (now) => [...this.views.values()].reduce((any, view) => view.fade(now) || any, false));
     if (document.body.classList.contains('picture')) keepPicture(this.stage);
@@ -90,7 +88,7 @@ class Viewer {
       this.tree.rebuild();
       this.answerPanel.rebuild();
       this.objectPanel.rebuild();
-      this.updateTools();
+      this.controls.updateTools();
       this.ask(true);
     });
     model.on('pose', ({indices, rest}) => {
@@ -103,7 +101,7 @@ class Viewer {
       this.gizmo.update();
       this.shell.place();
       this.objectPanel.updatePose();
-      this.updateTools();
+      this.controls.updateTools();
       this.stage.draw(!rest);
       this.ask(rest);
     });
@@ -172,12 +170,12 @@ class Viewer {
     this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
-    this.syncShown();
+    this.controls.syncShown();
+    this.joints.rebuild();
+    this.motion.rebuild();
+    this.timeLine.load(this.joints.track() ?? this.motion.track());
     model.tell('selection');
     this.mayChoosePair = true;
-    this.joining = false;
-    this.jointPanel.rebuild();
-    this.timeLine.rebuild();
     this.answerPanel.updateCollisions();
     this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
     this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
@@ -327,10 +325,11 @@ class Viewer {
       }
       this.gizmo.update();
       this.marks.rebuild();
+      this.motion.sweeps.rebuild();
       this.labels.rebuild();
       this.objectPanel.rebuild();
       this.answerPanel.update();
-      this.syncShown();
+      this.controls.syncShown();
     });
   }
 
@@ -345,10 +344,16 @@ class Viewer {
     this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
     this.stage.isFitted = true;
     const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);
+    const [moving] = model.moving;
+    const [first, second] = model.named;
     if (hulls.length === 2)
       model.select(hulls[1].index, hulls[0].index);
     else if (model.objects.length === 1)
       model.select(0);
+    else if (second !== undefined && !model.joints.length)
+      model.select(second, first);
+    else if (moving)
+      model.select(moving.index);
     else if (model.collisions.pairs.length)
       this.chooseCollidingPair();
     else
@@ -366,7 +371,7 @@ class Viewer {
 
   answer(message) {
     const {pair} = this.model;
-    if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] ||
+    if (!pair || !this.isCurrent(message) || message.pair[0] !== pair[0] ||
         message.pair[1] !== pair[1])
       return;
     const before = this.model.decidingPieces();
@@ -377,8 +382,13 @@ class Viewer {
     if (this.model.decidingPieces().some((piece, k) => piece !== before[k])) this.tree.rebuild();
   }
 
+  // Returns true if a message answers a question about the current scene.
+  isCurrent({update}) {
+    return update >= this.firstUpdate;
+  }
+
   collisions(message) {
-    if (message.update < this.firstUpdate) return;
+    if (!this.isCurrent(message)) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
     this.model.setCollisions(message);
   }
@@ -408,6 +418,7 @@ class Viewer {
       update: ++this.update,
       objects,
       poses: objects.flatMap((index) => model.objects[index].pose),
+      time: model.time,
       pair: model.pair || [],
       tolerance: model.tolerance,
       certificate: model.wantsCertificate(rest),
@@ -415,28 +426,9 @@ class Viewer {
     });
   }
 
-  // Moves the joints. The latest values win while an answer is in flight.
-  moveJoints(values, rest, waypoint = null) {
-    const {model} = this;
-    values.forEach((value, i) => model.joints[i].value = value);
-    this.wish = {values: values.slice(), rest, waypoint};
-    if (!this.joining) this.sendJoints();
-  }
-
-  sendJoints() {
-    const {values, rest, waypoint} = this.wish;
-    this.wish = null;
-    this.joining = true;
-    this.joiningRest = rest;
-    this.connection.send({type: 'joints', scene: this.model.number, values, waypoint});
-  }
-
   posesCame({scene, poses}) {
     if (scene !== this.model.number) return;
-    const rest = this.joiningRest;
-    this.joining = false;
-    if (this.wish) this.sendJoints();
-    this.model.setJointedPoses(poses, rest);
+    this.joints.arrived(poses);
     const bounds = this.model.bounds();
     if (this.fitted && bounds) this.stage.keepInView(bounds);
   }
@@ -462,8 +454,9 @@ class Viewer {
 
   rebuildViews() {
     const {model, stage} = this;
-    const isSingle = ({index, opacity, file}) => !model.isCrowd || index === model.selected ||
-        index === model.other || opacity < 1 || (file >= 0 && model.show.mesh);
+    const isSingle = (object) => !model.isCrowd || object.index === model.selected ||
+        object.index === model.other || object.opacity < 1 ||
+        (object.file >= 0 && model.show.mesh) || model.roundedOf(object);
     const single = model.objects.filter(isSingle);
     const wanted = new Set(single.map(({index}) => index));
     for (const [index, view] of this.views) {
@@ -497,20 +490,6 @@ class Viewer {
     this.rebuildGround();
   }
 
-  setOrthographic(on) {
-    this.stage.setOrthographic(on);
-    $('orthographic').setAttribute('aria-pressed', String(on));
-  }
-
-  toggleRuler() {
-    this.ruler.toggle();
-    $('measure').setAttribute('aria-pressed', String(this.ruler.on));
-  }
-
-  save() {
-    savePicture(this.stage, 'hulld.png');
-  }
-
   // Runs `work` a single time before the next frame, regardless of the number of calls.
   soon(name, work) {
     this.waiting ??= new Map();
@@ -524,7 +503,7 @@ class Viewer {
     this.waiting.set(name, work);
   }
 
-  // --- The bar and the tools ---
+  // --- The bar ---
 
   updateStatus(revision = undefined) {
     if (isNewer(revision, this.revision)) this.revision = revision;
@@ -553,162 +532,7 @@ class Viewer {
     this.rebuildGround();
     this.ruler.rebuild();
     this.marks.rebuild();
-  }
-
-  syncShown() {
-    const {model} = this;
-    for (const [key, on] of Object.entries(model.show)) $(`show-${key}`).checked = on;
-    $('show-mesh').disabled = !model.files.length;
-  }
-
-  updateTools() {
-    const object = this.model.selected === null ? null : this.model.objects[this.model.selected];
-    const can = Boolean(object?.hullId) && this.connection.live && !object.isJointed;
-    for (const [id, mode] of [['mode-move', 'translate'], ['mode-turn', 'rotate']]) {
-      $(id).disabled = !can;
-      $(id).setAttribute('aria-pressed', String(can && this.gizmo.mode === mode));
-    }
-    $('mode-reset').disabled = !can || object.pose === object.start;
-    $('undo').disabled = !this.model.history.length;
-    if (!this.connection.live) document.querySelector('.tools').hidden = true;
-    this.gizmo.handles.enabled = this.connection.live;
-    if (!this.connection.live) this.gizmo.handles.detach();
-  }
-
-  bindControls() {
-    const {model, stage} = this;
-    for (const key of Object.keys(model.show)) {
-      $(`show-${key}`).addEventListener('change', ({target}) => {
-        model.show[key] = target.checked;
-        model.tell('shown');
-      });
-    }
-    $('fit').addEventListener('click', () => this.fit());
-    $('theme').addEventListener(
-        'click', () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark'));
-    $('help').addEventListener('click', () => $('keys').showModal());
-    $('scene-choice').addEventListener('change', ({target}) => {
-      this.connection.send({type: 'show', key: target.value});
-      $('canvas').focus();
-    });
-    $('mode-move').addEventListener('click', () => this.mode('translate'));
-    $('mode-turn').addEventListener('click', () => this.mode('rotate'));
-    $('mode-reset').addEventListener('click', () => this.reset());
-    $('undo').addEventListener('click', () => model.undo());
-    for (const button of document.querySelectorAll('[data-view]')) {
-      button.addEventListener('click', () => this.fit(button.dataset.view));
-    }
-    $('orthographic').addEventListener('click', () => this.setOrthographic(!stage.isOrthographic));
-    $('measure').addEventListener('click', () => this.toggleRuler());
-    $('save').addEventListener('click', () => this.save());
-    for (const tab of document.querySelectorAll('.tabs button')) {
-      tab.addEventListener('click', () => this.showPanel(tab.dataset.panel));
-    }
-    this.showPanel('answer');
-    this.bindPicking();
-    bindKeys({
-      fit: () => this.fit(),
-      flyToSelected: () =>
-          model.selected !== null && model.tell('fly', [model.objects[model.selected]]),
-      step: (by) => this.step(by),
-      nextOther: () => this.nextOther(),
-      nextCollision: () => this.nextCollision(),
-      deselect: () => (this.ruler.on ? this.toggleRuler() : model.select(null)),
-      mode: (mode) => this.mode(mode),
-      reset: () => this.reset(),
-      undo: () => model.undo(),
-      view: (name) => this.fit(name),
-      orthographic: () => this.setOrthographic(!stage.isOrthographic),
-      measure: () => this.toggleRuler(),
-      save: () => this.save(),
-      show: (key) => $(`show-${key}`).click(),
-      toggleVisible: () => this.toggleVisible(),
-      search: () => {
-        this.showPanel('objects');
-        $('search').focus();
-      },
-      theme: () => $('theme').click(),
-      help: () => $('keys').showModal(),
-      pan: (x, y) => stage.pan(x, y),
-      orbit: (around, over) => stage.orbit(around, over),
-      zoom: (factor) => stage.zoom(factor),
-      nudge: (axis, steps) => this.connection.live && this.gizmo.nudge(axis, steps),
-      play: () => this.timeLine.play(),
-      scene: (key) => this.scenes?.length > 1 && this.connection.send({type: 'show', key}),
-    });
-  }
-
-  // Selects on a click, but not on a drag.
-  bindPicking() {
-    const canvas = $('canvas');
-    let down = null;
-    canvas.addEventListener('pointerdown', ({clientX, clientY, button}) => {
-      down = button === 0 ? [clientX, clientY] : null;
-      this.gizmo.dragged = false;
-      canvas.focus();
-    });
-    canvas.addEventListener('pointerup', ({clientX, clientY, shiftKey, offsetX, offsetY}) => {
-      if (!down || this.gizmo.dragged || this.gizmo.handles.dragging) return;
-      if (Math.hypot(clientX - down[0], clientY - down[1]) > 4) return;
-      if (this.ruler.on) {
-        this.ruler.take(offsetX, offsetY);
-        return;
-      }
-      const hit = pick(this.model, this.stage, offsetX, offsetY);
-      if (hit)
-        this.tree.choose(this.model.objects[hit.index], shiftKey);
-      else
-        this.model.select(null);
-    });
-  }
-
-  showPanel(name) {
-    document.querySelector('main').dataset.panel = name;
-    for (const tab of document.querySelectorAll('.tabs button')) {
-      tab.setAttribute('aria-selected', String(tab.dataset.panel === name));
-    }
-  }
-
-  mode(mode) {
-    this.gizmo.setMode(mode);
-    this.updateTools();
-  }
-
-  reset() {
-    const object = this.model.objects[this.model.selected];
-    if (object && !object.isJointed) this.model.setPose(object.index, object.start, true);
-  }
-
-  toggleVisible() {
-    const object = this.model.objects[this.model.selected];
-    if (!object) return;
-    object.visible = !object.visible;
-    this.model.tell('visibility');
-  }
-
-  step(by) {
-    const present = this.model.objects.filter(({gone}) => !gone);
-    if (!present.length) return;
-    const at = present.findIndex(({index}) => index === this.model.selected);
-    const next =
-        at < 0 ? (by > 0 ? 0 : present.length - 1) : (at + by + present.length) % present.length;
-    this.model.select(present[next].index);
-  }
-
-  nextOther() {
-    const {model} = this;
-    const others = model.objects.filter(
-        ({hullId, gone, index}) => hullId && !gone && index !== model.selected);
-    if (model.selected === null || !others.length) return;
-    const at = others.findIndex(({index}) => index === model.other);
-    model.select(model.selected, others[(at + 1) % others.length].index);
-  }
-
-  nextCollision() {
-    const {pairs} = this.model.collisions;
-    if (!pairs.length) return;
-    this.visited = ((this.visited ?? -1) + 1) % pairs.length;
-    this.answerPanel.visit(pairs[this.visited][0], pairs[this.visited][1]);
+    this.motion.sweeps.rebuild();
   }
 }
 

@@ -1,7 +1,8 @@
 // The displayed scene and the user's choices, without drawing. Parts of the page listen to its
 // changes.
 import {CROWD_COLOR, OBJECT_COLORS} from 'hulld/palette.js';
-import {samePose, toWorld} from 'hulld/pose.js';
+import {IDENTITY, poseAt, samePose, toWorld} from 'hulld/pose.js';
+import {RoundedShape} from 'hulld/rounded_shape.js';
 
 // Maximum number of objects drawn individually; more are drawn as a crowd, in few draw calls.
 const MOST_SINGLE_OBJECTS = 24;
@@ -15,13 +16,24 @@ const MOST_UNDONE = 200;
 // Bodies with more pairs of pieces than this are queried without a certificate.
 const MOST_PIECE_PAIRS = 1000;
 
+// Times at which the path of a moving object is enclosed in the picture.
+const PATH_TIMES = [0, 0.25, 0.5, 0.75, 1];
+
 // Shapes with more vertices than this, and those of a crowd, are represented by their box.
 const MOST_CORNERS = 300;
 
 export class Model extends EventTarget {
   constructor() {
     super();
-    this.show = {points: false, mesh: false, hull: true, edges: true, labels: true, grid: true};
+    this.show = {
+      points: false,
+      mesh: false,
+      hull: true,
+      edges: true,
+      labels: true,
+      grid: true,
+      sweep: true,
+    };
     this.tolerance = 0;
     this.clear();
   }
@@ -46,7 +58,13 @@ export class Model extends EventTarget {
     this.joints = [];
     this.waypoints = [];
     this.contacts = [];
-    // {index, pose}: poses before each completed motion.
+    // The first pair that the file of the scene names; empty if it names none.
+    this.named = [];
+    // The time t of a scene with motions; null in other scenes.
+    this.time = null;
+    // The last message about the motion of a pair.
+    this.motion = null;
+    // {index, pose}: poses before each completed drag.
     this.history = [];
     // In double; drawn coordinates are relative to it.
     this.origin = [0, 0, 0];
@@ -60,11 +78,12 @@ export class Model extends EventTarget {
     for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
   }
 
-  load({number, files, objects, joints, waypoints, contacts}) {
+  load({number, files, objects, joints, waypoints, contacts, named}) {
     this.clear();
-    Object.assign(this, {number, files, joints, waypoints, contacts});
+    Object.assign(this, {number, files, joints, waypoints, contacts, named});
     this.addObjects(objects);
     this.show.mesh = files.length > 0;
+    this.time = this.moving.length ? 0 : null;
   }
 
   addObjects(objects) {
@@ -75,7 +94,9 @@ export class Model extends EventTarget {
         ...object,
         index,
         start: object.pose,
-        // The pose after the last completed motion.
+        // Moved by the joints or the time of the scene, not by hand.
+        isDriven: object.isJointed || Boolean(object.endPose),
+        // The pose after the last completed drag.
         rested: object.pose,
         opacity: 1,
         visible: true,
@@ -83,6 +104,10 @@ export class Model extends EventTarget {
         color: many ? CROWD_COLOR : OBJECT_COLORS[index % OBJECT_COLORS.length],
       });
     }
+  }
+
+  get moving() {
+    return this.objects.filter(({endPose}) => endPose);
   }
 
   get isCrowd() {
@@ -108,6 +133,32 @@ export class Model extends EventTarget {
   // Returns the hull, or all pieces of a body; undefined while in flight.
   hullOf(object) {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
+  }
+
+  // Returns [{hull, pose, radius}]: the hull of an object, or the pieces of a body that are here.
+  partsOf(object) {
+    const {radius = 0, hullId} = object;
+    const pieces = this.bodyOf(object)?.pieces ?? [{hullId, pose: IDENTITY}];
+    return pieces.filter((piece) => this.hulls.has(piece.hullId))
+        .map((piece) => ({
+               hull: this.hulls.get(piece.hullId),
+               pose: piece.pose,
+               radius: radius + (piece.radius ?? 0),
+             }));
+  }
+
+  // Returns the surface of an object with a radius; null if it has none, and for a piece of a large
+  // scene.
+  roundedOf(object) {
+    const shape = this.hullOf(object);
+    if (!shape || shape.isEmpty || this.isNameless) return null;
+    if (object.rounded?.shape !== shape) {
+      const parts = this.partsOf(object).filter(({hull}) => !hull.isEmpty);
+      const isRounded = parts.some(({radius}) => radius > 0);
+      const made = isRounded ? new RoundedShape(parts, shape.center, this.objects.length) : null;
+      object.rounded = {shape, made};
+    }
+    return object.rounded.made;
   }
 
   bodyOf(object) {
@@ -175,35 +226,43 @@ export class Model extends EventTarget {
   }
 
   radiusOf(object) {
-    return this.shapeOf(object)?.radius || 0;
+    return (this.roundedOf(object) ?? this.shapeOf(object))?.radius || 0;
   }
 
-  // Returns world points that enclose an object: its vertices if few, otherwise the corners of its
-  // box.
-  cornersOf(object) {
+  // Returns world points that enclose an object at a pose: its vertices if few, otherwise the
+  // corners of its box.
+  cornersOf(object, pose = object.pose) {
     const {xyz, vertexCount} = this.shapeOf(object);
-    if (vertexCount > MOST_CORNERS || this.isCrowd) return this.boxCornersOf(object);
+    if (vertexCount > MOST_CORNERS || this.isCrowd || this.roundedOf(object))
+      return this.boxCornersOf(object, pose);
     return Array.from(
-        {length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
+        {length: vertexCount}, (_, i) => toWorld(pose, xyz.subarray(3 * i, 3 * i + 3)));
   }
 
-  boxCornersOf(object) {
-    const {low, high} = this.shapeOf(object);
+  boxCornersOf(object, pose) {
+    const {low, high} = this.roundedOf(object) ?? this.shapeOf(object);
     const corners = [];
     for (let i = 0; i < 8; ++i) {
-      corners.push(toWorld(object.pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));
+      corners.push(toWorld(pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));
     }
     return corners;
   }
 
-  // Returns {center, radius, corners}: a sphere around all shown objects, and its input points;
-  // null if none is shown.
-  bounds(objects = this.objects) {
-    const corners = objects
-                        .filter(
-                            (object) => this.isShown(object) && this.shapeOf(object) &&
-                                !this.shapeOf(object).isEmpty)
-                        .flatMap((object) => this.cornersOf(object));
+  // Returns some poses on the way of a moving object.
+  posesOnPath({start, endPose}) {
+    return PATH_TIMES.map((t) => poseAt(start, endPose, t));
+  }
+
+  // Returns {center, radius, corners}: a sphere around all shown objects and their motions, and its
+  // input points; null if none is shown. `now`: without the motions.
+  bounds(objects = this.objects, now = false) {
+    const posesOf = (object) => now || !object.endPose ? [object.pose] : this.posesOnPath(object);
+    const corners =
+        objects
+            .filter(
+                (object) =>
+                    this.isShown(object) && this.shapeOf(object) && !this.shapeOf(object).isEmpty)
+            .flatMap((object) => posesOf(object).flatMap((pose) => this.cornersOf(object, pose)));
     if (!corners.length) return null;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -261,6 +320,13 @@ export class Model extends EventTarget {
     return pair.every((i) => this.objects[i].hullId) ? pair : null;
   }
 
+  // Returns the message about the motion of the pair; null if none has arrived.
+  get pairMotion() {
+    const {motion, pair} = this;
+    const isOfPair = motion && pair && motion.pair.every((index, k) => index === pair[k]);
+    return isOfPair ? motion : null;
+  }
+
   // Returns true if the pair's certificate is requested. For large bodies it would hold one for
   // each of very many pairs of pieces.
   wantsCertificate(rest) {
@@ -280,6 +346,14 @@ export class Model extends EventTarget {
       object.rested = pose;
     }
     this.tell('pose', {indices: [index], rest});
+  }
+
+  // Moves all moving objects to their poses at time t.
+  setTime(t, rest) {
+    this.time = t;
+    const {moving} = this;
+    for (const object of moving) object.pose = poseAt(object.start, object.endPose, t);
+    this.tell('pose', {indices: moving.map(({index}) => index), rest});
   }
 
   // Sets the poses of all objects that joints move.

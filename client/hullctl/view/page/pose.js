@@ -30,6 +30,17 @@ export function toWorld(pose, p) {
   return [x + pose[4], y + pose[5], z + pose[6]];
 }
 
+// Returns the pose at time t of a motion, rounded: as PoseAt of client/hullctl/view/view_scene.h,
+// to the last bit.
+export const poseAt = (start, end, t) => start.map((value, i) => (1 - t) * value + t * end[i]);
+
+// Returns the angle in radians between two rotations.
+export function angleBetween(a, b) {
+  const [p, q] = [unitQuaternion(a), unitQuaternion(b)];
+  const cosine = p.reduce((sum, value, i) => sum + value * q[i], 0);
+  return 2 * Math.acos(Math.min(1, Math.abs(cosine)));
+}
+
 export const samePose = (a, b) => a.every((value, i) => Object.is(value, b[i]));
 
 // Returns the pose in the form of `hullctl check --pose-b`; every number reads back as the same

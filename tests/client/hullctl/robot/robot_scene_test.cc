@@ -16,6 +16,7 @@ namespace robot_scene_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Optional;
 using testing::SizeIs;
 
 // A box, a tetrahedron that slides along x, and a ball on a turning arm.
@@ -92,15 +93,35 @@ TEST_F(RobotScene, PartsAreObjectsThatJointsMove) {
 
 TEST_F(RobotScene, AdjacentLinksAreExcludedOrThoseOfTheSrdf) {
   ASSERT_TRUE(Add().ok());
-  EXPECT_THAT(scene_.rules.groups(), ElementsAre(0, 1, 2));
-  EXPECT_TRUE(scene_.rules.ignore_same_group());
-  EXPECT_THAT(scene_.rules.ignored_group_pairs(), ElementsAre(0, 1, 1, 2));
+  EXPECT_THAT(scene_.pairs, Optional(ElementsAre(0, 2)));
   const TempFile srdf("chain.srdf",
                       R"(<robot name="chain"><disable_collisions link1="a" link2="c"/></robot>)");
   arguments_.srdf = srdf.path();
   scene_ = {};
   ASSERT_TRUE(Add().ok());
-  EXPECT_THAT(scene_.rules.ignored_group_pairs(), ElementsAre(0, 2));
+  EXPECT_THAT(scene_.pairs, Optional(ElementsAre(0, 1, 1, 2)));
+}
+
+TEST_F(RobotScene, SurroundingsMeetThePartsOnly) {
+  const TempFile cell("cell.yaml",
+                      "place: {post: {id: cube, at: [4, 0, 0]}, floor: {id: cube, radius: 0.5}}\n");
+  arguments_.scene = cell.path();
+  arguments_.ignored = {"floor,a", "c,post"};
+  ASSERT_TRUE(Add().ok());
+  ASSERT_THAT(scene_.objects, SizeIs(5));
+  EXPECT_FALSE(scene_.objects[3].is_jointed);
+  EXPECT_EQ(scene_.objects[3].name, "post");
+  EXPECT_EQ(scene_.objects[3].pose[4], 4);
+  EXPECT_EQ(scene_.objects[4].radius, 0.5);
+  EXPECT_THAT(scene_.pairs, Optional(ElementsAre(0, 2, 0, 3, 1, 3, 1, 4, 2, 4)));
+  arguments_.ignored = {"post,floor"};
+  scene_ = {};
+  EXPECT_THAT(std::string(Add().message()),
+              HasSubstr("--ignore: \"post,floor\" is not a checked pair"));
+  const TempFile moving("moving.yaml", "place: {cart: {id: cube, to: [4, 0, 0]}}\n");
+  arguments_.scene = moving.path();
+  scene_ = {};
+  EXPECT_THAT(std::string(Add().message()), HasSubstr(moving.path() + ": cart moves"));
 }
 
 // At turn = pi the ball is at the origin, inside the box, and 1 + slide away along x otherwise.

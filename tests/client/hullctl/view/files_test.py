@@ -59,6 +59,22 @@ class FilesTest(viewer_case.ViewerCase):
         self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
         self.assertIn("\u2713 Proven", self.browser.text("#proof"))
 
+    def test_pairs_that_a_scene_names_are_the_queried_ones(self):
+        place = "place: {left: {id: box}, middle: {id: box}, right: {id: box, at: [1, 0, 0]}}\n"
+        rows = "[...document.querySelectorAll('#collisions .names')].map((row) => row.textContent)"
+        for name, text, names in (
+                ("all.yaml", place, ["left and middle", "left and right", "middle and right"]),
+                ("named.yaml", place + "ask: {pairs: [[right, left]]}\n", ["left and right"])):
+            pathlib.Path(self.hulld.directory, name).write_text(text)
+            self.view(name)
+            self.browser.wait(f"{rows}.length === arguments[0]", len(names))
+            self.assertEqual(self.browser.js(rows), names)
+        self.assertEqual(self.browser.js("hulldViewer.model.pair"), [0, 2])
+        target = pathlib.Path(self.hulld.directory, "named.html")
+        self.hulld.hullctl("view", "named.yaml", "--html", str(target))
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait(f"{rows}.join() === 'left and right'")
+
     def test_a_scene_file_needs_no_server_of_its_own(self):
         pathlib.Path(self.hulld.directory, "cell.txt").write_text(
             "hulls: {leg: {box: [1, 1, 1]}}\nbodies: {stand: [{hull: leg}, {hull: leg, at: [2, 0, 0]}]}\n"

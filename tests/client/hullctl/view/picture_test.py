@@ -224,6 +224,44 @@ class PictureTest(viewer_case.ViewerCase):
         self.assertEqual(colors, self.browser.js(
             "hulldViewer.model.objects.map((object) => hulldViewer.model.colorOf(object))"))
 
+    def test_radii_are_drawn_and_told(self):
+        self.hulld.add("dot", ["0 0 0"])
+        self.hulld.hullctl("body", "put", "dumbbell", "dot", "dot@3,0,0")
+        self.addCleanup(self.hulld.hullctl, "body", "delete", "dumbbell")
+        pathlib.Path(self.hulld.directory, "round.yaml").write_text(
+            "place:\n  ball: {id: dot, radius: 2}\n  crate: {id: box, at: [6, 0, 0], radius: 0.5}\n"
+            "  two: {id: dumbbell, at: [0, 9, 0], radius: 1}\n")
+        self.view("round.yaml")
+        self.browser.js("hulldViewer.model.select(1, 0)")
+        self.assertAlmostEqual(self.assert_answers_as_api()["separation"]["value"], 2.5)
+        self.assertEqual(self.browser.js("""[...document.querySelectorAll('#object-facts dt')]
+            .find((dt) => dt.textContent === 'radius').nextElementSibling.textContent"""), "0.5")
+        boxes = self.browser.js("""hulldViewer.model.objects.map((object) => {
+          const {low, high} = hulldViewer.model.roundedOf(object);
+          return [low, high];
+        })""")
+        # The surface is approximated from inside; moved facets are exact.
+        self.assertEqual(boxes[1], [[-1.5] * 3, [1.5] * 3])
+        for (low, high), radius, length in ((boxes[0], 2, 0), (boxes[2], 1, 3)):
+            for k in range(3):
+                self.assertLessEqual(high[k], radius + (length if k == 0 else 0) + 1e-9)
+                self.assertAlmostEqual(high[k], radius + (length if k == 0 else 0), delta=0.05 * radius)
+                self.assertAlmostEqual(low[k], -radius, delta=0.05 * radius)
+        # A ball is solid, a radius around a solid is glass, and clicks hit them.
+        self.assertEqual(self.browser.js("""[0, 1].map((i) => hulldViewer.views.get(i).group.children
+            .filter((part) => part.isMesh).map(({material}) => material.opacity).pop())"""), [1, 0.3])
+        self.browser.js("(hulldViewer.model.show.labels = false, hulldViewer.model.select(null))")
+        x, y = self.browser.js("""(() => {
+          const {stage, model} = hulldViewer;
+          const p = [0, 0, 1.5].map((value, k) => value - model.origin[k]);
+          return stage.toScreen(stage.controls.target.clone().set(...p));
+        })()""")
+        width, height = self.browser.js(
+            "[hulldViewer.stage.canvas.clientWidth, hulldViewer.stage.canvas.clientHeight]")
+        ActionChains(self.browser.driver).move_to_element_with_offset(
+            self.canvas(), round(x - width / 2), round(y - height / 2)).click().perform()
+        self.browser.wait("hulldViewer.model.selected === 0")
+
     def test_opacity_of_one_object(self):
         self.view("room/left", "room/right")
         self.browser.js("(() => { const slider = document.querySelector('#opacity');"

@@ -15,9 +15,17 @@ import viewing
 viewing.skip_unless_browser()
 
 
-def take(hulld, target, scene, width, height, dark=False, before="true"):
-    """Renders a scene of the demo at rest, after running `before` in the page."""
-    viewer = hulld.view("--demo", "--scene", scene)
+#: A spider falls past a ball and turns.
+MOTION = """hulls: {center: {points: [[0, 0, 0]]}}
+place:
+  ball: {hull: center, radius: 40, at: [30, -20, 70]}
+  spider: {id: spider, at: [-40, 170, 0], to: {xyz: [-30, -160, 40], rpy: [0.4, 2, 0.6]}}
+"""
+
+
+def take(hulld, target, arguments, width, height, dark=False, before="true"):
+    """Renders `hullctl view ARGUMENTS` at rest, after running `before` in the page."""
+    viewer = hulld.view(*arguments)
     browser = viewing.Browser(width, height, dark)
     try:
         browser.open(viewer.address)
@@ -55,9 +63,15 @@ def main():
         write_page(hulld.programs, target / "arm.html")
         moved = ("(hulldViewer.model.setPose(1, [0.9659258262890683, 0, 0.25881904510252074, 0, "
                  "{}], true), hulldViewer.fit())")
-        take(hulld, target / "view.png", "0", 1160, 700, before=moved.format("165, 20, -10"))
-        take(hulld, target / "view-overlap.png", "1", 1160, 700)
-        take(hulld, target / "view-phone.png", "2", 390, 844, dark=True)
+        demo = ["--demo", "--scene"]
+        take(hulld, target / "view.png", [*demo, "0"], 1160, 700, before=moved.format("165, 20, -10"))
+        take(hulld, target / "view-overlap.png", [*demo, "1"], 1160, 700)
+        take(hulld, target / "view-phone.png", [*demo, "2"], 390, 844, dark=True)
+        hulld.hullctl("append", "spider", "/usr/share/assimp/models/OBJ/spider.obj", "--create")
+        pathlib.Path(hulld.directory, "motion.yaml").write_text(MOTION)
+        hulld.hullctl("scene", "apply", "motion.yaml")
+        take(hulld, target / "view-motion.png", ["motion.yaml"], 1160, 700,
+             before="hulldViewer.timeLine.jumpTo(0.25)")
     finally:
         hulld.stop()
 

@@ -157,8 +157,15 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
       json,
       HasSubstr(
           R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0],"radius":0,)"
-          R"("isJointed":false})"));
-  EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[])"));
+          R"("isJointed":false,"endPose":null})"));
+  EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[],"named":[])"));
+}
+
+TEST(Protocol, MotionsTravelWithTheirEnd) {
+  ViewScene scene;
+  scene.objects = {{"box", "box", -1, {1, 0, 0, 0, 0.1, 0, 0}}};
+  scene.objects[0].motion = {{1, 0, 0, 0, 0.1, 0, 0}, {0, 2, 0, 0, 1e-300, 0, 5}};
+  EXPECT_THAT(SceneMessage(scene, 3), HasSubstr(R"("endPose":[0,2,0,0,1e-300,0,5]})"));
 }
 
 TEST(Protocol, JointsTravelWithTheirTrajectory) {

@@ -106,8 +106,40 @@ class RobotTest(viewer_case.ViewerCase):
             relations.add(self.browser.text("#relation").split()[-1])
         self.assertEqual(relations, {"separated", "overlapping"})
 
+    def test_a_robot_stands_in_its_surroundings(self):
+        pathlib.Path(self.hulld.directory, "cell.yaml").write_text(
+            "prefix: cell/\nhulls: {post: {box: [1, 1, 1]}}\n"
+            "place: {post: {hull: post, at: [4, 0, 2]}, lamp: {hull: post, at: [4, 0, 2.9]},\n"
+            "        floor: {hull: post, at: [0, 0, 0]}}\n")
+        self.hulld.hullctl("scene", "apply", "cell.yaml")
+        self.addCleanup(self.hulld.hullctl, "scene", "delete", "cell.yaml", "--yes")
+        self.view("arm.urdf", "--joints", "path.csv", "--scene", "cell.yaml", "--ignore", "base,floor")
+        self.assertEqual(self.browser.js("hulldViewer.model.objects.map(({name}) => name)"),
+                         ["base", "rod", "hand", "post", "lamp", "floor"])
+        # Post and lamp overlap, as do floor and base; neither pair is asked about.
+        self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
+        self.slide("[aria-label='Joint lift']", 1.5)
+        self.browser.wait("hulldViewer.model.collisions.pairs.join() === '2,3,RELATION_OVERLAPPING'")
+        self.browser.js("hulldViewer.model.select(3, 2)")
+        # Up to a step of the slider.
+        separation = self.assert_answers_as_api()["separation"]["value"]
+        self.assertAlmostEqual(separation, -0.5, delta=0.01)
+        # The surroundings can be dragged.
+        self.assertFalse(self.browser.js("document.querySelector('#mode-move').disabled"))
+        target = pathlib.Path(self.hulld.directory, "cell.html")
+        subprocess.run([self.hulld.programs / "hullctl", "view", "arm.urdf", "--local", "--scene",
+                        "cell.yaml", "--html", str(target)], cwd=self.hulld.directory, check=True)
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait("document.querySelector('#collision-count').textContent === '3 pairs collide'")
+
     def test_wrong_uses_are_refused(self):
+        pathlib.Path(self.hulld.directory, "moving.yaml").write_text(
+            "place: {cart: {id: box, at: [9, 0, 0], to: [5, 0, 0]}}\n")
         for arguments, words in (
+                (["box", "--scene", "moving.yaml"], "--scene needs --demo, or a robot"),
+                (["arm.urdf", "--scene", "moving.yaml"], "cart moves"),
+                (["--demo", "--scene", "8"], "is no scene of the demo"),
+                (["box", "--ignore", "a,b"], "need a robot"),
                 (["arm.urdf", "box"], "arm.urdf is a robot; it cannot be combined"),
                 (["box", "--joints", "path.csv"], "need a robot"),
                 (["arm.urdf", "--joints", "none.csv"], "none.csv")):

@@ -65,5 +65,41 @@ TEST(ViewScene, ABodyOfASceneIsOneObject) {
   EXPECT_EQ(scene.objects[1].hull_id, "cell/leg");
 }
 
+TEST(ViewScene, NamedPairsAreThoseOfTheFile) {
+  const TempFile all("all.yaml", "place: {a: {id: cube}, b: {id: cube}, c: {id: cube}}\n");
+  const TempFile named("named.yaml",
+                       "place: {a: {id: cube}, b: {id: cube}, c: {id: cube}}\n"
+                       "ask: {pairs: [[c, a], [a, b]]}\n");
+  ViewScene scene;
+  ASSERT_TRUE(AddSceneFile(all.path(), &scene).ok());
+  EXPECT_FALSE(scene.pairs.has_value());
+  ViewScene some;
+  ASSERT_TRUE(AddSceneFile(named.path(), &some).ok());
+  ASSERT_TRUE(some.pairs.has_value());
+  EXPECT_THAT(*some.pairs, ElementsAre(2, 0, 0, 1));
+}
+
+TEST(ViewScene, MotionsStartAtTheirPose) {
+  const TempFile file("moving.yaml",
+                      "place: {wall: {id: cube, at: [9, 0, 0], to: [9, 0, 0]},\n"
+                      "        ball: {id: cube, at: [3, 0, 0], to: [1, 0, 0]}}\n");
+  ViewScene scene;
+  const absl::Status added = AddSceneFile(file.path(), &scene);
+  ASSERT_TRUE(added.ok()) << added;
+  ASSERT_EQ(scene.objects.size(), 2U);
+  // It stays where it is.
+  EXPECT_FALSE(scene.objects[0].motion.has_value());
+  ASSERT_TRUE(scene.objects[1].motion.has_value());
+  EXPECT_THAT(scene.objects[1].pose, ElementsAre(1, 0, 0, 0, 3, 0, 0));
+  EXPECT_THAT(scene.objects[1].motion->end, ElementsAre(1, 0, 0, 0, 1, 0, 0));
+}
+
+TEST(ViewScene, PosesOfAMotionAreLinearAndNotNormalized) {
+  const ViewMotion motion{{1, 0, 0, 0, 0.1, -3, 0}, {0, 0, 4, 0, 0.7, 1, 5}};
+  EXPECT_EQ(PoseAt(motion, 0), motion.start);
+  EXPECT_EQ(PoseAt(motion, 1), motion.end);
+  EXPECT_THAT(PoseAt(motion, 0.25), ElementsAre(0.75, 0, 1, 0, 0.75 * 0.1 + 0.25 * 0.7, -2, 1.25));
+}
+
 }  // namespace view_scene_test
 }  // namespace hulld

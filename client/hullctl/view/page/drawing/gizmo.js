@@ -66,7 +66,7 @@ export class Gizmo {
   // Moves the handles to the object, or hides them.
   update() {
     const {object, model} = this;
-    if (!this.handles.enabled || !object || !object.hullId || object.isJointed ||
+    if (!this.handles.enabled || !object || !object.hullId || object.isDriven ||
         !model.isShown(object) || !model.shapeOf(object)) {
       this.handles.detach();
       return;
@@ -109,7 +109,7 @@ export class Gizmo {
   // power of ten, so that numbers stay short.
   nudge(axis, steps) {
     const {object, model} = this;
-    if (!object || !object.hullId || object.isJointed) return;
+    if (!object || !object.hullId || object.isDriven) return;
     const step = 10 ** Math.floor(Math.log10((model.radiusOf(object) || 1) / 20));
     const pose = object.pose.slice();
     const k = 4 + 'xyz'.indexOf(axis);

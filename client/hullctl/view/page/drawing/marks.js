@@ -163,7 +163,7 @@ export class Marks extends DrawnGroup {
 
   // Returns [low, high]: the box of the objects, slightly enlarged.
   boxOf(objects) {
-    const {corners, radius} = this.model.bounds(objects);
+    const {corners, radius} = this.model.bounds(objects, true);
     const box = new THREE.Box3().setFromPoints(corners.map((corner) => this.local(corner)));
     box.expandByScalar(0.05 * radius);
     return [box.min, box.max];

@@ -28,7 +28,7 @@ export function geometryOf(shape, kind) {
 const isHuge = (hull) => hull.facetCount > 200000;
 
 // Many lines hide the surface.
-const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
+export const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
 export class ObjectView extends DrawnGroup {
   constructor(model, stage, object) {
@@ -53,6 +53,8 @@ export class ObjectView extends DrawnGroup {
     }
     if (hull && show.hull && !hull.isEmpty)
       this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
+    const rounded = model.roundedOf(object);
+    if (rounded && show.hull) this.addRounded(rounded, hull);
     if (hull && show.edges && !hull.isEmpty && !isHuge(hull) &&
         (show.hull || !(mesh && show.mesh))) {
       this.addEdges(hull);
@@ -123,6 +125,23 @@ export class ObjectView extends DrawnGroup {
       part.renderOrder = side === THREE.BackSide ? 3 : 4;
       this.shift(part, hull);
     }
+  }
+
+  // The surface of a radius is glass around a solid hull, and solid around a point, a segment, or a
+  // polygon.
+  addRounded(rounded, {dimension}) {
+    const {model, object} = this;
+    const overlaps = model.relationOf.get(object.index) === 'RELATION_OVERLAPPING';
+    const opacity = object.opacity * (dimension === 3 ? 0.3 : overlaps ? 0.62 : 1);
+    const material = facetMaterial({
+      color: model.colorOf(object),
+      transparent: opacity < 1,
+      opacity,
+      depthWrite: opacity === 1,
+    });
+    const part = new THREE.Mesh(geometryOf(rounded, 'triangles'), material);
+    part.renderOrder = 4;
+    this.shift(part, rounded);
   }
 
   addEdges(hull) {

@@ -64,7 +64,7 @@ export function pick(model, stage, x, y, {toVertex = false} = {}) {
   let nearest = Infinity;
   let picked = null;
   for (const object of model.objects) {
-    const shape = model.shapeOf(object);
+    const shape = model.roundedOf(object) ?? model.shapeOf(object);
     if (!model.isShown(object) || !shape || shape.isEmpty) continue;
     const center = model.centerOf(object).map((value, k) => value - model.origin[k]);
     const toward = origin.map((value, k) => value - center[k]);

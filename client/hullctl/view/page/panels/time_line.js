@@ -1,19 +1,8 @@
-// A time line under the picture, for the trajectory of a robot: the configuration between two
-// waypoints is interpolated linearly in each joint.
-
-// Time from one waypoint to the next while playing, within limits for the whole.
-const WAYPOINT_MS = 600;
-const LEAST_MS = 3000;
-const MOST_MS = 30000;
-// Steps of the slider between two waypoints.
-const STEPS = 16;
+// A time line under the picture: a slider with marks, and a button that plays it. A track gives it
+// a meaning.
 
 export class TimeLine {
-  // move(values, rest, waypoint): as Viewer.moveJoints. A recording has the waypoints alone.
-  constructor(model, live, move) {
-    this.model = model;
-    this.steps = live ? STEPS : 1;
-    this.move = move;
+  constructor() {
     [this.root, this.button, this.slider, this.text, this.marks] = [
       'time', 'play', 'moment', 'moment-text', 'contacts'
     ].map((id) => document.getElementById(id));
@@ -22,38 +11,30 @@ export class TimeLine {
     this.button.addEventListener('click', () => this.play());
   }
 
-  get last() {
-    return this.model.waypoints.length - 1;
+  // Called when the scene changes. track: null for none, or {last, steps, length, marks(),
+  // text(moment), show(moment, rest)}: the last moment, from 0; the steps of the slider from one
+  // moment to the next; the time to play it all, in ms; the first and last moments of each mark;
+  // and the functions that name a moment and show it, `rest` if nothing moves after it.
+  load(track) {
+    this.track = track;
+    this.stop();
+    this.root.hidden = !track;
+    if (!track) return;
+    this.slider.max = track.last;
+    this.slider.step = 1 / track.steps;
+    this.slider.value = 0;
+    this.text.textContent = track.text(0);
+    this.updateMarks();
   }
 
-  // Called when the scene changes.
-  rebuild() {
-    this.stop();
-    this.root.hidden = this.last < 1;
-    if (this.root.hidden) return;
-    this.slider.max = this.last;
-    this.slider.step = 1 / this.steps;
-    this.slider.value = 0;
-    this.showText(0);
-    this.marks.replaceChildren(...this.runs().map(([first, end]) => {
+  updateMarks() {
+    const {last, marks} = this.track;
+    this.marks.replaceChildren(...marks().map(([first, end]) => {
       const mark = document.createElement('span');
-      mark.style.left = `${100 * first / this.last}%`;
-      mark.style.width = `${100 * (end - first) / this.last}%`;
+      mark.style.left = `${100 * first / last}%`;
+      mark.style.width = `${100 * (end - first) / last}%`;
       return mark;
     }));
-  }
-
-  // Merges the waypoints in contact into runs [first, last].
-  runs() {
-    const runs = [];
-    for (const contact of this.model.contacts) {
-      const run = runs[runs.length - 1];
-      if (run && run[1] === contact - 1)
-        run[1] = contact;
-      else
-        runs.push([contact, contact]);
-    }
-    return runs;
   }
 
   dragTo(rest) {
@@ -61,21 +42,16 @@ export class TimeLine {
     this.show(Number(this.slider.value), rest);
   }
 
-  // Shows a moment, in waypoints from 0.
-  show(moment, rest) {
-    const {waypoints} = this.model;
-    const before = Math.floor(moment);
-    const after = Math.min(before + 1, this.last);
-    const part = moment - before;
-    const values = waypoints[before].map(
-        (value, j) => (part === 0 ? value : (1 - part) * value + part * waypoints[after][j]));
-    this.showText(moment);
-    this.move(values, rest, part === 0 ? before : null);
+  // Stops at a moment, which may lie between two steps.
+  jumpTo(moment) {
+    this.stop();
+    this.slider.value = moment;
+    this.show(moment, true);
   }
 
-  showText(moment) {
-    const count = this.last + 1;
-    this.text.textContent = `${Number((moment + 1).toFixed(2))} of ${count}`;
+  show(moment, rest) {
+    this.text.textContent = this.track.text(moment);
+    this.track.show(moment, rest);
   }
 
   // Starts to play, from the beginning if at the end; or stops.
@@ -86,17 +62,17 @@ export class TimeLine {
       this.show(Number(this.slider.value), true);
       return;
     }
-    if (Number(this.slider.value) === this.last) this.slider.value = 0;
-    const length = Math.min(Math.max(WAYPOINT_MS * this.last, LEAST_MS), MOST_MS);
-    const start = performance.now() - length * Number(this.slider.value) / this.last;
+    const {last, steps, length} = this.track;
+    if (Number(this.slider.value) === last) this.slider.value = 0;
+    const start = performance.now() - length * Number(this.slider.value) / last;
     const tick = (now) => {
       if (this.playing !== tick) return;
-      const moment = Math.min(this.last, Math.max(0, (now - start) / length * this.last));
-      const shown = Math.round(moment * this.steps) / this.steps;
-      const isOver = shown === this.last;
+      const moment = Math.min(last, Math.max(0, (now - start) / length * last));
+      const shown = Math.round(moment * steps) / steps;
+      const isOver = shown === last;
       if (shown !== Number(this.slider.value) || isOver) {
         this.slider.value = shown;
-        this.show(shown, isOver || this.steps === 1);
+        this.show(shown, isOver);
       }
       if (isOver)
         this.stop();

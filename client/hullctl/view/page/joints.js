@@ -1,0 +1,89 @@
+// The joints of a robot, and the time line of its trajectory: the configuration between two
+// waypoints is interpolated linearly in each joint.
+import {JointPanel} from 'hulld/panels/joint_panel.js';
+
+// Time from one waypoint to the next while playing, within limits for the whole.
+const WAYPOINT_MS = 600;
+const LEAST_MS = 3000;
+const MOST_MS = 30000;
+// Steps of the slider between two waypoints. A recording has the waypoints alone.
+const STEPS = 16;
+
+// Merges ascending waypoints into runs [first, last].
+function runsOf(waypoints) {
+  const runs = [];
+  for (const waypoint of waypoints) {
+    const run = runs[runs.length - 1];
+    if (run && run[1] === waypoint - 1)
+      run[1] = waypoint;
+    else
+      runs.push([waypoint, waypoint]);
+  }
+  return runs;
+}
+
+export class Joints {
+  constructor(model, connection) {
+    this.model = model;
+    this.connection = connection;
+    this.panel = new JointPanel(model, connection.live, (values, rest) => this.move(values, rest));
+  }
+
+  // Called when the scene changes.
+  rebuild() {
+    this.inFlight = null;
+    this.wish = null;
+    this.panel.rebuild();
+  }
+
+  // Returns the track of the time line; null if there is no trajectory.
+  track() {
+    const {waypoints, contacts} = this.model;
+    const last = waypoints.length - 1;
+    if (last < 1) return null;
+    return {
+      last,
+      steps: this.connection.live ? STEPS : 1,
+      length: Math.min(Math.max(WAYPOINT_MS * last, LEAST_MS), MOST_MS),
+      marks: () => runsOf(contacts),
+      text: (moment) => `${Number((moment + 1).toFixed(2))} of ${last + 1}`,
+      show: (moment, rest) => {
+        const before = Math.floor(moment);
+        const after = Math.min(before + 1, last);
+        const part = moment - before;
+        const values = waypoints[before].map(
+            (value, j) => (part === 0 ? value : (1 - part) * value + part * waypoints[after][j]));
+        this.move(values, rest || !this.connection.live, part === 0 ? before : null);
+        this.panel.update();
+      },
+    };
+  }
+
+  // Moves the joints. The latest values win while an answer is in flight. waypoint: the index of
+  // the waypoint with these values, or null.
+  move(values, rest, waypoint = null) {
+    values.forEach((value, i) => this.model.joints[i].value = value);
+    this.wish = {values: values.slice(), rest, waypoint};
+    if (!this.inFlight) this.send();
+  }
+
+  send() {
+    this.inFlight = this.wish;
+    this.wish = null;
+    const {values, waypoint} = this.inFlight;
+    this.connection.send({type: 'joints', scene: this.model.number, values, waypoint});
+  }
+
+  // Takes the poses that answer the values in flight.
+  arrived(poses) {
+    const {rest} = this.inFlight;
+    this.inFlight = null;
+    if (this.wish) this.send();
+    this.model.setJointedPoses(poses, rest);
+  }
+
+  // Called when there is no answer.
+  failed() {
+    this.inFlight = null;
+  }
+}

@@ -1,0 +1,64 @@
+// The surface of an object with a radius: its hulls plus a ball, approximated from inside.
+import {directions, extremeVertex, fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
+import {toWorld} from 'hulld/pose.js';
+import {Shape} from 'hulld/shape.js';
+
+// Directions in which the surface of a hull is sampled, and those of all hulls of a scene.
+const MOST_DIRECTIONS = 400;
+const MOST_IN_ALL = 8000;
+const LEAST_DIRECTIONS = 40;
+// The facets of hulls with more triangles are too small to be seen as flat.
+const MOST_TRIANGLES = 100;
+// Larger hulls are represented by their extreme vertices.
+const MOST_VERTICES = 300;
+
+function normalOf([a, b, c]) {
+  const [u, v] = [b, c].map((p) => p.map((value, k) => value - a[k]));
+  const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const length = Math.hypot(...n) || 1;
+  return n.map((value) => value / length);
+}
+
+// Returns points on the surface of a hull plus a ball: those in `count` directions, and the corners
+// of its moved facets.
+function pointsAround(hull, radius, count) {
+  const moved = (p, n) => p.map((value, k) => value + radius * n[k]);
+  const few = fewVertices(hull, MOST_VERTICES);
+  const xyz = Float64Array.from(few.flat());
+  const points = directions(count).map((d) => moved(few[extremeVertex(xyz, d)], d));
+  const {triangles} = hull;
+  if (triangles.length > 3 * MOST_TRIANGLES) return points;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const corners =
+        [...triangles.subarray(t, t + 3)].map((i) => [...hull.xyz.subarray(3 * i, 3 * i + 3)]);
+    const n = normalOf(corners);
+    points.push(...corners.map((p) => moved(p, n)));
+    // A polygon has two sides.
+    if (hull.dimension < 3) points.push(...corners.map((p) => moved(p, n.map((v) => -v))));
+  }
+  return points;
+}
+
+export class RoundedShape extends Shape {
+  // parts: [{hull, pose, radius}]; center: that of the hulls alone; share: the number of objects
+  // that share the directions.
+  constructor(parts, center, share) {
+    const count = Math.min(
+        MOST_DIRECTIONS,
+        Math.max(LEAST_DIRECTIONS, Math.floor(MOST_IN_ALL / share / parts.length)));
+    const points = [];
+    const triangles = [];
+    const rounded = parts.map(({hull, pose, radius}) => {
+      const own = radius === 0 ? fewVertices(hull, count) : pointsAround(hull, radius, count);
+      for (const corner of hullTriangles(own)) triangles.push(points.length + corner);
+      points.push(...own.map((p) => toWorld(pose, p)));
+      return {hull: {xyz: Float64Array.from(own.flat())}, pose};
+    });
+    super(Float64Array.from(points.flat()), Uint32Array.from(triangles), new Uint32Array());
+    // [{hull: {xyz}, pose}].
+    this.parts = rounded;
+    this.center = center;
+    this.radius =
+        Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - center[k]))));
+  }
+}
