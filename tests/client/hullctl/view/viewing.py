@@ -54,7 +54,7 @@ class Process:
     def stop(self):
         if self.child.poll() is None:
             self.child.send_signal(signal.SIGTERM)
-        rest, _ = self.child.communicate(timeout=60)
+        rest, _ = self.child.communicate(timeout=600)
         self.said += rest
         return self.child.returncode
 
