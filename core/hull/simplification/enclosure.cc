@@ -8,10 +8,10 @@
 #include <cmath>
 #include <cstddef>
 #include <utility>
+#include <vector>
 
 #include "core/base/check.h"
 #include "core/hull/simplification/subset_hull.h"
-#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
@@ -26,8 +26,6 @@ constexpr int kMostAttempts = 18;
 // angle between the mean and a normal. It limits the distance if they differ widely, as at the tip
 // of a needle.
 constexpr double kLeastCosine = 0.05;
-// Corners farther from the center, in units of the hull's size, do not enclose tightly. A choice.
-constexpr double kFarthestCorner = 0x1p20;
 // Vertices of the full hull per check. As many, spread over all vertices, are checked first: most
 // failing hulls fail early.
 constexpr size_t kVerticesPerCheck = 1024;
@@ -44,38 +42,20 @@ double InflationOf(int attempt) {
 
 }  // namespace
 
-Enclosure::Enclosure(const Hull& full, const UnitScale& scale,
+Enclosure::Enclosure(const Hull& full, std::span<const Vector> unit_points, const UnitScale& scale,
                      const std::function<bool()>& should_stop, StopPoll& poll)
     : full_(full),
+      unit_points_(unit_points),
       scale_(scale),
       should_stop_(should_stop),
       poll_(poll),
-      vertices_(scale.ToUnit(full.vertices())),
-      support_(full, vertices_, poll) {}
+      support_(full, unit_points, poll) {}
 
-// Returns the places of the inside hull's vertices among those of the full hull; both are sorted.
-std::vector<uint32_t> Enclosure::PlacesOf(const Hull& inside) const {
-  std::vector<uint32_t> places;
-  uint32_t place = 0;
-  for (const Vector& v : inside.vertices()) {
-    while (full_.vertices()[place] != v) ++place;
-    places.push_back(place);
-  }
-  return places;
-}
-
-Enclosure::Plane Enclosure::MakePlane(const Vector& normal, const Vector& on_plane,
-                                      uint32_t start) const {
-  const double offset = normal.dot(on_plane);
-  const uint32_t farthest = support_.FarthestAlong(normal, start);
-  return {normal, offset, std::max(0.0, vertices_[farthest].dot(normal) - offset), farthest};
-}
-
-std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
+std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside, double most_error) {
   HULLD_CHECK(inside.dimension() == full_.dimension() && inside.dimension() >= 2);
   const bool is_flat = inside.dimension() == 2;
   const std::vector<Vector> points = scale_.ToUnit(inside.vertices());
-  const std::vector<uint32_t> places = PlacesOf(inside);
+  const std::vector<uint32_t> places = PlacesOf(inside, full_);
   // Vertices of each facet, or of each edge of a polygon.
   std::vector<std::span<const uint32_t>> sides;
   for (size_t f = 0; f < inside.facet_count() && !is_flat; ++f) sides.push_back(inside.facet(f));
@@ -88,7 +68,9 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
   const Vector center = MeanOf(points);
   const Vector flat_normal =
       is_flat ? AreaNormal(points, inside.facet(0)).stableNormalized() : Vector::Zero();
-  std::vector<Plane> planes;
+  // The normal of each side, and the largest extent of the full hull beyond it.
+  std::vector<Vector> normals;
+  std::vector<double> gaps;
   std::vector<Vector> along(points.size(), Vector::Zero());
   for (const auto& side : sides) {
     if (poll_.Step()) return std::nullopt;
@@ -97,16 +79,25 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
                             : AreaNormal(points, side).stableNormalized();
     // An edge starts at its lower vertex, in either orientation.
     if (is_flat && normal.dot(corner - center) < 0) normal = -normal;
-    planes.push_back(MakePlane(normal, corner, places[side[0]]));
+    const uint32_t farthest = support_.FarthestAlong(normal, places[side[0]]);
+    normals.push_back(normal);
+    gaps.push_back(std::max(0.0, normal.dot(unit_points_[farthest] - corner)));
     for (const uint32_t v : side) along[v] += normal;
   }
   for (Vector& direction : along) direction.stableNormalize();
   std::vector<double> push(points.size(), 0);
-  for (size_t k = 0; k < planes.size(); ++k) {
+  for (size_t k = 0; k < sides.size(); ++k) {
     for (const uint32_t v : sides[k]) {
-      const double cosine = std::max(kLeastCosine, planes[k].normal.dot(along[v]));
-      push[v] = std::max(push[v], planes[k].gap / cosine);
+      const double cosine = std::max(kLeastCosine, normals[k].dot(along[v]));
+      push[v] = std::max(push[v], gaps[k] / cosine);
     }
+  }
+  // Without this, most time would be spent on enclosures of too large an error.
+  const double enough = scale_.LengthToUnit(most_error);
+  for (size_t v = 0; v < points.size(); ++v) {
+    if (poll_.Step()) return std::nullopt;
+    const Vector p = points[v] + push[v] * along[v];
+    if (support_.DistanceBound(p, places[v], enough) > enough) return std::nullopt;
   }
 
   for (int attempt = 0; attempt < kMostAttempts && !poll_.stopped(); ++attempt) {
@@ -122,70 +113,6 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
     if (std::optional<SimplifiedHull> hull = HullAround(pushed)) return hull;
   }
   return std::nullopt;
-}
-
-std::optional<SimplifiedHull> Enclosure::ByPlanes(const Hull& inside) {
-  HULLD_CHECK(inside.dimension() == 3);
-  const std::vector<Vector> points = scale_.ToUnit(inside.vertices());
-  const std::vector<uint32_t> places = PlacesOf(inside);
-  const Vector center = MeanOf(points);
-  std::vector<Plane> planes;
-  for (size_t f = 0; f < inside.facet_count(); ++f) {
-    if (poll_.Step()) return std::nullopt;
-    const auto facet = inside.facet(f);
-    const Vector normal = AreaNormal(points, facet).stableNormalized();
-    planes.push_back(MakePlane(normal, points[facet[0]], places[facet[0]]));
-  }
-  const std::vector<Corner> corners = CornersOf(planes, center);
-  for (int attempt = 0; attempt < kMostAttempts && !poll_.stopped(); ++attempt) {
-    std::vector<Corner> inflated;
-    for (const Corner& corner : corners) {
-      const Vector p = center + (1 + InflationOf(attempt)) * corner.point;
-      inflated.push_back(CornerAt(p, corner.near));
-    }
-    if (std::optional<SimplifiedHull> hull = HullAround(inflated)) return hull;
-  }
-  return std::nullopt;
-}
-
-// Returns the corners, relative to the center and at unit scale, of the intersection of the
-// half-spaces, by duality: each facet of the hull of the points normal / reach is a corner.
-// Rounded; empty on failure.
-std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> planes,
-                                                    const Vector& center) const {
-  // Sorted like a hull's vertices, to map these back to the planes.
-  std::vector<Corner> dual;
-  for (const Plane& plane : planes) {
-    const double reach = plane.offset + plane.gap - plane.normal.dot(center);
-    // If the center is too near to a plane, dual points are too far away to compute with.
-    if (!(reach > kDualMinReach)) return {};
-    dual.push_back({plane.normal / reach, plane.farthest});
-  }
-  const auto less = [](const Vector& a, const Vector& b) {
-    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-  };
-  std::sort(dual.begin(), dual.end(),
-            [&](const Corner& a, const Corner& b) { return less(a.point, b.point); });
-  std::vector<Vector> points;
-  points.reserve(dual.size());
-  for (const Corner& d : dual) points.push_back(d.point);
-  HullBuilder builder;
-  if (!builder.Add(points, {.should_stop = should_stop_}).ok()) return {};
-  const absl::StatusOr<Hull> hull = builder.Snapshot(should_stop_);
-  if (!hull.ok() || hull->dimension() < 3) return {};
-  std::vector<Corner> corners;
-  for (size_t f = 0; f < hull->facet_count(); ++f) {
-    const auto facet = hull->facet(f);
-    const Vector& on_facet = hull->vertices()[facet[0]];
-    const Vector normal = AreaNormal(hull->vertices(), facet).stableNormalized();
-    const Vector corner = normal / normal.dot(on_facet);
-    // The corner of a dual facet that passes through the origin is at infinity.
-    if (!(LargestComponent(corner) < kFarthestCorner)) return {};
-    const size_t place =
-        std::lower_bound(points.begin(), points.end(), on_facet, less) - points.begin();
-    corners.push_back({corner, dual[place].near});
-  }
-  return corners;
 }
 
 std::optional<SimplifiedHull> Enclosure::ByBox() {

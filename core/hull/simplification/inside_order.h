@@ -34,9 +34,6 @@ class InsideOrder {
   double ErrorAt(size_t count);
   // Returns the first `count` vertices, by index.
   std::vector<uint32_t> First(size_t count);
-  // True for a solid if the signs of determinants usually are certain in floating point; false at
-  // extreme scales.
-  bool IsMeasurable() const { return solid_ && solid_->IsMeasurable(); }
   // The hull's vertices at unit scale.
   std::span<const Vector> unit_points() const { return unit_points_; }
 

@@ -56,17 +56,14 @@ class OutsideSearch {
         most_(target.max_vertices == 0 ? hull.vertices().size()
                                        : std::min(target.max_vertices, hull.vertices().size())),
         order_(hull, scale_, poll),
-        enclosure_(hull, scale_, target.should_stop, poll) {}
+        enclosure_(hull, order_.unit_points(), scale_, target.should_stop, poll) {}
 
   absl::StatusOr<SimplifiedHull> Run() {
     if (!poll_.stopped()) {
       if (hull_.vertices().size() <= most_) Consider(SimplifiedHull{hull_, 0});
       Consider(enclosure_.ByBox());
-      if (target_.max_error > 0) {
-        SearchByPushing();
-        SearchByPlanes();
-      }
-      if (!best_ || !Reaches(*best_)) UseAll();
+      if (target_.max_error > 0) Search();
+      if (!best_ || !Reaches(*best_)) TryPushing(most_ / CornersPerVertex());
     }
     if (poll_.stopped()) return Stopped();
     // The box is a hull for all finite doubles, with no more vertices than the least permitted
@@ -98,31 +95,26 @@ class OutsideSearch {
     return reaches;
   }
 
-  // Returns the most vertices of a better hull: as many as the best has, with its error or less.
-  size_t Worthwhile() const {
-    return best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
+  // Returns the largest error of an enclosure that may be better than the best.
+  double MostError() const {
+    return best_ ? std::max(best_->error, target_.max_error) : std::numeric_limits<double>::max();
   }
 
-  std::optional<Hull> Inside(size_t count) {
-    const std::vector<uint32_t> first = order_.First(count);
-    if (poll_.stopped()) return std::nullopt;
-    return HullOfSubset(hull_, first, poll_);
-  }
   bool TryPushing(size_t inside_vertices) {
-    const std::optional<Hull> inside = Inside(inside_vertices);
-    return inside && Consider(enclosure_.ByPushing(*inside));
-  }
-  bool TryPlanes(size_t inside_vertices) {
-    const std::optional<Hull> inside = Inside(inside_vertices);
-    return inside && Consider(enclosure_.ByPlanes(*inside));
+    if (inside_vertices < order_.least()) return false;
+    const std::vector<uint32_t> first = order_.First(inside_vertices);
+    if (poll_.stopped()) return false;
+    const std::optional<Hull> inside = HullOfSubset(hull_, first, poll_);
+    return inside && Consider(enclosure_.ByPushing(*inside, MostError()));
   }
 
   size_t CornersPerVertex() const { return hull_.dimension() == 2 ? 2 : 1; }
 
   // Pushing a vertex errs by at least the distance it is pushed, about the error of the inside
   // hull. The search starts there, continues in steps, and returns by halves.
-  void SearchByPushing() {
-    const size_t most = Worthwhile() / CornersPerVertex();
+  void Search() {
+    const size_t worthwhile = best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
+    const size_t most = worthwhile / CornersPerVertex();
     if (most < order_.least()) return;
     size_t fails = order_.CountFor(target_.max_error, most);
     if (TryPushing(fails)) return;
@@ -136,26 +128,6 @@ class OutsideSearch {
       const size_t middle = fails + (reaches - fails) / 2;
       (TryPushing(middle) ? reaches : fails) = middle;
     }
-  }
-
-  // Planes through the facets of an inside hull of n vertices meet in some 4 n corners, and in
-  // fewer if facets are large. They are tried if half of these corners would be permitted.
-  void SearchByPlanes() {
-    if (hull_.dimension() < 3) return;
-    const size_t all = hull_.vertices().size();
-    for (size_t n = order_.least(); n <= all && 2 * n <= Worthwhile() && !poll_.stopped();
-         n += n / 2 + 1) {
-      if (TryPlanes(n)) return;
-    }
-  }
-
-  // Without a reachable error limit: uses as many vertices as permitted.
-  void UseAll() {
-    const size_t pushed = most_ / CornersPerVertex();
-    if (pushed >= order_.least()) TryPushing(std::min(pushed, hull_.vertices().size()));
-    if (hull_.dimension() < 3) return;
-    // k planes have at most 2 k - 4 corners, and n vertices 2 n - 4 facets.
-    TryPlanes(std::min((most_ + 12) / 4, hull_.vertices().size()));
   }
 
   const Hull& hull_;
@@ -177,12 +149,11 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   const size_t most = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
   if (all <= least || (target.max_error == 0 && all == most)) return SimplifiedHull{hull, 0};
   StopPoll poll(target.should_stop);
-  InsideSearch search(hull, target.max_error, most, poll);
-  search.Run();
+  const VertexChoice choice = ChooseInside(hull, target.max_error, most, poll);
   if (poll.stopped()) return Stopped();
-  std::optional<Hull> inside = HullOfSubset(hull, search.best().vertices, poll);
+  std::optional<Hull> inside = HullOfSubset(hull, choice.vertices, poll);
   if (!inside) return Stopped();
-  return SimplifiedHull{*std::move(inside), search.best().error};
+  return SimplifiedHull{*std::move(inside), choice.error};
 }
 
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target) {

@@ -33,7 +33,7 @@ struct SimplifiedHull {
 };
 
 // Returns a hull inside the given one. Its vertices are a subset of the given one's, chosen
-// farthest first and then, for a solid, spread more evenly.
+// farthest first and then, for a solid, spread more evenly if that gains.
 //
 // With max_vertices alone: that many vertices, or all. With max_error: few vertices for an error
 // within it, or as many as max_vertices permits. Errors: INVALID_ARGUMENT: no limit, a max_error
@@ -42,17 +42,17 @@ struct SimplifiedHull {
 //
 // Guarantee: for a given max_error, at most as many vertices as farthest first needs; for a given
 // max_vertices, at most its error. For smooth bodies, farthest first alone needs vertices within a
-// constant factor of the fewest of any method (Kamenev 1992). **Observed** on spheres: less than
-// 1.5 times the fewest (SimplifyQuality). Cost: O((V + n) log n) for n choices of V vertices of
+// constant factor of the fewest of any method (Kamenev 1992). **Observed** on spheres: about 1.5
+// times the fewest (SimplifyQuality). Cost: O((V + n) log n) for n choices of V vertices of
 // round shapes; **observed** two to six times that of farthest first.
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target);
 
-// Returns a hull that encloses the given one, exactly for the doubles returned. It is the best of
-// three kinds: the vertices of inside simplifications pushed outwards, the planes that support the
-// given hull along their facets, or a box. With max_error, the best is the hull with the fewest
-// vertices within both limits; otherwise, or if there is none, the hull with the least error. Never
-// has more vertices than the hull itself. Errors: as for SimplifyInside, but at least 8 vertices
-// must be permitted. Cost: some ten inside simplifications.
+// Returns a hull that encloses the given one, exactly for the doubles returned: the vertices of an
+// inside simplification pushed outwards, or a box. With max_error, it is the hull with the fewest
+// vertices found within both limits; otherwise, or if there is none, the hull with the least error.
+// Never has more vertices than the hull itself. Errors: as for SimplifyInside, but at least 8
+// vertices must be permitted. Cost: one order of farthest first, and some ten hulls of its first
+// vertices.
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target);
 
 }  // namespace hulld

@@ -24,6 +24,18 @@ std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> cho
   return *std::move(hull);
 }
 
+std::vector<uint32_t> PlacesOf(const Hull& inside, const Hull& full) {
+  std::vector<uint32_t> places;
+  places.reserve(inside.vertices().size());
+  // Both are sorted.
+  uint32_t place = 0;
+  for (const Vector& v : inside.vertices()) {
+    while (full.vertices()[place] != v) ++place;
+    places.push_back(place);
+  }
+  return places;
+}
+
 Vector AreaNormal(std::span<const Vector> points, std::span<const uint32_t> loop) {
   Vector sum = Vector::Zero();
   const Vector& a = points[loop[0]];

@@ -25,6 +25,10 @@ struct VertexChoice {
 std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> chosen,
                                  StopPoll& poll);
 
+// Returns the indices of the inside hull's vertices among those of the full hull, which include
+// them all.
+std::vector<uint32_t> PlacesOf(const Hull& inside, const Hull& full);
+
 // Returns twice the area of a facet times its unit normal, rounded. Newell's sum, which is robust
 // for many corners.
 Vector AreaNormal(std::span<const Vector> points, std::span<const uint32_t> loop);

@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <numeric>
-#include <random>
 #include <utility>
 
 #include "core/base/check.h"
@@ -15,12 +13,6 @@
 
 namespace hulld {
 namespace {
-
-// The most steps from triangle to triangle toward a nearer one; the next search continues from
-// there.
-constexpr int kMostSteps = 64;
-// Average walk steps per point above which a shape is unsuitable for walks.
-constexpr uint64_t kMostWalkPerPoint = 64;
 
 // Returns the candidate with the largest `measure`, excluding some.
 template <size_t n, typename Measure>
@@ -44,10 +36,12 @@ uint32_t Farthest(std::span<const uint32_t> candidates, const std::array<uint32_
 }  // namespace
 
 VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points)
-    : points_(points), unit_points_(unit_points) {
+    : points_(points),
+      unit_points_(unit_points),
+      distance_(points.size(), 0),
+      triangle_(points.size(), kNone),
+      next_(points.size(), kNone) {
   HULLD_CHECK(points.size() >= 4 && points.size() == unit_points.size());
-  next_.resize(points.size(), kNone);
-  distance_.resize(points.size(), 0);
 }
 
 VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points,
@@ -56,14 +50,7 @@ VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vecto
   std::vector<uint32_t> everyone(points.size());
   std::iota(everyone.begin(), everyone.end(), 0u);
   const bool is_solid = StartWithCornersOf(everyone, poll);
-  if (poll.stopped()) return;
-  HULLD_CHECK(is_solid);
-  const std::vector<TriangleId> all = MakeCells();
-  for (const uint32_t i : everyone) {
-    if (poll.Step()) return;
-    if (std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end()) Assign(i, all);
-  }
-  EnqueueChanged();
+  HULLD_CHECK(is_solid || poll.stopped());
 }
 
 std::optional<VertexSubset> VertexSubset::StartingWith(std::span<const uint32_t> start,
@@ -72,7 +59,10 @@ std::optional<VertexSubset> VertexSubset::StartingWith(std::span<const uint32_t>
                                                        StopPoll& poll) {
   VertexSubset subset(points, unit_points);
   if (start.size() < 4 || !subset.StartWithCornersOf(start, poll)) return std::nullopt;
-  if (!subset.ChooseRestOf(start, poll) || !subset.AssignRest(poll)) return std::nullopt;
+  for (const uint32_t i : start) {
+    if (subset.distance_[i] != kChosen) subset.Choose(i, poll);
+    if (poll.stopped()) return std::nullopt;
+  }
   return subset;
 }
 
@@ -100,92 +90,57 @@ bool VertexSubset::StartWithCornersOf(std::span<const uint32_t> candidates, Stop
     d = *apart;
   }
   chosen_ = {a, b, c, d};
-  for (const uint32_t i : chosen_) vertices_.Add(points_[i]);
+  for (const uint32_t i : chosen_) {
+    vertices_.Add(points_[i]);
+    distance_[i] = kChosen;
+  }
   const std::array<VertexId, 3> base = {0, 1, 2};
   surface_.emplace(vertices_, base, 3);
-  return true;
-}
-
-// Adds the given vertices to the surface, before any list exists. Uses a pseudorandom order,
-// because sorted points may see all earlier ones. Returns false if walks are long, or the poll
-// stopped.
-bool VertexSubset::ChooseRestOf(std::span<const uint32_t> start, StopPoll& poll) {
-  if (surface_->directions() == nullptr) return false;
-  std::vector<uint32_t> order;
-  std::copy_if(start.begin(), start.end(), std::back_inserter(order), [this](uint32_t i) {
-    return std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end();
-  });
-  // Avoids std::shuffle, which differs between libraries.
-  std::mt19937 random;
-  for (size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random() % k]);
-  for (const uint32_t i : order) {
-    if (poll.Step(1 + surface_->TakeSteps())) return false;
-    surface_->Insert(vertices_, points_[i]);
-    chosen_.push_back(i);
-    // A vertex of the whole hull is and remains a vertex of the hull of any subset.
-    HULLD_CHECK(vertices_.size() == chosen_.size());
-    if (IsSlow()) return false;
-  }
-  return true;
-}
-
-// Assigns each vertex that is not chosen to a triangle. Returns false if walks are long, or the
-// poll stopped.
-bool VertexSubset::AssignRest(StopPoll& poll) {
-  MakeCells();
-  std::vector<bool> is_chosen(points_.size(), false);
-  for (const uint32_t i : chosen_) is_chosen[i] = true;
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    if (poll.Step()) return false;
-    if (is_chosen[i]) continue;
-    const std::optional<Surface::Location> location = surface_->Locate(vertices_, points_[i]);
-    if (!location || IsSlow()) return false;
-    HULLD_CHECK(location->side == Surface::Side::kOutside);
-    Assign(i, {&location->triangle, 1});
-  }
-  EnqueueChanged();
-  return true;
-}
-
-// True if walks on the surface are so long that their total may be quadratic.
-bool VertexSubset::IsSlow() const {
-  return surface_->work() > kMostWalkPerPoint * (points_.size() + 1024);
-}
-
-std::vector<TriangleId> VertexSubset::MakeCells() {
   std::vector<TriangleId> all;
   surface_->ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { all.push_back(id); });
   for (const TriangleId id : all) MakeCell(id);
-  return all;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    if (poll.Step()) return false;
+    if (distance_[i] != kChosen) Assign(i, all);
+  }
+  Enqueue(all);
+  return true;
 }
 
 void VertexSubset::ChooseNext(StopPoll& poll) {
   HULLD_CHECK(!is_complete());
-  const TriangleId worst = Worst();
   // Each vertex that is not chosen is in a list.
-  HULLD_CHECK(worst != kNone);
-  const uint32_t next = cells_[worst].farthest;
+  const double distance = DistanceBound();
+  HULLD_CHECK(distance > 0);
+  Choose(queue_.top().point, poll);
+}
+
+// Requires: a vertex that is not chosen.
+void VertexSubset::Choose(uint32_t point, StopPoll& poll) {
   orphans_.clear();
-  for (const TriangleId gone : surface_->RemoveVisible(vertices_, points_[next], worst)) {
+  for (const TriangleId gone :
+       surface_->RemoveVisible(vertices_, points_[point], triangle_[point])) {
     for (uint32_t i = cells_[gone].first; i != kNone; i = next_[i]) {
-      if (i != next) orphans_.push_back(i);
+      if (i != point) orphans_.push_back(i);
     }
     cells_[gone] = {};
   }
-  const std::span<const TriangleId> created = surface_->JoinToBoundary(vertices_, points_[next]);
-  chosen_.push_back(next);
+  const std::span<const TriangleId> created = surface_->JoinToBoundary(vertices_, points_[point]);
+  chosen_.push_back(point);
+  distance_[point] = kChosen;
+  // A vertex of the whole hull is and remains a vertex of the hull of any subset.
   HULLD_CHECK(vertices_.size() == chosen_.size());
   for (const TriangleId id : created) MakeCell(id);
   for (const uint32_t i : orphans_) {
     if (poll.Step()) return;
     Assign(i, created);
   }
-  EnqueueChanged();
+  Enqueue(created);
 }
 
 double VertexSubset::DistanceBound() {
-  const TriangleId worst = Worst();
-  return worst == kNone ? 0 : distance_[cells_[worst].farthest];
+  while (!queue_.empty() && distance_[queue_.top().point] != queue_.top().distance) queue_.pop();
+  return queue_.empty() ? 0 : queue_.top().distance;
 }
 
 void VertexSubset::MakeCell(TriangleId id) {
@@ -216,94 +171,22 @@ void VertexSubset::Assign(uint32_t point, std::span<const TriangleId> targets) {
       best = id;
     }
   }
-  best = ClimbFrom(best, point);
   for (size_t k = 0; !Sees(point, best); ++k) {
     HULLD_CHECK(k < targets.size());
     best = targets[k];
   }
-  Link(best, point, DistanceTo(best, point));
+  Cell& cell = cells_[best];
+  triangle_[point] = best;
+  next_[point] = std::exchange(cell.first, point);
+  distance_[point] = DistanceTo(best, point);
+  if (cell.farthest == kNone || distance_[point] > distance_[cell.farthest]) cell.farthest = point;
 }
 
-void VertexSubset::Link(TriangleId id, uint32_t point, double distance) {
-  Cell& cell = cells_[id];
-  next_[point] = cell.first;
-  distance_[point] = distance;
-  cell.first = point;
-  NoteChange(id);
-  if (cell.farthest == kNone || distance > distance_[cell.farthest]) cell.farthest = point;
-}
-
-// Moves the vertices of a list to nearer triangles.
-void VertexSubset::Redistribute(TriangleId id) {
-  uint32_t i = std::exchange(cells_[id].first, kNone);
-  cells_[id].farthest = kNone;
-  NoteChange(id);
-  while (i != kNone) {
-    const uint32_t next = next_[i];
-    TriangleId target = ClimbFrom(id, i);
-    double distance = distance_[i];
-    if (target != id) {
-      const double nearer = DistanceTo(target, i);
-      if (nearer < distance && Sees(i, target)) {
-        distance = nearer;
-      } else {
-        target = id;
-      }
-    }
-    Link(target, i, distance);
-    i = next;
+void VertexSubset::Enqueue(std::span<const TriangleId> ids) {
+  for (const TriangleId id : ids) {
+    const uint32_t farthest = cells_[id].farthest;
+    if (farthest != kNone) queue_.push({distance_[farthest], farthest});
   }
-}
-
-// Enqueues the changed lists in their current state.
-void VertexSubset::EnqueueChanged() {
-  for (const TriangleId id : changed_) {
-    Cell& cell = cells_[id];
-    if (!std::exchange(cell.is_changed, false)) continue;
-    cell.entry = ++entries_;
-    if (cell.first != kNone) queue_.push({distance_[cell.farthest], id, cell.entry});
-  }
-  changed_.clear();
-}
-
-// Returns the triangle reached by steps that each raise the point's height.
-TriangleId VertexSubset::ClimbFrom(TriangleId id, uint32_t point) const {
-  double height = HeightOver(id, point);
-  for (int step = 0; step < kMostSteps; ++step) {
-    TriangleId higher = id;
-    for (const TriangleId next : surface_->triangle(id).neighbors) {
-      if (const double h = HeightOver(next, point); h > height) {
-        height = h;
-        higher = next;
-      }
-    }
-    if (higher == id) break;
-    id = higher;
-  }
-  return id;
-}
-
-// Returns the triangle of the farthest vertex, which no step brings nearer to the surface; kNone if
-// no vertex is pending. Moves vertices to nearer triangles on the way, a whole list together: if
-// one vertex gains from a new triangle, most of its list does.
-TriangleId VertexSubset::Worst() {
-  while (!queue_.empty()) {
-    const Entry top = queue_.top();
-    if (cells_[top.triangle].entry != top.number) {
-      queue_.pop();
-      continue;
-    }
-    const uint32_t point = cells_[top.triangle].farthest;
-    const TriangleId nearer = ClimbFrom(top.triangle, point);
-    if (nearer == top.triangle || !(DistanceTo(nearer, point) < top.distance) ||
-        !Sees(point, nearer)) {
-      return top.triangle;
-    }
-    queue_.pop();
-    Redistribute(top.triangle);
-    EnqueueChanged();
-  }
-  return kNone;
 }
 
 }  // namespace hulld

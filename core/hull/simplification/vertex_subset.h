@@ -5,7 +5,6 @@
 #include <optional>
 #include <queue>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "core/base/stop_poll.h"
@@ -15,26 +14,24 @@
 
 namespace hulld {
 
-// A growing subset of the vertices of a hull of dimension 3. The next one is always the vertex
-// farthest from the hull of the chosen ones, as far as rounding permits.
+// A growing subset of the vertices of a hull of dimension 3. The next one is usually the vertex
+// farthest from the hull of the chosen ones.
 //
 // The hull of the chosen vertices grows exactly, like any hull. Each remaining vertex waits in the
 // list of a triangle that it sees strictly; one exists, because each vertex of the full hull is
 // outside the hull of any other vertices. The distance to that triangle bounds the distance to the
-// hull. A vertex is assigned to the triangle with the plane that it is highest above, which is the
-// nearest triangle if the vertex lies over it. Later triangles may be nearer; this is tested only
-// when a vertex appears to be the farthest of all. Source: Barber, Dobkin and Huhdanpaa 1996
-// (Quickhull) for the lists; Kamenev 1992, A Class of Adaptive Algorithms for Approximating Convex
-// Bodies by Polyhedra, for the order and its quality.
+// hull. When triangles are replaced, a vertex of their lists goes to the new triangle with the
+// plane that it is highest above, which is the nearest one if the vertex lies over it. Source:
+// Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists; Kamenev 1992, A Class of Adaptive
+// Algorithms for Approximating Convex Bodies by Polyhedra, for the order and its quality.
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
   // outlive this object. Starts with four vertices. If the poll stopped, here or in ChooseNext,
   // this object may only be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
-  // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane, if
-  // no double is found inside their hull, if walks on it are longer than round shapes need, or if
-  // the poll stopped. Cost: O(points) walks.
+  // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane or
+  // the poll stopped. Cost: that of as many choices, for an order that is about farthest first.
   static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
                                                   std::span<const Vector> points,
                                                   std::span<const Vector> unit_points,
@@ -43,8 +40,6 @@ class VertexSubset {
   // Indices, in the order chosen.
   const std::vector<uint32_t>& chosen() const { return chosen_; }
   bool is_complete() const { return chosen_.size() == points_.size(); }
-  // See Surface.
-  bool IsMeasurable() const { return surface_->IsMeasurable(); }
   // Chooses the apparently farthest vertex. Requires: !is_complete(). Cost: O((V + n) log n) for n
   // choices of V vertices of round shapes.
   void ChooseNext(StopPoll& poll);
@@ -54,6 +49,8 @@ class VertexSubset {
 
  private:
   static constexpr uint32_t kNone = UINT32_MAX;
+  // The distance of a chosen vertex, less than any real one.
+  static constexpr double kChosen = -1;
 
   // Data for a triangle of the surface: a corner and the unit normal, rounded, at unit scale, and
   // the list of vertices.
@@ -63,26 +60,19 @@ class VertexSubset {
     uint32_t first = kNone;
     // The farthest vertex of the list.
     uint32_t farthest = kNone;
-    // The number of this cell's last entry in the queue.
-    uint64_t entry = 0;
-    // True if the list has changed since that entry.
-    bool is_changed = false;
   };
+  // Stale if the vertex has another distance now.
   struct Entry {
     double distance;
-    TriangleId triangle;
-    uint64_t number;
+    uint32_t point;
     bool operator<(const Entry& other) const {
-      return distance != other.distance ? distance < other.distance : triangle > other.triangle;
+      return distance != other.distance ? distance < other.distance : point > other.point;
     }
   };
 
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points);
   bool StartWithCornersOf(std::span<const uint32_t> candidates, StopPoll& poll);
-  bool ChooseRestOf(std::span<const uint32_t> start, StopPoll& poll);
-  bool AssignRest(StopPoll& poll);
-  std::vector<TriangleId> MakeCells();
-  bool IsSlow() const;
+  void Choose(uint32_t point, StopPoll& poll);
   void MakeCell(TriangleId id);
   double HeightOver(TriangleId id, uint32_t point) const {
     return cells_[id].normal.dot(unit_points_[point] - cells_[id].corner);
@@ -92,14 +82,7 @@ class VertexSubset {
   }
   double DistanceTo(TriangleId id, uint32_t point) const;
   void Assign(uint32_t point, std::span<const TriangleId> targets);
-  void Link(TriangleId id, uint32_t point, double distance);
-  void NoteChange(TriangleId id) {
-    if (!std::exchange(cells_[id].is_changed, true)) changed_.push_back(id);
-  }
-  void EnqueueChanged();
-  void Redistribute(TriangleId id);
-  TriangleId ClimbFrom(TriangleId id, uint32_t point) const;
-  TriangleId Worst();
+  void Enqueue(std::span<const TriangleId> ids);
 
   std::span<const Vector> points_;
   std::span<const Vector> unit_points_;
@@ -109,14 +92,13 @@ class VertexSubset {
   std::vector<uint32_t> chosen_;
   // By triangle.
   std::vector<Cell> cells_;
-  // By point that is not chosen: the next one of its list, and a proven bound of its distance.
-  std::vector<uint32_t> next_;
+  // By point: a proven bound of its distance, or kChosen. If not chosen: the triangle of its list,
+  // and the next point there.
   std::vector<double> distance_;
-  // Each cell with a list has one valid entry, and may have stale ones.
+  std::vector<TriangleId> triangle_;
+  std::vector<uint32_t> next_;
+  // An entry for the farthest vertex of each list, and stale entries.
   std::priority_queue<Entry> queue_;
-  uint64_t entries_ = 0;
-  // Triangles with lists that changed since they were enqueued.
-  std::vector<TriangleId> changed_;
   // Vertices of removed triangles.
   std::vector<uint32_t> orphans_;
 };

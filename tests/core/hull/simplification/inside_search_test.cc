@@ -15,7 +15,6 @@
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/hull_builder.h"
 #include "core/hull/simplification/inside_order.h"
-#include "core/hull/simplification/relaxation.h"
 #include "core/hull/simplification/unit_scale.h"
 #include "core/hull/simplification/vertex_subset.h"
 #include "tests/core/checks/oracle_bridge.h"
@@ -89,20 +88,18 @@ TEST(InsideSearch, IsNeverWorseThanFarthestFirst) {
     InsideOrder order(full, scale, poll);
     for (const double relative_error : {0.3, 0.1, 0.03, 0.01, 0.003, 1e-4}) {
       const double max_error = relative_error * full.max_abs_coordinate();
-      InsideSearch search(full, max_error, all, poll);
-      search.Run();
+      const VertexChoice choice = ChooseInside(full, max_error, all, poll);
       const size_t count = order.CountFor(max_error, all);
-      EXPECT_LE(search.best().vertices.size(), count) << shape.name << " " << relative_error;
-      EXPECT_LE(search.best().error, max_error) << shape.name << " " << relative_error;
-      better += search.best().vertices.size() < count ? 1 : 0;
+      EXPECT_LE(choice.vertices.size(), count) << shape.name << " " << relative_error;
+      EXPECT_LE(choice.error, max_error) << shape.name << " " << relative_error;
+      better += choice.vertices.size() < count ? 1 : 0;
     }
     for (const size_t most : {4, 5, 8, 20, 60, 200}) {
       if (most >= all) continue;
-      InsideSearch search(full, 0, most, poll);
-      search.Run();
-      EXPECT_EQ(search.best().vertices.size(), most) << shape.name;
-      EXPECT_LE(search.best().error, order.ErrorAt(most)) << shape.name << " " << most;
-      better += search.best().error < order.ErrorAt(most) ? 1 : 0;
+      const VertexChoice choice = ChooseInside(full, 0, most, poll);
+      EXPECT_EQ(choice.vertices.size(), most) << shape.name;
+      EXPECT_LE(choice.error, order.ErrorAt(most)) << shape.name << " " << most;
+      better += choice.error < order.ErrorAt(most) ? 1 : 0;
     }
   }
   // **Observed**: 34.
@@ -155,47 +152,6 @@ TEST(VertexSubset, DoesNotStartInAPlane) {
   EXPECT_FALSE(start(top).has_value());
   EXPECT_FALSE(start(std::span(top).first(3)).has_value());
   EXPECT_FALSE(start({}).has_value());
-}
-
-TEST(Relaxation, SpreadsCrowdedPoints) {
-  const Hull full = BuildHull(OnEllipsoid(4000, Vector(1, 1, 1)));
-  const UnitScale scale(full.max_abs_coordinate());
-  const std::vector<Vector> unit_points = scale.ToUnit(full.vertices());
-  StopPoll poll;
-  Relaxation relaxation(full, unit_points, poll);
-  // Many of the vertices on one half of the sphere, and few on the other.
-  std::vector<uint32_t> chosen;
-  for (uint32_t i = 0; i < full.vertices().size(); ++i) {
-    if (i % (full.vertices()[i].x() < 0 ? 10 : 80) == 0) chosen.push_back(i);
-  }
-  const auto error_of = [&](std::span<const uint32_t> vertices) {
-    auto subset = VertexSubset::StartingWith(vertices, full.vertices(), unit_points, poll);
-    return subset->DistanceBound();
-  };
-  const double before = error_of(chosen);
-  const size_t count = chosen.size();
-  for (int k = 0; k < 8; ++k) {
-    auto moved = k % 4 == 0 ? relaxation.MoveFewer(chosen) : relaxation.Move(chosen);
-    ASSERT_TRUE(moved.has_value());
-    EXPECT_TRUE(std::is_sorted(moved->begin(), moved->end()));
-    chosen = *std::move(moved);
-  }
-  EXPECT_LT(chosen.size(), count);
-  EXPECT_GT(chosen.size(), count * 4 / 5);
-  EXPECT_LT(error_of(chosen), before / 2);
-}
-
-TEST(Relaxation, HasNoSolidToMoveInAPlane) {
-  const Hull full = BuildHull(OnPrism(20));
-  const UnitScale scale(full.max_abs_coordinate());
-  const std::vector<Vector> unit_points = scale.ToUnit(full.vertices());
-  StopPoll poll;
-  Relaxation relaxation(full, unit_points, poll);
-  std::vector<uint32_t> top;
-  for (uint32_t i = 0; i < full.vertices().size(); ++i) {
-    if (full.vertices()[i].z() > 0) top.push_back(i);
-  }
-  EXPECT_FALSE(relaxation.Move(top).has_value());
 }
 
 }  // namespace inside_search_test
