@@ -353,7 +353,7 @@ function first_contact_resolution(   m, n, r, methods, labels, key, open, widest
 }
 
 function rays(   fields) {
-  head("| length of a ray | answer | hits | rays a second | cores of the server |")
+  head("| length of a ray | library | hits | rays a second | cores of the server |")
   while (next_row("first_contact_rays_" machine, fields)) {
     printf "| %s | %s | %d | %s | %s |\n", fields[1], fields[2], fields[5], short(fields[7]),
            (fields[2] == "Bullet" ? "-" : fields[8])
