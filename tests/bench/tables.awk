@@ -287,7 +287,7 @@ function passages(kind, method,   r, key, text) {
 }
 
 function first_contact(   k, v, m, n, kinds, sizes, methods, kind, text) {
-  read_rows("first_contact_" machine)
+  read_rows("motions/first_contact_" machine)
   head("| motion, vertices | hulld | FCL, libccd | Bullet | Bullet, scaled | Bullet, cast | 10 poses | 100 poses | 1000 poses |")
   split("translation,rotation", kinds, ",")
   split("8,64,512,10000", sizes, ",")
@@ -308,7 +308,7 @@ function first_contact(   k, v, m, n, kinds, sizes, methods, kind, text) {
 
 # Sums over sizes and passages.
 function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, invented, error, asked) {
-  read_rows("first_contact_" machine)
+  read_rows("motions/first_contact_" machine)
   head("| method | translations: missed | false contacts | error of time | rotations: missed | false contacts | error of time |")
   split("translation,rotation", kinds, ",")
   peer_names()
@@ -336,7 +336,7 @@ function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, 
 }
 
 function first_contact_resolution(   m, n, r, methods, labels, key, open, widest) {
-  read_rows("first_contact_" machine)
+  read_rows("motions/first_contact_" machine)
   head("| resolution | hit / graze / near miss / miss, ns | open | widest bracket |")
   n = split("hulld 1e-2,hulld 1e-4,hulld 1e-6,hulld", methods, ",")
   split("1e-2,1e-4,1e-6,defaults", labels, ",")
@@ -354,7 +354,7 @@ function first_contact_resolution(   m, n, r, methods, labels, key, open, widest
 
 function rays(   fields) {
   head("| length of a ray | library | hits | rays a second | cores of the server |")
-  while (next_row("first_contact_rays_" machine, fields)) {
+  while (next_row("motions/first_contact_rays_" machine, fields)) {
     printf "| %s | %s | %d | %s | %s |\n", fields[1], fields[2], fields[5], short(fields[7]),
            (fields[2] == "Bullet" ? "-" : fields[8])
   }

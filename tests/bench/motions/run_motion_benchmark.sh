@@ -1,6 +1,6 @@
 #!/bin/bash
 # Measures first contacts of motions, and rays against a running server; keeps the rows in
-# tests/bench/results/.
+# tests/bench/results/motions/.
 #
 #   bash tests/bench/motions/run_motion_benchmark.sh [MACHINE] [SUITE...]
 #
@@ -24,14 +24,14 @@ cmake --build --preset release --target motion_benchmark ray_benchmark
 for suite in "${suites[@]}"; do
   case $suite in
     motions)
-      out=$results/first_contact_$machine.csv
+      out=$results/motions/first_contact_$machine.csv
       "$programs/motion_benchmark" --benchmark_out="$out" \
         --benchmark_repetitions="${REPETITIONS:-5}" --benchmark_enable_random_interleaving=true \
         --benchmark_report_aggregates_only=true
       { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"
       mv "$out.sorted" "$out"
       ;;
-    rays) "$programs/ray_benchmark" >"$results/first_contact_rays_$machine.csv" ;;
+    rays) "$programs/ray_benchmark" >"$results/motions/first_contact_rays_$machine.csv" ;;
     *)
       echo "run_motion_benchmark.sh: unknown suite $suite" >&2
       exit 2
