@@ -144,6 +144,14 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
     ignored_.insert(std::minmax(pair.first, pair.second));
   }
   const auto count = static_cast<uint32_t>(placements.size());
+  if (!options.groups.empty() && !ignored_.empty()) {
+    first_others_.resize(count);
+    for (uint32_t i = count; i-- > 0;) {
+      const bool skips_next =
+          i + 1 < count && options.groups[i] == options.groups[i + 1] && IsIgnored(i, i + 1);
+      first_others_[i] = skips_next ? first_others_[i + 1] : i + 1;
+    }
+  }
   pairs_ = CountPairs();
   size_ = options.movers ? std::min(*options.movers, count) : count;
 }
@@ -252,6 +260,7 @@ void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {
   HULLD_DCHECK(a < scene.size());
   scene_ = &scene;
   a_ = a;
+  first_ = scene.FirstCandidate(a);
   box_ = GrownBy(scene.boxes_[a], scene.options_->query.clearance.value_or(0));
   cursor_ = scene.tree_.Begin();
   is_gathered_ = false;
@@ -264,7 +273,7 @@ void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {
 bool SceneCandidates::Gather(uint64_t nodes) {
   if (is_gathered_) return true;
   const size_t before = listed_.size();
-  is_gathered_ = scene_->tree_.AppendMeeting(box_, a_ + 1, nodes, cursor_, listed_);
+  is_gathered_ = scene_->tree_.AppendMeeting(box_, first_, nodes, cursor_, listed_);
   const auto is_ignored = [this](uint32_t b) { return scene_->IsIgnored(a_, b); };
   listed_.erase(
       std::remove_if(listed_.begin() + static_cast<ptrdiff_t>(before), listed_.end(), is_ignored),

@@ -91,7 +91,8 @@ class SceneSearch {
 
   // Memory of the boxes and their tree.
   size_t MemoryBytes() const {
-    return boxes_.capacity() * sizeof(Box) + tree_.MemoryBytes() + sizeof *this;
+    return boxes_.capacity() * sizeof(Box) + first_others_.capacity() * sizeof(uint32_t) +
+           tree_.MemoryBytes() + sizeof *this;
   }
 
  private:
@@ -112,12 +113,20 @@ class SceneSearch {
   absl::StatusOr<Answer> AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
                                  PiecesAnswer* of_body) const;
   uint64_t CountPairs() const;
+  // Returns the first placement that may be a candidate of `placement`.
+  uint32_t FirstCandidate(uint32_t placement) const {
+    return first_others_.empty() ? placement + 1 : first_others_[placement];
+  }
 
   std::span<const PlacedHull> placements_;
   const SceneOptions* options_;
   // Computes the relation, and the comparison with the clearance.
   QueryOptions first_look_;
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
+  // For each placement, the next one, beyond those of its own group if that group ignores itself.
+  // Empty without ignored groups. A search skips subtrees of lower indices, so rays, which ignore
+  // each other and come first, cost nothing to each other.
+  std::vector<uint32_t> first_others_;
   std::vector<Box> boxes_;
   BoxTree tree_{std::span<const Box>()};
   uint64_t pairs_ = 0;
@@ -148,6 +157,7 @@ class SceneCandidates {
  private:
   const SceneSearch* scene_ = nullptr;
   uint32_t a_ = 0;
+  uint32_t first_ = 0;
   Box box_;
   BoxTree::Cursor cursor_;
   bool is_gathered_ = false;

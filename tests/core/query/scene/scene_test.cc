@@ -225,6 +225,32 @@ TEST(Scene, CandidatesAreGatheredInStepsAndTakeABitEachAtMost) {
   EXPECT_LT(candidates.MemoryBytes(), 2 * 1200 * sizeof(uint32_t) + kPlacements / 8 + 64);
 }
 
+// Rays against one hull: the boxes of all rays intersect.
+TEST(Scene, MembersOfAGroupThatIgnoresItselfAreNotVisited) {
+  constexpr uint32_t kRays = 4000;
+  Random random(TestSeed(829));
+  const Hull ball = BuildHull(RandomOnSphere(random, 8, 1));
+  const QueryHull query(ball);
+  const std::vector<PlacedHull> placements(kRays + 1, PlacedHull(query, Pose{}));
+  std::vector<uint32_t> groups(kRays, 0);
+  groups.push_back(1);
+  const std::vector<GroupPair> ignored = {{0, 0}};
+  SceneOptions options;
+  options.groups = groups;
+  options.ignored_groups = ignored;
+  const absl::StatusOr<SceneSearch> scene = SceneSearch::Make(placements, options);
+  ASSERT_TRUE(scene.ok());
+  SceneCandidates candidates;
+  for (const uint32_t a : {0U, kRays / 2, kRays - 1}) {
+    candidates.Start(*scene, a);
+    int nodes = 1;
+    while (!candidates.Gather(1)) ++nodes;
+    EXPECT_LT(nodes, 50) << a;
+    EXPECT_EQ(candidates.Next(), kRays);
+    EXPECT_EQ(candidates.Next(), std::nullopt);
+  }
+}
+
 TEST(Scene, BoxesHoldTheirHullsAtEveryScale) {
   Random random(TestSeed(825));
   for (const double scale : {1e-305, 1e-100, 1e-3, 1.0, 1e80, 1e300}) {
