@@ -1,4 +1,4 @@
-// Rays in one call: 2000 rays against 1000 hulls of 64 vertices.
+// Rays in one call: 100,000 rays against 1000 hulls of 64 vertices.
 //
 //   ray_benchmark [PROGRAM]
 //
@@ -9,8 +9,7 @@
 //
 //   hulld     the time of each hit, 0 for a ray that starts inside
 //   Bullet    every hit of btCollisionWorld::rayTest, a call per ray, on one thread in this
-//   process;
-//             it omits rays that start inside
+//             process; it omits rays that start inside
 //
 // Columns: `hits`, pairs of a ray and a hull; `rays_per_second`, by the wall clock; `cores`, the
 // processor time of the server over the time of the call.
@@ -43,8 +42,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kHulls = 1000;
 constexpr int kVertices = 64;
-constexpr size_t kRays = 2000;
-constexpr int kRounds = 7;
+constexpr size_t kRays = 100'000;
+constexpr int kRounds = 3;
 // Half the side of the cube that holds the hulls, about three radii of room for each.
 constexpr double kHalf = 15;
 
