@@ -63,7 +63,8 @@ class ChunkedVector {
   }
 
   void push_back(const T& value) {
-    const T copy = value;  // may be an element that moves
+    // May be an element that moves.
+    const T copy = value;  // NOLINT(performance-unnecessary-copy-initialization)
     Mutable(Extend()) = copy;
   }
   // Appends an unassigned element, to be set by Mutable; returns its index.
