@@ -220,7 +220,7 @@ TEST(Programs, ThatRunThreadsArePartOfThePresetTsan) {
   for (const TestProgram& program : TestPrograms()) {
     const std::string folder = program.folder.string();
     // File readers run on one thread for any input.
-    if (folder.find("/tests/client") != folder.npos) continue;
+    if (folder.find("/tests/client") != std::string::npos) continue;
     const bool uses_grpc = std::any_of(std::begin(grpc), std::end(grpc),
                                        [&](const auto& library) { return program.Has(library); });
     const bool runs_threads =

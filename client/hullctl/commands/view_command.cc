@@ -26,8 +26,6 @@
 #include "client/hullctl/view/recording.h"
 #include "client/hullctl/view/temporary_hulls.h"
 
-extern char** environ;
-
 namespace hulld {
 namespace {
 
