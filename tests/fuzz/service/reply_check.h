@@ -102,8 +102,8 @@ class AppendCheck {
   // Records the points of chunks in sending order.
   void Sent(const v1::AppendPointsRequest& request);
   std::string Received(const v1::AppendPointsResponse& response);
-  // ok: the final status, after everything was read. is_certain: no chunk of an abandoned stream can
-  // have been committed since this one was opened.
+  // ok: the final status, after everything was read. is_certain: no chunk of an abandoned stream
+  // can have been committed since this one was opened.
   std::string Ended(bool ok, bool is_certain) const;
 
   const v1::AppendOpened& opened() const { return opened_; }
