@@ -68,7 +68,7 @@ TEST(Includes, CoreKnowsNoServiceLogOrFile) {
               "fmt/", "CLI/", "assimp", "fstream", "iostream", "filesystem", "cstdio", "stdio.h"});
 }
 
-// Where one folder includes headers of another.
+// For each folder, the other folders whose headers it includes, with one such include.
 using Arrows = std::map<std::string, std::map<std::string, Include>>;
 
 Arrows ArrowsBetweenFolders() {

@@ -255,6 +255,15 @@ inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
 // |n| (M + |y| + |x|). The total is below 900 u w (|n| (M + |y| + |x|) + |c|). Proven.
 inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 
+// The gap of two translating hulls at a time, along a computed unit direction n: the gap at the
+// start, plus the time times n.d for the difference d of their displacements. S is the size of the
+// pair at the start, D the sum of the largest components of both displacements. d errs by 2 u D per
+// component, by 4 u D along n; products and sums by 10 u D; the final sums by 2 u of 7 S + 2 D. If
+// the gap at the start is that of balls, the difference of their centers errs by sqrt(3) * 128 u S
+// along n, its products and sums by 9 u S, and the radii, at most 4 S together, by 10 u of that.
+// The total is below 300 u (S + D). Proven.
+inline constexpr double kTranslatedGapErrorFactor = 512 * kUnitRoundoff;
+
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
 // with a radius errs by u more. The margins r |n| of the plane above enter its bound like c.
 // Proven.

@@ -26,7 +26,7 @@ struct MovingHull {
   const QueryHull& hull;
   Motion X_WB;
   double radius = 0;
-  // Of a piece. Requires: a valid pose (ValidatePose).
+  // The pose of the piece in its body. Requires: a valid pose (ValidatePose).
   Pose X_BH = {};
   double piece_radius = 0;
 

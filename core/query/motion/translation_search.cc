@@ -31,10 +31,6 @@ constexpr double kLeastRelativeGap = 0x1p-46;
 constexpr int kMostFloatSteps = 24;
 // Share of the gap that a step in floating point leaves open, more than rounding takes. A choice.
 constexpr double kOpenShare = 0x1p-10;
-// Bound of the rounding of a gap at a later time, relative to the pair and its displacements: far
-// above that of centers (kMinkowskiErrorFactor), of displacements, and of products with a
-// direction.
-constexpr double kLaterGapError = 0x1p-44;
 // Factor between the strides of successive exact queries. A choice.
 constexpr int64_t kStrideFactor = 16;
 
@@ -125,7 +121,7 @@ absl::Status TranslationSearch::AdvanceInFloatingPoint() {
     return -start.Farthest(n).value - start.SupportError(n);
   };
   const auto gap_at = [&](double gap_before, const Vector& n, double time) {
-    return gap_before + time * n.dot(displacement) - kLaterGapError * size;
+    return gap_before + time * n.dot(displacement) - kTranslatedGapErrorFactor * size;
   };
   Vector toward = -Vector(start.CenterDifference());
   if (toward.isZero(0)) return absl::OkStatus();

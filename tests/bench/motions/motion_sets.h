@@ -11,7 +11,7 @@
 
 namespace hulld::bench {
 
-// How closely B passes A, relative to the sum of their radii.
+// The passage of B along A; lengths are relative to the sum of their radii.
 enum class Passage {
   kHit,       // would be halfway to a tenth deep
   kGraze,     // 1e-6 deep
