@@ -70,7 +70,7 @@ check_format() {
 build() {
   local code=0
   for _ in first second; do
-    cmake --build --preset "$1" --parallel "$jobs" --target "${@:2}" 2>&1 | tee build/build.log
+    ${lower_priority-} cmake --build --preset "$1" --parallel "$jobs" --target "${@:2}" 2>&1 | tee build/build.log
     code=${PIPESTATUS[0]}
     ((code != 0)) && grep -q 'internal compiler error' build/build.log || break
   done
@@ -82,10 +82,10 @@ run_tests() {
   local preset=$1 code=0
   shift
   # Many tests wait for a disk or another process.
-  ctest --preset "$preset" --parallel $((jobs + 1)) "$@" | tee build/ctest.log || code=1
+  ctest --preset "$preset" --parallel $((jobs + 1)) "$@" | tee "build/$preset/ctest.log" || code=1
   grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
   echo "slowest:"
-  sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' build/ctest.log |
+  sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' "build/$preset/ctest.log" |
     sort -rn | sed -n '1,10s/^/  /p'
   return $code
 }
@@ -103,15 +103,18 @@ check_includes() {
       { echo "{} lacks an include"; exit 255; }' _ "$headers"
 }
 
-# The release tests leave a third of the processor idle, which the check of includes uses.
-start_includes() {
-  check_includes >build/includes.log 2>&1 &
-  includes=$!
+# Tests leave a third of the processor idle, which other checks use meanwhile. in_background NAME COMMAND... starts one of the
+# two; finish NAME waits for it, prints its output, and returns its exit code.
+declare -A background
+in_background() {
+  "${@:2}" >"build/$1.log" 2>&1 &
+  background[$1]=$!
 }
-finish_includes() {
+finish() {
   local code=0
-  wait "${includes:?needs the release build}" || code=$?
-  cat build/includes.log
+  [[ -n ${background[$1]-} ]] || { echo "not started, because the build failed"; return 1; }
+  wait "${background[$1]}" || code=$?
+  cat "build/$1.log"
   return $code
 }
 
@@ -143,16 +146,15 @@ readonly core_labels='core|core-threads|digest-threads|proof|proto'
 core_targets=(core_test core_threads_test digest_threads_test)
 readonly rare='long|mutant'
 
-test_preset() {  # test_preset PRESET EXCLUDED_LABELS TARGET...
-  local preset=$1 excluded=$2
-  shift 2
+build_preset() {  # build_preset PRESET TARGET...: tests core before it builds the rest
+  local preset=$1
+  shift
   run_part "$preset: configure" cmake --preset "$preset" || return
   run_part "$preset: core build" build "$preset" "${core_targets[@]}" &&
     run_part "$preset: core tests" run_tests "$preset" -L "^($core_labels)$" -LE "^($excluded)$"
-  run_part "$preset: build" build "$preset" "$@" &&
-    "${after_build:-true}" &&
-    run_part "$preset: tests" run_tests "$preset" -LE "^($core_labels|$excluded)$"
+  run_part "$preset: build" build "$preset" "$@"
 }
+test_rest() { run_tests "$1" -LE "^($core_labels|$excluded)$"; }
 
 if [[ $mode != tidy ]]; then
   run_part "format" check_format
@@ -166,15 +168,22 @@ case $mode in
     ;;
   default)
     core_targets+=(print_constants proto_test)
-    test_preset release "$rare" all
+    excluded=$rare
+    build_preset release all && run_part "release: tests" test_rest release
     ;;
   ci)
-    test_preset asan-ubsan none all
+    excluded=none
+    build_preset asan-ubsan all && in_background asan-ubsan test_rest asan-ubsan
     core_targets+=(print_constants proto_test)
-    after_build=start_includes
-    test_preset release none all hulld_mutants
-    run_part "includes" finish_includes
-    run_part "Debian packages" build_and_test_packages
+    release=failed
+    lower_priority=nice build_preset release all hulld_mutants && release=built
+    run_part "asan-ubsan: tests" finish asan-ubsan
+    if [[ $release == built ]]; then
+      in_background includes check_includes
+      run_part "release: tests" test_rest release
+      run_part "includes" finish includes
+      run_part "Debian packages" build_and_test_packages
+    fi
     run_part "tidy" bash tests/tidy.sh
     ;;
   tidy) run_part "tidy" bash tests/tidy.sh ;;
