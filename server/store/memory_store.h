@@ -15,7 +15,7 @@ namespace hulld::server {
 class MemoryStore : public Store {
  public:
   std::string kind() const override { return "memory"; }
-  std::string id() const override { return id_; }
+  const std::string& id() const override { return id_; }
   Durability durability() const override { return Durability::kMemory; }
   bool keeps_hulls() const override { return false; }
   uint64_t revision() const override { return revision_; }

@@ -70,7 +70,7 @@ class RocksDbStore : public Store {
   ~RocksDbStore() override;
 
   std::string kind() const override { return "rocksdb"; }
-  std::string id() const override { return id_; }
+  const std::string& id() const override { return id_; }
   Durability durability() const override { return options_.durability; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }

@@ -132,7 +132,7 @@ class Store {
   // The value of --store.
   virtual std::string kind() const = 0;
   // A random ID, one per store.
-  virtual std::string id() const = 0;
+  virtual const std::string& id() const = 0;
   virtual Durability durability() const = 0;
   // True if hulls can be read back, so that the registry may evict its copies.
   virtual bool keeps_hulls() const = 0;

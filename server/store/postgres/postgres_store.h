@@ -99,7 +99,7 @@ class PostgresStore : public Store, public PeerFeed {
   ~PostgresStore() override;
 
   std::string kind() const override { return "postgres"; }
-  std::string id() const override { return id_; }
+  const std::string& id() const override { return id_; }
   // Given by the value of synchronous_commit when this was opened, which the sessions keep.
   Durability durability() const override { return durability_; }
   bool keeps_hulls() const override { return true; }

@@ -21,7 +21,7 @@ class SharedStore : public Store, public PeerFeed {
   ~SharedStore() override;
 
   std::string kind() const override { return "shared"; }
-  std::string id() const override { return database_.id(); }
+  const std::string& id() const override { return database_.id(); }
   Durability durability() const override { return Durability::kSync; }
   bool keeps_hulls() const override { return true; }
   PeerFeed* peers() override { return this; }

@@ -58,7 +58,7 @@ class SimulatedStore : public Store {
   explicit SimulatedStore(const StoreFaults& faults) : faults_(faults) {}
 
   std::string kind() const override { return "simulated"; }
-  std::string id() const override { return "simulated"; }
+  const std::string& id() const override { return id_; }
   Durability durability() const override { return Durability::kSync; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return ledger_.revision(); }
@@ -120,6 +120,7 @@ class SimulatedStore : public Store {
   void Keep(const Change& change, bool nobody_waits);
   void KeepBody(const Change& change);
 
+  const std::string id_ = "simulated";
   StoreFaults faults_;
   bool finds_records_ = false;
   Ledger ledger_;
