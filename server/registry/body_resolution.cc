@@ -161,7 +161,7 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
-  KnownPlaced known;
+  KnownPlaced known = KnownPlaced::ForOneLookup();
   return RefreshPlaced(registry, ids, known, lookup, should_stop);
 }
 

@@ -35,6 +35,14 @@ struct PlacedLookup {
 // State that a reader keeps between repeated lookups of the same IDs. Not thread-safe.
 class KnownPlaced {
  public:
+  KnownPlaced() = default;
+  // As KnownHulls::ForOneLookup.
+  static KnownPlaced ForOneLookup() {
+    KnownPlaced known;
+    known.hulls_ = KnownHulls::ForOneLookup();
+    return known;
+  }
+
   // Bytes held for bodies. Hulls hold KnownHulls::kBytesEach per ID.
   size_t BodyBytes() const;
 

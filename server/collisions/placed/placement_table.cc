@@ -150,13 +150,16 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
   // Errors of the IDs, then of the inline shapes.
   std::vector<absl::Status> malformed(id_count + shape_count);
   named_.resize(id_count, kNoHull);
+  ids_.reserve(id_count);
   for (size_t k = 0; k < id_count; ++k) {
-    const std::string& id = packed.hull_ids(static_cast<int>(k));
-    malformed[k] =
-        Prefixed("packed_placements.", CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
-    if (!malformed[k].ok()) continue;
+    std::string& id = *packed.mutable_hull_ids(static_cast<int>(k));
+    if (!CheckHullId(caller, id, "").ok()) {
+      malformed[k] = Prefixed("packed_placements.",
+                              CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
+      continue;
+    }
     named_[k] = static_cast<uint32_t>(ids_.size());
-    ids_.push_back(id);
+    ids_.push_back(std::move(id));
   }
   std::vector<uint32_t> hulls = named_;
   hulls.resize(id_count + shape_count, kNoHull);
@@ -297,7 +300,7 @@ PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPl
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
-  KnownPlaced known;
+  KnownPlaced known = KnownPlaced::ForOneLookup();
   return ResolveFrom(registry, known, options, plan);
 }
 

@@ -187,6 +187,33 @@ HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
   return resting;
 }
 
+// Puts a hull to rest with its points if it is small and unused. Returns false if not.
+bool HullTable::RestCompact(Locked& locked, Entry& entry) {
+  std::unique_ptr<CompactHull> compact =
+      entry.awake_.use_count() > 1 ? nullptr : entry.awake_->Compact();
+  if (compact == nullptr) return false;
+  entry.resting_ = AtRest(*entry.awake_);
+  entry.awake_->account.Close();
+  locked.Discard(std::exchange(entry.awake_, nullptr));
+  ExchangeCompact(entry, std::move(compact));
+  return true;
+}
+
+void HullTable::RestSoon(Locked& locked, const RegisteredHull& hull) {
+  const std::string& id = hull.committed().record.hull_id;
+  const auto changed = index_.find(id);
+  if (changed == index_.end() || !hull.is_small()) return;
+  (*changed)->second.is_idle_ = true;
+  just_changed_.push_back(id);
+  for (int i = 0; i < 2 && just_changed_.size() > kMostJustChanged; ++i) {
+    const auto found = index_.find(just_changed_.front());
+    just_changed_.pop_front();
+    if (found == index_.end()) continue;
+    Entry& entry = (*found)->second;
+    if (entry.is_idle_ && entry.awake_ != nullptr) RestCompact(locked, entry);
+  }
+}
+
 bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
   // Takes longer than a lookup: the points are copied.
   constexpr uint64_t kMostRested = kMostLookupsPerHold / 4;
@@ -200,18 +227,12 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
     locked.NoteLookup();
     const bool was_idle = std::exchange(entry.is_idle_, true);
     if (!was_idle || entry.awake_ == nullptr) continue;
-    std::unique_ptr<CompactHull> compact =
-        entry.awake_.use_count() > 1 ? nullptr : entry.awake_->Compact();
-    if (compact == nullptr) {
+    if (RestCompact(locked, entry)) {
+      ++rested;
+    } else if (entry.awake_->is_small()) {
       // In use, perhaps not at the next pass.
-      if (entry.awake_->is_small()) passes_since_use_ = 0;
-      continue;
+      passes_since_use_ = 0;
     }
-    entry.resting_ = AtRest(*entry.awake_);
-    entry.awake_->account.Close();
-    locked.Discard(std::exchange(entry.awake_, nullptr));
-    ExchangeCompact(entry, std::move(compact));
-    ++rested;
   }
   return true;
 }

@@ -2,42 +2,30 @@
 
 #include <absl/status/status.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "core/base/check.h"
 
 namespace hulld::server {
 
-// Equal IDs have equal hashes, so sorting by hash groups them. Hulls are numbered by their first
-// occurrence: neighbors in a request were mostly created together, so a store has them in one
-// place.
+// Hulls are numbered by their first occurrence: neighbors in a request were mostly created together,
+// so a store has them in one place.
 void KnownHulls::Begin(std::span<const std::string> ids) {
   HULLD_CHECK(!has_begun_ || hull_of_.size() == ids.size());
   if (std::exchange(has_begun_, true)) return;
-  std::vector<std::pair<uint64_t, uint32_t>> order;
-  order.reserve(ids.size());
-  for (uint32_t i = 0; i < ids.size(); ++i) order.emplace_back(RecentChanges::HashOf(ids[i]), i);
-  std::ranges::sort(order, [&](const auto& a, const auto& b) {
-    if (a.first != b.first) return a.first < b.first;
-    const int compared = ids[a.second].compare(ids[b.second]);
-    return compared != 0 ? compared < 0 : a.second < b.second;
-  });
-  // Maps each occurrence to the index of the ID's first occurrence.
-  hull_of_.resize(ids.size());
-  for (size_t n = 0; n < order.size(); ++n) {
-    const auto [hash, i] = order[n];
-    const bool is_new = n == 0 || order[n - 1].first != hash || ids[order[n - 1].second] != ids[i];
-    hull_of_[i] = is_new ? i : hull_of_[order[n - 1].second];
-    if (is_new) by_hash_.emplace_back(hash, i);
-  }
-  hulls_.reserve(by_hash_.size());
+  hulls_.reserve(ids.size());
+  hull_of_.reserve(ids.size());
+  by_hash_.reserve(ids.size());
   for (uint32_t i = 0; i < ids.size(); ++i) {
-    const bool is_first = hull_of_[i] == i;
-    if (is_first) hulls_.emplace_back().first = i;
-    hull_of_[i] = is_first ? static_cast<uint32_t>(hulls_.size() - 1) : hull_of_[hull_of_[i]];
+    const auto next = static_cast<uint32_t>(hulls_.size());
+    uint32_t* hull = &by_hash_.try_emplace(RecentChanges::HashOf(ids[i]), next).first->second;
+    while (*hull != next && *hull != kNone && ids[hulls_[*hull].first] != ids[i]) {
+      hull = &hulls_[*hull].same_hash;
+    }
+    if (*hull == kNone) *hull = next;
+    hull_of_.push_back(*hull);
+    if (*hull == next) hulls_.emplace_back().first = i;
   }
-  for (auto& [hash, hull] : by_hash_) hull = hull_of_[hull];
   ForgetAll();
 }
 
@@ -47,8 +35,9 @@ void KnownHulls::ForgetAll() {
 }
 
 void KnownHulls::NoteChange(uint64_t hash) {
-  auto changed = std::ranges::lower_bound(by_hash_, std::pair(hash, uint32_t{0}));
-  for (; changed != by_hash_.end() && changed->first == hash; ++changed) MakeDue(changed->second);
+  const auto changed = by_hash_.find(hash);
+  if (changed == by_hash_.end()) return;
+  for (uint32_t k = changed->second; k != kNone; k = hulls_[k].same_hash) MakeDue(k);
 }
 
 void KnownHulls::MakeDue(uint32_t hull) {
@@ -70,11 +59,15 @@ uint64_t KnownHulls::HullBytes() const {
   return bytes;
 }
 
-std::vector<absl::StatusOr<HullView>> KnownHulls::Views(std::span<const std::string> ids) const {
+std::vector<absl::StatusOr<HullView>> KnownHulls::Views(std::span<const std::string> ids) {
   HULLD_CHECK(ids.size() == hull_of_.size());
   std::vector<absl::StatusOr<HullView>> views;
   views.reserve(ids.size());
-  for (const uint32_t hull : hull_of_) views.push_back(hulls_[hull].view);
+  const bool takes = is_for_one_lookup_ && hulls_.size() == ids.size();
+  for (const uint32_t hull : hull_of_) {
+    absl::StatusOr<HullView>& view = hulls_[hull].view;
+    views.push_back(takes ? std::move(view) : view);
+  }
   return views;
 }
 

@@ -1,6 +1,8 @@
 #ifndef HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
 #define HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
 
+#include <absl/container/flat_hash_map.h>
+#include <absl/hash/hash.h>
 #include <absl/status/statusor.h>
 
 #include <cstddef>
@@ -29,7 +31,8 @@ class RecentChanges {
   // Half a megabyte when full.
   static constexpr uint64_t kMost = 1 << 16;
 
-  static uint64_t HashOf(std::string_view id) { return std::hash<std::string_view>()(id); }
+  // Differs between processes, so that no request can be made of IDs with equal hashes.
+  static uint64_t HashOf(std::string_view id) { return absl::HashOf(id); }
 
   void Note(std::string_view id) {
     if (end_ < kMost) {
@@ -56,9 +59,15 @@ class RecentChanges {
 class KnownHulls {
  public:
   KnownHulls() = default;
+  // For a single lookup: its result takes the views instead of copying them.
+  static KnownHulls ForOneLookup() {
+    KnownHulls known;
+    known.is_for_one_lookup_ = true;
+    return known;
+  }
 
   // Sets the IDs; all hulls must be looked up. Does nothing after the first call: the IDs stay the
-  // same. Cost: O(n log n).
+  // same. Cost: O(n).
   void Begin(std::span<const std::string> ids);
 
   // Hulls by index, each ID once.
@@ -67,9 +76,13 @@ class KnownHulls {
  private:
   friend class HullReader;
 
+  // Not an index into hulls_.
+  static constexpr uint32_t kNone = UINT32_MAX;
   struct Known {
     // Index of the ID's first occurrence in the request.
     uint32_t first = 0;
+    // The next hull with the same hash.
+    uint32_t same_hash = kNone;
     bool is_due = false;
     bool is_prepared = false;
     // is_loaded: read from the store for this lookup, in a batch. is_ahead: in a batch being read.
@@ -79,7 +92,8 @@ class KnownHulls {
     std::shared_ptr<RegisteredHull> found;
     // Approximate bytes of the hull that this holds.
     uint64_t bytes = 0;
-    absl::StatusOr<HullView> view = absl::UnknownError("not looked up");
+    // Unknown without a message, which costs no allocation, until it was looked up.
+    absl::StatusOr<HullView> view = absl::Status(absl::StatusCode::kUnknown, "");
   };
 
   // Hulls being read from the store before their lookup.
@@ -94,12 +108,12 @@ class KnownHulls {
  public:
   // Approximate bytes held per ID, excluding the ID itself and the hull.
   static constexpr size_t kBytesEach =
-      sizeof(Known) + 2 * sizeof(uint32_t) + sizeof(std::pair<uint64_t, uint32_t>);
+      sizeof(Known) + 2 * sizeof(uint32_t) + 2 * sizeof(std::pair<uint64_t, uint32_t>);
 
  private:
   // Marks every hull for lookup.
   void ForgetAll();
-  // Marks for lookup all hulls that a change with this hash may concern. Cost: O(log n).
+  // Marks for lookup all hulls that a change with this hash may concern. Cost: O(1).
   void NoteChange(uint64_t hash);
   void MakeDue(uint32_t hull);
   // Marks hulls with failed reads for lookup, and all hulls as unprepared.
@@ -107,14 +121,15 @@ class KnownHulls {
   // Approximate bytes held of all hulls.
   uint64_t HullBytes() const;
   // Returns the views in the order of the request.
-  std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids) const;
+  std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids);
 
+  bool is_for_one_lookup_ = false;
   bool has_begun_ = false;
   std::vector<Known> hulls_;
   // Index of the hull of each requested ID.
   std::vector<uint32_t> hull_of_;
-  // Hulls sorted by the hash of their IDs.
-  std::vector<std::pair<uint64_t, uint32_t>> by_hash_;
+  // The first hull with each hash of an ID.
+  absl::flat_hash_map<uint64_t, uint32_t> by_hash_;
   // Hulls to look up; processed from the back.
   std::vector<uint32_t> due_;
   // Reads from the store, in the order of processing; empty between lookups.

@@ -252,6 +252,22 @@ std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
   return {std::move(reading), shown};
 }
 
+void RegisteredHull::Prefetch() const {
+  __builtin_prefetch(&state);
+  __builtin_prefetch(&committed_.stored.record);
+  __builtin_prefetch(&committed_.stored.record.counts);
+  __builtin_prefetch(&committed_.mark);
+  __builtin_prefetch(&served_);
+  __builtin_prefetch(&served_.readers);
+  __builtin_prefetch(&account);
+}
+
+void RegisteredHull::PrefetchParts() const {
+  __builtin_prefetch(served_.live.get());
+  __builtin_prefetch(served_.version.get());
+  __builtin_prefetch(account.parts().get());
+}
+
 void RegisteredHull::EndLoading() {
   served_.is_loading = false;
   changed.notify_all();
@@ -288,12 +304,12 @@ void RegisteredHull::NoteUse() {
 
 // A part at a repeated address reuses free memory: the former part had no holder.
 void RegisteredHull::CountParts() {
-  std::vector<std::shared_ptr<MemoryPart>> parts;
+  MemoryParts parts;
   served_.shared_bytes = 0;
   if (live() != nullptr) {
     for (const LiveHull::Shared& shared : live()->SharedBy(committed_.mark)) {
-      const auto known = std::ranges::find(account.parts(), shared.what, &MemoryPart::what);
-      parts.push_back(known != account.parts().end()
+      const auto known = std::ranges::find(*account.parts(), shared.what, &MemoryPart::what);
+      parts.push_back(known != account.parts()->end()
                           ? *known
                           : std::make_shared<MemoryPart>(account.budget(), shared.what));
       parts.back()->SetBytes(shared.bytes);

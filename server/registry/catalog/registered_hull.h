@@ -151,6 +151,10 @@ class RegisteredHull {
   // counts as held for readers until the last of them releases it, even if the hull ends first.
   // Cost: O(log n) for the first reader, O(1) for later ones.
   std::shared_ptr<const ServedHull> Serve();
+  // Load what IsReady and Serve read into the processor's caches, for several hulls at once: first
+  // this object, then the objects that it refers to.
+  void Prefetch() const;
+  void PrefetchParts() const;
   // Approximate bytes that the current version shares with readers, as last counted.
   uint64_t shared_bytes() const { return served_.shared_bytes; }
   // A reader reads the points from the store. EndLoading notifies `changed`.
@@ -211,8 +215,7 @@ class RegisteredHull {
   };
   // A served version while a reader holds it. Its memory counts until it is freed.
   struct Reading {
-    Reading(std::vector<std::shared_ptr<MemoryPart>> parts,
-            std::shared_ptr<const ServedHull> served_hull)
+    Reading(std::shared_ptr<const MemoryParts> parts, std::shared_ptr<const ServedHull> served_hull)
         : pin(std::move(parts)), served(std::move(served_hull)) {}
     const MemoryPin pin;
     const std::shared_ptr<const ServedHull> served;

@@ -208,6 +208,7 @@ void HullChanges::CloseAppend(const AppendSession& session) {
   if (hull.builder() == nullptr || hull.state.gone()) return;
   hull.DiscardUnneededBuilder(locked);
   hull.NoteUse();
+  state_.catalog.hulls().RestSoon(locked, hull);
 }
 
 void HullChanges::Append(const AppendSession& session, Chunk chunk,

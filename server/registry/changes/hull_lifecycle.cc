@@ -219,6 +219,7 @@ absl::StatusOr<ReplaceResult> HullChanges::FinishReplacement(Locked& locked,
   }
   hull->DiscardUnneededBuilder(locked);
   hull->NoteUse();
+  state_.catalog.hulls().RestSoon(locked, *hull);
   state_.memory.Evict(locked);
   return ReplaceResult{state_.catalog.revision(), change.hull.record, former == nullptr};
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <mutex>
+#include <utility>
 
 #include "core/base/check.h"
 #include "server/contract/limit_error.h"
@@ -59,11 +60,17 @@ void MemoryBudget::Account::Age() {
   if (bytes_ > 0) budget_.used_.splice(budget_.used_.end(), budget_.used_, place_);
 }
 
-void MemoryBudget::Account::Hold(std::vector<std::shared_ptr<MemoryPart>> parts) {
-  if (parts == parts_) return;
+const std::shared_ptr<const MemoryParts>& MemoryBudget::Account::NoParts() {
+  static const auto* const kNone =
+      new std::shared_ptr<const MemoryParts>(std::make_shared<const MemoryParts>());
+  return *kNone;
+}
+
+void MemoryBudget::Account::Hold(MemoryParts parts) {
+  if (parts == *parts_) return;
   {
     const std::lock_guard lock(budget_.usage_->mutex);
-    for (const auto* const moved : {&parts_, &parts}) {
+    for (const MemoryParts* const moved : {parts_.get(), &std::as_const(parts)}) {
       for (const auto& part : *moved) {
         part->Leave();
         part->account_ = moved == &parts ? this : nullptr;
@@ -71,7 +78,7 @@ void MemoryBudget::Account::Hold(std::vector<std::shared_ptr<MemoryPart>> parts)
       }
     }
   }
-  parts_ = std::move(parts);
+  parts_ = parts.empty() ? NoParts() : std::make_shared<const MemoryParts>(std::move(parts));
 }
 
 void MemoryBudget::Account::Close() {
@@ -107,7 +114,7 @@ void MemoryPart::SetBytes(uint64_t bytes) {
   Enter();
 }
 
-void MemoryPart::Pin(const std::vector<std::shared_ptr<MemoryPart>>& parts, bool pins) {
+void MemoryPart::Pin(const MemoryParts& parts, bool pins) {
   if (parts.empty()) return;
   const std::lock_guard lock(parts.front()->usage_->mutex);
   for (const auto& part : parts) {

@@ -38,6 +38,7 @@ struct MemoryStatistics {
 };
 
 class MemoryPart;
+using MemoryParts = std::vector<std::shared_ptr<MemoryPart>>;
 
 // Counts the memory of each use and chooses evictions when the limit is exceeded.
 //
@@ -88,8 +89,8 @@ class MemoryBudget {
     void Touch();
     void Age();
     // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
-    void Hold(std::vector<std::shared_ptr<MemoryPart>> parts);
-    const std::vector<std::shared_ptr<MemoryPart>>& parts() const { return parts_; }
+    void Hold(MemoryParts parts);
+    const std::shared_ptr<const MemoryParts>& parts() const { return parts_; }
     // Empties the account; the budget may be destroyed afterwards.
     void Close();
 
@@ -102,6 +103,7 @@ class MemoryBudget {
     // Add the account's memory to the budget, and remove it. Require the budget's mutex.
     void Enter();
     void Leave();
+    static const std::shared_ptr<const MemoryParts>& NoParts();
 
     MemoryBudget& budget_;
     const Drop drop_;
@@ -112,7 +114,7 @@ class MemoryBudget {
     uint64_t resting_ = 0;
     uint64_t pinned_ = 0;
     // Guarded by the owners' mutex.
-    std::vector<std::shared_ptr<MemoryPart>> parts_;
+    std::shared_ptr<const MemoryParts> parts_ = NoParts();
     std::list<Account*>::iterator place_;
   };
 
@@ -173,7 +175,7 @@ class MemoryPart {
   friend class MemoryPin;
 
   // Requires: all parts are of one budget.
-  static void Pin(const std::vector<std::shared_ptr<MemoryPart>>& parts, bool pins);
+  static void Pin(const MemoryParts& parts, bool pins);
   // Require the budget's mutex.
   void Enter();
   void Leave();
@@ -189,15 +191,15 @@ class MemoryPart {
 // Counts parts as held for readers during its lifetime. Any thread may destroy it.
 class MemoryPin {
  public:
-  explicit MemoryPin(std::vector<std::shared_ptr<MemoryPart>> parts) : parts_(std::move(parts)) {
-    MemoryPart::Pin(parts_, true);
+  explicit MemoryPin(std::shared_ptr<const MemoryParts> parts) : parts_(std::move(parts)) {
+    MemoryPart::Pin(*parts_, true);
   }
   MemoryPin(const MemoryPin&) = delete;
   MemoryPin& operator=(const MemoryPin&) = delete;
-  ~MemoryPin() { MemoryPart::Pin(parts_, false); }
+  ~MemoryPin() { MemoryPart::Pin(*parts_, false); }
 
  private:
-  const std::vector<std::shared_ptr<MemoryPart>> parts_;
+  const std::shared_ptr<const MemoryParts> parts_;
 };
 
 // Memory that stays until its owner is done, counted during the lifetime of this. Not thread-safe;

@@ -77,6 +77,7 @@ class HullReader {
 
   absl::StatusOr<LookUpEnd> LookUpDue(Locked& locked, const HullsRead& read);
   absl::StatusOr<LookUpEnd> LookUpAll(Locked& locked, const HullsRead& read);
+  size_t FindAhead(const HullsRead& read);
   absl::StatusOr<LookUpEnd> LookUp(Locked& locked, const HullsRead& read, uint32_t k);
   absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
   absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,

@@ -272,5 +272,19 @@ TEST_F(HullTableTest, AnIdleBoxTakesLessThan600Bytes) {
 }
 #endif
 
+TEST_F(HullTableTest, AChangedHullRestsAfterManyLaterOnesUnlessItIsLookedUp) {
+  const auto change = [this](const std::string& id) { table_.RestSoon(locked_, *Cube(id)); };
+  change("first");
+  change("asked");
+  EXPECT_NE(table_.Find("asked"), nullptr);
+  for (size_t i = 0; i < HullTable::kMostJustChanged; ++i) {
+    change("later/" + std::to_string(i));
+    if (i == 0) EXPECT_TRUE(IsAwake("first"));
+  }
+  EXPECT_FALSE(IsAwake("first"));
+  EXPECT_TRUE(IsAwake("asked"));
+  EXPECT_TRUE(IsAwake("later/0"));
+}
+
 }  // namespace hull_table_test
 }  // namespace hulld::server

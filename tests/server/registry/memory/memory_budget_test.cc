@@ -146,10 +146,10 @@ TEST_F(MemoryBudgetTest, APartIsHeldForReadersWhileOneHoldsIt) {
   owner.account.Hold({part});
   EXPECT_EQ(bytes(), 35);
   {
-    const MemoryPin pin({part});
+    const MemoryPin pin(std::make_shared<const MemoryParts>(MemoryParts{part}));
     EXPECT_EQ(bytes(), 35);
     EXPECT_EQ(reading(), 30);
-    const MemoryPin another({part});
+    const MemoryPin another(std::make_shared<const MemoryParts>(MemoryParts{part}));
     EXPECT_EQ(reading(), 30);
     part->SetBytes(40);
     EXPECT_EQ(reading(), 40);
