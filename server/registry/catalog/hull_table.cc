@@ -96,9 +96,7 @@ void HullTable::Wake(const std::string& id, Entry& entry) {
   const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
   entry.awake_ = std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
   if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
-  if (const auto compact = ExchangeCompact(entry, nullptr); compact != nullptr) {
-    entry.awake_->Restore(*compact);
-  }
+  if (resting.compact != nullptr) entry.awake_->Restore(*resting.compact);
 }
 
 // Sets the points of a hull at rest, counts them, and returns the former ones. Under memory
@@ -192,6 +190,15 @@ bool HullTable::RestCompact(Locked& locked, Entry& entry) {
   std::unique_ptr<CompactHull> compact =
       entry.awake_.use_count() > 1 ? nullptr : entry.awake_->Compact();
   if (compact == nullptr) return false;
+  // The points of an unchanged hull stay in place: copies would be scattered over the pages that
+  // its other structures leave.
+  const RestingHull& former = entry.resting_;
+  const HullRecord& record = entry.awake_->committed().record;
+  const bool is_unchanged = former.compact != nullptr && former.revision == record.revision &&
+                            former.create_revision == record.create_revision &&
+                            former.compact->writers == compact->writers;
+  if (is_unchanged) compact = ExchangeCompact(entry, nullptr);
+  ExchangeCompact(entry, nullptr);
   entry.resting_ = AtRest(*entry.awake_);
   entry.awake_->account.Close();
   locked.Discard(std::exchange(entry.awake_, nullptr));
@@ -249,6 +256,7 @@ void HullTable::RestSome() {
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
       if (!IsUnused(entry.awake_)) continue;
+      ExchangeCompact(entry, nullptr);
       entry.resting_ = AtRest(*entry.awake_);
       entry.awake_ = nullptr;
     }

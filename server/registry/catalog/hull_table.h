@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -86,7 +85,8 @@ class HullTable {
     uint64_t revision() const;
     // Null for a hull at rest.
     const HullPointer& awake() const { return awake_; }
-    // Null unless the hull is at rest with its points.
+    // Points of a hull at rest, if they are in memory. They stay while the hull is awake, and are
+    // valid until it changes.
     const CompactHull* compact() const { return resting_.compact.get(); }
     // Describes the committed hull for watches and lists. id: the hull's own.
     HullChange Describe(const std::string& id) const;

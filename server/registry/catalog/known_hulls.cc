@@ -8,8 +8,8 @@
 
 namespace hulld::server {
 
-// Hulls are numbered by their first occurrence: neighbors in a request were mostly created together,
-// so a store has them in one place.
+// Hulls are numbered by their first occurrence: neighbors in a request were mostly created
+// together, so a store has them in one place.
 void KnownHulls::Begin(std::span<const std::string> ids) {
   HULLD_CHECK(!has_begun_ || hull_of_.size() == ids.size());
   if (std::exchange(has_begun_, true)) return;

@@ -353,10 +353,10 @@ std::unique_ptr<CompactHull> RegisteredHull::Compact() const {
   return compact;
 }
 
-void RegisteredHull::Restore(CompactHull& compact) {
+void RegisteredHull::Restore(const CompactHull& compact) {
   for (const auto& [writer_id, sequence] : compact.writers) KeepSequence(writer_id, sequence);
   if (compact.points.empty()) return;
-  SetLive(std::make_shared<LiveHull>(std::move(compact.points), committed().record.dimension));
+  SetLive(std::make_shared<LiveHull>(compact.points, committed().record.dimension));
   NoteUse();
 }
 

@@ -186,7 +186,7 @@ class RegisteredHull {
   // is small and unused. Cost: O(points).
   std::unique_ptr<CompactHull> Compact() const;
   // Restores a hull that was compact. Requires: nothing was set before but the box.
-  void Restore(CompactHull& compact);
+  void Restore(const CompactHull& compact);
   // Drops all memory of a hull that is gone.
   void DiscardAll(Locked& locked);
   // Returns a chunk to the queue, before all later chunks.

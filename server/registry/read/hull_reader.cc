@@ -57,6 +57,10 @@ size_t HullReader::FindAhead(const HullsRead& read) {
   for (const uint32_t k : next) {
     if (known.hulls_[k].found != nullptr) known.hulls_[k].found->PrefetchParts();
   }
+  for (const uint32_t k : next) {
+    if (known.hulls_[k].found == nullptr) continue;
+    for (const auto& part : *known.hulls_[k].found->account.parts()) __builtin_prefetch(part.get());
+  }
   return known.due_.size() - count;
 }
 

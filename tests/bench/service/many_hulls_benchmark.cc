@@ -117,6 +117,7 @@ class ManyHulls {
   static Limits WideLimits() {
     Limits limits;
     limits.memory_limit = uint64_t{16} << 30;
+    limits.max_hulls = uint64_t{1} << 32;
     return limits;
   }
   static double Heap() {
