@@ -47,6 +47,14 @@ class WideInteger {
   friend bool operator==(const WideInteger&, const WideInteger&) = default;
   friend WideInteger operator+(const WideInteger& a, const WideInteger& b) {
     WideInteger sum;
+    if constexpr (kWords == 2 || kWords == 3) {
+      sum.SetHigh(a.high() + b.high());
+      if constexpr (kWords == 3) {
+        sum.words_[0] = a.words_[0] + b.words_[0];
+        sum.SetHigh(sum.high() + (sum.words_[0] < a.words_[0] ? 1 : 0));
+      }
+      return sum;
+    }
     uint64_t carry = 0;
 #pragma GCC unroll 16
     for (int i = 0; i < kWords; ++i) {
@@ -58,6 +66,14 @@ class WideInteger {
   }
   friend WideInteger operator-(const WideInteger& a, const WideInteger& b) {
     WideInteger difference;
+    if constexpr (kWords == 2 || kWords == 3) {
+      difference.SetHigh(a.high() - b.high());
+      if constexpr (kWords == 3) {
+        difference.words_[0] = a.words_[0] - b.words_[0];
+        difference.SetHigh(difference.high() - (a.words_[0] < b.words_[0] ? 1 : 0));
+      }
+      return difference;
+    }
     uint64_t borrow = 0;
 #pragma GCC unroll 16
     for (int i = 0; i < kWords; ++i) {
@@ -69,6 +85,15 @@ class WideInteger {
   }
   friend WideInteger operator-(const WideInteger& a) { return WideInteger(0) - a; }
   WideInteger& operator+=(const WideInteger& b) { return *this = *this + b; }
+
+  // The two highest words. Requires: at least two.
+  UInt128 high() const {
+    return static_cast<UInt128>(words_[kWords - 1]) << 64 | words_[kWords - 2];
+  }
+  void SetHigh(UInt128 high) {
+    words_[kWords - 1] = static_cast<uint64_t>(high >> 64);
+    words_[kWords - 2] = static_cast<uint64_t>(high);
+  }
 
  private:
   void FillFrom(int first, bool negative) {
@@ -101,6 +126,15 @@ template <int kResult, int kA, int kB>
         static_cast<Int128>(static_cast<int64_t>(a.word(0))) * static_cast<int64_t>(b.word(0));
     product.word(0) = static_cast<uint64_t>(t);
     product.word(1) = static_cast<uint64_t>(t >> 64);
+    return product;
+  }
+  if constexpr (kA == 2 && kB == 1 && kResult == 3) {
+    const auto factor = static_cast<Int128>(static_cast<int64_t>(b.word(0)));
+    // Below 2^127 in magnitude, as is the sum.
+    const Int128 low = static_cast<Int128>(a.word(0)) * factor;
+    const Int128 high = static_cast<int64_t>(a.word(1)) * factor;
+    product.word(0) = static_cast<uint64_t>(low);
+    product.SetHigh(static_cast<UInt128>(high + (low >> 64)));
     return product;
   }
   // Multiplies as if both factors were unsigned.

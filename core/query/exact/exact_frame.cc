@@ -31,6 +31,19 @@ int ExponentAbove(double x) {
   return d.exponent + static_cast<int>(std::bit_width(d.magnitude));
 }
 
+// Returns the signs of the components if all that are not zero have the same magnitude, as in
+// quarter and third turns.
+bool FindSigns(const std::array<double, 4>& q, std::array<int64_t, 4>& signs) {
+  double largest = 0;
+  for (const double c : q) largest = std::max(largest, std::abs(c));
+  bool alike = true;
+  for (int i = 0; i < 4; ++i) {
+    alike &= q[i] == 0 || std::abs(q[i]) == largest;
+    signs[i] = (q[i] > 0) - (q[i] < 0);
+  }
+  return alike;
+}
+
 // Divides by the least non-zero component if it divides all of them. A greatest common divisor
 // would find more factors, at the price of many divisions; common powers of two are left to the
 // caller.
@@ -47,6 +60,31 @@ void DivideByLeast(std::array<int64_t, 4>& q) {
   for (int64_t& c : q) c /= least;
 }
 
+// Computes the matrix and norm of a quaternion in numbers that hold them.
+template <typename Number>
+void SetRotation(const std::array<int64_t, 4>& q, SmallRotation& rotation) {
+  const Number w = q[0];
+  const Number x = q[1];
+  const Number y = q[2];
+  const Number z = q[3];
+  const Number ww = w * w;
+  const Number xx = x * x;
+  const Number yy = y * y;
+  const Number zz = z * z;
+  Number norm = ww + xx + yy + zz;
+  Number rows[3][3] = {{ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                       {2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)},
+                       {2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz}};
+  // If |q|^2 is 2 or 4 modulo 8, all entries may be even.
+  Number any = norm;
+  for (const auto& row : rows) any |= row[0] | row[1] | row[2];
+  const int even = std::countr_zero(static_cast<uint64_t>(any) | uint64_t{4});
+  rotation.norm = norm >> even;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) rotation.rows[i][j] = rows[i][j] >> even;
+  }
+}
+
 // Returns the bits of a hull's own coordinates after rotation, in the pair's unit.
 int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
   // |R p| = N |p| <= N sqrt(3) times the largest component.
@@ -57,6 +95,11 @@ int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
 
 bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) {
   HULLD_DCHECK(IsValidPose({q, Vector::Zero()}));
+  std::array<int64_t, 4> integers;
+  if (FindSigns(q, integers)) {
+    SetRotation<int64_t>(integers, rotation);
+    return true;
+  }
   int exponent = kAboveAllExponents;
   int above = -kAboveAllExponents - 60;
   for (const double component : q) {
@@ -65,33 +108,11 @@ bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) 
     above = std::max(above, ExponentAbove(component));
   }
   if (above - exponent > kMostQuaternionBits) return false;
-  std::array<int64_t, 4> integers;
   for (int i = 0; i < 4; ++i) {
     integers[i] = static_cast<int64_t>(WideIntegerOf<1>(q[i], exponent).word(0));
   }
   DivideByLeast(integers);
-  const Int128 w = integers[0];
-  const Int128 x = integers[1];
-  const Int128 y = integers[2];
-  const Int128 z = integers[3];
-  const Int128 ww = w * w;
-  const Int128 xx = x * x;
-  const Int128 yy = y * y;
-  const Int128 zz = z * z;
-  rotation.norm = ww + xx + yy + zz;
-  rotation.rows = {{{ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)},
-                    {2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)},
-                    {2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz}}};
-  // If |q|^2 is 2 or 4 modulo 8, all entries may be even.
-  Int128 any = rotation.norm;
-  for (const auto& row : rotation.rows) any |= row[0] | row[1] | row[2];
-  const int even = std::countr_zero(static_cast<uint64_t>(any) | uint64_t{4});
-  if (even > 0) {
-    for (auto& row : rotation.rows) {
-      for (Int128& entry : row) entry >>= even;
-    }
-    rotation.norm >>= even;
-  }
+  SetRotation<Int128>(integers, rotation);
   return true;
 }
 
@@ -151,13 +172,12 @@ bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
   for (const PlacedHull* placed : {&pair.a(), &pair.b()}) {
     // |R(q) t_P / |q|^2 + t_B| is at most 1 + sqrt(3) times the larger of the largest components.
     const int of_sum = placed->product() == nullptr ? 0 : 2;
+    double largest = 0;
     for (const Pose* pose : PosesOf(*placed)) {
-      for (int i = 0; i < 3; ++i) {
-        const double t = pose->t[i];
-        if (t == 0) continue;
-        translation_bits = std::max(translation_bits, ExponentAbove(t) - frame.exponent + of_sum);
-      }
+      largest = std::max(largest, pose->t.cwiseAbs().maxCoeff());
     }
+    if (largest == 0) continue;
+    translation_bits = std::max(translation_bits, ExponentAbove(largest) - frame.exponent + of_sum);
   }
   const auto add_side = [&](const PlacedHull& placed, SmallFrame::Side& side) {
     const double largest = placed.query_hull().max_abs_coordinate();

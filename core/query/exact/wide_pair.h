@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_EXACT_WIDE_PAIR_H_
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -138,12 +139,17 @@ class WidePair {
   // Own coordinates of at most this many bits fit in one word, and so do sums of ten of them.
   static constexpr int kOneWordBits = 59;
   static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
+  // Exponents of at most this magnitude have a normal power of two and an inverse.
+  static constexpr int kMostScaled = 1000;
   // Number of vertices, from the first on, that are cached after they are multiplied out.
   static constexpr uint32_t kKept = 32;
 
   struct Side {
     Side(const PlacedHull& hull, const SmallFrame::Side& frame)
-        : placed(&hull), exponent(frame.exponent), is_narrow(frame.own_bits <= kOneWordBits) {}
+        : placed(&hull),
+          exponent(frame.exponent),
+          per_unit(std::abs(exponent) <= kMostScaled ? std::ldexp(1.0, -exponent) : 0),
+          is_narrow(frame.own_bits <= kOneWordBits) {}
 
     template <int kOwnWords>
     Coordinates Rotated(const WideVector<kOwnWords>& own) const {
@@ -158,6 +164,11 @@ class WidePair {
     template <int kOwnWords>
     WideVector<kOwnWords> Own(uint32_t i) const {
       const Vector v = placed->query_hull().point(i);
+      if constexpr (kOwnWords == 1) {
+        // The product is an integer below 2^kOneWordBits, so it is exact.
+        const auto own = [&](double x) { return static_cast<int64_t>(x * per_unit); };
+        if (per_unit != 0) return {own(v.x()), own(v.y()), own(v.z())};
+      }
       return {WideIntegerOf<kOwnWords>(v.x(), exponent), WideIntegerOf<kOwnWords>(v.y(), exponent),
               WideIntegerOf<kOwnWords>(v.z(), exponent)};
     }
@@ -236,6 +247,8 @@ class WidePair {
 
     const PlacedHull* placed;
     int exponent;
+    // 2^-exponent, or 0 if that may not be a normal double.
+    double per_unit;
     bool is_narrow;
     // world = rows * own + shift.
     std::array<Coordinates, 3> rows;
