@@ -51,49 +51,87 @@ Box BoundingBox(const PlacedHull& placed) {
   return box;
 }
 
-BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should_stop)
-    : indices_(boxes.size()) {
-  std::iota(indices_.begin(), indices_.end(), 0u);
+BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should_stop,
+                 int threads) {
   if (boxes.empty()) return;
-  nodes_.reserve(2 * (boxes.size() / (kLeafBoxes / 2) + 1));
-  StopPoll poll(should_stop);
-  Build(boxes, 0, static_cast<uint32_t>(boxes.size()), poll);
-  boxes_.reserve(boxes.size());
-  for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
+  std::vector<Item> items;
+  items.reserve(boxes.size());
+  for (const Box& box : boxes) {
+    const Vector sum = box.low + box.high;
+    items.push_back({sum.array().isFinite().all() ? sum : Vector(Vector::Zero()),
+                     static_cast<uint32_t>(items.size())});
+  }
+  nodes_.resize(NodesOf(static_cast<uint32_t>(boxes.size())));
+  indices_.resize(boxes.size());
+  boxes_.resize(boxes.size());
+  if (boxes.size() <= kMostUnshared) threads = 1;
+#pragma omp parallel num_threads(threads) if (threads > 1)
+#pragma omp single
+  Build(boxes, items, 0, 0, should_stop);
 }
 
-// Splits the boxes in half along the axis with the widest spread of centers.
-uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll) {
-  const auto node = static_cast<uint32_t>(nodes_.size());
-  Box bounds = Box::Empty();
-  Box centers = bounds;
-  // Twice the center; 0 for a box that covers all of space.
-  const auto center = [&](uint32_t index) {
-    const Vector sum = boxes[index].low + boxes[index].high;
-    return sum.array().isFinite().all() ? sum : Vector(Vector::Zero());
-  };
-  uint32_t largest_index = 0;
-  for (uint32_t i = begin; i < end; ++i) {
-    const Box& box = boxes[indices_[i]];
-    bounds = {bounds.low.cwiseMin(box.low), bounds.high.cwiseMax(box.high)};
-    const Vector c = center(indices_[i]);
-    centers = {centers.low.cwiseMin(c), centers.high.cwiseMax(c)};
-    largest_index = std::max(largest_index, indices_[i]);
+// Returns the number of nodes of a tree. At each level, parts have one of two consecutive sizes.
+uint32_t BoxTree::NodesOf(uint32_t boxes) {
+  uint32_t nodes = 0;
+  uint32_t size = boxes;
+  for (uint32_t smaller = 1, larger = 0; smaller + larger > 0; size /= 2) {
+    nodes += smaller + larger;
+    if (size <= kLeafBoxes) smaller = 0;
+    if (size < kLeafBoxes) larger = 0;
+    if (size % 2 == 0) {
+      smaller = 2 * smaller + larger;
+    } else {
+      larger = smaller + 2 * larger;
+    }
   }
-  nodes_.push_back({bounds, largest_index, 0, begin, end});
-  if (end - begin <= kLeafBoxes || poll.Step(end - begin)) return node;
+  return nodes;
+}
+
+// Splits the boxes in half along the axis with the widest spread of centers. Large halves are tasks
+// of their own.
+void BoxTree::Build(std::span<const Box> boxes, std::span<Item> items, uint32_t begin,
+                    uint32_t index, const std::function<bool()>& should_stop) {
+  const auto count = static_cast<uint32_t>(items.size());
+  Node& node = nodes_[index];
+  node = {Box::Empty(), 0, 0, begin, begin + count};
+  if (count <= kLeafBoxes) {
+    for (uint32_t i = 0; i < count; ++i) {
+      const Box& box = boxes[items[i].index];
+      node.box = {node.box.low.cwiseMin(box.low), node.box.high.cwiseMax(box.high)};
+      node.largest_index = std::max(node.largest_index, items[i].index);
+      indices_[begin + i] = items[i].index;
+      boxes_[begin + i] = box;
+    }
+    return;
+  }
+  if (count > kMostUnshared && StopPoll(should_stop).Poll()) return;
+  Box centers = Box::Empty();
+  for (const Item& item : items) {
+    centers = {centers.low.cwiseMin(item.center), centers.high.cwiseMax(item.center)};
+  }
   int axis = 0;
   (centers.high - centers.low).maxCoeff(&axis);
-  const uint32_t middle = begin + (end - begin) / 2;
-  std::nth_element(indices_.begin() + begin, indices_.begin() + middle, indices_.begin() + end,
-                   [&](uint32_t i, uint32_t j) {
-                     const double x = center(i)[axis];
-                     const double y = center(j)[axis];
-                     return x < y || (x == y && i < j);
+  const uint32_t half = count / 2;
+  std::nth_element(items.begin(), items.begin() + half, items.end(),
+                   [axis](const Item& i, const Item& j) {
+                     const double x = i.center[axis];
+                     const double y = j.center[axis];
+                     return x < y || (x == y && i.index < j.index);
                    });
-  Build(boxes, begin, middle, poll);
-  nodes_[node].second = Build(boxes, middle, end, poll);
-  return node;
+  node.second = index + 1 + NodesOf(half);
+  if (count > kMostUnshared) {
+#pragma omp task shared(should_stop)
+    Build(boxes, items.first(half), begin, index + 1, should_stop);
+    Build(boxes, items.subspan(half), begin + half, node.second, should_stop);
+#pragma omp taskwait
+  } else {
+    Build(boxes, items.first(half), begin, index + 1, should_stop);
+    Build(boxes, items.subspan(half), begin + half, node.second, should_stop);
+  }
+  const Node& left = nodes_[index + 1];
+  const Node& right = nodes_[node.second];
+  node.box = {left.box.low.cwiseMin(right.box.low), left.box.high.cwiseMax(right.box.high)};
+  node.largest_index = std::max(left.largest_index, right.largest_index);
 }
 
 void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const {

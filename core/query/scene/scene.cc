@@ -173,7 +173,7 @@ bool SceneSearch::ComputeBoxes() {
 }
 
 bool SceneSearch::BuildTree() {
-  tree_ = BoxTree(boxes_, options_->query.should_stop);
+  tree_ = BoxTree(boxes_, options_->query.should_stop, std::max(1, options_->threads));
   return !StopPoll(options_->query.should_stop, 1).Poll();
 }
 

@@ -165,6 +165,49 @@ TEST(Scene, CancellationEndsTheSearch) {
   EXPECT_LT(emitted, all);
 }
 
+TEST(BoxTree, IsTheSameOnAnyNumberOfThreads) {
+  Random random(TestSeed(825));
+  for (const int count : {1, 8, 9, 17, 4097, 20000}) {
+    std::vector<Box> boxes;
+    for (int i = 0; i < count; ++i) {
+      // Many centers are equal, and some boxes have none.
+      const Vector low(random.Below(5), random.Below(50), random.Below(5));
+      boxes.push_back(i % 100 == 99   ? Box::All()
+                      : i % 100 == 98 ? Box::Empty()
+                                      : Box{low, low + Vector::Constant(random.Below(3))});
+    }
+    const BoxTree one(boxes);
+    const BoxTree two(boxes, {}, 2);
+    std::vector<bool> placed(boxes.size(), false);
+    std::vector<uint32_t> waiting = {0};
+    while (!waiting.empty()) {
+      const uint32_t node = waiting.back();
+      waiting.pop_back();
+      ASSERT_EQ(one.is_leaf(node), two.is_leaf(node));
+      EXPECT_EQ(one.box(node).low, two.box(node).low);
+      EXPECT_EQ(one.box(node).high, two.box(node).high);
+      if (one.is_leaf(node)) {
+        EXPECT_TRUE(std::ranges::equal(one.indices(node), two.indices(node)));
+        for (size_t i = 0; i < one.indices(node).size(); ++i) {
+          const uint32_t index = one.indices(node)[i];
+          EXPECT_FALSE(placed[index]);
+          placed[index] = true;
+          EXPECT_EQ(one.boxes(node)[i].low, boxes[index].low);
+        }
+        continue;
+      }
+      EXPECT_EQ(one.children(node), two.children(node));
+      for (const uint32_t child : one.children(node)) waiting.push_back(child);
+    }
+    EXPECT_TRUE(std::ranges::all_of(placed, [](bool is_placed) { return is_placed; }));
+    // The whole world meets all but the empty ones.
+    std::vector<uint32_t> found;
+    two.AppendMeeting(Box::All(), 0, found);
+    EXPECT_EQ(found.size(),
+              boxes.size() - static_cast<size_t>(count) / 100 - (count % 100 == 99 ? 1 : 0));
+  }
+}
+
 // Every pair collides: the backlog between two calls of emit must not grow with the scene.
 TEST(Scene, AnswersAreEmittedInBoundedParts) {
   constexpr uint32_t kPlacements = 1000;
