@@ -115,16 +115,45 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   }
 }
 
+// Stores the contact that an exact search found, or drops the suggestion if the hulls do not touch.
+// `along`: the last direction of the search before it, the axis of a contact at a single vertex.
+// Not inlined, to keep the path of other pairs short.
+[[gnu::noinline]] void RememberContact(const FloatPair& pair, const Decision& decision,
+                                       const PlainVector& along, PairCache& cache) {
+  const bool touches = decision.relation == Relation::kTouching;
+  const std::optional<RelativePose> pose = touches ? RelativePoseOf(pair) : std::nullopt;
+  // The pairs of the contact that was in the cache are often those of this one.
+  if (pose && cache.touching && cache.pair_count == 3 && decision.pair_count == 3 &&
+      std::equal(cache.pairs, cache.pairs + 3, decision.pairs.begin())) {
+    *cache.touching = *pose;
+    return;
+  }
+  cache.Clear();
+  if (!touches) return;
+  if (pose) cache.touching = *pose;
+  if (decision.pair_count == 0) return;
+  const auto w = [&](int i) { return pair.Difference(decision.pairs[i]); };
+  PlainVector n = Cross(w(1) - w(0), w(2) - w(0));
+  const bool at_vertex =
+      decision.pairs[0] == decision.pairs[1] && decision.pairs[1] == decision.pairs[2];
+  if (at_vertex || Dot(n, along) < 0) n = at_vertex ? along : -n;
+  if (!IsFilterDirection(LargestComponent(n))) return;
+  cache.axis = n;
+  cache.pair_count = at_vertex ? 1 : 3;
+  std::copy(decision.pairs.begin(), decision.pairs.begin() + 3, cache.pairs);
+}
+
 // Tries the rungs between spheres and exact arithmetic. Returns false if none of them decides. `n`
-// leads from A's center to B's; `found` receives the state in which the search ended. Requires:
-// pair.usable(). Not inlined, to keep the path of distant pairs short.
+// leads from A's center to B's; `found` receives the state in which the search ended, or the cached
+// contact if that may still hold. Requires: pair.usable(). Not inlined, to keep the path of distant
+// pairs short.
 [[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
                                              double tolerance, PairCache* cache, Purpose purpose,
                                              FloatSearchResult& found, Decision& decision) {
   if (cache != nullptr) {
     // A tolerance or requested evidence needs more than the relation.
-    if (cache->touching && tolerance == 0 && purpose == Purpose::kRelation &&
-        RelativePoseOf(pair) == *cache->touching) {
+    const bool relation_alone = tolerance == 0 && purpose == Purpose::kRelation;
+    if (cache->touching && relation_alone && RelativePoseOf(pair) == *cache->touching) {
       decision.relation = Relation::kTouching;
       decision.rung = Rung::kCached;
       return true;
@@ -134,6 +163,10 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
     if (cached.verdict != FloatVerdict::kUndecided) {
       Accept(cached, Rung::kCached, purpose, decision);
       return true;
+    }
+    if (cached.pair_count > 0 && relation_alone) {
+      found = cached;
+      return false;
     }
   }
   PlainVector first = n;
@@ -163,10 +196,9 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   decision.relation = found->relation;
   decision.rung = Rung::kExact;
   decision.directions_tried += found->directions_tried;
-  if (purpose == Purpose::kRelation) return absl::OkStatus();
-  if (found->axis) decision.axis = *std::move(found->axis);
   decision.pair_count = found->pair_count;
   std::copy(found->pairs.begin(), found->pairs.end(), decision.pairs.begin());
+  if (found->axis) decision.axis = *std::move(found->axis);
   return absl::OkStatus();
 }
 
@@ -186,9 +218,7 @@ absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, P
       return absl::OkStatus();
     }
     const absl::Status status = DecideExactly(pair, &found, purpose, should_stop, decision);
-    if (cache != nullptr && status.ok() && decision.relation == Relation::kTouching) {
-      if (const std::optional<RelativePose> pose = RelativePoseOf(pair)) cache->touching = *pose;
-    }
+    if (cache != nullptr && status.ok()) RememberContact(pair, decision, found.axis, *cache);
     return status;
   }
   return DecideExactly(pair, nullptr, purpose, should_stop, decision);

@@ -406,9 +406,14 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
     const PlainVector n = *cache.axis;
     ++result.directions_tried;
     const double error = pair.SupportError(n);
-    if (pair.Farthest(n).value < -error) {
+    const double value = pair.Farthest(n).value;
+    if (value < -error) {
       result.verdict = FloatVerdict::kSeparated;
       result.axis = n;
+    } else if (cache.pair_count > 0 && value <= error) {
+      result.axis = n;
+      result.pair_count = cache.pair_count;
+      std::copy(cache.pairs, cache.pairs + cache.pair_count, result.pairs.begin());
     }
   } else if (cache.pair_count == 4) {
     for ([[maybe_unused]] const VertexPair& known : cache.pairs) {

@@ -35,7 +35,9 @@ FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first);
 
 // Proves the cached suggestion of an earlier query at the present poses; undecided if that fails.
-// Requires: pair.usable(), and that the pairs of the cache are vertices of these hulls.
+// Then, if hulls that touched may touch along the same axis, the result holds that axis and the
+// cached pairs; otherwise it holds no pairs. Requires: pair.usable(), and that the pairs of the
+// cache are vertices of these hulls.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);
 
 }  // namespace hulld

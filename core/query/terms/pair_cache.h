@@ -33,11 +33,13 @@ struct RelativePose {
 // A suggestion left by a query for the next query of the same two hulls at other poses: an axis
 // that separated them, or vertex pairs; the hull of their differences contained the origin. The
 // next query proves the suggestion again, or drops it. For hulls that touched, the cache holds
-// their relative pose; the same hulls at the same relative pose touch again. Not thread-safe.
+// their relative pose: the same hulls at the same relative pose touch again. It also holds the axis
+// and the pairs of their contact, because hulls that slide along each other often touch in the same
+// facets. Not thread-safe.
 struct PairCache {
   // World frame, from A toward B.
   std::optional<Vector> axis;
-  // 0 or 4.
+  // 0 or 4; for hulls that touched, 0, or 1 or 3 with an axis.
   uint32_t pair_count = 0;
   VertexPair pairs[4];
   Boxed<RelativePose> touching;

@@ -11,6 +11,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/batch.h"
 #include "core/query/collision.h"
+#include "core/query/floating/float_search.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
@@ -120,6 +121,45 @@ TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
     EXPECT_EQ(ask(X_WA, turned, &cache), from_cache);
     cache.ForgetHulls();
     EXPECT_EQ(ask(X_WA, turned, &cache), exactly);
+  }
+}
+
+// A box slides on another one, lifts off, and sinks in.
+TEST(Collision, TheContactOfHullsThatSlideIsKeptInTheCache) {
+  const Hull cube = UnitCube();
+  const QueryHull query_cube(cube);
+  const PlacedHull a(query_cube, At(0.5, 0.25, 0));
+  for (const double side : {1.0, -1.0}) {
+    PairCache cache;
+    for (int i = -12; i <= 12; ++i) {
+      const double x = 0.5 + 0.0625 * i;
+      const PlacedHull b(query_cube, At(x, 0.375, side));
+      if (i > -12) {
+        // The cache is for the pair in the order of content.
+        const FloatPair pair = x <= 0.5 ? FloatPair(b, a) : FloatPair(a, b);
+        PairCache mirrored = cache;
+        if (x <= 0.5) {
+          mirrored.axis = -*cache.axis;
+          for (uint32_t k = 0; k < cache.pair_count; ++k) {
+            std::swap(mirrored.pairs[k].a, mirrored.pairs[k].b);
+          }
+        }
+        const FloatSearchResult hint = TryCached(pair, mirrored);
+        EXPECT_EQ(hint.verdict, FloatVerdict::kUndecided);
+        EXPECT_EQ(hint.pair_count, 3u);
+      }
+      const auto ask = [&](double z, PairCache* into) {
+        return CheckCollision(a, PlacedHull(query_cube, At(x, 0.375, z)), {}, into)->relation;
+      };
+      PairCache before = cache;
+      EXPECT_EQ(ask(std::nextafter(side, 2 * side), &before), Relation::kSeparated);
+      before = cache;
+      EXPECT_EQ(ask(std::nextafter(side, 0), &before), Relation::kOverlapping);
+      before = cache;
+      EXPECT_EQ(ask(4 * side, &before), Relation::kSeparated);
+      EXPECT_EQ(ask(side, &cache), Relation::kTouching) << i;
+      EXPECT_TRUE(cache.axis.has_value());
+    }
   }
 }
 
