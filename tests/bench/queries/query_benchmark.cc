@@ -15,8 +15,8 @@
 //   contact   depth, normal, and witness points of overlapping or touching hulls; `none`: no depth
 //             was found
 //   distance  distance and witness points of separated hulls
-//   motion    the same pairs repeatedly, with a small motion each time, or at rest in contact; with
-//             and without a cache
+//   motion    the same pairs repeatedly, with a small motion each time, or at rest in contact, or
+//             sliding face on face; with and without a cache
 //   batch     all queries in one call on 1 or 2 threads; `ns` is real time, `cpu_ns` the processor
 //             time of all threads together
 //   scene     all colliding pairs among many hulls (scene_benchmark.h)
@@ -173,21 +173,30 @@ void Measure(benchmark::State& state, Subject& subject) {
   ReportValues(state, *subject.workload, values);
 }
 
-// Frames of a motion: each rotates B by about a milliradian and moves it by about a thousandth of
-// its radius, or by nothing if `rests`. The motion oscillates, so that it can last as long as the
-// benchmark.
-std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set, bool rests) {
+enum class Motion {
+  kTurning,  // each frame rotates B by about a milliradian and moves it by about as much
+  kSliding,  // each frame moves B in the plane of contact by 2^-10, exactly
+  kResting,
+};
+
+// Frames of a motion that oscillates, so that it can last as long as the benchmark.
+std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set, Motion motion) {
   constexpr int kFrames = 32;
   constexpr double kStep = 1e-3;
+  constexpr double kSlide = 0x1p-10;
   std::vector<std::vector<PlacedHull>> frames(kFrames);
   for (int frame = 0; frame < kFrames; ++frame) {
-    const double phase = rests ? 0 : kStep * std::abs(kFrames / 2 - frame);
+    const int phase = std::abs(kFrames / 2 - frame);
     for (size_t i = 0; i < set.queries.size(); ++i) {
       const QuerySet::Query& query = set.queries[i];
       const QueryHull& b = set.query_hulls[query.hull_b];
       Pose X_WB = query.X_WB;
-      X_WB.q[i % 4] += phase;
-      X_WB.t[static_cast<Eigen::Index>(i % 3)] += phase * b.radius();
+      if (motion == Motion::kTurning) {
+        X_WB.q[i % 4] += kStep * phase;
+        X_WB.t[static_cast<Eigen::Index>(i % 3)] += kStep * phase * b.radius();
+      } else if (motion == Motion::kSliding) {
+        X_WB.t[static_cast<Eigen::Index>(i % 2)] += kSlide * phase;
+      }
       frames[frame].push_back(*PlacedHull::Make(b, X_WB));
     }
   }
@@ -197,8 +206,11 @@ std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set, bool rests)
 void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
   const QuerySet& set = workload.questions();
   if (set.queries.empty()) return state.SkipWithError("skipped: no data");
-  const std::vector<std::vector<PlacedHull>> frames =
-      MakeFrames(set, workload.regime() == Regime::kContact);
+  const bool turns = workload.regime() != Regime::kContact;
+  const bool slides = set.name.starts_with("mating:");
+  const std::vector<std::vector<PlacedHull>> frames = MakeFrames(set, turns    ? Motion::kTurning
+                                                                      : slides ? Motion::kSliding
+                                                                               : Motion::kResting);
   std::vector<PairCache> caches(set.queries.size());
   const QueryOptions options;
   for (size_t i = 0; i < caches.size(); ++i) {
@@ -343,6 +355,8 @@ void Register() {
   }
   for (const char* set : {"mating:8", "mating:64"}) {
     RegisterRelations(set, Regime::kContact);
+    RegisterSequences(set, Regime::kContact,
+                      std::make_shared<Workload>(set, Regime::kContact, kQuestions));
   }
   RegisterScenes();
 }
