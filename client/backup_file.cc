@@ -136,7 +136,7 @@ absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory)
   fs::create_directories(directory, error);
   if (!error) return made;
   return absl::UnavailableError(
-      absl::StrCat("cannot make ", directory.string(), ": ", error.message()));
+      absl::StrCat("cannot create ", directory.string(), ": ", error.message()));
 }
 
 // Moves the unpacked files into place. The mark comes first and the database last, in one step: the
@@ -158,7 +158,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
     fs::rename(staging / part, directory / part, error);
     if (error) {
       absl::Status status = absl::UnavailableError(
-          absl::StrCat("cannot make ", (directory / part).string(), ": ", error.message()));
+          absl::StrCat("cannot create ", (directory / part).string(), ": ", error.message()));
       for (const fs::path& moved : parts) {
         if (moved == part) break;
         fs::remove_all(directory / moved, error);
@@ -177,7 +177,7 @@ absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* c
   fs::create_directory(staging, error);
   if (error) {
     return absl::UnavailableError(
-        absl::StrCat("cannot make ", staging.string(), ": ", error.message()));
+        absl::StrCat("cannot create ", staging.string(), ": ", error.message()));
   }
   if (absl::Status s = WritePieces(file, staging.string(), check); !s.ok()) return s;
   if (file.peek() != std::ifstream::traits_type::eof()) {
@@ -217,7 +217,7 @@ absl::Status BackupCheck::Take(const v1::SaveBackupResponse& part) {
 
 absl::Status BackupCheck::TakePiece(const v1::BackupPiece& piece) {
   if (piece.offset() == 0) {
-    if (!IsInside(piece.path())) return Damaged("the path of a file leaves the directory");
+    if (!IsInside(piece.path())) return Damaged("a file path points outside of the directory");
     path_ = piece.path();
     file_bytes_ = 0;
     totals_.set_file_count(totals_.file_count() + 1);

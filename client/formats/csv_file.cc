@@ -65,7 +65,7 @@ absl::Status FindColumns(const ByteSource& source, const std::vector<std::string
       if (found) (*columns)[axis] = i;
     }
     if (!found) {
-      return source.ErrorAtLine(absl::StrCat("the header names no column \"", std::string(1, name),
+      return source.ErrorAtLine(absl::StrCat("the header has no column \"", std::string(1, name),
                                              "\"; it must name x, y and z"));
     }
   }

@@ -210,7 +210,7 @@ class Parser {
       }
       if (!value.is_value() || value.is_date() || value.is_time() || value.is_date_time()) {
         return absl::InvalidArgumentError(
-            absl::StrCat(where, "the value of ", key, " is no text, number, or boolean"));
+            absl::StrCat(where, "the value of ", key, " is not a string, number, or boolean"));
       }
       // An empty text is the default, as in variables.
       const std::string text = ValueText(value);
@@ -232,7 +232,7 @@ class Parser {
         Hint(variable.substr(std::size(kVariablePrefix) - 1), known, kVariablePrefix);
     if (hint.empty()) return absl::OkStatus();
     return absl::InvalidArgumentError(
-        absl::StrCat("the environment variable ", variable, " is no setting", hint));
+        absl::StrCat("the environment variable ", variable, " is not a setting", hint));
   }
 
   // Restricts Parse to its arguments. CLI11 would also read the variables of all unset options.
@@ -402,18 +402,17 @@ class Parser {
         kMaxPieceIndex);
     AddSize(
         "memory-limit", limits.memory_limit,
-        "Memory for hulls, points on their way to them, replacements under way, and the "
-        "placements, "
-        "pairs, and answers of batches, scenes, and streams. Messages of calls and the store's own "
-        "buffers come on top. 0: half of the memory of the machine or the control group",
+        "Memory for hulls, points in flight, replacements in progress, and the placements, pairs, "
+        "and answers of batches, scenes, and streams. Excludes the messages of calls and the "
+        "store's own buffers. 0: half of the memory of the machine or the control group",
         kAnyNumber, kLeastMemory);
     AddSize("request-memory", limits.request_memory,
-            "Memory for requests under way, and the same again for those that arrive", kAnyNumber,
-            1);
+            "Memory for requests in flight, and as much again for requests that are being received",
+            kAnyNumber, 1);
     AddSize("max-message-bytes", limits.max_message_bytes, "Size of one message from a client",
             kMaxGrpcMessageBytes, 1);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
-             "Points that one hull can receive in totaltime", kAnyNumber);
+             "Points that one hull can receive in total", kAnyNumber);
     AddLimit("max-placements", limits.max_placements,
              "Placements of one batch, scene, or stream of poses", kAnyNumber);
     AddCallLimits();

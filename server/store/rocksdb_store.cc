@@ -141,7 +141,7 @@ absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   std::filesystem::create_directories(directory, error);
   if (error) {
     return absl::UnavailableError(
-        absl::StrCat("cannot make ", directory, " for the copy: ", error.message()));
+        absl::StrCat("cannot create ", directory, " for the copy: ", error.message()));
   }
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);

@@ -171,7 +171,8 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
 }  // namespace
 
 void AddBodyCommand(Command program, Invocation* invocation) {
-  Command body = program.AddCommand("body", "Keep bodies: several hulls at fixed poses as one");
+  Command body =
+      program.AddCommand("body", "Manage bodies: several hulls at fixed poses, treated as one");
   body.RequireCommand();
   const auto arguments = std::make_shared<BodyArguments>();
   body.SetDetails(

@@ -56,7 +56,7 @@ absl::Status ReadPieces(const std::string& path, Pieces* pieces) {
   }
   if (body.pieces().empty()) {
     return absl::InvalidArgumentError(absl::StrCat(
-        (*source)->name(), ": there is no piece; write {\"pieces\":[{\"hullId\":\"arm\"}]}"));
+        (*source)->name(), ": contains no pieces; write {\"pieces\":[{\"hullId\":\"arm\"}]}"));
   }
   pieces->MergeFrom(body.pieces());
   return absl::OkStatus();

@@ -166,10 +166,10 @@ void PrintAppended(const Invocation& run, const std::string& hull_id, const File
       .Row({"inside", std::to_string(counts.inside())});
   for (const std::string& text : skipped) table.Row({"skipped", text});
   if (files.resumed_points() > 0) {
-    table.Row({"resumed", Counted(files.resumed_points(), "point") + " committed before"});
+    table.Row({"resumed", Counted(files.resumed_points(), "point") + " already committed"});
   }
   if (totals.chunks_recovered > 0) {
-    table.Row({"reconnected", Counted(totals.reconnects, "time") + "; the counts lack " +
+    table.Row({"reconnected", Counted(totals.reconnects, "time") + "; the counts exclude " +
                                   Counted(totals.chunks_recovered, "chunk")});
   }
   table.Row({"vertices", std::to_string(totals.vertex_count)})
@@ -186,7 +186,7 @@ ExitCode ReportInterrupt(const Invocation& run, const AppendArguments& arguments
   run.err << "hullctl: interrupted; " << Counted(points, "point") << " committed to "
           << arguments.hull_id << "; "
           << (arguments.writer.empty()
-                  ? "run the command again to add the rest, which counts committed points again"
+                  ? "run the command again to append the rest; committed points are counted again"
                   : "add --resume to the command to append the rest")
           << "\n";
   if (points == 0) static_cast<void>(files.RemoveIfEmpty());
@@ -283,15 +283,16 @@ void AddAppendCommand(Command program, Invocation* invocation) {
       .Needs(writer);
   command
       .AddText("--split", &arguments->split,
-               "Append each part to a hull ID/PART, and put these into a body ID. Parts are named "
-               "in the file (objects and groups of obj, solids of stl, nodes of gltf and dae), or "
+               "Append each part to a hull of its own, ID/PART, and combine them as the body ID. "
+               "Parts are named in the file (objects and groups of obj, solids of stl, nodes of "
+               "gltf and dae), or "
                "are connected components")
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl,\n"
       "gltf, dae.\n"
-      "--create creates the hull with its first points; a refused file leaves none behind.\n"
+      "--create creates the hull with its first points; a rejected file leaves no hull behind.\n"
       "--resume needs the same files, options, and writer as before.\n"
       "--split can be repeated: a body that has all parts is not changed.\n"
       "For a closed mesh, the ratio of the volumes of hull and mesh is printed, both summed\n"

@@ -77,9 +77,9 @@ void AddBackupCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("backup", "Save and restore the whole store");
   command.RequireCommand();
   Command save = command.AddCommand("save", "Save a backup while hulld keeps serving");
-  save.AddText("FILE", &arguments->file, "File to make").Required();
+  save.AddText("FILE", &arguments->file, "File to write").Required();
   save.SetDetails(
-      "Takes as long as needed, unless --timeout bounds it. A failed backup leaves no file.");
+      "Runs without a time limit unless --timeout is given. A failed backup leaves no file.");
   save.SetExamples({{"", "hullctl backup save hulls.backup"}});
   save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
   Command restore =

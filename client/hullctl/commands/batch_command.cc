@@ -137,7 +137,8 @@ class BatchRun {
     const v1::HullVersion* const a = VersionOf(request_->pairs(static_cast<int>(2 * pair)));
     const v1::HullVersion* const b = VersionOf(request_->pairs(static_cast<int>(2 * pair + 1)));
     if (a == nullptr || b == nullptr || row.certificate == nullptr) {
-      return absl::InternalError("the answers lack hulls or certificates that they refer to");
+      return absl::InternalError(
+          "the answers refer to hulls or certificates that they do not contain");
     }
     auto verification = CheckRow(row, first_ + pair, *a, *b);
     if (!verification.ok()) return verification;

@@ -261,11 +261,12 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
     PrintLoadTable(arguments, result, run.out);
   }
   if (!deleted.ok()) {
-    run.err << "hullctl: hulls of the load may remain; see 'hullctl list " << prefix << "'\n";
+    run.err << "hullctl: some hulls of the load test may remain; see 'hullctl list " << prefix
+            << "'\n";
     return run.Fail(deleted);
   }
   if (!created.ok() && !interrupted) return run.Fail(created);
-  if (interrupted) run.err << "hullctl: interrupted; deleted the hulls of the load\n";
+  if (interrupted) run.err << "hullctl: interrupted; deleted the hulls of the load test\n";
   return LoadExitCode(result);
 }
 
@@ -280,8 +281,7 @@ void AddPlanOptions(Command command, LoadPlan* plan) {
           },
           "Duration, such as 30s (default 10s, unless --requests is given)")
       .ValueName("TIME");
-  command.AddNumber("--requests", 1, uint64_t{1} << 40,
-                    "Number of requests of all clients together",
+  command.AddNumber("--requests", 1, uint64_t{1} << 40, "Total number of requests of all clients",
                     [plan](uint64_t number) { plan->requests = number; });
   command
       .AddParsed(
@@ -295,7 +295,7 @@ void AddPlanOptions(Command command, LoadPlan* plan) {
             plan->rate = rate;
             return absl::OkStatus();
           },
-          "Requests per second of all clients together (default: as fast as possible)")
+          "Total requests per second of all clients (default: as fast as possible)")
       .ValueName("R");
 }
 
@@ -343,9 +343,9 @@ void AddBenchCommand(Command program, Invocation* invocation) {
       "--json", [invocation] { invocation->form = OutputForm::kJson; }, "Same as --output json");
   load.SetDetails(
       "Creates hulls and deletes them at the end, also after Ctrl-C. Without --rate, each client\n"
-      "sends its next request after an answer. With --rate, requests are due at fixed times, and\n"
-      "latencies count from these, so that queueing behind a slow request is visible. Requests\n"
-      "are not retried; latencies are those of successful ones.");
+      "sends its next request as soon as it has an answer. With --rate, requests are due at fixed\n"
+      "times and latencies are measured from these, so that queueing behind a slow request is\n"
+      "visible. Requests are not retried; latencies are those of successful requests.");
   load.SetExamples(
       {{"Four clients, as fast as possible", "hullctl bench load --clients 4 --duration 30s"},
        {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},

@@ -195,7 +195,7 @@ ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
   Print(run, *found);
   if (found->failed == 0) return ExitCode::kDone;
   run.err << "hullctl: " << found->failed << " of " << Counted(list->hulls_size(), "hull")
-          << " have no answer; they were deleted during the command, so repeat it\n";
+          << " have no answer; they were deleted during the command; run it again\n";
   return ExitCode::kSomeFailed;
 }
 
@@ -216,22 +216,19 @@ void AddTriple(Command command, const std::string& name, Triple* triple, const s
 
 void AddCastCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CastArguments>();
-  Command command = program.AddCommand("cast", "Find the hulls that a ray meets");
+  Command command = program.AddCommand("cast", "Find the hulls that a ray hits");
   AddTriple(command, "ORIGIN", &arguments->origin, "Start of the ray, x,y,z");
   AddTriple(command, "DIRECTION", &arguments->direction,
-            "From the start of the ray to its end, x,y,z");
+            "Vector from the start of the ray to its end, x,y,z");
   command.AddText("PREFIX", &arguments->prefix, "Only hulls whose IDs start with this")
       .Completes(ValueKind::kHull);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
-      "The ray ends at ORIGIN + DIRECTION, so give a direction as long as the ray. Hits ascend "
-      "with\n"
-      "time, from 0 at the start to 1 at the end, and are exact: a ray that grazes a corner meets\n"
-      "the hull. A time that no double represents becomes the next double. Each hull is at its "
-      "own\n"
-      "frame's place. NORMAL points out of the facet that is met; it is - if the ray starts in "
-      "the\n"
-      "hull. Bodies are not searched.");
+      "The ray ends at ORIGIN + DIRECTION: the length of DIRECTION is that of the ray. Hits are\n"
+      "sorted by time, from 0 at the start to 1 at the end, and are exact: a ray that grazes a\n"
+      "corner hits the hull. A time that is not a double is rounded up to the next one. Hulls are\n"
+      "not moved. NORMAL is the outward normal of the facet that the ray hits, or - if the ray\n"
+      "starts in the hull. Bodies are not searched.");
   command.SetExamples({{"What is below the origin?", "hullctl cast 0,0,0 0,0,-100"},
                        {"", "hullctl cast 0,0,0 100,0,0 robot/ --output name"}});
   command.OnGiven([=] { invocation->action = [=] { return CastRay(*invocation, *arguments); }; });

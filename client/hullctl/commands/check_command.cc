@@ -71,7 +71,8 @@ std::string ProofText(const v1::CheckCollisionResponse& response) {
     const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
     const bool by_boxes =
         response.relation() != v1::RELATION_OVERLAPPING && !response.has_first_contact();
-    return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes decide the rest" : "");
+    return "of " + std::to_string(count) + pairs +
+           (by_boxes ? "; bounding boxes decide the rest" : "");
   }
   if (!response.has_first_contact()) return CertificateText(response.certificate());
   const auto count = static_cast<uint64_t>(response.first_contact().intervals_size());
@@ -312,13 +313,14 @@ void AddMotionOptions(Command command, v1::Wanted* wanted) {
   command
       .AddLength(
           "--max-time-error",
-          "Maximum width of the bracket of a first contact; a motion lasts 1 (default 2^-30)",
+          "Maximum width of the bracket around the first contact, in units of the whole motion "
+          "(default 2^-30)",
           [wanted](double width) { wanted->set_max_time_error(width); })
       .ValueName("TIME");
   command.AddLength(
       "--resolution",
-      "Allow the answer WITHIN_TOLERANCE if a rotating motion comes this close without proven "
-      "contact (default 1e-9 of the sizes)",
+      "Allow the answer WITHIN_TOLERANCE if a rotating motion comes this close without a proven "
+      "contact (default: 1e-9 times the sizes)",
       [wanted](double length) { wanted->set_resolution(length); });
 }
 
@@ -338,8 +340,8 @@ void AddCheckCommand(Command program, Invocation* invocation) {
                     [request](double radius) { request->mutable_b()->set_radius(radius); });
   command
       .AddText("--points", &arguments->points,
-               "Show which points of a file are inside A, on its boundary, or outside, instead of "
-               "a pair; - is standard input")
+               "Instead of checking a pair, show which points of a file are inside A, on its "
+               "boundary, or outside; - is standard input")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   AddQueryOptions(command, &arguments->details);
@@ -354,19 +356,19 @@ void AddCheckCommand(Command program, Invocation* invocation) {
             checked->details.wanted.set_certificate(true);
             return absl::OkStatus();
           },
-          "Write request and answer, with its certificate, for 'hullctl verify'; - is standard "
-          "output, instead of the answer")
+          "Record the request and the answer with its certificate, for 'hullctl verify'; - writes "
+          "the record to standard output, in place of the answer")
       .ValueName("FILE");
   command.SetDetails(
       "The hull of a file is sent with the query and never stored; formats are those of 'hullctl\n"
       "append'. A file without an extension needs a path, such as ./part. Lengths are in the unit\n"
       "of the points. For a body ('hullctl body --help'), the answer names the deciding pieces,\n"
-      "and its certificate has one part for each pair of pieces that boxes do not decide;\n"
-      "--output json shows them. --textbook takes no bodies and no radii.\n"
+      "and its certificate has one part for each pair of pieces that bounding boxes do not\n"
+      "decide; --output json shows them. --textbook takes no bodies and no radii.\n"
       "\n"
       "--to-a and --to-b give a motion, from time 0 to time 1, with quaternion and translation\n"
-      "linear in time. Of the two quaternions of the end's rotation, hullctl takes the one with\n"
-      "the shorter path. The relation holds over all times, and contact is never missed.");
+      "linear in time. Of the two quaternions of the end rotation, hullctl picks the one with the\n"
+      "shorter path. The relation holds over all times, and contact is never missed.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

@@ -203,7 +203,7 @@ void AddContextCommand(Command program, Invocation* invocation) {
   use.AddText("NAME", &arguments->name, "Name of the context").Completes(ValueKind::kContext);
   use.AddFlag("--none", &arguments->none, "Select no context");
   use.SetExamples({{"", "hullctl context use cell-3"},
-                   {"Another one for one command", "hullctl list --context here"}});
+                   {"Use another context for a single command", "hullctl list --context here"}});
   use.OnGiven(act([=] { return Use(*invocation, *arguments); }));
   Command list = command.AddCommand("list", "List the contexts");
   list.OnGiven(act([=] { return ListContexts(*invocation); }));

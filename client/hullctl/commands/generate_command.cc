@@ -71,7 +71,7 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
   command.AddText("SHAPE", &arguments->shape, "Shape that the points fill").Required().OneOf(names);
   command
-      .AddNumber("N", 0, uint64_t{1} << 40, "How many points",
+      .AddNumber("N", 0, uint64_t{1} << 40, "Number of points",
                  [cloud](uint64_t number) { cloud->count = number; })
       .Required();
   command.AddNumber("--seed", 0, kAnyNumber, "Seed of the points (default 1)",

@@ -134,7 +134,7 @@ void AddGetCommand(Command program, Invocation* invocation) {
       "Show volume, area, centroid, and inertia tensor about it, at density 1");
   command.AddFlag(
       "--audit", [asked] { asked->set_audit(true); },
-      "Make the server check the hull with independent code");
+      "Have the server check the hull with independent code");
   AddFreshnessOptions(command, invocation);
   command.SetExamples(
       {{"", "hullctl get arm/3"},

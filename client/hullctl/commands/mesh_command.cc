@@ -120,7 +120,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
     double& length = arguments->max_error;
     const bool is_number = ParseDouble(text, &length) == NumberText::kNumber;
     if (is_number && std::isfinite(length) && length > 0) return absl::OkStatus();
-    return absl::InvalidArgumentError(Quoted(text) + " is not a length above 0");
+    return absl::InvalidArgumentError(Quoted(text) + " is not a positive length");
   };
   command
       .AddParsed("--max-error", take_max_error,

@@ -101,7 +101,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
 void AddReplaceCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ReplaceArguments>();
   Command command = program.AddCommand(
-      "replace", "Replace a hull by the hull of the points of files, atomically");
+      "replace", "Atomically replace a hull with the hull of the points in files");
   command.AddText("ID", &arguments->hull_id, "ID of the hull")
       .Required()
       .Completes(ValueKind::kHull);
@@ -113,8 +113,9 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
   command.SetDetails(
-      "Takes as long as needed, unless --timeout bounds it. A call that fails leaves the hull\n"
-      "unchanged, or, if all points were sent, may have replaced it.");
+      "Runs without a time limit unless --timeout is given. A failed call leaves the hull "
+      "unchanged,\n"
+      "except that the hull may have been replaced if all points had been sent.");
   command.SetExamples({{"", "hullctl replace arm arm-v2.stl"},
                        {"Only if it is unchanged since revision 7",
                         "hullctl replace arm arm-v2.stl --if-revision 7"}});

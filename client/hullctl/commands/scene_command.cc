@@ -121,14 +121,14 @@ void AddChoiceOptions(Command command, SceneArguments* arguments) {
   command
       .AddNumber(
           "--nearest", 1, std::numeric_limits<uint32_t>::max(),
-          "Find at most this many pairs, those of the least separation, nearest first; "
-          "implies --separation. Without --clearance, among all pairs",
+          "Find only the N pairs of least separation, nearest first, within --clearance if it is "
+          "given; implies --separation",
           [arguments](uint64_t number) { arguments->nearest = static_cast<uint32_t>(number); })
       .ValueName("N");
   command.AddFlag("--first", &arguments->first,
                   "Of pairs in motion, find only those that may be the first to touch");
   command.AddFlag("--every-piece", &arguments->every_piece,
-                  "Print a row for every pair of pieces that is found, not only the deciding one");
+                  "Print a row for every pair of pieces found, not only for the deciding pair");
 }
 
 // Reads a scene that must end the source.

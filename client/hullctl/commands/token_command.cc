@@ -99,14 +99,16 @@ void AddTokenCommand(Command program, Invocation* invocation) {
                            name.find_first_not_of(
                                "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
                                "0123456789._-") == std::string::npos;
-        return valid ? "" : "not up to 64 of [A-Za-z0-9._-] that start with a letter or digit";
+        return valid ? ""
+                     : "a name has up to 64 characters of [A-Za-z0-9._-] and starts with a letter "
+                       "or digit";
       });
-  make.AddText("--role", &arguments->role, "What it allows")
+  make.AddText("--role", &arguments->role, "Permissions of the token")
       .ValueName("ROLE")
       .Required()
       .OneOf({"read-only", "read-write", "admin"});
   make.AddText("--prefix", &arguments->prefix,
-               "Prefix of the IDs that it may access, ending in \"/\" (default: all)")
+               "Prefix of the IDs that the token may access, ending in \"/\" (default: all)")
       .ValueName("PREFIX")
       .Check([](const std::string& prefix) -> std::string {
         const bool valid = prefix.size() > 1 && prefix.back() == '/' &&

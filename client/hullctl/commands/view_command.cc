@@ -225,7 +225,7 @@ class Viewing {
     if (!hull.ok()) return hull.status();
     if (hull->vertex_count() > kMaxShapePoints) {
       return absl::InvalidArgumentError(absl::StrCat("its hull has ", hull->vertex_count(),
-                                                     " vertices, and a query carries up to ",
+                                                     " vertices, but a query can carry at most ",
                                                      kMaxShapePoints, "; use --local"));
     }
     shape->hull = std::make_shared<const HullMesh>(*std::move(hull));
@@ -305,16 +305,16 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (!is_robot && !(arguments.robot.joints.empty() && arguments.robot.srdf.empty() &&
                      arguments.robot.ignored.empty() && arguments.robot.robot.packages.empty())) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--joints, --srdf, --ignore, and --package need a robot: name one .urdf file"));
+        "--joints, --srdf, --ignore, and --package apply to a robot: name one .urdf file"));
   }
   const std::string& scene = arguments.scene;
   if (!scene.empty() && !arguments.demo && !is_robot) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--scene needs --demo, or a robot that stands in it: name one .urdf file"));
+        "--scene needs --demo, or a robot to place in the scene: name one .urdf file"));
   }
   if (!scene.empty() && arguments.demo && (scene.size() != 1 || scene[0] < '0' || scene[0] > '7')) {
     return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat("--scene: ", Quoted(scene), " is no scene of the demo; give 0 to 7")));
+        absl::StrCat("--scene: ", Quoted(scene), " is not a demo scene; pass a key from 0 to 7")));
   }
   const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
   if (files == 2) {
@@ -401,18 +401,18 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .OneOf({"x", "y", "z"});
   command.SetDetails(
       "A body is dragged as a whole; the hulls of its pieces are shown on their own only if\n"
-      "named. The page queries hulld through hullctl: it never sees your token, and without\n"
-      "--edit it changes nothing on the server. Files alone, and --demo, need no server: hullctl\n"
-      "starts one of its own, which ends with the viewer. Beside hulls of another server, the\n"
-      "hull of a FILE is not stored: its vertices, at most 4096, are sent with each query. Press\n"
-      "? on the page for its keys. --png runs chromium or another browser of its family.\n"
+      "named. The page queries hulld through hullctl: it never sees your token, and cannot change\n"
+      "the server unless --edit is given. Files alone and --demo need no server: hullctl starts a\n"
+      "private one, which ends with the viewer. Files shown next to hulls of a server are not\n"
+      "stored there: each query carries the vertices of their hulls, at most 4096. Press ? on the\n"
+      "page to list its keys. --png runs chromium or another browser that is based on it.\n"
       "\n"
-      "A scene is YAML or JSON, as for 'hullctl scene'; with --local, its hulls and bodies are\n"
-      "created, too. If placements move ('to'), a slider plays the motion and marks the first\n"
-      "contact of the selected pair. A robot has a slider for each joint and, with --joints, a\n"
-      "time line that marks the waypoints in contact. Its pairs are those of 'hullctl robot\n"
-      "check', with --scene also those of its parts and the placements of that file, whose hulls\n"
-      "are on the server, or created with --local.");
+      "A scene is YAML or JSON, as for 'hullctl scene'; --local also creates its hulls and\n"
+      "bodies. If placements move ('to'), a slider plays the motion and marks the first contact\n"
+      "of the selected pair. A robot has a slider for each joint and, with --joints, a time line\n"
+      "that marks the waypoints in contact. Its pairs are those of 'hullctl robot check'. With\n"
+      "--scene, they include pairs of a part and a placement of that file, whose hulls must be on\n"
+      "the server unless --local creates them.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},

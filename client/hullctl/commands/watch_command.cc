@@ -194,7 +194,7 @@ void AddWatchCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kFile);
   command.AddFlag("--until-synced", &options->until_synced, "Exit after the initial state");
   command.AddNumber("--events", 1, kAnyNumber,
-                    "Exit after N events, or a few more that arrive together",
+                    "Exit after N events, or slightly more if several arrive together",
                     [options](uint64_t number) { options->events = number; });
   command.SetDetails(
       "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body,\n"

@@ -86,7 +86,7 @@ absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
   if (mesh->vertex_count() > kMaxShapePoints) {
     return absl::InvalidArgumentError(
         absl::StrCat(request.path, ": its hull has ", mesh->vertex_count(),
-                     " vertices, and a query carries up to ", kMaxShapePoints,
+                     " vertices, but a query can carry at most ", kMaxShapePoints,
                      "; use --local, or register the hull with 'hullctl append'"));
   }
   points->mutable_xyz()->Assign(mesh->xyz.begin(), mesh->xyz.end());

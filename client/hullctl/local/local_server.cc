@@ -37,7 +37,7 @@ bool IsProgram(const fs::path& path) { return access(path.c_str(), X_OK) == 0; }
 absl::StatusOr<std::string> FindServer() {
   if (const char* const named = std::getenv("HULLD_BINARY"); named != nullptr) {
     if (IsProgram(named)) return named;
-    return absl::NotFoundError(absl::StrCat("HULLD_BINARY is ", named, ", which is no program"));
+    return absl::NotFoundError(absl::StrCat("HULLD_BINARY is ", named, ", which is not a program"));
   }
   std::error_code ignored;
   std::vector<fs::path> folders = {fs::read_symlink("/proc/self/exe", ignored).parent_path()};
@@ -50,7 +50,7 @@ absl::StatusOr<std::string> FindServer() {
     if (IsProgram(folder / "hulld")) return (folder / "hulld").string();
   }
   return absl::NotFoundError(
-      "hulld is neither beside hullctl nor on the PATH; install it, or set HULLD_BINARY");
+      "hulld is neither next to hullctl nor on the PATH; install it, or set HULLD_BINARY");
 }
 
 // The environment without settings of hulld, which are not for this server.

@@ -383,7 +383,7 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
       "  a_qw, a_qx, a_qy, a_qz  quaternion of a (default identity), likewise b_qw and so on\n"
       "  a_to_x, ..., a_to_qz    pose of a at the end of a motion (default: that of the start)\n"
       "  relation                SEPARATED, TOUCHING, or OVERLAPPING\n"
-      "  colliding               0 or 1, of a program that does not tell touching from "
+      "  colliding               0 or 1, of a program that does not distinguish touching from "
       "overlapping\n"
       "  distance                0 or more; a negative one is minus a depth\n"
       "  depth                   0 or more\n"

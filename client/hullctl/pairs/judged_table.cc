@@ -56,14 +56,15 @@ absl::Status ReadRelation(std::string_view cell, std::optional<v1::Relation>* re
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(Quoted(cell), " is none of SEPARATED, TOUCHING, OVERLAPPING"));
+      absl::StrCat(Quoted(cell), " is not one of SEPARATED, TOUCHING, OVERLAPPING"));
 }
 
 absl::Status ReadColliding(std::string_view cell, std::optional<bool>* colliding) {
   const std::string word = absl::AsciiStrToLower(std::string(cell));
   const bool is_true = word == "1" || word == "true";
   if (!is_true && word != "0" && word != "false") {
-    return absl::InvalidArgumentError(absl::StrCat(Quoted(cell), " is none of 0, 1, false, true"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(cell), " is not one of 0, 1, false, true"));
   }
   *colliding = is_true;
   return absl::OkStatus();
@@ -82,7 +83,7 @@ absl::Status ReadUpTo(double most, const char* what, std::string_view cell,
   if (!read.ok()) return read.status();
   if (*read < 0 || *read > most) {
     return absl::InvalidArgumentError(
-        absl::StrCat(std::string(cell), " is no ", what, "; leave the cell empty"));
+        absl::StrCat(std::string(cell), " is not a ", what, "; leave the cell empty"));
   }
   *value = *read;
   return absl::OkStatus();
@@ -155,7 +156,7 @@ class TableReader {
     for (const char* name : {"a", "b"}) {
       if (!Has(name)) {
         return absl::InvalidArgumentError(absl::StrCat(
-            "the header names no column ", name, ", which holds an ID or a file for each row"));
+            "the header has no column ", name, ", which holds an ID or a file for each row"));
       }
       for (const std::string& first : {absl::StrCat(name, "_q"), absl::StrCat(name, "_to_q")}) {
         const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {
@@ -170,7 +171,7 @@ class TableReader {
       if (Has(name)) return absl::OkStatus();
     }
     return absl::InvalidArgumentError(
-        "the header names no answer; it needs relation, colliding, distance, depth, or "
+        "the header has no column with answers; it needs relation, colliding, distance, depth, or "
         "contact_time");
   }
 
@@ -202,7 +203,7 @@ class TableReader {
     }
     if (answer.moves && (answer.distance || answer.depth)) {
       return absl::InvalidArgumentError(
-          "distance and depth are those of a pair at rest; leave them empty for a motion");
+          "distance and depth apply only to a pair at rest; leave them empty for a motion");
     }
     if (!answer.moves && answer.contact_time) {
       return absl::InvalidArgumentError(

@@ -144,7 +144,7 @@ ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
   const std::string comment = absl::StrCat(
       "Adjacent: connected by a joint, or through links without shapes. Never, Always: in ",
       arguments.samples, " random configurations (seed ", arguments.seed,
-      "), which is evidence and no proof.");
+      "), which is evidence, not proof.");
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
     WriteSrdf(model->robot, disabled, comment, out);
   });

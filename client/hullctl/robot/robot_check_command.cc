@@ -171,7 +171,7 @@ absl::Status RobotCheck::ChoosePairs() {
     left_out_by_ = arguments_.srdf;
   } else if (!arguments_.adjacent) {
     out = AdjacentPairs(model_.robot);
-    left_out_by_ = "being adjacent";
+    left_out_by_ = "adjacency";
   }
   pairs_ = model_.PairsWithout(out);
   left_out_ = (model_.PairsWithout({}).size() - pairs_.size()) / 2;
@@ -431,7 +431,7 @@ void RobotCheck::PrintHead() {
   }
   for (const std::string& note : model_.notes) run_.out << "# " << note << "\n";
   run_.out << "# " << Counted(pairs_.size() / 2, "pair");
-  if (left_out_ > 0) run_.out << "; " << left_out_ << " left out by " << left_out_by_;
+  if (left_out_ > 0) run_.out << "; " << left_out_ << " excluded by " << left_out_by_;
   if (left_out_bare_ > 0) {
     run_.out << ", " << left_out_bare_ << " of them joined through links without shapes";
   }
@@ -595,9 +595,10 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
       command.AddFlag("--continuous", &arguments->continuous,
                       "Check the motion between waypoints, too: joints move linearly");
   command
-      .AddLength("--resolution",
-                 "With --continuous: leave undecided what comes this near (default 1e-6)",
-                 [arguments](double length) { arguments->resolution = length; })
+      .AddLength(
+          "--resolution",
+          "With --continuous: may leave a pair undecided that comes this close (default 1e-6)",
+          [arguments](double length) { arguments->resolution = length; })
       .Needs(continuous);
   AddWantedOptions(command, &arguments->details);
   DescribeRobotCheck(command);

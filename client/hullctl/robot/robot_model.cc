@@ -174,14 +174,14 @@ absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, Robot
     if (is_small) return absl::OkStatus();
     return absl::Status(hull.status().code(),
                         absl::StrCat(part->name, " has more than ", kMaxShapePoints,
-                                     " points, so a local server has to find the vertices of its "
-                                     "hull; --prefix needs none: ",
+                                     " points, and the local server that would reduce them to its "
+                                     "hull failed; pass --prefix to do without: ",
                                      hull.status().message()));
   }
   if (hull->vertex_count() > kMaxShapePoints) {
     return absl::InvalidArgumentError(
         absl::StrCat(part->name, ": its hull has ", hull->vertex_count(),
-                     " vertices, and a query carries up to ", kMaxShapePoints,
+                     " vertices, but a query can carry at most ", kMaxShapePoints,
                      "; use --local, or register the hulls with --prefix"));
   }
   WarnOfSwollenPart(run, *part, *hull);

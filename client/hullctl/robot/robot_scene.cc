@@ -134,9 +134,9 @@ absl::Status AddSurroundings(const std::string& path, ViewScene* scene) {
   const int files = static_cast<int>(scene->files.size());
   for (ViewObject& object : around.objects) {
     if (object.motion) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(path, ": ", object.name,
-                       " moves, but the surroundings of a robot stand still; remove its \"to\""));
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, ": ", object.name,
+          " moves, but the surroundings of a robot must be at rest; remove its \"to\""));
     }
     if (object.file >= 0) object.file += files;
     scene->objects.push_back(std::move(object));

@@ -60,7 +60,7 @@ void GeometryFeed::Ask(const std::vector<ShapeRequest>& shapes) {
   const std::lock_guard lock(mutex_);
   for (const ShapeRequest& shape : shapes) {
     if (worker_.Ask({shape, files_})) continue;
-    page_->SendBinary(MissingFrame(shape, "too many shapes wait to be sent"));
+    page_->SendBinary(MissingFrame(shape, "too many shapes are waiting to be sent"));
   }
 }
 

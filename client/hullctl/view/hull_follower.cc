@@ -48,7 +48,7 @@ void HullFollower::Run() {
     const absl::Status status = Follow(watch_.get());
     const bool is_unknown = absl::IsUnimplemented(status);
     const std::string complaint =
-        absl::StrCat("Changes of hulls are not shown at present: ",
+        absl::StrCat("Hull changes are currently not shown: ",
                      is_unknown ? "this hulld does not implement WatchHulls" : status.message());
     {
       const std::lock_guard lock(mutex_);

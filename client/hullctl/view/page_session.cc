@@ -89,7 +89,8 @@ void PageSession::MoveJoints(const ViewConfiguration& configuration) {
   }
   if (configuration.values.size() != shown_->joints.joints.size() ||
       shown_->joints.joints.empty()) {
-    page_->SendText(ProblemMessage("The page sent values for other joints than the scene has."));
+    page_->SendText(
+        ProblemMessage("The page sent values for joints that the scene does not have."));
     return;
   }
   const auto poses = shown_->joints.poses(configuration.values);

@@ -174,7 +174,7 @@ TEST(CsvFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("1,2\n", PointFormat::kCsv).error(),
             "FILE:1: the row has 2 columns; z is column 3");
   EXPECT_EQ(ReadText("a,b,c\n1,2,3\n", PointFormat::kCsv).error(),
-            "FILE:1: the header names no column \"x\"; it must name x, y and z");
+            "FILE:1: the header has no column \"x\"; it must name x, y and z");
   EXPECT_EQ(ReadText("1,5;2,5;3,5\n", PointFormat::kCsv).error(),
             "FILE:1: \"1,5\" is not a number (the decimal mark is a point)");
   EXPECT_EQ(ReadText("1,,3\n", PointFormat::kCsv).error(), "FILE:1: \"\" is not a number");

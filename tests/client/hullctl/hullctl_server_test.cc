@@ -510,7 +510,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
                        "--prefix", "short/"});
   interrupter.join();
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.err, HasSubstr("interrupted; deleted the hulls of the load"));
+  EXPECT_THAT(ran.err, HasSubstr("interrupted; deleted the hulls of the load test"));
   EXPECT_THAT(ran.out, HasSubstr("requests/s"));
   v1::ListHullsResponse left;
   grpc::ClientContext context;

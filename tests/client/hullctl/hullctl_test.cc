@@ -255,7 +255,7 @@ TEST_F(HullctlTest, AppendResumesWhereTheWriterStopped) {
   again.push_back("--resume");
   const Ran resumed = Ask(again);
   EXPECT_EQ(resumed.code, 0) << resumed.err;
-  EXPECT_THAT(resumed.out, HasSubstr("2 points committed before"));
+  EXPECT_THAT(resumed.out, HasSubstr("2 points already committed"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3));
 }
 

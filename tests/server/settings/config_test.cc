@@ -216,7 +216,7 @@ TEST_F(ConfigTest, AMisspelledNameIsRefusedWithTheNearestOne) {
     return std::string(CheckVariables({name}).message());
   };
   EXPECT_THAT(with_variable("HULLD_LISEN"),
-              HasSubstr("variable HULLD_LISEN is no setting; did you mean HULLD_LISTEN?"));
+              HasSubstr("variable HULLD_LISEN is not a setting; did you mean HULLD_LISTEN?"));
   EXPECT_THAT(with_variable("HULLD_MAX_HULL"), HasSubstr("did you mean HULLD_MAX_HULLS?"));
   // Variables of hullctl, and those that Kubernetes sets for a service named hulld.
   for (const char* name : {"HULLD_TOKEN", "HULLD_PORT", "HULLD_SERVICE_HOST", "HULLD_LISTEN"}) {
@@ -233,7 +233,7 @@ TEST_F(ConfigTest, ErrorsOfTheFileNameItsLine) {
   refused("threads = 1\nthreads = 2\n", "\"threads = 2\" is not TOML: ");
   refused("threads = 1\nstore\n", "\"store\" is not TOML: ");
   refused("threads = 1\nmax-hulls = [2]\n",
-          "the value of max-hulls is no text, number, or boolean");
+          "the value of max-hulls is not a string, number, or boolean");
   refused("threads = 1\n[limits]\nmax-hulls = 2\n", "unknown key \"limits\"");
   refused("threads = 1\nmax-hulls = -2\n", "--max-hulls: \"-2\" is not a whole number");
   refused("threads = 1\nconfig = \"other.toml\"\n", "unknown key \"config\"");

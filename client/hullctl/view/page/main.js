@@ -149,7 +149,7 @@ class Viewer {
         ...ordered.map(({key, title}) => element('option', {value: key}, `${key}  ${title}`)));
     $('status').dataset.live = this.connection.live ? 'yes' : 'no';
     $('status').title = this.connection.live ? `hulld ${version} at ${server}` :
-                                               'A recording; nothing here changes';
+                                               'A recording: its content does not change';
     this.scenes = scenes.map(({key}) => key);
   }
 
@@ -401,9 +401,9 @@ class Viewer {
     $('status').dataset.live = 'lost';
     $('status').textContent = 'ended';
     this.say(
-        'hullctl has ended, or lets this page in no more. ' +
-        'What is here stays, and nothing follows. ' +
-        'Run hullctl view again for another address.');
+        'hullctl has ended, or no longer accepts this page. ' +
+        'The page keeps its content, but receives no more updates. ' +
+        'Run hullctl view again for a new address.');
   }
 
   // --- Questions ---

@@ -152,25 +152,27 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
   };
   error("", "the table holds no answers");
   error("a,b,colliding\n", "the table holds no answers");
-  error("a,colliding\n", "answers.csv:1: the header names no column b");
+  error("a,colliding\n", "answers.csv:1: the header has no column b");
   error("a,b,b_x\n", "needs relation, colliding, distance, depth, or contact_time");
   error("a,b,colliding,A\n", "the header names \"a\" twice");
   error("a,b,b_qw,colliding\n", "a quaternion has four columns: b_qw b_qx b_qy b_qz");
   error("a,b,colliding\ncube,cube\n", "answers.csv:2: the row has 2 cells, the header 3");
   error("a,b,colliding\ncube,,1\n", "answers.csv:2: b is empty");
-  error("a,b,colliding\ncube,cube,yes\n", "colliding: \"yes\" is none of 0, 1, false, true");
-  error("a,b,relation\ncube,cube,NEAR\n", "\"NEAR\" is none of SEPARATED, TOUCHING, OVERLAPPING");
+  error("a,b,colliding\ncube,cube,yes\n", "colliding: \"yes\" is not one of 0, 1, false, true");
+  error("a,b,relation\ncube,cube,NEAR\n",
+        "\"NEAR\" is not one of SEPARATED, TOUCHING, OVERLAPPING");
   error("a,b,distance\ncube,cube,far\n", "distance: \"far\" is not a number");
   error("a,b,distance\ncube,cube,nan\n", "leave the cell empty");
-  error("a,b,depth\ncube,cube,-1\n", "depth: -1 is no depth");
+  error("a,b,depth\ncube,cube,-1\n", "depth: -1 is not a depth");
   error("a,b,b_x,depth\ncube,cube,inf,1\n", "b_x: inf is not finite");
   error("a,b,b_qw,b_qx,b_qy,b_qz,depth\ncube,cube,0,0,0,0,1\n", "are all 0");
   error("a,b,b_to_qw,colliding\n", "a quaternion has four columns: b_to_qw b_to_qx");
   error("a,b,b_to_qw,b_to_qx,b_to_qy,b_to_qz,colliding\ncube,cube,0,0,0,0,1\n",
         "b_to_qw, b_to_qx, b_to_qy, b_to_qz are all 0");
-  error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is no time from 0 to 1");
+  error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is not a time from 0 to 1");
   error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
-  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n", "distance and depth are those of a pair at rest");
+  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n",
+        "distance and depth apply only to a pair at rest");
   error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is no duration of at least 0");
 }
 

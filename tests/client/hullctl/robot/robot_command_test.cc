@@ -39,7 +39,7 @@ TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
   Ran ran = Robot({});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("# c: a cylinder within a polyhedron that reaches at most 0.002"));
-  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 left out by being adjacent\n"));
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 excluded by adjacency\n"));
   EXPECT_THAT(ran.out, HasSubstr("a\tc\tSEPARATED\t0.9"));
   EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 0 overlapping 0 failed 0\n"));
   ran = Robot({"--adjacent"});
@@ -138,7 +138,7 @@ TEST_F(HullctlRobot, CheckReadsTheOutputOfAcm) {
   EXPECT_THAT(ran.out, Not(HasSubstr("link1=\"a\" link2=\"c\"")));
   EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"}).out, ran.out);
   const TempFile srdf("chain.srdf", ran.out);
-  EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pair; 2 left out by "));
+  EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pair; 2 excluded by "));
 }
 
 // b is attached to a through a link without shapes.
@@ -155,7 +155,7 @@ constexpr char kBareUrdf[] = R"(<robot name="bare">
 TEST_F(HullctlRobot, PairsLeftOutThroughLinksWithoutShapesAreCounted) {
   const TempFile bare("bare.urdf", kBareUrdf);
   const Ran ran = Ask({"robot", "check", bare.path()});
-  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 left out by being adjacent, 1 of them joined "
+  EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 excluded by adjacency, 1 of them joined "
                                  "through links without shapes\n"));
   EXPECT_THAT(Ask({"robot", "check", bare.path(), "--adjacent"}).out,
               HasSubstr("# 3 pairs\na\tb\tOVERLAPPING"));
@@ -337,8 +337,9 @@ TEST_F(StoredHulls, MeshesOfManyPointsSendTheVerticesOfTheirHull) {
   EXPECT_THAT(ran.out, HasSubstr("gap\tpost\tSEPARATED\t0.7"));
   ran = Check(many);
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("gap: its hull has 5000 vertices, and a query carries up to 4096; "
-                                 "use --local, or register the hulls with --prefix"));
+  EXPECT_THAT(ran.err,
+              HasSubstr("gap: its hull has 5000 vertices, but a query can carry at most 4096; "
+                        "use --local, or register the hulls with --prefix"));
   EXPECT_EQ(Check(many, {"--prefix", "arm/"}).code, 0);
   setenv("HULLD_BINARY", "/nonexistent/hulld", 1);
   ran = Check(inside);

@@ -138,10 +138,10 @@ class RobotTest(viewer_case.ViewerCase):
         for arguments, words in (
                 (["box", "--scene", "moving.yaml"], "--scene needs --demo, or a robot"),
                 (["arm.urdf", "--scene", "moving.yaml"], "cart moves"),
-                (["--demo", "--scene", "8"], "is no scene of the demo"),
-                (["box", "--ignore", "a,b"], "need a robot"),
+                (["--demo", "--scene", "8"], "is not a demo scene"),
+                (["box", "--ignore", "a,b"], "apply to a robot"),
                 (["arm.urdf", "box"], "arm.urdf is a robot; it cannot be combined"),
-                (["box", "--joints", "path.csv"], "need a robot"),
+                (["box", "--joints", "path.csv"], "apply to a robot"),
                 (["arm.urdf", "--joints", "none.csv"], "none.csv")):
             refused = subprocess.run([*self.hulld.command(), "view", *arguments], text=True,
                                      cwd=self.hulld.directory, capture_output=True)

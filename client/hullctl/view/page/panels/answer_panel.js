@@ -39,7 +39,7 @@ export class AnswerPanel {
     const {pair} = model;
     if (!pair) {
       const hint = model.objects.filter((o) => o.hullId && !o.gone).length > 1 ?
-          'Select an object in the picture or the list; the nearest one becomes the other of the pair.' :
+          'Select an object in the picture or the list; the nearest other object completes the pair.' :
           'A pair needs two hulls or bodies.';
       this.root.replaceChildren(
           element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
@@ -77,8 +77,7 @@ export class AnswerPanel {
     const {answer, pair} = this.model;
     if (!pair) return;
     if (!answer) {
-      const text =
-          this.live ? 'Asking\u2026' : 'Not in this file; it holds the answers at the start.';
+      const text = this.live ? 'Waiting for the answer\u2026' : 'Not recorded in this file.';
       this.body.replaceChildren(element('p', {className: 'quiet'}, text));
       return;
     }
@@ -210,7 +209,7 @@ export class AnswerPanel {
 
   toggles() {
     return element(
-        'div', {className: 'marks', role: 'group', 'aria-label': 'What of the answer is drawn'},
+        'div', {className: 'marks', role: 'group', 'aria-label': 'Parts of the answer to draw'},
         ...Object.entries(MARK_NAMES).map(([key, name]) => {
           const swatch = element('span', {className: 'swatch'});
           swatch.style.background = MARK_COLORS[key];
@@ -237,7 +236,7 @@ export class AnswerPanel {
         [a, b].map(({radius}, k) => radius ? ` --radius-${'ab'[k]} ${radius}` : '').join('');
     return element(
         'details', {className: 'command', open: Boolean(open)},
-        element('summary', {}, 'Ask the same in a shell'),
+        element('summary', {}, 'Run the same query in a shell'),
         element('pre', {tabIndex: 0, id: 'command'}, text));
   }
 

@@ -34,7 +34,7 @@ export class MotionPanel {
       return [element('p', {className: 'quiet'}, 'This pair does not move.')];
     const {pairMotion} = model;
     if (!pairMotion) {
-      const text = this.live ? 'Asking\u2026' : 'Not in this file.';
+      const text = this.live ? 'Waiting for the answer\u2026' : 'Not recorded in this file.';
       return [element('p', {className: 'quiet'}, text)];
     }
     if (pairMotion.problem) return [element('p', {}, pairMotion.problem)];
@@ -65,7 +65,7 @@ export class MotionPanel {
     const ids = sides.map(({hullId}) => hullId).join(' ');
     return element(
         'details', {className: 'command', open: Boolean(isOpen)},
-        element('summary', {}, 'Ask and verify in a shell'),
+        element('summary', {}, 'Run and verify in a shell'),
         element(
             'pre', {tabIndex: 0, id: 'motion-command'},
             `hullctl check ${ids} --verify${options.join('')}`));

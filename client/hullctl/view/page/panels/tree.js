@@ -68,7 +68,7 @@ export class Tree {
           element('div', {className: 'more'}, `and ${grouped(left)} more: search to find them`));
     }
     if (!found.length) {
-      const empty = this.model.objects.length ? 'No name has this in it.' : 'There is nothing yet.';
+      const empty = this.model.objects.length ? 'No name contains this text.' : 'Nothing here yet.';
       rows.push(element('div', {className: 'more'}, empty));
     }
     this.root.replaceChildren(...rows);
@@ -211,7 +211,7 @@ export class Tree {
           object.visible = !object.visible;
           model.tell('visibility');
         }));
-    if (isOther) row.title = 'The other one of the pair';
+    if (isOther) row.title = 'The other object of the pair';
     return row;
   }
 
