@@ -1,6 +1,7 @@
 #include "client/hullctl/view/answer_feed.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <utility>
@@ -271,24 +272,46 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
                        tolerant_json);
 }
 
-std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b) {
+std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b,
+                                                       bool certificate) {
   if (a.hull_id.empty() || b.hull_id.empty() || !(a.motion || b.motion)) return std::nullopt;
   v1::CheckCollisionRequest request;
   *request.mutable_a() = MotionOf(a);
   *request.mutable_b() = MotionOf(b);
+  request.mutable_wanted()->set_certificate(certificate);
   return request;
 }
 
-std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
+std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
+                             const ViewObject& b, uint64_t update,
                              const absl::StatusOr<v1::CheckCollisionResponse>& response) {
   if (!response.ok()) return ProblemOfPair("motion", pair, update, response.status());
-  return JsonObject()
-      .Add("type", "motion")
+  std::vector<std::string> hulls;
+  for (const v1::HullVersion* version : {&response->hull_a(), &response->hull_b()}) {
+    // An inline shape has none.
+    if (!version->hull_id().empty()) hulls.push_back(MessageJson(*version));
+  }
+  for (const v1::HullVersion& version : response->piece_hulls()) {
+    hulls.push_back(MessageJson(version));
+  }
+  std::vector<std::string> certificates;
+  for (const v1::PieceCertificate& one : response->piece_certificates()) {
+    certificates.push_back(MessageJson(one));
+  }
+  const auto start = [](const ViewObject& of) { return of.motion ? of.motion->start : of.pose; };
+  JsonObject message;
+  message.Add("type", "motion")
       .AddJson("update", std::to_string(update))
       .AddJson("pair", PairJson(pair))
+      .AddJson("poses", PosesJson({start(a), start(b)}))
+      .AddJson("hulls", absl::StrCat("[", absl::StrJoin(hulls, ","), "]"))
       .Add("relation", v1::Relation_Name(response->relation()))
       .AddJson("firstContact", MessageJson(response->first_contact()))
-      .Close();
+      .AddJson("pieceCertificates", absl::StrCat("[", absl::StrJoin(certificates, ","), "]"));
+  if (response->has_certificate()) {
+    message.AddJson("certificate", MessageJson(response->certificate()));
+  }
+  return message.Close();
 }
 
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
@@ -473,16 +496,20 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
 }
 
 bool AnswerFeed::AnswerMotion(const Question& question) {
-  const auto request = question.pair ? MotionRequest(question.objects[question.pair->first],
-                                                     question.objects[question.pair->second])
-                                     : std::nullopt;
+  if (!question.pair) {
+    asked_motion_.clear();
+    return true;
+  }
+  const ViewObject& a = question.objects[question.pair->first];
+  const ViewObject& b = question.objects[question.pair->second];
+  const auto request = MotionRequest(a, b, question.certificate);
   std::string asked =
       request ? absl::StrCat(PairJson(*question.pair), request->SerializeAsString()) : "";
   const bool is_known = asked == asked_motion_ && !question.motion_is_stale;
   asked_motion_ = std::move(asked);
   if (!request || is_known) return true;
   return page_->SendText(
-      MotionAnswerJson(*question.pair, question.update, client_.CheckCollision(*request)));
+      MotionAnswerJson(*question.pair, a, b, question.update, client_.CheckCollision(*request)));
 }
 
 bool AnswerFeed::AnswerScene(const Question& question) const {

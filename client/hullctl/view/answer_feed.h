@@ -92,11 +92,14 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
 // Returns the request for that answer, with or without a proof.
 v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate);
 
-// Returns the request for the first contact of a pair; nothing if neither moves.
-std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b);
+// Returns the request for the first contact of a pair, with or without a proof; nothing if neither
+// moves.
+std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, const ViewObject& b,
+                                                       bool certificate);
 
 // Returns the message `motion` for its response or error.
-std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, uint64_t update,
+std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
+                             const ViewObject& b, uint64_t update,
                              const absl::StatusOr<v1::CheckCollisionResponse>& response);
 
 // Returns the message `collisions` for a scene; rules, pairs: as in ViewScene.

@@ -57,9 +57,11 @@ namespace hulld {
 //              pair; with a body, for the deciding pieces. The result of CheckCollision at rest, of
 //              StreamCollisions otherwise. tolerant, at rest and with a tolerance:
 //              {tolerance, relation, rung}, the result of CheckCollision with it.
-//   motion     {update, pair, relation, firstContact} or {update, pair, problem}: for the requested
-//              pair, if it moves: the result of CheckCollision for the motions from start to end.
-//              Not repeated while it stays the same.
+//   motion     {update, pair, poses, hulls, relation, firstContact, certificate,
+//              pieceCertificates} or {update, pair, problem}: for the requested pair, if it moves:
+//              the result of CheckCollision for the motions from `poses` to the end. hulls: the
+//              versions of hulls, bodies, and pieces that it concerns. Not repeated while it stays
+//              the same.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
 //              of the scene that collide (FindCollisions), or all named pairs that do, a < b.
 //   poses      {scene, poses}: of all jointed objects, seven numbers each.

@@ -41,16 +41,24 @@ std::string AllFrames(const Client& client, const ViewScene& scene) {
   return frames + "]";
 }
 
+// Returns the answer with its certificate; without it for bodies of so many pieces that no message
+// can hold their certificate.
+template <typename RequestWith>
+absl::StatusOr<v1::CheckCollisionResponse> Proven(const Client& client,
+                                                  const RequestWith& request_with) {
+  auto response = client.CheckCollision(request_with(true));
+  if (!absl::IsResourceExhausted(response.status())) return response;
+  return client.CheckCollision(request_with(false));
+}
+
 absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<ViewObject>& objects) {
   std::string answers = "[";
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
-      auto response = client.CheckCollision(PairRequest(objects[a], objects[b], true));
-      if (absl::IsResourceExhausted(response.status())) {
-        // For bodies of so many pieces that no message can hold their certificate.
-        response = client.CheckCollision(PairRequest(objects[a], objects[b], false));
-      }
+      const auto response = Proven(client, [&](bool certificate) {
+        return PairRequest(objects[a], objects[b], certificate);
+      });
       if (!response.ok()) return response.status();
       absl::StrAppend(&answers, answers.size() > 1 ? "," : "",
                       PairAnswerJson({a, b}, objects[a], objects[b], 0, *response));
@@ -66,11 +74,12 @@ std::string AllMotions(const Client& client, const std::vector<ViewObject>& obje
   std::string motions = "[";
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
-      const auto request = MotionRequest(objects[a], objects[b]);
-      if (!request) continue;
-      const auto response = client.CheckCollision(*request);
+      if (!MotionRequest(objects[a], objects[b], false)) continue;
+      const auto response = Proven(client, [&](bool certificate) {
+        return *MotionRequest(objects[a], objects[b], certificate);
+      });
       absl::StrAppend(&motions, motions.size() > 1 ? "," : "",
-                      MotionAnswerJson({a, b}, 0, response));
+                      MotionAnswerJson({a, b}, objects[a], objects[b], 0, response));
       if (!response.ok() || !response->first_contact().has_contact_time()) continue;
       times->insert(response->first_contact().separated_until());
       times->insert(response->first_contact().contact_time());

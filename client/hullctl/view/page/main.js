@@ -326,6 +326,7 @@ class Viewer {
       this.gizmo.update();
       this.marks.rebuild();
       this.motion.sweeps.rebuild();
+      this.motion.panel.update();
       this.labels.rebuild();
       this.objectPanel.rebuild();
       this.answerPanel.update();

@@ -1,13 +1,12 @@
 // The server's answer about the pair, and about all pairs of the scene.
-import {element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
 import {MARK_COLORS, RELATIONS, RUNGS} from 'hulld/palette.js';
+import {element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
+import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {certificateProblem} from 'hulld/proof/certificate.js';
 
 const MOST_ROWS = 200;
 const MOST_CHOICES = 400;
-// Certificates about more vertices are checked on demand: a million take seconds.
-const MOST_CHECKED_VERTICES = 20000;
 const MARK_NAMES = {
   plane: 'plane',
   axis: 'axis',
@@ -31,6 +30,7 @@ export class AnswerPanel {
     // Shown next to the objects, as it concerns all of them.
     this.list = document.getElementById('collisions');
     this.body = element('div', {'aria-live': 'polite', 'aria-busy': 'false'});
+    this.proofLine = new ProofLine('proof');
   }
 
   // Called when the pair changes.
@@ -95,36 +95,15 @@ export class AnswerPanel {
 
   // The result of checking the certificate in this page.
   proof(answer) {
-    const line = element('p', {id: 'proof', className: 'quiet'});
-    if (!answer.rest || !answer.certificate) return line;
+    if (!answer.rest || !answer.certificate) return element('p', {id: 'proof'});
     const sides = this.model.pair.map((index, k) => this.placedSide(answer, index, k));
-    const reason = sides.find((side) => typeof side === 'string');
-    if (reason) {
-      line.textContent = `Certificate not checked: ${reason}`;
-      return line;
-    }
-    // Changes of other hulls show the same answer again.
-    const {known} = this;
-    if (known?.answer === answer && sides.every(({xyz}, k) => xyz === known.sides[k].xyz))
-      return known.line;
-    this.known = {answer, sides, line};
-    const run = () => {
-      const problem = certificateProblem(answer.relation, answer.certificate, ...sides);
-      const isPieces = this.model.decidingPieces().some(Boolean);
-      line.className = problem ? 'refuted' : 'proven';
-      line.textContent = problem ? `\u2717 Certificate refuted here: ${problem}` :
-          isPieces ? '\u2713 Proven for the deciding pieces, by exact arithmetic in this page' :
-                     '\u2713 Proven by exact arithmetic in this page';
-    };
-    const count = sides.reduce((total, {xyz}) => total + xyz.length / 3, 0);
-    if (count <= MOST_CHECKED_VERTICES) {
-      run();
-    } else {
-      line.append(element(
-          'button', {type: 'button', onclick: run},
-          `Check the certificate here (${grouped(count)} vertices)`));
-    }
-    return line;
+    const isPieces = this.model.decidingPieces().some(Boolean);
+    const concerned = isPieces ? ' for the deciding pieces,' : '';
+    return this.proofLine.show(answer, sides, {
+      steps: sides.reduce((total, {xyz}) => total + xyz?.length / 3, 0),
+      proven: `Proven${concerned} by exact arithmetic in this page`,
+      check: () => certificateProblem(answer.relation, answer.certificate, ...sides),
+    });
   }
 
   // Returns what the certificate concerns at place k of the pair, or the reason why the page cannot

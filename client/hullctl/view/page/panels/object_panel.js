@@ -57,7 +57,7 @@ export class ObjectPanel {
     const info = this.model.info.get(object.hullId) || hull?.info || body?.info;
     const isSolid = !body && hull?.dimension === 3;
     const rows = [element('h2', {}, 'Facts')];
-    if (object.gone) rows.push(element('p', {className: 'quiet'}, 'It was deleted.'));
+    if (object.gone) rows.push(element('p', {className: 'quiet'}, 'Deleted.'));
     if (hull?.message) rows.push(element('p', {className: 'quiet'}, hull.message));
     rows.push(facts([
       [body ? 'body' : 'hull', object.hullId || null],
@@ -86,7 +86,7 @@ export class ObjectPanel {
     if (!mesh.triangles.length) {
       const drawn =
           mesh.vertexCount < mesh.pointCount ? `, ${grouped(mesh.vertexCount)} drawn` : '';
-      return [...rows, ['in it', `${grouped(mesh.pointCount)} points${drawn}`]];
+      return [...rows, ['contents', `${grouped(mesh.pointCount)} points${drawn}`]];
     }
     rows.push([
       'mesh',

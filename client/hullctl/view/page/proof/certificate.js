@@ -1,11 +1,11 @@
 // Checks the certificate of an answer by exact arithmetic, from vertices and poses alone: the page
 // trusts neither the server nor hullctl. The C++ client has the same check in
 // client/verify/certificate_check.h.
-import {combination, commonExponent, cross, difference, dot, isZero, product, rotationOf, scaled, sum, toInteger, toIntegers} from 'hulld/proof/exact.js';
+import {combination, commonExponent, cross, difference, dot, isZero, product, rotationOf, scaled, sum, toIntegers} from 'hulld/proof/exact.js';
 
 // Limits of the contract: Caratheodory's number for a point of the hull, and Steinitz's for an
 // interior point.
-const MOST_PAIRS = {
+export const MOST_PAIRS = {
   RELATION_TOUCHING: 4,
   RELATION_OVERLAPPING: 6
 };
@@ -13,54 +13,67 @@ const MOST_DIGITS = 100000;
 
 class ProofFails extends Error {}
 
-function require(holds, reason) {
+export function require(holds, reason) {
   if (!holds) throw new ProofFails(reason);
 }
 
-const areFinite = (numbers) => numbers.every(Number.isFinite);
+// Returns the missing proof if the check throws one, or an empty text.
+export function problemOf(check) {
+  try {
+    check();
+    return '';
+  } catch (error) {
+    if (error instanceof ProofFails) return error.message;
+    throw error;
+  }
+}
+
+export function checkRelation(relation) {
+  require(
+      ['RELATION_SEPARATED', 'RELATION_TOUCHING', 'RELATION_OVERLAPPING'].includes(relation),
+      `${relation} has no certificate`);
+}
+
+export const areFinite = (numbers) => numbers.every(Number.isFinite);
 const isRotated = (pose) => pose.slice(0, 4).some((value) => value !== 0);
 
-// An exact hull in the world: p_W = (rows p + shift) / scale in integers, all lengths at one power
-// of two.
+// An exact hull: p = (rows v + shift) / scale for its vertices v, in integers, all lengths at one
+// power of two.
 class ExactHull {
-  // placed: {xyz, poses, radii}: the pose and radius of the hull and, for a piece of a body, of the
-  // piece in the body.
-  constructor({xyz, poses, radii = []}, exponent) {
+  // xyz: the vertices; radii: of the hull and, for a piece of a body, of the piece.
+  constructor(xyz, radii, exponent) {
     this.xyz = xyz;
+    this.vertices = toIntegers(xyz, exponent);
     // The exact sum of the radii, not times scale.
     this.radius = toIntegers(radii, exponent).reduce((total, radius) => total + radius, 0n);
-    this.exponent = exponent;
     this.rows = [[1n, 0n, 0n], [0n, 1n, 0n], [0n, 0n, 1n]];
     this.scale = 1n;
     this.shift = [0n, 0n, 0n];
-    for (const pose of poses) {
-      const {rows, scale} = rotationOf(pose.slice(0, 4));
-      const t = toIntegers(pose.slice(4), exponent);
-      const turned = this.rows.map((row) => combination(row, rows));
-      this.shift = sum(scaled(scale, this.shift), scaled(scale, product(this.rows, t)));
-      this.rows = turned;
-      this.scale *= scale;
-    }
   }
 
-  vertex(i) {
-    return toIntegers(this.xyz.subarray(3 * i, 3 * i + 3), this.exponent);
+  // Returns this hull moved by p -> rotation(p) + translation / divisor.
+  moved({rows, scale}, translation, divisor = 1n) {
+    const turned = product(rows, this.shift);
+    return Object.assign(Object.create(ExactHull.prototype), this, {
+      rows: rows.map((row) => scaled(divisor, combination(row, this.rows))),
+      scale: divisor * scale * this.scale,
+      shift: sum(scaled(divisor, turned), scaled(scale * this.scale, translation)),
+    });
   }
 
-  // Returns scale p_W of vertex i.
-  world(i) {
-    return sum(product(this.rows, this.vertex(i)), this.shift);
+  // Returns scale p of vertex i.
+  point(i) {
+    return sum(product(this.rows, this.vertices.slice(3 * i, 3 * i + 3)), this.shift);
   }
 
-  // Returns the least and the greatest n.p_W over the vertices, times scale.
+  // Returns the least and the greatest n.p over the vertices, times scale.
   extent(n) {
-    const turned = combination(n, this.rows);
-    const {xyz, exponent} = this;
+    const [x, y, z] = combination(n, this.rows);
+    const {vertices} = this;
     let least = null;
     let greatest = null;
-    for (let i = 0; i < xyz.length; i += 3) {
-      const height = turned[0] * toInteger(xyz[i], exponent) +
-          turned[1] * toInteger(xyz[i + 1], exponent) + turned[2] * toInteger(xyz[i + 2], exponent);
+    for (let i = 0; i < vertices.length; i += 3) {
+      const height = x * vertices[i] + y * vertices[i + 1] + z * vertices[i + 2];
       if (least === null || height < least) least = height;
       if (greatest === null || height > greatest) greatest = height;
     }
@@ -69,7 +82,12 @@ class ExactHull {
   }
 }
 
-function checkPlacement({xyz, poses, radii = []}) {
+// Returns a hull at its poses, from the world inward.
+export const placedHull = ({xyz, poses, radii = []}, exponent) => poses.reduceRight(
+    (hull, pose) => hull.moved(rotationOf(pose.slice(0, 4)), toIntegers(pose.slice(4), exponent)),
+    new ExactHull(xyz, radii, exponent));
+
+export function checkPlacement({xyz, poses, radii = []}) {
   require(xyz.every(Number.isFinite), 'a hull holds a number that is not finite');
   require(areFinite(radii), 'a radius holds a number that is not finite');
   require(radii.every((radius) => radius >= 0), 'a radius is negative');
@@ -89,22 +107,32 @@ function readInteger(text) {
 
 const numbersOf = ({x = 0, y = 0, z = 0}) => [Number(x), Number(y), Number(z)];
 
-function readDirection({direction, integerDirection}) {
+// Returns {n, exponent}: a direction as integers times 2^exponent.
+export function readDirection({direction, integerDirection}) {
   let n = null;
+  let exponent = 0;
   if (direction) {
     const numbers = numbersOf(direction);
     require(areFinite(numbers), 'the direction holds a number that is not finite');
-    n = toIntegers(numbers, commonExponent(numbers));
+    exponent = commonExponent(numbers);
+    n = toIntegers(numbers, exponent);
   } else {
     require(integerDirection, 'the certificate has no direction');
     n = ['x', 'y', 'z'].map((key) => readInteger(integerDirection[key] ?? ''));
   }
   require(!isZero(n), 'the direction is zero');
-  return n;
+  return {n, exponent};
 }
 
-// Returns min n.B - max n.A, times a positive number.
-const gap = (a, b, n) => b.extent(n)[0] * a.scale - a.extent(n)[1] * b.scale;
+// Returns a number with the sign of min n.B - max n.A - r |n|, r the sum of the radii.
+export function gapSign(a, b, n) {
+  const width = b.extent(n)[0] * a.scale - a.extent(n)[1] * b.scale;
+  const r = radiiOf(a, b);
+  return r === 0n || width < 0n ? width : width ** 2n - r ** 2n * dot(n, n);
+}
+
+// The sum of the radii at the scale of A - B.
+const radiiOf = (a, b) => (a.radius + b.radius) * a.scale * b.scale;
 
 function checkVertex(index, vertex, {xyz}, name) {
   const count = xyz.length / 3;
@@ -114,8 +142,7 @@ function checkVertex(index, vertex, {xyz}, name) {
 }
 
 // Returns the points of A - B that the vertex pairs name, times both scales.
-function differences(relation, {pairs = []}, a, b) {
-  const most = MOST_PAIRS[relation];
+export function differences(most, {pairs = []}, a, b) {
   require(
       pairs.length <= most,
       `the certificate has ${pairs.length} vertex pairs; its relation allows ${most}`);
@@ -125,7 +152,7 @@ function differences(relation, {pairs = []}, a, b) {
   });
   return pairs.map(
       ({indexA = 0, indexB = 0}) =>
-          difference(scaled(b.scale, a.world(indexA)), scaled(a.scale, b.world(indexB))));
+          difference(scaled(b.scale, a.point(indexA)), scaled(a.scale, b.point(indexB))));
 }
 
 // 0 = (b x c) a + (c x a) b + (a x b) c in the plane of the three, measured along its normal.
@@ -138,7 +165,7 @@ function isInTriangle(a, b, c) {
 
 // Returns true if 0 is in the hull of the points. Requires points in a closed half space with 0 on
 // its boundary; then three of them suffice. Source: Caratheodory 1907.
-function holdsOriginOnBoundary(points) {
+export function holdsOriginOnBoundary(points) {
   return points.some(
       (p, i) => isZero(p) ||
           points.slice(i + 1).some(
@@ -148,7 +175,7 @@ function holdsOriginOnBoundary(points) {
 
 // Returns true if 0 is in the interior of the hull of the points: no plane through 0 has all of
 // them on one side. A plane through two of them is such a plane if any is.
-function holdsOriginInside(points) {
+export function holdsOriginInside(points) {
   let spansSpace = false;
   for (let i = 0; i < points.length; ++i) {
     for (let j = i + 1; j < points.length; ++j) {
@@ -188,48 +215,32 @@ function comesWithin(points, rSquared, nearer) {
 
 // Checks a certificate of hulls with radii, not both 0.
 function checkRounded(relation, certificate, a, b) {
-  const r = (a.radius + b.radius) * a.scale * b.scale;
+  const isSeparated = relation === 'RELATION_SEPARATED';
   if (relation !== 'RELATION_OVERLAPPING') {
-    const n = readDirection(certificate);
-    const width = gap(a, b, n);
-    const more = width ** 2n - r ** 2n * dot(n, n);
     require(
-        width >= 0n && (relation === 'RELATION_SEPARATED' ? more > 0n : more >= 0n),
+        gapSign(a, b, readDirection(certificate).n) >= (isSeparated ? 1n : 0n),
         'the gap between the hulls along the direction is too small for their radii');
-    if (relation === 'RELATION_SEPARATED') return;
+    if (isSeparated) return;
   }
-  const points = differences(relation, certificate, a, b);
+  const points = differences(MOST_PAIRS[relation], certificate, a, b);
   require(
-      comesWithin(points, r ** 2n, relation === 'RELATION_OVERLAPPING'),
+      comesWithin(points, radiiOf(a, b) ** 2n, relation === 'RELATION_OVERLAPPING'),
       'the hull of the differences of the vertex pairs is too far from 0 for the radii');
 }
 
-function check(relation, certificate, placedA, placedB) {
-  require(
-      ['RELATION_SEPARATED', 'RELATION_TOUCHING', 'RELATION_OVERLAPPING'].includes(relation),
-      `${relation} has no certificate`);
-  if (!placedA.xyz.length || !placedB.xyz.length) {
-    require(relation === 'RELATION_SEPARATED', 'a hull is empty, and so separated from everything');
-    return;
-  }
-  checkPlacement(placedA);
-  checkPlacement(placedB);
-  const lengths = [placedA, placedB].flatMap(
-      ({xyz, poses, radii = []}) => [xyz, radii, ...poses.map((pose) => pose.slice(4))]);
-  const exponent = commonExponent(...lengths);
-  const a = new ExactHull(placedA, exponent);
-  const b = new ExactHull(placedB, exponent);
+// Checks a certificate of hulls that are not empty, at one exponent.
+export function checkExactly(relation, certificate, a, b) {
   if (a.radius + b.radius > 0n) {
     checkRounded(relation, certificate, a, b);
     return;
   }
   if (relation === 'RELATION_SEPARATED') {
     require(
-        gap(a, b, readDirection(certificate)) > 0n,
+        gapSign(a, b, readDirection(certificate).n) > 0n,
         'the direction does not separate: max n.A >= min n.B');
     return;
   }
-  const points = differences(relation, certificate, a, b);
+  const points = differences(MOST_PAIRS[relation], certificate, a, b);
   if (relation === 'RELATION_OVERLAPPING') {
     require(
         holdsOriginInside(points),
@@ -237,11 +248,27 @@ function check(relation, certificate, placedA, placedB) {
     return;
   }
   require(
-      gap(a, b, readDirection(certificate)) >= 0n,
+      gapSign(a, b, readDirection(certificate).n) >= 0n,
       'the direction does not keep the insides apart: max n.A > min n.B');
   require(
       holdsOriginOnBoundary(points),
       'the vertex pairs show no common point: 0 is not in the hull of their differences');
+}
+
+// Returns the lengths of a placed hull, as lists for commonExponent.
+export const lengthsOf =
+    ({xyz, poses, radii = []}) => [xyz, radii, ...poses.map((pose) => pose.slice(4))];
+
+function check(relation, certificate, a, b) {
+  checkRelation(relation);
+  if (!a.xyz.length || !b.xyz.length) {
+    require(relation === 'RELATION_SEPARATED', 'a hull is empty, and so separated from everything');
+    return;
+  }
+  checkPlacement(a);
+  checkPlacement(b);
+  const exponent = commonExponent(...lengthsOf(a), ...lengthsOf(b));
+  checkExactly(relation, certificate, placedHull(a, exponent), placedHull(b, exponent));
 }
 
 // Returns the missing proof, or an empty text if the certificate proves that A and B are in this
@@ -250,12 +277,5 @@ function check(relation, certificate, placedA, placedB) {
 // of a body).
 //
 // Cost: O(vertices) operations on integers of any length: about two microseconds per vertex.
-export function certificateProblem(relation, certificate, a, b) {
-  try {
-    check(relation, certificate, a, b);
-    return '';
-  } catch (error) {
-    if (error instanceof ProofFails) return error.message;
-    throw error;
-  }
-}
+export const certificateProblem = (relation, certificate, a, b) =>
+    problemOf(() => check(relation, certificate, a, b));

@@ -43,17 +43,25 @@ export const cross =
     (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const isZero = (a) => a.every((value) => value === 0n);
 
-// Returns {rows, scale} of a quaternion of any length: R(q) and |q|^2, up to a common factor.
-export function rotationOf(quaternion) {
-  const [w, x, y, z] = toIntegers(quaternion, commonExponent(quaternion));
+// Returns {rows, scale}: R(q) and |q|^2 as symmetric bilinear forms of two quaternions. For a = b,
+// these are R(a) and |a|^2.
+export function rotationForm(a, b) {
+  const [ww, xx, yy, zz] = a.map((value, i) => value * b[i]);
+  const twice = (i, j) => a[i] * b[j] + a[j] * b[i];
   return {
     rows: [
-      [w * w + x * x - y * y - z * z, 2n * (x * y - w * z), 2n * (x * z + w * y)],
-      [2n * (x * y + w * z), w * w - x * x + y * y - z * z, 2n * (y * z - w * x)],
-      [2n * (x * z - w * y), 2n * (y * z + w * x), w * w - x * x - y * y + z * z],
+      [ww + xx - yy - zz, twice(1, 2) - twice(0, 3), twice(1, 3) + twice(0, 2)],
+      [twice(1, 2) + twice(0, 3), ww - xx + yy - zz, twice(2, 3) - twice(0, 1)],
+      [twice(1, 3) - twice(0, 2), twice(2, 3) + twice(0, 1), ww - xx - yy + zz],
     ],
-    scale: w * w + x * x + y * y + z * z,
+    scale: ww + xx + yy + zz,
   };
+}
+
+// Returns {rows, scale} of a quaternion of any length: R(q) and |q|^2, up to a common factor.
+export function rotationOf(quaternion) {
+  const q = toIntegers(quaternion, commonExponent(quaternion));
+  return rotationForm(q, q);
 }
 
 // n^T M and M p, for the rows of M.
