@@ -54,6 +54,7 @@ class MotionTest(viewer_case.ViewerCase):
             self.assertEqual(self.motion_fact("first contact"), contact["contactTime"])
         else:
             self.assertIn("throughout", self.browser.text("#motion-relation"))
+        self.assertIn("\u2713 Times proven", self.browser.text("#motion-proof"))
         return answer
 
     def test_a_slider_moves_the_object_and_its_first_contact_is_marked(self):
@@ -202,6 +203,24 @@ class MotionTest(viewer_case.ViewerCase):
         self.browser.wait("!hulldViewer.timeLine.playing && hulldViewer.model.time === 1")
         self.browser.js("hulldViewer.model.select(2, 1)")
         self.assertIn("throughout", self.browser.text("#motion-relation"))
+        self.assertIn("\u2713 Times proven", self.browser.text("#motion-proof"))
+
+    def test_a_forged_motion_is_refuted(self):
+        self.view(self.scene("moving.yaml", SCENE))
+        self.assert_motion_as_api()
+        self.browser.js("""(() => {
+          const {model, motion} = hulldViewer;
+          motion.arrived({...model.motion, firstContact: {
+            ...model.motion.firstContact, contactTime: 0.75, separatedUntil: 0.75}});
+        })()""")
+        self.assertIn("refuted", self.browser.text("#motion-proof"))
+        self.assertIn("before separated_until, 0.75", self.browser.text("#motion-proof"))
+
+    def test_motions_of_bodies_are_proven(self):
+        self.hulld.hullctl("body", "put", "pair", "box@0,0,2:0.25", "box@0,0,-2")
+        self.view(self.scene("bodies.yaml", SCENE.replace("ball: {id: box", "ball: {id: pair")))
+        self.assert_motion_as_api()
+        self.assertEqual(self.browser.js("hulldViewer.model.pairMotion.pieceCertificates.length"), 2)
 
 
 if __name__ == "__main__":
