@@ -16,6 +16,7 @@
 #include "client/hullctl/local/local_server.h"
 #include "client/hullctl/printing/table.h"
 #include "client/hullctl/robot/robot_scene.h"
+#include "client/hullctl/scene/recorded_watch.h"
 #include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/scene/yaml_scene.h"
 #include "client/hullctl/view/bridge/bridge.h"
@@ -37,6 +38,8 @@ struct ViewArguments {
   uint16_t port = 0;
   bool no_open = false;
   bool edit = false;
+  // A recorded watch.
+  std::string recording;
   std::string html_file;
   std::string png_file;
   PictureSize size;
@@ -168,8 +171,34 @@ class Viewing {
         if (!added.ok()) return run_.Fail(added);
       }
     }
+    if (!arguments_.recording.empty()) {
+      const absl::Status added = AddTheRecording(&scene);
+      if (!added.ok()) return run_.FailUsage(added);
+    }
     program_.scenes.push_back(std::move(scene));
     return ExitCode::kDone;
+  }
+
+  absl::Status AddTheRecording(ViewScene* scene) {
+    const std::string& path = arguments_.recording;
+    auto watch = ReadRecordedWatch(path);
+    if (!watch.ok()) return watch.status();
+    const std::vector<std::string>& things = arguments_.things;
+    if (watch->is_of_pairs != (things.size() == 1 && IsScene(things[0]))) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, watch->is_of_pairs ? " is a watch of a scene; name the scene file that was watched"
+                                   : " is a watch of hulls; name their IDs or prefix, or nothing"));
+    }
+    if (watch->is_of_pairs && watch->placements > scene->objects.size()) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(path, " is a watch of another scene: it has placement ",
+                       watch->placements - 1, ", but ", things[0], " ends before it"));
+    }
+    scene->watch = std::move(watch->messages);
+    scene->note = absl::StrCat("A recorded watch: the time line shows the ",
+                               watch->is_of_pairs ? "pairs that collided" : "hulls that existed",
+                               ". Shapes and answers are current.");
+    return absl::OkStatus();
   }
 
   absl::Status AddTheRobot(ViewScene* scene) {
@@ -316,6 +345,10 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         absl::StrCat("--scene: ", Quoted(scene), " is not a demo scene; pass a key from 0 to 7")));
   }
+  if (!arguments.recording.empty() && (arguments.demo || is_robot)) {
+    return run.FailUsage(
+        absl::InvalidArgumentError("--recording cannot be combined with --demo or a robot"));
+  }
   const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
   if (files == 2) {
     return run.FailUsage(absl::InvalidArgumentError("--html and --png cannot be combined"));
@@ -395,6 +428,11 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .ValueName("WIDTHxHEIGHT");
   command.AddFlag("--edit", &arguments->edit,
                   "Let the page append points to hulls and delete them");
+  command
+      .AddText("--recording", &arguments->recording,
+               "Play a recorded watch: the output of 'hullctl watch --output json'")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   AddRobotOptions(command, &arguments->robot);
   command.AddText("--up", &arguments->up, "The axis that points up (default z for a robot, else y)")
       .ValueName("x|y|z")
@@ -412,7 +450,11 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "of the selected pair. A robot has a slider for each joint and, with --joints, a time line\n"
       "that marks the waypoints in contact. Its pairs are those of 'hullctl robot check'. With\n"
       "--scene, they include pairs of a part and a placement of that file, whose hulls must be on\n"
-      "the server unless --local creates them.");
+      "the server unless --local creates them.\n"
+      "\n"
+      "--recording adds a time line to the scene that 'hullctl watch --scene' watched: it shows\n"
+      "the pairs that collided at each moment. With the output of 'hullctl watch PREFIX', it\n"
+      "shows which hulls existed.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
@@ -420,6 +462,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
        {"A scene", "hullctl view scene.json"},
        {"A robot on its way", "hullctl view arm.urdf --joints path.csv"},
        {"A robot in its cell", "hullctl view arm.urdf --scene cell.yaml --ignore base,floor"},
+       {"The collisions of a scene over time", "hullctl view scene.yaml --recording watch.jsonl"},
        {"A file to share", "hullctl view arm --html arm.html"},
        {"A picture for a report", "hullctl view scene.yaml --png scene.png --size 1200x800"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });

@@ -205,11 +205,14 @@ void AddWatchCommand(Command program, Invocation* invocation) {
       "deleted), the two placements, the revisions of their hulls or bodies, and, for bodies, the\n"
       "deciding pieces. Poses are fixed; pairs change as hulls grow and bodies are replaced.\n"
       "A watch that loses the server reconnects within --timeout and resumes where it was.\n"
-      "With --output json, each message of the contract is one line. Ctrl-C ends the watch.");
+      "With --output json, each message of the contract is one line; 'hullctl view --recording'\n"
+      "plays such a file. Ctrl-C ends the watch.");
   command.SetExamples(
       {{"Hulls of one cell", "hullctl watch cell-3/"},
        {"The current state, for a script", "hullctl watch --until-synced --output json"},
-       {"Collisions while hulls grow", "hullctl watch --scene scene.yaml"}});
+       {"Collisions while hulls grow", "hullctl watch --scene scene.yaml"},
+       {"Record them, to play them later",
+        "hullctl watch --scene scene.yaml --output json > watch.jsonl"}});
   command.OnGiven([=] {
     invocation->action = [=] {
       const Invocation& run = *invocation;

@@ -305,7 +305,8 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
                                {"joints", joined(scene.joints.joints, joint_json)},
                                {"waypoints", joined(scene.joints.waypoints, values_json)},
                                {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"},
-                               {"named", "[" + absl::StrJoin(named, ",") + "]"}});
+                               {"named", "[" + absl::StrJoin(named, ",") + "]"},
+                               {"watch", "[" + absl::StrJoin(scene.watch, ",") + "]"}});
 }
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {

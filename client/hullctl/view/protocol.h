@@ -43,12 +43,15 @@ namespace hulld {
 //   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: true if the page
 //              may change hulls.
 //   scene      {number, key, title, note, files: [{name}], objects: [OBJECT], joints: [{name, low,
-//              high, value}], waypoints: [values], contacts, named}: replaces all previous content.
+//              high, value}], waypoints: [values], contacts, named, watch}: replaces all previous
+//              content.
 //              OBJECT is {name, hullId, file, pose, radius, isJointed, endPose}: hullId is that of
 //              a hull or a body, "" if absent; file is -1 if absent; isJointed: moved by the joints
 //              only; endPose: the end of its motion, null if it has none. Later messages name
 //              objects and files by their index here. contacts: the waypoints with a colliding
-//              pair. named: the first pair that the file names; empty if it names none.
+//              pair. named: the first pair that the file names; empty if it names none. watch: the
+//              messages of a recorded watch, as in the contract; empty if there is none. Placements
+//              are objects. `collisions` is ignored with a watch of pairs, `hull` with one of hulls.
 //   objects    {scene, objects}: appends objects to that scene.
 //   hull       {event}: a HullEvent of the contract: a hull or a body changed, appeared, or was
 //              deleted.

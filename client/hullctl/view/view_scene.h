@@ -99,6 +99,8 @@ struct ViewScene {
   std::optional<std::vector<uint32_t>> pairs;
   // Empty unless the scene is a robot.
   ViewJoints joints;
+  // RecordedWatch::messages of a recorded watch of these objects; empty if there is none.
+  std::vector<std::string> watch;
 };
 
 // Reads a mesh (IsMeshFormat) or the points of any other format. Skips points that are not finite.

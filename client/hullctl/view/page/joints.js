@@ -1,6 +1,7 @@
 // The joints of a robot, and the time line of its trajectory: the configuration between two
 // waypoints is interpolated linearly in each joint.
 import {JointPanel} from 'hulld/panels/joint_panel.js';
+import {runsOf} from 'hulld/panels/time_line.js';
 
 // Time from one waypoint to the next while playing, within limits for the whole.
 const WAYPOINT_MS = 600;
@@ -8,19 +9,6 @@ const LEAST_MS = 3000;
 const MOST_MS = 30000;
 // Steps of the slider between two waypoints. A recording has the waypoints alone.
 const STEPS = 16;
-
-// Merges ascending waypoints into runs [first, last].
-function runsOf(waypoints) {
-  const runs = [];
-  for (const waypoint of waypoints) {
-    const run = runs[runs.length - 1];
-    if (run && run[1] === waypoint - 1)
-      run[1] = waypoint;
-    else
-      runs.push([waypoint, waypoint]);
-  }
-  return runs;
-}
 
 export class Joints {
   constructor(model, connection) {

@@ -20,6 +20,7 @@ import {ObjectPanel} from 'hulld/panels/object_panel.js';
 import {TimeLine} from 'hulld/panels/time_line.js';
 import {Tree} from 'hulld/panels/tree.js';
 import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
+import {Watch} from 'hulld/watch.js';
 
 const $ = (id) => document.getElementById(id);
 // Compares revisions, 64-bit numbers as text; an absent one is the oldest.
@@ -66,6 +67,7 @@ class Viewer {
         (edit) => this.connection.send({type: 'edit', ...edit}));
     this.timeLine = new TimeLine();
     this.joints = new Joints(this.model, this.connection);
+    this.watch = new Watch(this.model);
     this.listen();
     this.motion = new Motion(this.model, this.stage, this.connection, this.timeLine);
     this.controls = new Controls(this);
@@ -106,6 +108,10 @@ class Viewer {
       this.ask(rest);
     });
     model.on('visibility shown', () => this.rebuildGround());
+    model.on('visibility', () => {
+      this.objectPanel.rebuild();
+      this.updateStatus();
+    });
     model.on('visibility color shown', () => {
       this.rebuildViews();
       this.gizmo.update();
@@ -173,10 +179,12 @@ class Viewer {
     this.controls.syncShown();
     this.joints.rebuild();
     this.motion.rebuild();
-    this.timeLine.load(this.joints.track() ?? this.motion.track());
+    this.watch.rebuild();
+    this.timeLine.load(this.watch.track() ?? this.joints.track() ?? this.motion.track());
     model.tell('selection');
     this.mayChoosePair = true;
     this.answerPanel.updateCollisions();
+    if (this.watch.isOfPairs) this.watch.show(0);
     this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
     this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
     this.updateStatus();
@@ -205,6 +213,7 @@ class Viewer {
 
   hullChanged({kind, hull}) {
     const {model} = this;
+    if (this.watch.ownsHulls) return;
     const gone = kind === 'HULL_EVENT_KIND_DELETED';
     model.info.set(hull.hullId, gone ? undefined : hull);
     for (const object of model.objects) {
@@ -224,6 +233,7 @@ class Viewer {
 
   // Requests a hull or a body again if it changed while its shape was in flight.
   fetchIfOlder(id) {
+    if (this.watch.ownsHulls) return;
     const told = this.model.info.get(id)?.revision;
     if (isNewer(told, this.model.revisionOf(id))) this.fetchHulls([id]);
   }
@@ -359,6 +369,8 @@ class Viewer {
       this.chooseCollidingPair();
     else
       this.ask(true);
+    // Hulls that appear later were part of the fit.
+    if (this.watch.ownsHulls) this.watch.show(0);
     document.body.dataset.fitted = document.body.dataset.scene || 'yes';
   }
 
@@ -391,7 +403,7 @@ class Viewer {
   collisions(message) {
     if (!this.isCurrent(message)) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
-    this.model.setCollisions(message);
+    if (!this.watch.isOfPairs) this.model.setCollisions(message);
   }
 
   edited(message) {

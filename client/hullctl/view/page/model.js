@@ -60,6 +60,8 @@ export class Model extends EventTarget {
     this.contacts = [];
     // The first pair that the file of the scene names; empty if it names none.
     this.named = [];
+    // The messages of a recorded watch.
+    this.watch = [];
     // The time t of a scene with motions; null in other scenes.
     this.time = null;
     // The last message about the motion of a pair.
@@ -78,9 +80,9 @@ export class Model extends EventTarget {
     for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
   }
 
-  load({number, files, objects, joints, waypoints, contacts, named}) {
+  load({number, files, objects, joints, waypoints, contacts, named, watch}) {
     this.clear();
-    Object.assign(this, {number, files, joints, waypoints, contacts, named});
+    Object.assign(this, {number, files, joints, waypoints, contacts, named, watch});
     this.addObjects(objects);
     this.show.mesh = files.length > 0;
     this.time = this.moving.length ? 0 : null;
@@ -94,8 +96,9 @@ export class Model extends EventTarget {
         ...object,
         index,
         start: object.pose,
-        // Moved by the joints or the time of the scene, not by hand.
-        isDriven: object.isJointed || Boolean(object.endPose),
+        // Moved by the joints or the time of the scene, or at rest in a recorded watch: not by
+        // hand.
+        isDriven: object.isJointed || Boolean(object.endPose) || this.watch.length > 0,
         // The pose after the last completed drag.
         rested: object.pose,
         opacity: 1,

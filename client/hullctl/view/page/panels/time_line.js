@@ -1,6 +1,19 @@
 // A time line under the picture: a slider with marks, and a button that plays it. A track gives it
 // a meaning.
 
+// Merges ascending moments into runs [first, last].
+export function runsOf(moments) {
+  const runs = [];
+  for (const moment of moments) {
+    const run = runs[runs.length - 1];
+    if (run && run[1] === moment - 1)
+      run[1] = moment;
+    else
+      runs.push([moment, moment]);
+  }
+  return runs;
+}
+
 export class TimeLine {
   constructor() {
     [this.root, this.button, this.slider, this.text, this.marks] = [
