@@ -117,7 +117,7 @@ if TYPE_CHECKING:
     from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
-    from hulld.robot.answers import RobotCheck
+    from hulld.robot.answers import MotionCheck, MotionContact, RobotCheck
     from hulld.robot.robot import Robot
     from hulld.verification import VerificationError, Verifier
     from hulld.watches import CollisionWatch, HullWatch
@@ -190,6 +190,8 @@ __all__ = [
     "MeshPart",
     "MeshVertices",
     "Method",
+    "MotionCheck",
+    "MotionContact",
     "Normal",
     "NotFoundError",
     "Opened",

@@ -30,7 +30,7 @@ class Backup:
 
 class BackupWriter:
     """Writes the parts of SaveBackup: a line that names the format, then each part after its size
-    and CRC-32. The file gets its name only when it is complete and on disk; otherwise nothing is
+    and CRC-32. The file gets its final name only when it is complete and on disk; otherwise nothing is
     left. A context manager.
 
     OSError: the file cannot be written. ValueError: a part is damaged or out of place.

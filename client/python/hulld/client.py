@@ -72,7 +72,7 @@ class Client(ClientBase):
     server: HOST:PORT, with 50551 as the default port; several servers over one store, which are
     called in turn, as "10.0.0.1:50551,10.0.0.2:50551" or "dns:///hulls.example:50551"; or any other
     target name of gRPC, as "unix:/run/hulld.sock". timeout: seconds for each call, its retries
-    included; None: unbounded. Each method has one of its own. For appenders and collision streams
+    included; None: unbounded. Each method can override it. For appenders and collision streams
     it bounds each wait, for watches the search for a lost server. retry: see RetryPolicy. tls:
     encrypts. token: sent with each call, and never unencrypted to another machine unless `insecure`
     allows it.
@@ -84,11 +84,11 @@ class Client(ClientBase):
     ValueError or TypeError if an argument is wrong, before anything is sent. All are safe to repeat
     but delete_hull, delete_body, create_hull without if_absent, put_body with if_revision,
     replace_hull, save_backup, and collision streams; these are sent once.
-    Numbers are never changed on the way: the server gets the doubles of an array, and answers hold
-    the doubles that it sent. orthogonality_tolerance, of calls that take poses: the largest entry
-    of R Rᵀ - I that a matrix may have; matrices of float32 need 1e-6.
+    Numbers are never changed in transit: the server receives the doubles of an array, and answers
+    hold the doubles that it sent. orthogonality_tolerance, of calls that take poses: the largest
+    entry of R Rᵀ - I that a matrix may have; matrices of float32 need 1e-6.
 
-    A process that was forked while this one has an open client can make no calls.
+    A process that is forked while a client is open cannot make any calls.
     """
 
     # --- The server ---
@@ -99,13 +99,13 @@ class Client(ClientBase):
 
     def check_health(self, *, timeout: float | None = None) -> bool:
         """True if the server reports that it is serving; needs no token. Not retried.
-        UnavailableError: it is not reached."""
+        UnavailableError: it cannot be reached."""
         return self._unary(requests.check_health(), timeout)
 
     def save_backup(self, path: PathLike, *, timeout: float | None = None) -> Backup:
         """Saves a consistent copy of the whole store to one file, for `hullctl backup restore`. The
-        file gets its name only when it is complete and on disk. Unbounded in time unless `timeout`
-        is given; not retried. FailedPreconditionError: the store is in memory."""
+        file gets its final name only when it is complete and on disk. Unbounded in time unless
+        `timeout` is given; not retried. FailedPreconditionError: the store is in memory."""
         seconds = arguments.seconds(timeout)
         with BackupWriter(path) as writer:
             for part in self._parts(requests.save_backup(), seconds):
@@ -138,11 +138,12 @@ class Client(ClientBase):
         """Adds points to a hull, and returns when they are committed.
 
         points: n x 3, the caller's length unit; or an iterator of such arrays, which are sent as
-        they come. float64 and float32 travel unchanged. All must be finite, and none masked.
-        create: makes the hull if there is none. writer_id: names the writer; its chunks are
-        numbered on. if_revision: applied only if the hull is at this revision; then all points must
-        fit one chunk of chunk_bytes. A lost connection is reopened, and each chunk is applied once,
-        wholly or not at all. If this raises, earlier chunks stand: see Appender for how many.
+        they arrive. float64 and float32 are sent unchanged. All must be finite, and none masked.
+        create: creates the hull if it does not exist. writer_id: names the writer and continues its
+        numbering of chunks. if_revision: appends only if the hull is at this revision; then all
+        points must fit one chunk of chunk_bytes. A lost connection is reopened, and each chunk is
+        applied once, wholly or not at all. If this raises, earlier chunks remain committed: see
+        Appender for how many.
 
         ValueError: not points. NotFoundError: no such hull. AbortedError: if_revision does not
         match.
@@ -167,7 +168,7 @@ class Client(ClientBase):
         max_in_flight_chunks: int = DEFAULT_IN_FLIGHT_CHUNKS,
         timeout: float | None = None,
     ) -> Appender:
-        """Opens a stream of chunks into a hull. Unacknowledged chunks are kept for sending again;
+        """Opens a stream of chunks into a hull. Unacknowledged chunks are kept to be resent;
         `append` waits while they reach either bound. For a named writer, `opened.last_sequence` is
         the number of its committed chunks. NotFoundError: no such hull, without `create`."""
         state = AppendState(hull_id, writer_id, create, max_in_flight_bytes, max_in_flight_chunks)
@@ -185,8 +186,8 @@ class Client(ClientBase):
         chunk_bytes: int = DEFAULT_CHUNK_BYTES,
         timeout: float | None = None,
     ) -> ReplacedHull:
-        """Replaces a hull by that of the points, at once for all readers. points, create: as in
-        append_points; if an iterator raises, nothing is changed.
+        """Replaces a hull with that of the points, atomically for all readers. points, create: as
+        in append_points; if an iterator raises, nothing is changed.
         Unbounded in time unless `timeout` is given; not retried.
 
         NotFoundError: no such hull. AbortedError: if_revision (0: no hull) does not match at the
@@ -336,8 +337,8 @@ class Client(ClientBase):
 
         pieces: hulls at poses in the frame of the body, as placements elsewhere; a hull need not
         exist yet, and each query uses its current state. Placements name a body by its ID, like a
-        hull. if_revision: put only if the body is at this revision; 0: only if there is none; such
-        a call is not retried.
+        hull. if_revision: put only if the body is at this revision; 0: only if it does not exist;
+        such a call is not retried.
 
         ValueError: no piece. AlreadyExistsError: a hull has the ID. AbortedError: if_revision does
         not match. ResourceExhaustedError: more pieces, or hulls and bodies, than the server takes.
@@ -579,7 +580,7 @@ class Client(ClientBase):
         timeout: float | None = None,
     ) -> Hits:
         """The hits of rays: exact, grazes included. A ray is a point that moves from its origin to
-        origin + direction, so give directions as long as the rays.
+        origin + direction, so a direction has the length of its ray.
 
         origins, directions: n x 3, or one of them 3 for all rays. placements: as in
         check_collisions; the pieces of a body must have its frame. Pairs far apart are skipped in
@@ -738,7 +739,7 @@ class Client(ClientBase):
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         timeout: float | None = None,
     ) -> CollisionWatch:
-        """Reports when pairs begin and end to collide, or to be within a clearance, because poses
+        """Reports when pairs start and stop colliding, or being within a clearance, because poses
         or hulls change. pairs: m x 2 indices of placements; None: a scene, with groups and movers
         as in find_collisions. orthogonality_tolerance: of all updates, too."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)

@@ -105,13 +105,13 @@ class InvalidArgumentError(HulldError, ValueError):
 
 
 class DeadlineExceededError(HulldError):
-    """No answer came in time."""
+    """No answer arrived in time."""
 
     code = "DEADLINE_EXCEEDED"
 
 
 class NotFoundError(HulldError, LookupError):
-    """There is no such hull."""
+    """The hull does not exist."""
 
     code = "NOT_FOUND"
 

@@ -54,7 +54,7 @@ class LocalServer:
 
     data_dir: keeps the hulls on disk there; None: in memory, until it ends. options: more flags of
     hulld, as in ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, else the PATH, else
-    a build in the checkout around the working directory. FileNotFoundError: there is none.
+    a build in the checkout around the working directory. FileNotFoundError: it is not found.
     """
 
     def __init__(

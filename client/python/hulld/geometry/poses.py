@@ -120,7 +120,7 @@ def pack_pose(
     array = _doubles(pose)
     if array.shape not in ((3,), (7,), (4, 4)):
         raise ValueError(
-            f"a pose of shape {array.shape} is none of (4, 4), a matrix; (7,), a quaternion and a "
+            f"a pose of shape {array.shape} is not one of (4, 4), a matrix; (7,), a quaternion and a "
             "translation w x y z x y z; (3,), a translation"
         )
     packed: npt.NDArray[np.float64] = _pack_array(
@@ -142,7 +142,7 @@ def pack_poses(
     quaternion_order: the order of the quaternions in rows of seven numbers; a Pose has its own.
 
     ValueError names the pose: another shape, a masked or non-finite number, a zero quaternion, a
-    matrix that is no rigid motion.
+    matrix that is not a rigid motion.
     """
     if isinstance(poses, (np.ndarray, np.ma.MaskedArray)) and poses.dtype != object:
         return _pack_array(_doubles(poses, "poses"), orthogonality_tolerance, quaternion_order)

@@ -17,7 +17,7 @@ _OUTWARD = 1 + 2.0**-46
 
 
 def primitive_points(shape: Shape) -> tuple[Points, float, float]:
-    """n x 3 points in the frame of the shape, which is no mesh, the radius, and the excess: the
+    """n x 3 points in the frame of the shape, which is not a mesh, the radius, and the excess: the
     rounded hull contains the shape and extends at most this far beyond it, up to the rounding of
     this number.
 

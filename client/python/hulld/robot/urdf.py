@@ -23,7 +23,7 @@ from hulld.robot.xml_tree import Element, read_xml
 def read_urdf(path: str | os.PathLike[str]) -> Description:
     """Links, joints, and collision shapes of a file. Other elements are ignored.
 
-    ValueError names file and line: malformed XML, a number that is none, a link or joint without a
+    ValueError names file and line: malformed XML, a malformed number, a link or joint without a
     name or with a duplicate name, a shape without a size above 0, links that form no tree, a joint
     that mimics itself, or a planar joint without an axis.
     """

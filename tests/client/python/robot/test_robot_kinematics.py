@@ -137,8 +137,8 @@ def test_configurations_are_checked(write: Write) -> None:
         (np.where(np.arange(12) == 3, np.nan, rest), r"q\[3\] is nan"),
         (np.zeros((2, 12)), r"q\[0\]: the quaternion of free is zero"),
         (np.ma.array(rest, mask=rest == 1), "masked"),
-        ({"elbow": 1}, "'elbow' is no variable of arm, which has cart/x"),
-        ({"j3": 1}, "'j3' is no variable"),
+        ({"elbow": 1}, "'elbow' is not a variable of arm, which has cart/x"),
+        ({"j3": 1}, "'j3' is not a variable"),
         ({"j1": [1, 2], "j2": [1, 2, 3]}, "the same n for all"),
         ({"j1": np.inf}, "inf"),
     ):
