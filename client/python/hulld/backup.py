@@ -30,8 +30,8 @@ class Backup:
 
 class BackupWriter:
     """Writes the parts of SaveBackup: a line that names the format, then each part after its size
-    and CRC-32. The file gets its final name only when it is complete and on disk; otherwise nothing is
-    left. A context manager.
+    and CRC-32. The file gets its final name only when it is complete and on disk; otherwise it is
+    removed. A context manager.
 
     OSError: the file cannot be written. ValueError: a part is damaged or out of place.
     """

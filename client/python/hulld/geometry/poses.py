@@ -120,8 +120,8 @@ def pack_pose(
     array = _doubles(pose)
     if array.shape not in ((3,), (7,), (4, 4)):
         raise ValueError(
-            f"a pose of shape {array.shape} is not one of (4, 4), a matrix; (7,), a quaternion and a "
-            "translation w x y z x y z; (3,), a translation"
+            f"a pose of shape {array.shape} is not one of (4, 4), a matrix; (7,), a quaternion and "
+            "a translation w x y z x y z; (3,), a translation"
         )
     packed: npt.NDArray[np.float64] = _pack_array(
         array[np.newaxis], orthogonality_tolerance, quaternion_order

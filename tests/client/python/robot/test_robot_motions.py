@@ -1,4 +1,4 @@
-"""The motion of robots between waypoints: the same contacts as `hullctl robot check --continuous`."""
+"""Motions of robots between waypoints: the same contacts as `hullctl robot check --continuous`."""
 
 from __future__ import annotations
 
