@@ -72,7 +72,8 @@ export class MotionPanel {
     const vertices = parts.reduce((total, {xyz}) => total + xyz?.length / 3, 0);
     const intervals =
         (isBodies ? pieceCertificates : [firstContact]).map(({intervals}) => intervals.length);
-    return this.proofLine.show(motion, parts, {
+    // A file repeats the message at each time, with the same first contact.
+    return this.proofLine.show(firstContact, parts, {
       steps: STEPS_PER_INTERVAL * vertices * Math.max(1, ...intervals),
       proven: 'Times proven by exact arithmetic in this page',
       check: () => isBodies ?
