@@ -9,7 +9,7 @@ import {bodiesMotionProblem, motionProblem} from 'hulld/proof/motion_certificate
 const LEGEND = 'The swept shapes are hulls of sampled positions: a picture, not a proof. ' +
     'The certificate proves the times.';
 // Coefficients of the polynomial of a vertex.
-const STEPS_PER_INTERVAL = 4;
+const STEPS_PER_INTERVAL = 5;
 
 export class MotionPanel {
   // goToContact(): shows the time of the first contact.

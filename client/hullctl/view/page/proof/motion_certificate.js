@@ -77,10 +77,10 @@ const sumOfForms = (f, g) =>
 const signOf = (a, b, c) => (a >= 0n || b === 0n ? a + b : b * b * c - a * a);
 
 // Returns true if the hull is on the side n.p < offset of a plane over the interval, or, if
-// `mayEnd`, on the plane at its end. For each vertex p, |q|^2 (n.p + radius |n| - offset) is a
-// polynomial of time. It is negative if no coefficient is positive and the outer ones, its values
-// at both ends, are negative. `normals` and `offsets` hold one of each, or two if the plane moves;
-// the length of the longer normal stands for |n|.
+// `mayEnd`, on the plane at its end. `normals` and `offsets`: of the plane at both ends of the
+// interval; both are linear in between, and the length of the longer normal stands for |n|. For
+// each vertex p, |q|^2 (n.p + radius |n| - offset) is a polynomial of time of degree 4. It is
+// negative if no coefficient is positive and the outer ones, its values at both ends, are negative.
 function isBelow({inBody}, {normals, offsets}, {q, x, divisor}, mayEnd) {
   const forms = productOf(q, q, rotationForm, sumOfForms);
   const turned = productOf(normals, forms, (n, {rows}) => combination(n, rows), sum);
@@ -88,9 +88,9 @@ function isBelow({inBody}, {normals, offsets}, {q, x, divisor}, mayEnd) {
   const limits = elevated(offsets);
   const shifts = productOf(normals, x, dot).map((shift, i) => shift - divisor * limits[i]);
   const lengths = forms.map(({scale}) => inBody.scale * scale);
-  const margins = normals.reduce((p) => elevated(p), lengths);
-  const squares = normals.map((n) => dot(n, n));
-  const square = squares.reduce((a, b) => (a > b ? a : b));
+  const margins = elevated(elevated(lengths));
+  const [start, end] = normals.map((n) => dot(n, n));
+  const square = start > end ? start : end;
   const signs = productOf(lengths, shifts).map((shift, i) => {
     const height = shift + divisor * inBody.extent(directions[i])[1];
     return signOf(height, divisor * inBody.radius * margins[i], square);
@@ -101,21 +101,16 @@ function isBelow({inBody}, {normals, offsets}, {q, x, divisor}, mayEnd) {
 }
 
 // Returns the plane of an interval, all lengths at one power of two.
-function planeOf({n, exponent}, {offset, endDirection, endOffset}, ofLengths) {
-  const ends = [{n, exponent, offset: Number(offset)}];
-  if (endDirection !== undefined || endOffset !== undefined) {
-    require(
-        endDirection && endOffset !== undefined,
-        'there is an end direction without an end offset, or the other way round');
-    ends.push({...readDirection({direction: endDirection}), offset: Number(endOffset)});
-  }
-  const offsets = ends.map((end) => end.offset);
-  require(areFinite(offsets), 'the offset is not finite');
-  const exponents = ends.map((end) => end.exponent + ofLengths);
-  const common = Math.min(commonExponent(offsets), ...exponents);
+function planeOf(direction, {offset, endDirection, endOffset}, ofLengths) {
+  const directions =
+      [direction, endDirection ? readDirection({direction: endDirection}) : direction];
+  const given = [offset, endOffset ?? offset].map(Number);
+  require(areFinite(given), 'the offset is not finite');
+  const exponents = directions.map(({exponent}) => exponent + ofLengths);
+  const common = Math.min(commonExponent(given), ...exponents);
   return {
-    normals: ends.map((end, i) => scaled(1n << BigInt(exponents[i] - common), end.n)),
-    offsets: toIntegers(offsets, common),
+    normals: directions.map(({n}, i) => scaled(1n << BigInt(exponents[i] - common), n)),
+    offsets: toIntegers(given, common),
   };
 }
 
@@ -173,6 +168,11 @@ class MovingPair {
       const mayEnd = contactTime !== undefined && until === last;
       const problem = problemOf(() => {
         const direction = readDirection(interval);
+        const hasEnd = interval.endDirection !== undefined;
+        require(
+            hasEnd === (interval.endOffset !== undefined) &&
+                !(hasEnd && interval.offset === undefined),
+            'the end of a plane needs a direction, and offsets at both ends');
         if (interval.offset === undefined)
           this.checkTranslation(direction, interval, begin, mayEnd);
         else
