@@ -391,7 +391,8 @@ class Robot:
             ]
             X_WL = link_poses(description, X_WB, between)
             poses = [compose(X_WL[part.link], part.X_LS) for part in self.parts]
-            return stacked(poses, len(keys))[inverse.reshape(-1)]
+            every: npt.NDArray[np.float64] = stacked(poses, len(keys))[inverse.reshape(-1)]
+            return every
 
         return Movers(
             names,
