@@ -285,8 +285,7 @@ void AddAppendCommand(Command program, Invocation* invocation) {
       .AddText("--split", &arguments->split,
                "Append each part to a hull of its own, ID/PART, and combine them as the body ID. "
                "Parts are named in the file (objects and groups of obj, solids of stl, nodes of "
-               "gltf and dae), or "
-               "are connected components")
+               "gltf and dae), or are connected components")
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(

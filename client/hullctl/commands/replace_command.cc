@@ -113,9 +113,8 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
   command.SetDetails(
-      "Runs without a time limit unless --timeout is given. A failed call leaves the hull "
-      "unchanged,\n"
-      "except that the hull may have been replaced if all points had been sent.");
+      "Runs without a time limit unless --timeout is given. A failed call leaves the hull\n"
+      "unchanged, except that it may have been replaced if all points had been sent.");
   command.SetExamples({{"", "hullctl replace arm arm-v2.stl"},
                        {"Only if it is unchanged since revision 7",
                         "hullctl replace arm arm-v2.stl --if-revision 7"}});

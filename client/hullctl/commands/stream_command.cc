@@ -160,12 +160,11 @@ void AddStreamCommand(Command program, Invocation* invocation) {
                   "Answer updates only with pairs whose relation changed");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
-      "FILE starts with a scene, as for 'hullctl batch'. If the scene is JSON in braces, each "
-      "line\n"
-      "after it is a CollisionStreamUpdate of the contract, answered before the next is read. "
-      "Poses are seven\n"
-      "numbers for each placement named: quaternion w x y z, translation x y z. Only pairs with a\n"
-      "placement that moved are answered. --timeout bounds the wait for each answer. A file:\n"
+      "FILE starts with a scene, as for 'hullctl batch'. If the scene is JSON in braces, each\n"
+      "line after it is a CollisionStreamUpdate of the contract, answered before the next is\n"
+      "read. Poses are seven numbers for each placement named: quaternion w x y z, translation\n"
+      "x y z. Only pairs with a placement that moved are answered. --timeout bounds the wait for\n"
+      "each answer. A file:\n"
       "  {\"placements\":[{\"hullId\":\"arm\"},{\"hullId\":\"box\"}],\"pairs\":[0,1]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.5,0,0]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.6,0,0],\"refreshHulls\":true}");
