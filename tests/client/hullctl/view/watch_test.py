@@ -33,7 +33,7 @@ class WatchTest(viewer_case.ViewerCase):
             message = json.loads(line)
             if last in line:
                 break
-            if message["synced"] if not is_synced else message["events"]:
+            if changes and message["events" if is_synced else "synced"]:
                 is_synced = True
                 changes.pop(0)()
         watch.terminate()

@@ -110,7 +110,7 @@ def test_a_scene_is_at_rest(make: Make, client: hulld.Client, name: str) -> None
     assert apart.is_free
     with pytest.raises(ValueError, match="must be at rest"):
         robot.check_motion(SWING_PAST, scene=[hulld.Placement(name, end_pose=(1, 0, 0))])
-    with pytest.raises(hulld.NotFoundError, match=f"arm with {name}-absent: "):
+    with pytest.raises(hulld.NotFoundError, match=f"wall with {name}-absent: "):
         robot.check_motion(SWING_PAST, scene=[f"{name}-absent"])
 
 
