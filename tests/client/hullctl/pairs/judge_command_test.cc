@@ -173,7 +173,7 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
   error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
   error("a,b,b_to_x,distance\ncube,cube,1,0.5\n",
         "distance and depth apply only to a pair at rest");
-  error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is no duration of at least 0");
+  error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is not a duration of at least 0");
 }
 
 // Cubes approach along x by 2 from gaps of 1 and of 3.

@@ -345,7 +345,8 @@ TEST_F(StoredHulls, MeshesOfManyPointsSendTheVerticesOfTheirHull) {
   ran = Check(inside);
   const Ran few = Check(BoxObj("o box", 0, 1));
   unsetenv("HULLD_BINARY");
-  EXPECT_THAT(ran.err, HasSubstr("gap has more than 4096 points, so a local server has to find"));
+  EXPECT_THAT(ran.err,
+              HasSubstr("gap has more than 4096 points, and the local server that would reduce"));
   EXPECT_EQ(few.code, 0) << few.err;
 }
 
