@@ -237,21 +237,23 @@ inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
 inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 
 // A Bernstein coefficient of |q(t)|^2 (n . p(t) - c) over the vertices of a hull in motion
-// (moving_plane.h), with w the larger of |q|^2 at both ends, and x the larger translation. Both
-// quaternions err by (1 + 2^-8) u of their length. The bilinear form of two of them on n sums at
-// most 6 w |n|_2 of terms that err by 10.1 u of themselves: 105 u w |n| per component, elevation to
-// degree 3 adds 7 u w |n|. Times a vertex: 3 * 112 u w |n| M; the support value itself errs by 32 u
-// w |n| M (kSupportBlurFactor). n . x errs by 12 u |n||x|, products of quaternions by 6 u w, so
-// their cubic by 42 u w |n||x|; the weight of c by 8 u w, its product with c by 9 u w |c|; sums of
-// at most 6 w |n| M + 3 w |n||x| + w |c| by 2 u of that. The total is below 400 u w (|n| (M + |x|)
-// + |c|). Proven.
+// (moving_plane.h), with w the larger of |q|^2 at both ends, x the larger translation, and n and c
+// the larger of both ends. Both quaternions err by (1 + 2^-8) u of their length. The bilinear form
+// of two of them on n sums at most 6 w |n|_2 of terms that err by 10.1 u of themselves: 105 u w |n|
+// per component; the mean of six of them, for degree 4, adds 9 u w |n|. Times a vertex: 3 * 114 u w
+// |n| M; the support value itself errs by 32 u w |n| M (kSupportBlurFactor). n . x errs by 15 u
+// |n||x|, products of quaternions by 6 u w, so their quartic by 45 u w |n||x|; that of c, by u |c|
+// of a mean, by 11 u w |c|; sums of at most 6 w |n| M + 3 w |n||x| + w |c| by 2 u of that. The
+// total is below 400 u w (|n| (M + |x|) + |c|). If the plane then ends at an earlier time, its
+// share of the interval and one minus it err by 3 u, the new n and c by 8 u of |n| and |c|: 24 u w
+// |n| (M + |x|) + 8 u w |c| more, within the rest of the factor. Proven.
 inline constexpr double kMotionPlaneErrorFactor = 512 * kUnitRoundoff;
 
 // The same coefficient for a piece of a body, with the position y of its frame in the body. A
-// direction, with errors of 112 u w |n| per component and a length of at most sqrt(3) w |n|, is
-// rotated into that frame: sqrt(3) * 112 u w |n|, entries add 3 * 16 u w |n|, sums 6 u w |n|, below
-// 250 u w |n| in total. Times a vertex: 750 u w |n| M, and 32 u w |n| M of the support value. The
-// direction times y errs by 3 * 112 u w |n||y| and 9 u w |n||y|. The final sums err by 3 u of 3 w
+// direction, with errors of 114 u w |n| per component and a length of at most sqrt(3) w |n|, is
+// rotated into that frame: sqrt(3) * 114 u w |n|, entries add 3 * 16 u w |n|, sums 6 u w |n|, below
+// 252 u w |n| in total. Times a vertex: 756 u w |n| M, and 32 u w |n| M of the support value. The
+// direction times y errs by 3 * 114 u w |n||y| and 9 u w |n||y|. The final sums err by 3 u of 3 w
 // |n| (M + |y| + |x|). The total is below 900 u w (|n| (M + |y| + |x|) + |c|). Proven.
 inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 
@@ -265,8 +267,8 @@ inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 inline constexpr double kTranslatedGapErrorFactor = 512 * kUnitRoundoff;
 
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
-// with a radius errs by u more. The margins r |n| of the plane above enter its bound like c.
-// Proven.
+// with a radius errs by u more. The margins r |n| of the plane above, with |n| the larger of both
+// ends, enter its bound like c; an earlier end adds 3 u to the length. Proven.
 inline constexpr double kUnitLengthRoundUp = 1 + 16 * kUnitRoundoff;
 
 // The sign of det[p, q, r], p . ((q - p) x (r - p)), for computed Minkowski vertices in a unit with

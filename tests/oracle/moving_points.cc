@@ -172,44 +172,69 @@ TranslationContact BruteForceTranslation(const MovingPoints& a, const MovingPoin
 
 namespace {
 
-// Returns n.p over all points, |q|^2 (n.p - offset) if there is an offset, at a time.
+// Returns n.p over all points at a time.
 std::vector<Rational> ValuesAt(const MovingPoints& moving, const SeparatedInterval& interval,
                                const Rational& t) {
-  const Rational norm = At(moving.motion, t).norm;
   std::vector<Rational> values;
   for (const RationalVector& p : AllPlaced(moving, t)) {
-    const Rational along = Product(interval.direction, p);
-    values.push_back(interval.offset ? norm * (along - *interval.offset) : along);
+    values.push_back(Product(interval.direction, p));
   }
   return values;
 }
 
-// Returns the interval with its offset moved by a radius times |n|, in the direction of `sign`.
+// Returns |q|^2 (n.p - offset) over all points, at a share of the interval from `from` on.
+std::vector<Rational> HeightsAt(const MovingPoints& moving, const SeparatedInterval& interval,
+                                const Rational& from, const Rational& share) {
+  const Rational t = from + share * (interval.until - from);
+  RationalVector n;
+  for (int i = 0; i < 3; ++i) {
+    n[i] = (1 - share) * interval.direction[i] + share * interval.end_direction[i];
+  }
+  const Rational offset = (1 - share) * *interval.offset + share * *interval.end_offset;
+  const Rational norm = At(moving.motion, t).norm;
+  std::vector<Rational> heights;
+  for (const RationalVector& p : AllPlaced(moving, t)) {
+    heights.push_back(norm * (Product(n, p) - offset));
+  }
+  return heights;
+}
+
+// Returns a rational number above the length of a vector: a tangent of the square root.
+Rational LengthOver(const RationalVector& n) {
+  const Rational squared = Product(n, n);
+  const Rational guess(std::sqrt(static_cast<double>(squared)));
+  return (guess + squared / guess) / 2;
+}
+
+// Returns the interval with its offsets moved by a radius times |n|, in the direction of `sign`.
 SeparatedInterval Moved(SeparatedInterval interval, double radius, int sign) {
   if (radius == 0 || !interval.offset) return interval;
-  // A rational number above the length: a tangent of the square root.
-  const Rational squared = Product(interval.direction, interval.direction);
-  const Rational guess(std::sqrt(static_cast<double>(squared)));
-  *interval.offset += sign * Rational(radius) * (guess + squared / guess) / 2;
+  const Rational length =
+      std::max(LengthOver(interval.direction), LengthOver(interval.end_direction));
+  *interval.offset += sign * Rational(radius) * length;
+  *interval.end_offset += sign * Rational(radius) * length;
   return interval;
 }
 
-// Returns the Bernstein coefficients of the cubic with these values at 0, 1/3, 2/3, and 1.
-std::array<Rational, 4> Bernstein(const Rational& f0, const Rational& f1, const Rational& f2,
-                                  const Rational& f3) {
-  return {f0, (-5 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / 6, (2 * f0 - 9 * f1 + 18 * f2 - 5 * f3) / 6,
-          f3};
+// Returns the Bernstein coefficients of the quartic with these values at 0, 1/4, 1/2, 3/4, and 1.
+std::array<Rational, 5> Bernstein(const std::array<Rational, 5>& f) {
+  const auto second = [](const Rational& f0, const Rational& f1, const Rational& f2,
+                         const Rational& f3, const Rational& f4) {
+    return (-13 * f0 + 48 * f1 - 36 * f2 + 16 * f3 - 3 * f4) / 12;
+  };
+  const Rational middle = (13 * (f[0] + f[4]) - 64 * (f[1] + f[3]) + 120 * f[2]) / 18;
+  return {f[0], second(f[0], f[1], f[2], f[3], f[4]), middle, second(f[4], f[3], f[2], f[1], f[0]),
+          f[4]};
 }
 
 // Returns true if all coefficients of all points have this strict sign.
 bool HasSign(const MovingPoints& moving, const SeparatedInterval& interval, const Rational& from,
              int sign) {
-  std::vector<Rational> values[4];
-  for (int i = 0; i < 4; ++i) {
-    values[i] = ValuesAt(moving, interval, from + (interval.until - from) * i / 3);
-  }
+  std::array<std::vector<Rational>, 5> values;
+  for (int i = 0; i < 5; ++i) values[i] = HeightsAt(moving, interval, from, Rational(i, 4));
   for (size_t v = 0; v < moving.points.size(); ++v) {
-    for (const Rational& c : Bernstein(values[0][v], values[1][v], values[2][v], values[3][v])) {
+    for (const Rational& c :
+         Bernstein({values[0][v], values[1][v], values[2][v], values[3][v], values[4][v]})) {
       if (sign * c <= 0) return false;
     }
   }

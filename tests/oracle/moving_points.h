@@ -53,11 +53,15 @@ struct SeparatedInterval {
   Rational until;
   std::array<Rational, 3> direction;
   std::optional<Rational> offset;
+  // With an offset: direction and offset at `until`, linear in between.
+  std::array<Rational, 3> end_direction = direction;
+  std::optional<Rational> end_offset = offset;
 };
 
 // Returns the defect of intervals that should prove separation from 0 to `until`, or an empty
 // string. With an offset: the Bernstein coefficients of |q(t)|^2 (n.p(t) - offset) of every point,
-// by interpolation at four times, with the offset moved by the radius times |n|, rounded up.
+// by interpolation at five times, with the offset moved by the radius times |n| at the end at which
+// n is longer, rounded up.
 // Without one, and without radii: n.(b - a) at both ends, where 0 is allowed at the last end if the
 // pair meets.
 std::string FaultOf(const MovingPoints& a, const MovingPoints& b,

@@ -50,6 +50,7 @@ FirstContact Mirrored(FirstContact contact) {
     if (Vector* n = std::get_if<Vector>(&interval.direction)) *n = -*n;
     if (IntegerVector* n = std::get_if<IntegerVector>(&interval.direction)) *n = -*n;
     if (interval.offset) interval.offset = -*interval.offset;
+    if (interval.end) interval.end = {{-interval.end->direction, -interval.end->offset}};
   }
   if (contact.certificate) contact.certificate = Mirrored(*std::move(contact.certificate));
   return contact;

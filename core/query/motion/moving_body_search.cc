@@ -3,7 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
+#include <variant>
 
 #include "core/base/check.h"
 #include "core/query/motion/pair_at.h"
@@ -23,13 +25,21 @@ std::vector<uint32_t> PiecesOf(const MovingBody& body) {
   return pieces;
 }
 
-// Ends the intervals at an earlier time. Their proofs hold for shorter intervals, too.
+// Ends the intervals at an earlier time. Their proofs hold for shorter intervals, too: the slack of
+// kMotionPlaneErrorFactor covers the rounding of a plane at its new end.
 void EndAt(double until, std::vector<SeparatedInterval>& intervals) {
   const auto ends_later = [=](const SeparatedInterval& interval) {
     return interval.until >= until;
   };
   const auto last = std::ranges::find_if(intervals, ends_later);
   HULLD_CHECK(last != intervals.end());
+  if (last->end && last->until > until) {
+    const double from = last == intervals.begin() ? 0 : std::prev(last)->until;
+    const double share = (until - from) / (last->until - from);
+    const Vector& n = std::get<Vector>(last->direction);
+    last->end->direction = (1 - share) * n + share * last->end->direction;
+    last->end->offset = (1 - share) * *last->offset + share * last->end->offset;
+  }
   last->until = until;
   intervals.erase(last + 1, intervals.end());
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "core/base/check.h"
 #include "core/numeric/double_double.h"
@@ -59,28 +60,63 @@ double ReachAlong(const QueryHull& hull, const PlainVector& n) {
   return reach;
 }
 
-using Cubic = std::array<double, 4>;
+using Quadratic = std::array<double, 3>;
+using Quartic = std::array<double, 5>;
 
-// Returns the Bernstein coefficients of a quadratic times a linear polynomial.
-Cubic Product(const std::array<double, 3>& f, double g0, double g1) {
-  return {f[0] * g0, (f[0] * g1 + 2 * f[1] * g0) / 3, (2 * f[1] * g1 + f[2] * g0) / 3, f[2] * g1};
+// Polynomials by their Bernstein coefficients: a product, and a linear polynomial as a quadratic.
+Quartic Product(const Quadratic& f, const Quadratic& g) {
+  return {f[0] * g[0], (f[0] * g[1] + f[1] * g[0]) / 2,
+          (f[0] * g[2] + 4 * (f[1] * g[1]) + f[2] * g[0]) / 6, (f[1] * g[2] + f[2] * g[1]) / 2,
+          f[2] * g[2]};
+}
+Quadratic Elevated(double f0, double f1) { return {f0, (f0 + f1) / 2, f1}; }
+
+// Returns the coefficients of R(q)^T n for q from q0 to q1, and n from n0 to n1.
+std::array<PlainVector, 5> TurnedBack(const Quaternion& q0, const Quaternion& q1,
+                                      const PlainVector& n0, const PlainVector& n1, bool turns) {
+  const PlainVector first = TurnedBack(q0, q0, n0);
+  const PlainVector middle = TurnedBack(q0, q1, n0);
+  const PlainVector last = TurnedBack(q1, q1, n0);
+  const PlainVector first_1 = turns ? TurnedBack(q0, q0, n1) : first;
+  const PlainVector middle_1 = turns ? TurnedBack(q0, q1, n1) : middle;
+  const PlainVector last_1 = turns ? TurnedBack(q1, q1, n1) : last;
+  return {first, 0.25 * (first + first_1) + 0.5 * middle,
+          1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
+          0.5 * middle_1 + 0.25 * (last + last_1), last_1};
 }
 
 }  // namespace
 
 // Bernstein coefficients of a hull in motion over an interval.
 struct MovingPlane::Bounds {
-  // Coefficients of |q|^2.
-  Cubic weights;
+  // Coefficients of |q|^2, of degree 2 and 4.
+  Quadratic norms;
+  Quartic weights;
   // The larger of |q|^2 at both ends.
   double weight = 0;
-  // For each coefficient of |q|^2 n.p, its largest and its least value over all vertices.
-  Cubic most;
-  Cubic least;
-  // Error bound of `most` and `least`; the offset adds to it.
+  // For each coefficient of |q|^2 n.p, its largest value over all vertices.
+  Quartic most;
+  // Error bound of `most`; the offset adds to it.
   double error = 0;
   // False if the hull turns too far.
   bool usable = false;
+
+  // Returns `most` over the weights for offsets at both ends, less these.
+  double HeightOver(double offset, double end_offset) const {
+    const Quartic offsets = Product(norms, Elevated(offset, end_offset));
+    double height = -kInfinity;
+    for (int i = 0; i < 5; ++i) height = std::max(height, (most[i] - offsets[i]) / weights[i]);
+    return height;
+  }
+  // Returns true if all coefficients are below those of the offsets. `sizes`: lengths that the
+  // offsets are sums of.
+  bool IsBelow(double offset, double end_offset, double sizes) const {
+    const Quartic offsets = Product(norms, Elevated(offset, end_offset));
+    const double all = error + kMotionPlaneErrorFactor * weight * sizes;
+    bool below = true;
+    for (int i = 0; i < 5; ++i) below = below && most[i] + all < offsets[i];
+    return below;
+  }
 };
 
 MovingPlane::MovingPlane(const MovingHull& a, const MovingHull& b)
@@ -91,7 +127,7 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   const Pose& start = moving.X_WB.start;
   const Pose& end = moving.X_WB.end;
   const Pose& X_BH = moving.X_BH;
-  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0};
+  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0, false};
   if (!IsIdentity(X_BH)) side.piece = {PlacedHull(moving.hull, X_BH).R_WH(), X_BH.t};
   int exponent = 0;
   std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
@@ -105,80 +141,86 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   if (moving.piece_radius > 0) {
     side.radius = std::nextafter(side.radius + moving.piece_radius * kUnitLengthRoundUp, kInfinity);
   }
+  side.at_rest = start.q == end.q && start.t == end.t;
   return side;
 }
 
-MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n, double start,
-                                          double end) {
+MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_start,
+                                          const Vector& n_end, double start, double end) {
   Bounds bounds;
   if (!(side.size <= kMotionMaxSize)) return bounds;
   const Quaternion p = At(side.q0, side.q1, start);
   const Quaternion q = At(side.q0, side.q1, end);
   if (std::min(LargestOf(p), LargestOf(q)) < kInterpolationLeastRemainder) return bounds;
-  const std::array<double, 3> norms = {Dot(p, p), Dot(p, q), Dot(q, q)};
-  bounds.weights = Product(norms, 1, 1);
-  bounds.weight = std::max(norms[0], norms[2]);
+  bounds.norms = {Dot(p, p), Dot(p, q), Dot(q, q)};
+  bounds.weights = Product(bounds.norms, {1, 1, 1});
+  bounds.weight = std::max(bounds.norms[0], bounds.norms[2]);
   for (const double w : bounds.weights) {
     if (w < kLeastRelativeWeight * bounds.weight) return bounds;
   }
   bounds.usable = true;
 
-  const PlainVector first = TurnedBack(p, p, n);
-  const PlainVector middle = TurnedBack(p, q, n);
-  const PlainVector last = TurnedBack(q, q, n);
-  PlainVector turned[4] = {first, 1.0 / 3 * (first + 2 * middle), 1.0 / 3 * (2 * middle + last),
-                           last};
-  const auto along = [&](double t) {
+  const PlainVector n0 = n_start;
+  const PlainVector n1 = n_end;
+  const bool turns = n_start != n_end;
+  std::array<PlainVector, 5> turned = TurnedBack(p, q, n0, n1, turns);
+  const auto position = [&](double t) {
     PlainVector x;
     x.x = Interpolated(side.x0.x(), side.x1.x(), t).high;
     x.y = Interpolated(side.x0.y(), side.x1.y(), t).high;
     x.z = Interpolated(side.x0.z(), side.x1.z(), t).high;
-    return hulld::Dot(PlainVector(n), x);
+    return x;
   };
-  Cubic moved = Product(norms, along(start), along(end));
-  if (side.piece) {
-    for (int i = 0; i < 4; ++i) {
+  const PlainVector x0 = position(start);
+  const PlainVector x1 = position(end);
+  Quartic moved = Product(
+      bounds.norms,
+      {hulld::Dot(n0, x0), (hulld::Dot(n0, x1) + hulld::Dot(n1, x0)) / 2, hulld::Dot(n1, x1)});
+  const bool is_constant = (side.at_rest || start == end) && !turns;
+  const int count = is_constant ? 1 : 5;
+  for (int i = 0; i < count; ++i) {
+    if (side.piece) {
       moved[i] += hulld::Dot(turned[i], PlainVector(side.piece->p_BH));
       turned[i] = TransposedProduct(side.piece->R_BH, turned[i]);
     }
-  }
-  for (int i = 0; i < 4; ++i) {
     bounds.most[i] = ReachAlong(*side.hull, turned[i]) + moved[i];
-    bounds.least[i] = moved[i] - ReachAlong(*side.hull, -turned[i]);
+  }
+  if (is_constant) {
+    bounds.weights.fill(bounds.norms[0]);
+    bounds.most.fill(bounds.most[0]);
   }
   const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
-  bounds.error = factor * bounds.weight * LargestComponent(n) * std::max(side.size, kMotionMinSize);
+  const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
+  bounds.error = factor * bounds.weight * largest * std::max(side.size, kMotionMinSize);
   return bounds;
 }
 
-MovingPlane::Result MovingPlane::Try(const Vector& n, double start, double end,
+MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double start, double end,
                                      double margin) const {
   HULLD_DCHECK(0 <= start && start <= end && end <= 1);
-  Result result{false, 0, -kInfinity};
-  const Bounds a = BoundsOf(a_, n, start, end);
-  const Bounds b = BoundsOf(b_, n, start, end);
+  Result result;
+  const Bounds a = BoundsOf(a_, n0, n1, start, end);
+  const Bounds b = BoundsOf(b_, -n0, -n1, start, end);
   if (!a.usable || !b.usable) return result;
-  double low = -kInfinity;
-  double high = kInfinity;
-  for (int i = 0; i < 4; ++i) {
-    low = std::max(low, a.most[i] / a.weights[i]);
-    high = std::min(high, b.least[i] / b.weights[i]);
+  // The offset keeps pace with A or with B.
+  double shift = 0;
+  for (const auto& [side, sign] : {std::pair(&a, 1), std::pair(&b, -1)}) {
+    const double offset = sign * (side->most[0] / side->weights[0]);
+    const double end_offset = sign * (side->most[4] / side->weights[4]);
+    const double low = a.HeightOver(offset, end_offset) + a_.radius;
+    const double high = -b.HeightOver(-offset, -end_offset) - b_.radius;
+    if (!(high - low > result.gap)) continue;
+    result = {false, offset, end_offset, high - low};
+    shift = low / 2 + high / 2;
   }
-  low += a_.radius;
-  high -= b_.radius;
-  result.offset = low / 2 + high / 2;
-  result.gap = high - low;
+  result.offset += shift;
+  result.end_offset += shift;
   const double margin_a = a_.radius + margin;
   const double margin_b = b_.radius + margin;
-  const double sizes = std::abs(result.offset) + std::abs(margin) + (a_.radius + b_.radius);
-  const double error_a = a.error + kMotionPlaneErrorFactor * a.weight * sizes;
-  const double error_b = b.error + kMotionPlaneErrorFactor * b.weight * sizes;
-  result.proven = true;
-  for (int i = 0; i < 4; ++i) {
-    result.proven = result.proven &&
-                    a.most[i] + error_a < (result.offset - margin_a) * a.weights[i] &&
-                    b.least[i] - error_b > (result.offset + margin_b) * b.weights[i];
-  }
+  const double sizes = std::max(std::abs(result.offset), std::abs(result.end_offset)) +
+                       std::abs(margin) + (a_.radius + b_.radius);
+  result.proven = a.IsBelow(result.offset - margin_a, result.end_offset - margin_a, sizes) &&
+                  b.IsBelow(-result.offset - margin_b, -result.end_offset - margin_b, sizes);
   return result;
 }
 

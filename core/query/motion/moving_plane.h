@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_
 
 #include <array>
+#include <limits>
 #include <optional>
 
 #include "core/numeric/vector.h"
@@ -9,17 +10,17 @@
 
 namespace hulld {
 
-// Planes between two hulls in motion over intervals of time, in floating point with a proven bound.
+// Planes that turn between two hulls in motion over intervals of time, in floating point with a
+// proven bound.
 //
-// Let q(t) be the rotation of a hull and x(t) its translation. For a plane n.p = c and a vertex v,
-// |q(t)|^2 (n.p(t) - c) = (R(q(t))^T n).v + |q(t)|^2 (n.x(t) - c) is a cubic polynomial in t. Over
-// an interval, R(q(t))^T n has three Bernstein coefficients: a bilinear form of the quaternions at
-// both ends. Elevated to degree 3, they are four directions in the hull's frame, and the largest
-// value of a Bernstein coefficient over all vertices is the hull's support value along one of them.
-// So four support values of each hull prove a plane for all vertices and all times of the interval
-// (Farouki and Rajan 1987). The offset may be chosen last: each coefficient bounds it. The pose of
-// a piece in its body does not depend on time: it turns the four directions into the piece's frame,
-// and adds a constant to each support value.
+// Let q(t) be the rotation of a hull and x(t) its translation. For a plane n(t).p = c(t), with n
+// and c linear in t, and a vertex v, |q(t)|^2 (n.p(t) - c) = (R(q(t))^T n).v + |q(t)|^2 (n.x(t) -
+// c) is a polynomial in t of degree 4. The Bernstein coefficients of R(q(t))^T n over an interval
+// are five directions in the hull's frame, and the largest value of a coefficient over all vertices
+// is the hull's support value along one of them. So five support values of each hull prove a plane
+// for all vertices and all times of the interval (Farouki and Rajan 1987). The offset may be chosen
+// last: each coefficient bounds it. The pose of a piece in its body does not depend on time: it
+// turns the five directions into the piece's frame, and adds a constant to each support value.
 class MovingPlane {
  public:
   // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), neither is empty.
@@ -30,17 +31,19 @@ class MovingPlane {
   double size() const { return size_; }
 
   struct Result {
-    // True if the plane at `offset` has A and B, with their radii, farther than `margin` on its two
-    // sides at all times of the interval.
+    // True if the plane with these offsets has A and B, with their radii, farther than `margin` on
+    // its two sides at all times of the interval.
     bool proven = false;
     double offset = 0;
-    // Width of the range of such offsets, up to rounding; a lower bound of the least separation.
-    // -infinity if a hull turns too far for a statement.
-    double gap = 0;
+    double end_offset = 0;
+    // Width of the range in which both offsets may move together, up to rounding; a lower bound of
+    // the least separation. -infinity if a hull turns too far for a statement.
+    double gap = -std::numeric_limits<double>::infinity();
   };
-  // Tries the direction n (world frame, from A toward B, of unit length up to rounding) from time
-  // `start` to `end`. A margin may be negative. Requires: 0 <= start <= end <= 1.
-  Result Try(const Vector& n, double start, double end, double margin = 0) const;
+  // Tries the direction that turns from n0 to n1 (world frame, from A toward B, of unit length up
+  // to rounding) from time `start` to `end`. A margin may be negative. Requires: 0 <= start <= end
+  // <= 1, and the same direction if the times are equal.
+  Result Try(const Vector& n0, const Vector& n1, double start, double end, double margin = 0) const;
 
  private:
   // The pose of a piece in its body.
@@ -61,11 +64,14 @@ class MovingPlane {
     double size;
     // At least the sum of the radii times the length of a direction.
     double radius;
+    // True if the motion ends where it starts.
+    bool at_rest;
   };
   struct Bounds;
 
   static Side SideOf(const MovingHull& moving);
-  static Bounds BoundsOf(const Side& side, const Vector& n, double start, double end);
+  static Bounds BoundsOf(const Side& side, const Vector& n_start, const Vector& n_end, double start,
+                         double end);
 
   Side a_;
   Side b_;

@@ -19,6 +19,12 @@ namespace {
 // trials. Choices.
 constexpr double kLeftShare = 0x1p-5;
 constexpr int kMostTrials = 10;
+// A constant plane loses to one that turns if this share of its gap is left in the nearest
+// direction at its end. A choice.
+constexpr double kTurnedShare = 0.25;
+// A plane turns by less than 60 degrees, so that its normal, linear in time, keeps more than 0.86
+// of its length. A choice.
+constexpr double kLeastCosine = 0.5;
 // Trials keep this share of an interval away from its ends. A choice.
 constexpr double kLeastShare = 0x1p-4;
 // Factor between the lengths of successive steps, at first trial. A choice.
@@ -27,10 +33,12 @@ constexpr double kGrowth = 4;
 constexpr double kShortestStep = 0x1p-50;
 
 // Returns a time between two at which a plane is proven, with gap `gap`, and not proven, with
-// `failed_gap`: shortly before a linear gap would close.
-double TrialBetween(double proven, double gap, double failed, double failed_gap) {
+// `failed_gap`: shortly before the gap would close. A plane of constant direction loses a multiple
+// of the time, one that turns a multiple of its square.
+double TrialBetween(double proven, double gap, double failed, double failed_gap, bool turned) {
   const double length = failed - proven;
-  const double share = gap / (gap - failed_gap) * (1 - kLeftShare / 2);
+  const double lost = gap / (gap - failed_gap);
+  const double share = (turned ? std::sqrt(lost) : lost) * (1 - kLeftShare / 2);
   if (!(share > 0)) return proven + length / 2;
   return proven + length * std::clamp(share, kLeastShare, 1 - kLeastShare);
 }
@@ -48,44 +56,49 @@ TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const Mot
 }
 
 absl::StatusOr<FirstContact> TurningSearch::Run() {
-  const absl::StatusOr<Relation> at_start = RelationAt(0);
-  if (!at_start.ok()) return at_start.status();
-  if (*at_start != Relation::kSeparated) return Contact(0);
   bool may_tolerate = true;
   for (;;) {
     if (poll_.Step()) return MotionStopped();
-    const absl::StatusOr<Vector> n = DirectionAt(separated_);
-    if (!n.ok()) return n.status();
-    const std::optional<Step> step = FindStep(*n);
-    if (!step) return ConcludeStuck();
-    last_length_ = step->until - separated_;
-    last_direction_ = *n;
-    separated_ = step->until;
-    if (options_.want_certificate) intervals_.push_back({separated_, *n, step->offset});
+    absl::StatusOr<std::optional<Step>> found = NextStep();
+    if (!found.ok()) return found.status();
+    if (!*found) {
+      const absl::StatusOr<Relation> relation =
+          separated_ == 0 ? RelationAt(0) : Relation::kSeparated;
+      if (!relation.ok()) return relation.status();
+      if (*relation != Relation::kSeparated) return Contact(0, *relation);
+      // Floating point may find no good direction so near.
+      found = NextExactStep();
+      if (!found.ok()) return found.status();
+      if (!*found) return ConcludeStuck();
+    }
+    const Step& step = **found;
+    if (may_tolerate && step.gap <= resolution_) {
+      const absl::StatusOr<bool> stays = StaysWithinResolution();
+      if (!stays.ok()) return stays.status();
+      if (*stays) return WithoutContact(Relation::kWithinTolerance);
+      may_tolerate = false;
+    }
+    if (options_.want_certificate) {
+      intervals_.push_back({step.until,
+                            direction_,
+                            step.plane.found.offset,
+                            {{step.plane.end_direction, step.plane.found.end_offset}}});
+    }
+    turns_ = step.plane.end_direction != direction_;
+    last_length_ = step.until - separated_;
+    last_gap_ = step.gap;
+    direction_ = step.plane.end_direction;
+    separated_ = step.until;
     if (separated_ == 1 || separated_ > options_.latest) {
       return WithoutContact(Relation::kSeparated);
     }
     // Contact is likely where the plane fails, and after it.
     const double latest = LatestContactTime();
-    for (const double time : {step->failed, latest}) {
-      if (step->failed > latest) break;
+    for (const double time : {step.failed, latest}) {
+      if (step.failed > latest) break;
       const absl::StatusOr<Relation> relation = RelationAt(time);
       if (!relation.ok()) return relation.status();
-      if (*relation != Relation::kSeparated) return Contact(time);
-    }
-    if (may_tolerate && step->gap_after <= resolution_) {
-      // The gap along n may be less than the separation.
-      const absl::StatusOr<bool> near = IsWithinResolution();
-      if (!near.ok()) return near.status();
-      if (!*near) continue;
-      const absl::StatusOr<double> tolerable = TolerableUntil(*n);
-      if (!tolerable.ok()) return tolerable.status();
-      const absl::StatusOr<Relation> at_end = RelationAt(1);
-      if (!at_end.ok()) return at_end.status();
-      if (*tolerable == 1 && *at_end == Relation::kSeparated) {
-        return WithoutContact(Relation::kWithinTolerance);
-      }
-      may_tolerate = false;
+      if (*relation != Relation::kSeparated) return Contact(time, *relation);
     }
   }
 }
@@ -97,40 +110,77 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
   return answer->relation;
 }
 
-absl::StatusOr<bool> TurningSearch::IsWithinResolution() const {
-  return PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
-}
-
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) const {
   const PairAt at(a_, b_, time);
   const Vector first =
-      last_direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : last_direction_;
+      direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
   if (at.pair().usable() && first.isZero(0)) return Vector(Vector::UnitX());
   return NearestDirection(at.pair(), first, options_.should_stop);
 }
 
-// Returns a long interval for which the direction gives a plane, or none if there is no progress.
-std::optional<TurningSearch::Step> TurningSearch::FindStep(const Vector& n) const {
+absl::StatusOr<Vector> TurningSearch::ExactDirectionAt(double time) const {
+  return ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
+}
+
+// Tries a plane of constant direction n and, if it fails and `turns`, one that turns from n to the
+// nearest direction at the end.
+absl::StatusOr<TurningSearch::Plane> TurningSearch::TryPlane(const Vector& n, double start,
+                                                             double end, bool turns,
+                                                             double margin) const {
+  Plane plane = {plane_.Try(n, n, start, end, margin), n};
+  if (plane.found.proven || !turns) return plane;
+  const absl::StatusOr<Vector> at_end = DirectionAt(end);
+  if (!at_end.ok()) return at_end.status();
+  if (!(n.dot(*at_end) > kLeastCosine)) return plane;
+  const MovingPlane::Result turned = plane_.Try(n, *at_end, start, end, margin);
+  if (turned.gap > plane.found.gap) plane = {turned, *at_end};
+  return plane;
+}
+
+// Returns a step from separated_ along the nearest direction, or none if there is no progress.
+absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
+  if (!turns_) {
+    const absl::StatusOr<Vector> n = DirectionAt(separated_);
+    if (!n.ok()) return n.status();
+    direction_ = *n;
+  }
+  return FindStep(direction_);
+}
+
+absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextExactStep() {
+  const absl::StatusOr<Vector> n = ExactDirectionAt(separated_);
+  if (!n.ok()) return n.status();
+  direction_ = *n;
+  return FindStep(direction_);
+}
+
+// Returns a long interval for which a plane of direction n at its start is proven, or none if there
+// is no progress.
+absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const Vector& n) {
   if (n.isZero(0)) return std::nullopt;
-  const MovingPlane::Result start = plane_.Try(n, separated_, separated_);
+  const MovingPlane::Result start = plane_.Try(n, n, separated_, separated_);
   if (!start.proven) return std::nullopt;
-  Step step{separated_, start.offset, start.gap, start.gap, 2};
-  double failed_gap = 0;
+  turns_ = turns_ || start.gap > kTurnedShare * last_gap_;
+  Step step = {separated_, {start, n}, start.gap, 2};
+  Plane failed = step.plane;
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
   for (int i = 0; i < kMostTrials || step.until == separated_; ++i) {
     if (!(trial > step.until) || trial == step.failed) break;
-    const MovingPlane::Result result = plane_.Try(n, separated_, trial);
-    if (result.proven) {
+    const absl::StatusOr<Plane> plane = TryPlane(n, separated_, trial, turns_);
+    if (!plane.ok()) return plane.status();
+    if (plane->found.proven) {
       step.until = trial;
-      step.offset = result.offset;
-      step.gap_after = result.gap;
-      if (trial == 1 || result.gap <= kLeftShare * start.gap) break;
+      step.plane = *plane;
+      const bool turned = plane->end_direction != n;
+      if (trial == 1 || plane->found.gap <= kLeftShare * start.gap) break;
+      if (turned && step.failed <= 1) break;
     } else {
       step.failed = trial;
-      failed_gap = result.gap;
+      failed = *plane;
     }
     trial = step.failed > 1 ? std::min(1.0, separated_ + kGrowth * (step.until - separated_))
-                            : TrialBetween(step.until, step.gap_after, step.failed, failed_gap);
+                            : TrialBetween(step.until, step.plane.found.gap, step.failed,
+                                           failed.found.gap, failed.end_direction != n);
   }
   if (step.until == separated_) return std::nullopt;
   return step;
@@ -146,27 +196,58 @@ double TurningSearch::LatestContactTime() const {
   return latest > separated_ ? latest : std::nextafter(separated_, 2.0);
 }
 
+// Returns true if the pair is within the resolution at separated_, apart at the end, and proven to
+// be at least -resolution_ apart in between.
+absl::StatusOr<bool> TurningSearch::StaysWithinResolution() {
+  // The gap along a direction may be less than the separation.
+  const absl::StatusOr<bool> near =
+      PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
+  if (!near.ok() || !*near) return near;
+  const absl::StatusOr<Relation> at_end = RelationAt(1);
+  if (!at_end.ok()) return at_end.status();
+  if (*at_end != Relation::kSeparated) return false;
+  const absl::StatusOr<double> tolerable = TolerableUntil();
+  if (!tolerable.ok()) return tolerable.status();
+  return *tolerable == 1;
+}
+
 // Returns the time up to which the separation is proven to be at least -resolution_ from separated_
-// on, usually the latest such time. `n`: the direction at separated_.
-absl::StatusOr<double> TurningSearch::TolerableUntil(Vector n) {
-  // Exceeds the rounding of the length of n.
-  const double margin = -resolution_ / 2 * (1 - 0x1p-40);
+// on, usually the latest such time.
+absl::StatusOr<double> TurningSearch::TolerableUntil() {
+  // Twice this, over the least length of a normal, is within the resolution.
+  const double margin = -0.4 * resolution_;
+  Vector n = direction_;
   double time = separated_;
   double length = last_length_;
+  bool is_exact = false;
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
-    while (!plane_.Try(n, time, until, margin).proven) {
-      if (until - time < kShortestStep) return time;
-      until = time + (until - time) / 2;
+    absl::StatusOr<Plane> plane;
+    for (;; until = time + (until - time) / 2) {
+      plane = TryPlane(n, time, until, /*turns=*/true, margin);
+      if (!plane.ok()) return plane.status();
+      if (plane->found.proven || until - time < kShortestStep) break;
     }
+    if (!plane->found.proven) {
+      if (is_exact) return time;
+      // Floating point may find no good direction so near.
+      const absl::StatusOr<Vector> exact = ExactDirectionAt(time);
+      if (!exact.ok()) return exact.status();
+      if (exact->isZero(0)) return time;
+      n = *exact;
+      is_exact = true;
+      continue;
+    }
+    is_exact = false;
     length = until - time;
     time = until;
+    n = plane->end_direction;
     const absl::StatusOr<Vector> nearest = DirectionAt(time);
     if (!nearest.ok()) return nearest.status();
     // The nearest direction is unreliable if the hulls meet; the previous one may then be better.
     if (!nearest->isZero(0) &&
-        plane_.Try(*nearest, time, time).gap > plane_.Try(n, time, time).gap) {
+        plane_.Try(*nearest, *nearest, time, time).gap > plane_.Try(n, n, time, time).gap) {
       n = *nearest;
     }
   }
@@ -176,42 +257,45 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(Vector n) {
 // No plane can be proven from separated_ on: the gap is below rounding, if not the rotation.
 absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   const double latest = LatestContactTime();
-  absl::StatusOr<Relation> relation = RelationAt(latest);
+  const absl::StatusOr<Relation> relation = RelationAt(latest);
   if (!relation.ok()) return relation.status();
-  if (*relation != Relation::kSeparated) return Contact(latest);
-  const absl::StatusOr<bool> near = IsWithinResolution();
+  if (*relation != Relation::kSeparated) return Contact(latest, *relation);
+  const absl::StatusOr<bool> near =
+      PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
   if (!near.ok()) return near.status();
   if (*near) {
-    // Floating point may find no direction at such a distance.
-    const absl::StatusOr<Vector> n =
-        ExactNearestUnit(PairAt(a_, b_, separated_).pair(), options_.should_stop);
-    if (!n.ok()) return n.status();
-    const absl::StatusOr<double> tolerable = TolerableUntil(*n);
+    const absl::StatusOr<double> tolerable = TolerableUntil();
     if (!tolerable.ok()) return tolerable.status();
-    if (*tolerable == 1) return WithoutContact(Relation::kWithinTolerance);
     const absl::StatusOr<double> contact = FindLateContact(*tolerable);
     if (!contact.ok()) return contact.status();
-    if (*contact <= 1) return Contact(*contact);
+    if (*contact <= 1) {
+      const absl::StatusOr<Relation> met = RelationAt(*contact);
+      if (!met.ok()) return met.status();
+      return Contact(*contact, *met);
+    }
+    if (*tolerable == 1) return WithoutContact(Relation::kWithinTolerance);
   }
   return absl::InvalidArgumentError(
       "no separation can be proven between the poses: a rotation nearly vanishes, or sizes are out "
       "of range; add a pose between them");
 }
 
-// Returns an early time of contact, or a time above 1 if none is found. The separation between
-// separated_ and it is below rounding, and not proven. The hulls probably meet at `likely`.
+// Returns a time of contact, early if that is simple, or a time above 1 if none is found. The
+// separation between separated_ and it is below rounding, and not proven. The hulls probably meet
+// at `likely`, or soon after.
 absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
-  double apart = separated_;
   double contact = 2;
-  for (double length = kShortestStep; contact > 1; length *= kGrowth) {
-    const bool passes = apart < likely && separated_ + length > likely;
-    const double time = passes ? likely : std::min(1.0, separated_ + length);
+  for (double length = 0; contact > 1; length = std::max(kShortestStep, kGrowth * length)) {
+    const double time = std::min(1.0, likely + length);
     const absl::StatusOr<Relation> relation = RelationAt(time);
     if (!relation.ok()) return relation.status();
-    if (*relation != Relation::kSeparated) contact = time;
-    if (contact > 1) apart = time;
-    if (apart == 1) return contact;
+    if (*relation != Relation::kSeparated) {
+      contact = time;
+    } else if (time == 1) {
+      return contact;
+    }
   }
+  double apart = separated_;
   while (contact - apart > options_.max_time_error) {
     const double time = apart + (contact - apart) / 2;
     if (!(time > apart && time < contact)) break;
@@ -222,13 +306,15 @@ absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
   return contact;
 }
 
-absl::StatusOr<FirstContact> TurningSearch::Contact(double time) {
-  absl::StatusOr<Answer> answer =
-      PairAt(a_, b_, time).Check(options_.want_certificate, options_.should_stop);
-  if (!answer.ok()) return answer.status();
-  FirstContact contact = WithoutContact(answer->relation);
+absl::StatusOr<FirstContact> TurningSearch::Contact(double time, Relation relation) {
+  FirstContact contact = WithoutContact(relation);
   contact.contact_time = time;
-  contact.certificate = std::move(answer->certificate);
+  if (options_.want_certificate) {
+    absl::StatusOr<Answer> answer =
+        PairAt(a_, b_, time).Check(/*want_certificate=*/true, options_.should_stop);
+    if (!answer.ok()) return answer.status();
+    contact.certificate = std::move(answer->certificate);
+  }
   return contact;
 }
 

@@ -3,6 +3,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -18,8 +19,13 @@ namespace hulld {
 // (Mirtich 1996). At a time that is known to be separated, the direction in which the hulls are
 // nearest gives a plane, and the longest interval found for which MovingPlane proves it leads to
 // the next time. If the plane fails within max_time_error, an exact query at a double may prove
-// contact. Each step takes most of the gap along its direction, so a transversal contact needs few
-// steps, and a graze a number proportional to the logarithm of the resolution.
+// contact.
+//
+// A plane of constant direction takes most of the gap along it, so a transversal contact needs few
+// steps. Past a graze, the nearest direction turns before the gap closes; there the plane turns,
+// too, from the direction at one end of the interval to that at the other. It loses the square of
+// the interval's length, so a graze needs a number of steps proportional to the logarithm of its
+// gap.
 //
 // Once the gap is within the resolution, planes that the hulls may cross by the resolution decide
 // if the least separation of the remaining motion is within it, too.
@@ -33,26 +39,35 @@ class TurningSearch {
   absl::StatusOr<FirstContact> Run();
 
  private:
+  // A plane from a time on.
+  struct Plane {
+    MovingPlane::Result found;
+    Vector end_direction;
+  };
   // A plane from separated_ to `until`.
   struct Step {
     double until;
-    double offset;
-    // The gaps along the direction at both ends.
-    double gap_before;
-    double gap_after;
+    Plane plane;
+    // The gap along the direction at separated_.
+    double gap;
     // The earliest time at which the plane failed; above 1 if none.
     double failed;
   };
 
   absl::StatusOr<Relation> RelationAt(double time) const;
-  absl::StatusOr<bool> IsWithinResolution() const;
   absl::StatusOr<Vector> DirectionAt(double time) const;
-  std::optional<Step> FindStep(const Vector& n) const;
+  absl::StatusOr<Vector> ExactDirectionAt(double time) const;
+  absl::StatusOr<Plane> TryPlane(const Vector& n, double start, double end, bool turns,
+                                 double margin = 0) const;
+  absl::StatusOr<std::optional<Step>> NextStep();
+  absl::StatusOr<std::optional<Step>> NextExactStep();
+  absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
-  absl::StatusOr<double> TolerableUntil(Vector n);
+  absl::StatusOr<bool> StaysWithinResolution();
+  absl::StatusOr<double> TolerableUntil();
   absl::StatusOr<FirstContact> ConcludeStuck();
   absl::StatusOr<double> FindLateContact(double likely) const;
-  absl::StatusOr<FirstContact> Contact(double time);
+  absl::StatusOr<FirstContact> Contact(double time, Relation relation);
   FirstContact WithoutContact(Relation relation);
 
   const MovingHull& a_;
@@ -64,9 +79,12 @@ class TurningSearch {
   // The pair is separated up to this time, inclusive, as intervals_ prove.
   double separated_ = 0;
   std::vector<SeparatedInterval> intervals_;
-  // Length and direction of the last step; the next ones start from them.
+  // Length of the last step, and the direction at its end; the next ones start from them.
   double last_length_ = 1;
-  Vector last_direction_ = Vector::Zero();
+  Vector direction_ = Vector::Zero();
+  // The nearest direction turns faster than the gap closes.
+  bool turns_ = false;
+  double last_gap_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace hulld

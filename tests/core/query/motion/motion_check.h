@@ -97,6 +97,13 @@ inline std::vector<oracle::SeparatedInterval> ToOracle(
       }
     }
     if (interval.offset) copy.offset = oracle::Rational(*interval.offset);
+    copy.end_direction = copy.direction;
+    copy.end_offset = copy.offset;
+    if (interval.end) {
+      for (int i = 0; i < 3; ++i)
+        copy.end_direction[i] = oracle::Rational(interval.end->direction[i]);
+      copy.end_offset = oracle::Rational(interval.end->offset);
+    }
     result.push_back(copy);
   }
   return result;
