@@ -241,6 +241,10 @@ void EncodeIntervals(const std::vector<SeparatedInterval>& intervals,
     message->set_until(interval.until);
     EncodeDirection(interval.direction, message);
     if (interval.offset.has_value()) message->set_offset(*interval.offset);
+    if (interval.end.has_value()) {
+      EncodeVector(interval.end->direction, message->mutable_end_direction());
+      message->set_end_offset(interval.end->offset);
+    }
   }
 }
 
