@@ -133,33 +133,44 @@ class ExactMotion {
   std::array<BigVector, 2> x_;
 };
 
-// A quadratic polynomial by its Bernstein coefficients over an interval, and three times those of a
-// cubic one.
+// Polynomials by their Bernstein coefficients over an interval.
 template <typename Number>
 using Quadratic = std::array<Number, 3>;
 template <typename Number>
-using Cubic = std::array<Number, 4>;
+using Quartic = std::array<Number, 5>;
 
-// Source: Farouki, "The Bernstein polynomial basis: a centennial retrospective", 2012: elevation of
-// the degree, and products.
+// Returns twice a linear polynomial, given by its values at both ends.
 template <typename Number>
-Cubic<Number> Elevated(const Quadratic<Number>& of) {
-  const BigInteger two = 2;
-  const BigInteger three = 3;
-  return {three * of[0], of[0] + two * of[1], two * of[1] + of[2], three * of[2]};
+Quadratic<Number> Twice(const Number& start, const Number& end) {
+  return {start + start, start + end, end + end};
 }
 
-Cubic<BigInteger> Product(const Quadratic<BigInteger>& of, const std::array<BigInteger, 2>& line) {
-  return {3 * of[0] * line[0], of[0] * line[1] + 2 * of[1] * line[0],
-          2 * of[1] * line[1] + of[2] * line[0], 3 * of[2] * line[1]};
+// Returns six times a product. Source: Farouki, "The Bernstein polynomial basis: a centennial
+// retrospective", 2012.
+template <typename F, typename G, typename Times>
+auto Product(const Quadratic<F>& f, const Quadratic<G>& g, const Times& times) {
+  using Number = decltype(times(f[0], g[0]));
+  const auto scaled = [](int factor, const Number& number) -> Number {
+    return BigInteger(factor) * number;
+  };
+  const auto product = [&](int i, int j) -> Number { return times(f[i], g[j]); };
+  return Quartic<Number>{scaled(6, product(0, 0)), scaled(3, product(0, 1) + product(1, 0)),
+                         product(0, 2) + scaled(4, product(1, 1)) + product(2, 0),
+                         scaled(3, product(1, 2) + product(2, 1)), scaled(6, product(2, 2))};
 }
 
-// The half space n.p <= offset, with n not zero; all lengths at one power of two.
+// The half space n.p <= offset over an interval, with n and the offset linear in time, and n not
+// zero at the ends; all lengths at one power of two.
 struct HalfSpace {
-  BigVector n;
-  BigInteger offset;
+  std::array<BigVector, 2> n;
+  std::array<BigInteger, 2> offset;
 
-  HalfSpace Opposite() const { return {BigInteger(-1) * n, -offset}; }
+  HalfSpace Opposite() const {
+    const BigInteger minus = -1;
+    return {{minus * n[0], minus * n[1]}, {-offset[0], -offset[1]}};
+  }
+  // An upper bound of |n|^2 over the interval.
+  BigInteger GreatestSquare() const { return std::max(Dot(n[0], n[0]), Dot(n[1], n[1])); }
 };
 
 BigInteger Greatest(const BigVector& n, const std::vector<BigVector>& points) {
@@ -182,32 +193,36 @@ int SignOf(const Surd& number, const BigInteger& c) {
   return sign * BigInteger(number.a * number.a - number.b * number.b * c).sign();
 }
 
-// For each vertex p, |q|^2 (n.p + radius |n| - offset) is a cubic polynomial of time. Returns the
-// greatest of each Bernstein coefficient over all vertices, as sums a + b |n|; all are times one
-// positive number.
-Cubic<Surd> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space,
-                            const std::array<Moment, 2>& interval) {
+// For each vertex p, |q|^2 (n.p + radius |n| - offset) is a polynomial of time of degree 4, with a
+// constant bound in place of |n|. Returns the greatest of each Bernstein coefficient over all
+// vertices, as sums a + b |n|; all are times one positive number.
+Quartic<Surd> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space,
+                              const std::array<Moment, 2>& interval) {
+  const auto& [n, offset] = half_space;
   const BigQuaternion q[2] = {hull.RotationAt(interval[0]), hull.RotationAt(interval[1])};
-  const BigRotation forms[3] = {RotationForm(q[0], q[0]), RotationForm(q[0], q[1]),
-                                RotationForm(q[1], q[1])};
+  const BigVector x[2] = {hull.TranslationAt(interval[0]), hull.TranslationAt(interval[1])};
+  const Quadratic<BigRotation> forms = {RotationForm(q[0], q[0]), RotationForm(q[0], q[1]),
+                                        RotationForm(q[1], q[1])};
   const BigInteger& divisor = interval[0].divisor;
-  Quadratic<BigVector> turned;
   Quadratic<BigInteger> scale;
-  for (int i = 0; i < 3; ++i) {
-    turned[i] = divisor * Combination(half_space.n, forms[i].rows);
-    scale[i] = hull.scale() * forms[i].scale;
-  }
-  std::array<BigInteger, 2> shift;
-  for (int i = 0; i < 2; ++i) {
-    shift[i] = Dot(half_space.n, hull.TranslationAt(interval[i])) - divisor * half_space.offset;
-  }
-  const Cubic<BigInteger> shifts = Product(scale, shift);
-  const Cubic<BigInteger> scales = Elevated(scale);
-  const Cubic<BigVector> directions = Elevated(turned);
-  Cubic<Surd> heights;
-  for (int i = 0; i < 4; ++i) {
-    heights[i] = {shifts[i] + Greatest(directions[i], hull.vertices()),
-                  divisor * hull.radius() * scales[i]};
+  for (int i = 0; i < 3; ++i) scale[i] = hull.scale() * forms[i].scale;
+  const Quadratic<BigInteger> along = {BigInteger(2 * Dot(n[0], x[0])),
+                                       BigInteger(Dot(n[0], x[1]) + Dot(n[1], x[0])),
+                                       BigInteger(2 * Dot(n[1], x[1]))};
+  const Quadratic<BigInteger> offsets = Twice(offset[0], offset[1]);
+  Quadratic<BigInteger> shift;
+  for (int i = 0; i < 3; ++i) shift[i] = along[i] - divisor * offsets[i];
+
+  const auto times = [](const BigInteger& f, const BigInteger& g) { return BigInteger(f * g); };
+  const auto turned = [&](const BigRotation& form, const BigVector& direction) -> BigVector {
+    return divisor * Combination(direction, form.rows);
+  };
+  const Quartic<BigInteger> shifts = Product(scale, shift, times);
+  const Quartic<BigInteger> scales = Product(scale, Twice<BigInteger>(divisor, divisor), times);
+  const Quartic<BigVector> directions = Product(forms, Twice(n[0], n[1]), turned);
+  Quartic<Surd> heights;
+  for (int i = 0; i < 5; ++i) {
+    heights[i] = {shifts[i] + Greatest(directions[i], hull.vertices()), hull.radius() * scales[i]};
   }
   return heights;
 }
@@ -217,12 +232,12 @@ Cubic<Surd> GreatestHeights(const ExactMotion& hull, const HalfSpace& half_space
 // coefficient is positive and the outer ones, its values at both ends, are negative.
 bool IsBelow(const ExactMotion& hull, const HalfSpace& half_space,
              const std::array<Moment, 2>& interval, bool may_end) {
-  const BigInteger n_squared = Dot(half_space.n, half_space.n);
-  std::array<int, 4> signs;
+  const BigInteger n_squared = half_space.GreatestSquare();
+  std::array<int, 5> signs;
   std::ranges::transform(GreatestHeights(hull, half_space, interval), signs.begin(),
                          [&](const Surd& height) { return SignOf(height, n_squared); });
-  return signs[0] < 0 && signs[1] <= 0 && signs[2] <= 0 &&
-         (signs[3] < 0 || (may_end && signs[3] == 0));
+  return signs[0] < 0 && signs[1] <= 0 && signs[2] <= 0 && signs[3] <= 0 &&
+         (signs[4] < 0 || (may_end && signs[4] == 0));
 }
 
 v1::Certificate DirectionOf(const v1::SeparatedInterval& interval) {
@@ -246,15 +261,29 @@ struct MovingPair {
   }
 };
 
-absl::Status CheckPlane(const MovingPair& pair, const BigVector& n, int exponent, double offset,
+// A direction at a power of two, and an offset.
+struct Plane {
+  BigVector n;
+  int exponent = 0;
+  double offset = 0;
+};
+
+absl::Status CheckPlane(const MovingPair& pair, const std::array<Plane, 2>& planes,
                         const std::array<double, 2>& times, bool may_end) {
-  if (!std::isfinite(offset)) return ProofFails("the offset is not finite");
-  CommonExponent of_offset;
-  of_offset.Include(offset);
-  const int of_heights = exponent + pair.lengths.exponent();
-  const int common = std::min(of_heights, of_offset.exponent());
-  const HalfSpace of_a = {(BigInteger(1) << (of_heights - common)) * n,
-                          of_offset.ToInteger(offset) << (of_offset.exponent() - common)};
+  CommonExponent of_offsets;
+  int common = of_offsets.exponent();
+  for (const Plane& plane : planes) {
+    if (!std::isfinite(plane.offset)) return ProofFails("the offset is not finite");
+    of_offsets.Include(plane.offset);
+    common = std::min({common, plane.exponent + pair.lengths.exponent(), of_offsets.exponent()});
+  }
+  HalfSpace of_a;
+  for (int i = 0; i < 2; ++i) {
+    const Plane& plane = planes[i];
+    const int exponent = plane.exponent + pair.lengths.exponent();
+    of_a.n[i] = (BigInteger(1) << (exponent - common)) * plane.n;
+    of_a.offset[i] = of_offsets.ToInteger(plane.offset) << (of_offsets.exponent() - common);
+  }
   const std::array<Moment, 2> interval = MomentsOf(times);
   if (!IsBelow(pair.a, of_a, interval, may_end)) {
     return ProofFails("A does not stay on its side of the plane");
@@ -278,12 +307,25 @@ absl::Status CheckTranslation(const MovingPair& pair, const BigVector& n,
 
 absl::Status CheckInterval(const MovingPair& pair, const v1::SeparatedInterval& interval,
                            double begin, bool may_end) {
-  BigVector n;
-  int exponent = 0;
-  if (absl::Status s = ReadDirection(DirectionOf(interval), &n, &exponent); !s.ok()) return s;
+  Plane start;
+  if (absl::Status s = ReadDirection(DirectionOf(interval), &start.n, &start.exponent); !s.ok()) {
+    return s;
+  }
+  const bool has_end = interval.has_end_direction();
+  if (has_end != interval.has_end_offset() || (has_end && !interval.has_offset())) {
+    return ProofFails("the end of a plane needs a direction, and offsets at both ends");
+  }
   const std::array<double, 2> times = {begin, interval.until()};
-  if (!interval.has_offset()) return CheckTranslation(pair, n, times, may_end);
-  return CheckPlane(pair, n, exponent, interval.offset(), times, may_end);
+  if (!interval.has_offset()) return CheckTranslation(pair, start.n, times, may_end);
+  start.offset = interval.offset();
+  Plane end = start;
+  if (has_end) {
+    v1::Certificate direction;
+    *direction.mutable_direction() = interval.end_direction();
+    if (absl::Status s = ReadDirection(direction, &end.n, &end.exponent); !s.ok()) return s;
+    end.offset = interval.end_offset();
+  }
+  return CheckPlane(pair, {start, end}, times, may_end);
 }
 
 using Intervals = google::protobuf::RepeatedPtrField<v1::SeparatedInterval>;

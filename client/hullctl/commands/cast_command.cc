@@ -48,7 +48,8 @@ double Leading(const std::string& digits, size_t dropped) {
 
 Triple NumbersOf(const v1::SeparatedInterval& interval) {
   if (!interval.has_integer_direction()) {
-    const v1::Vector3& n = interval.direction();
+    const v1::Vector3& n =
+        interval.has_end_direction() ? interval.end_direction() : interval.direction();
     return {n.x(), n.y(), n.z()};
   }
   // A double holds 308 digits.

@@ -101,6 +101,15 @@ struct Claim {
     Until(until, n).contact.mutable_intervals()->rbegin()->set_offset(offset);
     return *this;
   }
+  // Moves the end of the last plane.
+  Claim& To(const Numbers& n, double offset) {
+    v1::Vector3* const end = Last().mutable_end_direction();
+    end->set_x(n[0]);
+    end->set_y(n[1]);
+    end->set_z(n[2]);
+    Last().set_end_offset(offset);
+    return *this;
+  }
   Claim& Contact(double time) {
     contact.set_contact_time(time);
     return *this;
@@ -321,6 +330,60 @@ TEST(MotionCheck, APlaneMustHoldBetweenTheEnds) {
   ExpectInvalid(Claim(claim).Until(1, {-1, 0, 0}, -4.25), wall, rod, "intervals[1]: B");
   const Moving farther = Resting(Box({5.5, -1, -1}, {6, 1, 1}));
   ExpectValid(Separated().Until(0.5, {-1, 0, 0}, -5.25).Until(1, {-1, 0, 0}, -5.25), farther, rod);
+}
+
+// A point flies ahead of the turning rod, so that no plane of one direction is between them.
+TEST(MotionCheck, PlanesMayTurn) {
+  const Moving point = Shifted({0, 0, 0}, {5, 5, 0}, {-5, 5, 0});
+  const auto claim = [](double offset, double end_offset) {
+    return Separated().Until(1, {0, 1, 0}, offset).To({-1, 0, 0}, end_offset);
+  };
+  // Heights of the tip times 1 + t^2: 5 t (1 - t)^2. Of the point: 5 - 10 t + 10 t^2.
+  ExpectValid(claim(1.25, 1.25), kTurningRod, point);
+  ExpectInvalid(claim(std::nextafter(1.25, 1.0), 1.25), kTurningRod, point, "A does not stay");
+  ExpectValid(claim(1.625, 1.625), kTurningRod, point);
+  ExpectValid(claim(1.25, 2), kTurningRod, point);
+  ExpectInvalid(claim(1.625, 1.75), kTurningRod, point, "B does not stay");
+  ExpectInvalid(Separated().Until(1, {0, 1, 0}, 1.25), kTurningRod, point, "A does not stay");
+  // Both scaled alike.
+  ExpectValid(Separated().Until(1, {0, 0x1p-900, 0}, 0x1.4p-900).To({-0x1p-900, 0, 0}, 0x1.4p-900),
+              kTurningRod, point);
+  // The radii of both count in full.
+  const Moving rounded = Rounded(point, 0.25);
+  ExpectValid(claim(1.3125, 1.3125), kTurningRod, rounded);
+  ExpectInvalid(claim(1.625, 1.625), kTurningRod, rounded, "B does not stay");
+  ExpectValid(claim(1.375, 1.375), Rounded(kTurningRod, 0.125), point);
+  ExpectInvalid(claim(std::nextafter(1.375, 1.0), 1.375), Rounded(kTurningRod, 0.125), point,
+                "A does not stay");
+}
+
+TEST(MotionCheck, TheLongerDirectionBoundsARadius) {
+  const Moving a = Rounded(Resting({0, 0, 0}), 1);
+  const Moving b = Resting({0, 9, 0});
+  const auto claim = [](double offset, double end_offset) {
+    return Separated().Until(1, {0, 1, 0}, offset).To({0, 2, 0}, end_offset);
+  };
+  ExpectValid(claim(std::nextafter(2.0, 3.0), std::nextafter(2.0, 3.0)), a, b);
+  ExpectInvalid(claim(2, 3), a, b, "A does not stay");
+  ExpectInvalid(claim(3, 2), a, b, "A does not stay");
+}
+
+TEST(MotionCheck, TheEndOfAPlaneIsWhole) {
+  const Moving b = Coming(3, 2);
+  const auto claim = [] { return Separated().Until(1, {1, 0, 0}, 1.5).To({1, 0, 0}, 1.5); };
+  ExpectValid(claim(), kCube, b);
+  Claim part = claim();
+  part.Last().clear_end_offset();
+  ExpectInvalid(part, kCube, b, "the end of a plane needs");
+  part = claim();
+  part.Last().clear_end_direction();
+  ExpectInvalid(part, kCube, b, "the end of a plane needs");
+  part = claim();
+  part.Last().clear_offset();
+  ExpectInvalid(part, kCube, b, "the end of a plane needs");
+  ExpectInvalid(claim().To({0, 0, 0}, 1.5), kCube, b, "the direction is zero");
+  ExpectInvalid(claim().To({kNaN, 0, 0}, 1.5), kCube, b, "not finite");
+  ExpectInvalid(claim().To({1, 0, 0}, kInfinity), kCube, b, "offset is not finite");
 }
 
 TEST(MotionCheck, RotationsNeedOffsets) {
@@ -547,6 +610,9 @@ TEST(MotionCheck, AcceptsNoFalseInterval) {
       Claim claim = Separated().Until(1, {1, 0.25 * lattice(random), 0});
       const bool has_offset = random() % 4 != 0;
       if (has_offset) claim.Last().set_offset(2.5 + 0.5 * lattice(random));
+      if (has_offset && random() % 2 == 0) {
+        claim.To({1, 0.25 * lattice(random), 0}, 2.5 + 0.5 * lattice(random));
+      }
       if (!Check(claim, hulls[0], hulls[1]).ok()) continue;
       ++accepted;
       turning += static_cast<int>(q[0][0][3] != 0 || q[1][1][3] != 0);
