@@ -31,6 +31,9 @@ constexpr double kLeastShare = 0x1p-4;
 constexpr double kGrowth = 4;
 // A tolerable step that is shorter than this makes no progress. A choice.
 constexpr double kShortestStep = 0x1p-50;
+// Share of the last length below which a tolerable step is not tried before the search is stuck. A
+// choice.
+constexpr double kLeastTolerableShare = 0x1p-8;
 
 // Returns a time between two at which a plane is proven, with gap `gap`, and not proven, with
 // `failed_gap`: shortly before the gap would close. A plane of constant direction loses a multiple
@@ -206,19 +209,21 @@ absl::StatusOr<bool> TurningSearch::StaysWithinResolution() {
   const absl::StatusOr<Relation> at_end = RelationAt(1);
   if (!at_end.ok()) return at_end.status();
   if (*at_end != Relation::kSeparated) return false;
-  const absl::StatusOr<double> tolerable = TolerableUntil();
+  const absl::StatusOr<double> tolerable = TolerableUntil(/*thorough=*/false);
   if (!tolerable.ok()) return tolerable.status();
   return *tolerable == 1;
 }
 
 // Returns the time up to which the separation is proven to be at least -resolution_ from separated_
-// on, usually the latest such time.
-absl::StatusOr<double> TurningSearch::TolerableUntil() {
+// on; if `thorough`, usually the latest such time.
+absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   // Twice this, over the least length of a normal, is within the resolution.
   const double margin = -0.4 * resolution_;
   Vector n = direction_;
   double time = separated_;
   double length = last_length_;
+  const double shortest =
+      thorough ? kShortestStep : std::max(kShortestStep, kLeastTolerableShare * last_length_);
   bool is_exact = false;
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
@@ -227,10 +232,10 @@ absl::StatusOr<double> TurningSearch::TolerableUntil() {
     for (;; until = time + (until - time) / 2) {
       plane = TryPlane(n, time, until, /*turns=*/true, margin);
       if (!plane.ok()) return plane.status();
-      if (plane->found.proven || until - time < kShortestStep) break;
+      if (plane->found.proven || until - time < shortest) break;
     }
     if (!plane->found.proven) {
-      if (is_exact) return time;
+      if (is_exact || !thorough) return time;
       // Floating point may find no good direction so near.
       const absl::StatusOr<Vector> exact = ExactDirectionAt(time);
       if (!exact.ok()) return exact.status();
@@ -264,7 +269,7 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
       PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
   if (!near.ok()) return near.status();
   if (*near) {
-    const absl::StatusOr<double> tolerable = TolerableUntil();
+    const absl::StatusOr<double> tolerable = TolerableUntil(/*thorough=*/true);
     if (!tolerable.ok()) return tolerable.status();
     const absl::StatusOr<double> contact = FindLateContact(*tolerable);
     if (!contact.ok()) return contact.status();

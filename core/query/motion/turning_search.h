@@ -64,7 +64,7 @@ class TurningSearch {
   absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
   absl::StatusOr<bool> StaysWithinResolution();
-  absl::StatusOr<double> TolerableUntil();
+  absl::StatusOr<double> TolerableUntil(bool thorough);
   absl::StatusOr<FirstContact> ConcludeStuck();
   absl::StatusOr<double> FindLateContact(double likely) const;
   absl::StatusOr<FirstContact> Contact(double time, Relation relation);
