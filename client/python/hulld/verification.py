@@ -347,6 +347,26 @@ def _check_pieces(
                 )
 
 
+# Directions and offsets at both ends of an interval, linear in between.
+_Plane = tuple[tuple[_Point, Fraction], tuple[_Point, Fraction]]
+
+
+def _mixed(table: Sequence[Sequence[Fraction]]) -> tuple[Fraction, ...]:
+    """The Bernstein coefficients of the product of two quadratic polynomials, from the products of
+    their coefficients."""
+    return (
+        table[0][0],
+        (table[0][1] + table[1][0]) / 2,
+        (table[0][2] + 4 * table[1][1] + table[2][0]) / 6,
+        (table[1][2] + table[2][1]) / 2,
+        table[2][2],
+    )
+
+
+def _product(f: Sequence[Fraction], g: Sequence[Fraction]) -> tuple[Fraction, ...]:
+    return _mixed([[x * y for y in g] for x in f])
+
+
 class _MovingPiece:
     """A hull in motion, or a piece of a body in motion."""
 
@@ -387,40 +407,39 @@ class _MovingPiece:
         parallel = all(q0[i] * q1[j] == q0[j] * q1[i] for i, j in combinations(range(4), 2))
         return parallel and sum(p * q for p, q in zip(q0, q1)) > 0
 
-    def is_below(
-        self, n: _Point, offset: Fraction, begin: float, until: float, may_end: bool
-    ) -> bool:
-        """True if n.p + radius |n| < offset for all vertices p over the interval; if may_end, they
-        may be equal at its end. |q(t)|^2 times the difference is a cubic polynomial in t. It is
-        negative if no Bernstein coefficient is positive and the outer ones are negative."""
+    def is_below(self, plane: _Plane, begin: float, until: float, may_end: bool) -> bool:
+        """True if n.p + radius |n| < offset for all vertices p over the interval, with the longer
+        of both ends for |n|; if may_end, they may be equal at its end. |q(t)|^2 times the
+        difference is a polynomial in t of degree 4. It is negative if no Bernstein coefficient is
+        positive and the outer ones are negative."""
         (q0, x0), (q1, x1) = self._parts_at(Fraction(begin)), self._parts_at(Fraction(until))
-        lines = _dot(n, x0) - offset, _dot(n, x1) - offset
+        (n0, offset0), (n1, offset1) = plane
         forms = _form(q0, q0), _form(q0, q1), _form(q1, q1)
-        s = [norm for _, norm in forms]
-        constants = (
-            3 * s[0] * lines[0],
-            s[0] * lines[1] + 2 * s[1] * lines[0],
-            2 * s[1] * lines[1] + s[2] * lines[0],
-            3 * s[2] * lines[1],
-        )
-        turned = [
-            [_dot(n, (rows[0][k], rows[1][k], rows[2][k])) for rows, _ in forms] for k in range(3)
-        ]
+        norms = [norm for _, norm in forms]
+        crossed = (_dot(n0, x1) + _dot(n1, x0) - offset0 - offset1) / 2
+        constants = _product(norms, (_dot(n0, x0) - offset0, crossed, _dot(n1, x1) - offset1))
+        # Of each axis of the hull, over pairs of a form and a direction.
+        middle = tuple((x + y) / 2 for x, y in zip(n0, n1))
         directions = [
-            tuple(sum(w * f for w, f in zip(weights, of_axis)) for of_axis in turned)
-            for weights in ((3, 0, 0), (1, 2, 0), (0, 2, 1), (0, 0, 3))
+            [
+                [_dot(n, (rows[0][k], rows[1][k], rows[2][k])) for n in (n0, middle, n1)]
+                for rows, _ in forms
+            ]
+            for k in range(3)
         ]
+        by_axis = [_mixed(table) for table in directions]
         points = [_point(vertex) for vertex in self._vertices]
         for motion in self._inner:
             points = [motion(point) for point in points]
-        b = [
+        heights = [
             constant + max(sum(d * x for d, x in zip(direction, point)) for point in points)
-            for constant, direction in zip(constants, directions)
+            for constant, direction in zip(constants, zip(*by_axis))
         ]
-        grown = (3 * s[0], s[0] + 2 * s[1], 2 * s[1] + s[2], 3 * s[2])
-        signs = [_sign(plain, self.radius * more, _dot(n, n)) for plain, more in zip(b, grown)]
-        end_is_right = signs[3] < 0 or (may_end and signs[3] == 0)
-        return signs[0] < 0 and signs[1] <= 0 and signs[2] <= 0 and end_is_right
+        grown = _product(norms, (Fraction(1), Fraction(1), Fraction(1)))
+        longest = max(_dot(n0, n0), _dot(n1, n1))
+        signs = [_sign(plain, self.radius * more, longest) for plain, more in zip(heights, grown)]
+        end_is_right = signs[-1] < 0 or (may_end and signs[-1] == 0)
+        return signs[0] < 0 and all(sign <= 0 for sign in signs[1:-1]) and end_is_right
 
 
 def _sign(a: Fraction, b: Fraction, c: Fraction) -> int:
@@ -445,6 +464,9 @@ def _check_interval(
     n = _direction(interval.direction)
     if n == _ORIGIN:
         raise VerificationError("the direction is zero")
+    has_end = interval.end_direction is not None
+    if has_end != (interval.end_offset is not None) or (has_end and interval.offset is None):
+        raise VerificationError("the end of a plane needs a direction, and offsets at both ends")
     until = interval.until
     if interval.offset is None:
         if not (a.keeps_rotation() and b.keeps_rotation()):
@@ -454,12 +476,17 @@ def _check_interval(
         if at_begin <= 0 or at_end < 0 or (at_end == 0 and not may_end):
             raise VerificationError("the direction does not separate at both ends")
         return
-    if not np.isfinite(interval.offset):
+    end_direction = n if interval.end_direction is None else _direction(interval.end_direction)
+    end_offset = interval.offset if interval.end_offset is None else interval.end_offset
+    if not (np.isfinite(interval.offset) and np.isfinite(end_offset)):
         raise VerificationError("the offset is not finite")
-    offset = Fraction(interval.offset)
-    if not a.is_below(n, offset, begin, until, may_end):
+    if end_direction == _ORIGIN:
+        raise VerificationError("the direction is zero")
+    plane = ((n, Fraction(interval.offset)), (end_direction, Fraction(end_offset)))
+    opposite = tuple((_minus(_ORIGIN, m), -offset) for m, offset in plane)
+    if not a.is_below(plane, begin, until, may_end):
         raise VerificationError("A does not stay on its side of the plane")
-    if not b.is_below(_minus(_ORIGIN, n), -offset, begin, until, may_end):
+    if not b.is_below((opposite[0], opposite[1]), begin, until, may_end):
         raise VerificationError("B does not stay on its side of the plane")
 
 

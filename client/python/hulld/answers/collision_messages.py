@@ -86,11 +86,14 @@ def _axis_of(message: Any) -> Axis:
     )
 
 
+def _triple(message: Any) -> tuple[float, float, float]:
+    return (message.x, message.y, message.z)
+
+
 def _direction_of(message: Any) -> tuple[float, float, float] | tuple[int, int, int] | None:
     kind = message.WhichOneof("exact_direction")
     if kind == "direction":
-        n = message.direction
-        return (n.x, n.y, n.z)
+        return _triple(message.direction)
     if kind == "integer_direction":
         m = message.integer_direction
         return (int(m.x), int(m.y), int(m.z))
@@ -111,6 +114,8 @@ def _intervals_of(messages: Iterable[Any]) -> tuple[SeparatedInterval, ...]:
             message.until,
             _direction_of(message),
             message.offset if message.HasField("offset") else None,
+            _triple(message.end_direction) if message.HasField("end_direction") else None,
+            message.end_offset if message.HasField("end_offset") else None,
         )
         for message in messages
     )

@@ -181,13 +181,16 @@ class SeparatedInterval:
     `until`.
 
     direction: as in Certificate. offset: n.p < offset for all points p of A, and n.p > offset for
-    all points p of B, at all these times. None: neither placement rotates, and max n.A < min n.B at
-    both ends; equality is allowed at a contact.
+    all points p of B, at all these times. end_direction, end_offset: direction and offset at
+    `until`, linear in between; None if they do not change. offset None: neither placement rotates,
+    and max n.A < min n.B at both ends; equality is allowed at a contact.
     """
 
     until: float
     direction: tuple[float, float, float] | tuple[int, int, int] | None
     offset: float | None
+    end_direction: tuple[float, float, float] | None = None
+    end_offset: float | None = None
 
 
 @dataclass(frozen=True)

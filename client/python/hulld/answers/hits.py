@@ -51,9 +51,10 @@ def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
     """The plane that separates a ray from a hull until they meet is that of the facet."""
     if not proof or proof[-1].direction is None:
         return np.full(3, np.nan)
+    direction = proof[-1].end_direction or proof[-1].direction
     # Integers may exceed doubles; their quotients do not.
-    largest = max(abs(n) for n in proof[-1].direction)
-    n = np.array([-x / largest for x in proof[-1].direction]) + 0.0
+    largest = max(abs(n) for n in direction)
+    n = np.array([-x / largest for x in direction]) + 0.0
     normal: npt.NDArray[np.float64] = n / np.linalg.norm(n)
     return normal
 

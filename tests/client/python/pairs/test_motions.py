@@ -73,7 +73,17 @@ def test_each_part_of_a_proof_is_checked(client: hulld.Client, cube: str) -> Non
     expect("before separated_until", intervals=())
     expect("stay", intervals=(dataclasses.replace(first, offset=first.offset + 9), *rest))
     expect("stay", intervals=(dataclasses.replace(first, offset=first.offset - 9), *rest))
-    expect("no offset", intervals=(dataclasses.replace(first, offset=None), *rest))
+    expect("offsets at both ends", intervals=(dataclasses.replace(first, offset=None), *rest))
+    at_rest = dataclasses.replace(first, offset=None, end_direction=None, end_offset=None)
+    expect("no offset", intervals=(at_rest, *rest))
+    assert first.end_offset is not None
+    for change in (9.0, -9.0):
+        moved = dataclasses.replace(first, end_offset=first.end_offset + change)
+        expect("stay", intervals=(moved, *rest))
+    expect("offsets at both ends", intervals=(dataclasses.replace(first, end_offset=None), *rest))
+    zero = dataclasses.replace(first, end_direction=(0.0, 0.0, 0.0))
+    expect("direction is zero", intervals=(zero, *rest))
+    expect("not finite", intervals=(dataclasses.replace(first, end_offset=np.inf), *rest))
     expect("not finite", intervals=(dataclasses.replace(first, offset=np.inf), *rest))
     expect("direction is zero", intervals=(dataclasses.replace(first, direction=(0, 0, 0)), *rest))
     expect("no direction", intervals=(dataclasses.replace(first, direction=None), *rest))
