@@ -155,10 +155,18 @@ absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
 
 absl::Status SceneStream::Prepare() {
   options_.bodies = table_.bodies();
-  std::vector<Box> boxes(table_.size());
-  ShareOut(boxes.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
+  const bool moves = table_.has_motions();
+  std::vector<Box> boxes(moves ? 0 : table_.size());
+  std::vector<MovingBox> moving(moves ? table_.size() : 0);
+  ShareOut(table_.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
     if (call().ShouldStop()) return;
-    for (size_t i = begin; i < end; ++i) boxes[i] = table_.BoxOf(i);
+    for (size_t i = begin; i < end; ++i) {
+      if (moves) {
+        moving[i] = table_.MovingBoxAt(i);
+      } else {
+        boxes[i] = table_.BoxOf(i);
+      }
+    }
   });
   if (call().ShouldStop()) return call().StopStatus();
   if (request().has_limit()) {
@@ -175,7 +183,8 @@ absl::Status SceneStream::Prepare() {
   piece_query_ = options_.query;
   piece_query_.threads = 1;
   absl::StatusOr<SceneSearch> search =
-      SceneSearch::Make(table_.placed(), options_, std::move(boxes));
+      moves ? SceneSearch::Make(table_.placed(), options_, std::move(moving))
+            : SceneSearch::Make(table_.placed(), options_, std::move(boxes));
   if (!search.ok()) return search.status();
   search_ = *std::move(search);
   call().AddPairs(search_->pairs());

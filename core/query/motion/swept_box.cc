@@ -1,5 +1,6 @@
 #include "core/query/motion/swept_box.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -12,8 +13,6 @@
 namespace hulld {
 namespace {
 
-Box Union(const Box& a, const Box& b) { return {a.low.cwiseMin(b.low), a.high.cwiseMax(b.high)}; }
-
 // Returns an upper bound of the distance of the points of a box from a point.
 double Reach(const Box& box, const Vector& from) {
   const Vector farthest = (box.low - from).cwiseAbs().cwiseMax((box.high - from).cwiseAbs());
@@ -23,32 +22,82 @@ double Reach(const Box& box, const Vector& from) {
   return farthest.stableNorm() * kRoundedUp + std::numeric_limits<double>::min();
 }
 
-// A rotation about the frame's origin keeps the distance of each point from it. box_at: returns the
-// bounding box at a pose.
+// A rotation about the frame's origin keeps the distance of each point from it. A point that
+// translates moves linearly between its positions at both ends, which are in the boxes there.
+// box_at: returns the bounding box at a pose.
 template <typename BoxAt>
-Box Swept(const Motion& X_WB, const BoxAt& box_at) {
+MovingBox Moving(const Motion& X_WB, const BoxAt& box_at) {
   const auto& [start, end] = X_WB;
   const Box at_start = box_at(start);
-  if (at_start.IsEmpty()) return at_start;
-  if (IsTranslation(X_WB)) return Union(at_start, box_at(end));
+  if (at_start.IsEmpty()) return {at_start, at_start};
+  if (IsTranslation(X_WB)) return {at_start, box_at(end)};
   const double reach = Reach(at_start, start.t);
-  if (!std::isfinite(reach)) return Box::All();
-  return GrownBy(Union({start.t, start.t}, {end.t, end.t}), reach);
+  const Box swept = std::isfinite(reach)
+                        ? GrownBy(MovingBox{{start.t, start.t}, {end.t, end.t}}.Around(), reach)
+                        : Box::All();
+  return {swept, swept};
 }
+
+// An interval of times.
+struct TimeSpan {
+  double begin = 0;
+  double end = 1;
+
+  bool IsEmpty() const { return begin > end; }
+  // Drops times at which a gap that changes linearly, from `first` at time 0 to `last` at time 1,
+  // is negative; returns false if it is so at all of them. Both are differences of two doubles,
+  // rounded: their signs are exact. If the signs differ, they err by u of themselves, their
+  // difference by 2 u, and the time at which the gap is 0 by 4 u + 8 u^2 of itself, and by
+  // underflow of the quotient. It is moved outwards by 8 u and the least normal double. **Proven.**
+  // An overflow or NaN drops nothing.
+  bool KeepNonNegative(double first, double last) {
+    if (first < 0 && last < 0) return false;
+    if (!(first < 0) && !(last < 0)) return true;
+    constexpr double kMargin = 0x1p-50;
+    const double change = std::abs(first - last);
+    if (!(change < std::numeric_limits<double>::infinity())) return true;
+    const double time = std::abs(first) / change;
+    if (first < 0) {
+      begin = std::max(begin, time * (1 - kMargin) - std::numeric_limits<double>::min());
+    } else {
+      end = std::min(end, time * (1 + kMargin) + std::numeric_limits<double>::min());
+    }
+    return true;
+  }
+};
 
 }  // namespace
 
-Box SweptBox(const MovingHull& moving) {
-  return Swept(moving.X_WB, [&](const Pose& X_WB) {
+MovingBox MovingBoxOf(const MovingHull& moving) {
+  return Moving(moving.X_WB, [&](const Pose& X_WB) {
+    if (IsIdentity(moving.X_BH) && moving.piece_radius == 0) {
+      return BoundingBox(PlacedHull(moving.hull, X_WB, moving.radius));
+    }
     const PoseProduct X_WH(X_WB, moving.X_BH);
     return BoundingBox(PlacedHull(moving.hull, X_WH, moving.radius, moving.piece_radius));
   });
 }
 
-Box SweptBox(const MovingBody& moving) {
-  return Swept(moving.X_WB, [&](const Pose& X_WB) {
+MovingBox MovingBoxOf(const MovingBody& moving) {
+  return Moving(moving.X_WB, [&](const Pose& X_WB) {
     return BoundingBox(PlacedBody(moving.body, X_WB, moving.radius));
   });
+}
+
+// Relative to B, the boxes meet along an axis while both gaps between opposite bounds are not
+// negative. These are linear in time, so they meet at some time if and only if the intervals of all
+// six gaps have a common point.
+bool MayMeet(const MovingBox& a, const MovingBox& b) {
+  TimeSpan times;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!times.KeepNonNegative(a.start.high[axis] - b.start.low[axis],
+                               a.end.high[axis] - b.end.low[axis]) ||
+        !times.KeepNonNegative(b.start.high[axis] - a.start.low[axis],
+                               b.end.high[axis] - a.end.low[axis])) {
+      return false;
+    }
+  }
+  return !times.IsEmpty();
 }
 
 }  // namespace hulld

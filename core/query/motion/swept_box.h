@@ -7,12 +7,30 @@
 
 namespace hulld {
 
-// Returns a box (world frame) that certainly contains the rounded hull at all times. For a
-// translation, it is the least box around the boxes of both ends (BoundingBox); a rotation may turn
-// the hull in any direction. Empty for an empty hull. Requires a valid motion.
-Box SweptBox(const MovingHull& moving);
-// Returns a box that certainly contains all pieces of the body at all times; see above.
-Box SweptBox(const MovingBody& moving);
+// The box of a placement in motion (world frame). Its bounds move linearly: at time t, they are (1
+// - t) start.low + t end.low and (1 - t) start.high + t end.high.
+struct MovingBox {
+  Box start;
+  Box end;
+
+  // The least box that contains it at all times.
+  Box Around() const { return {start.low.cwiseMin(end.low), start.high.cwiseMax(end.high)}; }
+};
+
+// Returns a box that certainly contains the rounded hull at each time. For a translation, the boxes
+// of both ends (BoundingBox). A rotation may turn the hull in any direction, so its box is at rest.
+// Empty for an empty hull. Requires a valid motion.
+MovingBox MovingBoxOf(const MovingHull& moving);
+// Returns a box that certainly contains all pieces of the body at each time; see above.
+MovingBox MovingBoxOf(const MovingBody& moving);
+
+// Return a box that certainly contains the hull or body at all times.
+inline Box SweptBox(const MovingHull& moving) { return MovingBoxOf(moving).Around(); }
+inline Box SweptBox(const MovingBody& moving) { return MovingBoxOf(moving).Around(); }
+
+// Returns false only if the boxes are disjoint at each time. True for some pairs that come within
+// rounding of each other.
+bool MayMeet(const MovingBox& a, const MovingBox& b);
 
 }  // namespace hulld
 

@@ -173,24 +173,36 @@ bool SceneSearch::ComputeBoxes() {
 }
 
 bool SceneSearch::BuildTree() {
-  tree_ = BoxTree(boxes_, options_->query.should_stop, std::max(1, options_->threads));
+  if (size_ > 0) tree_first_ = std::min<uint32_t>(FirstCandidate(0), boxes_.size());
+  tree_ = BoxTree(std::span(boxes_).subspan(tree_first_), options_->query.should_stop,
+                  std::max(1, options_->threads));
   return !StopPoll(options_->query.should_stop, 1).Poll();
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
                                               const SceneOptions& options) {
-  return MakeWith(placements, options, std::nullopt);
+  return MakeWith(placements, options, std::nullopt, {});
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
                                               const SceneOptions& options, std::vector<Box> boxes) {
   HULLD_CHECK(boxes.size() == placements.size());
-  return MakeWith(placements, options, std::move(boxes));
+  return MakeWith(placements, options, std::move(boxes), {});
+}
+
+absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
+                                              const SceneOptions& options,
+                                              std::vector<MovingBox> boxes) {
+  HULLD_CHECK(boxes.size() == placements.size());
+  std::vector<Box> around(boxes.size());
+  std::ranges::transform(boxes, around.begin(), &MovingBox::Around);
+  return MakeWith(placements, options, std::move(around), std::move(boxes));
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> placements,
                                                   const SceneOptions& options,
-                                                  std::optional<std::vector<Box>> boxes) {
+                                                  std::optional<std::vector<Box>> boxes,
+                                                  std::vector<MovingBox> moving) {
   if (!options.groups.empty() && options.groups.size() != placements.size()) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", options.groups.size(),
                                                    " groups for ", placements.size(),
@@ -198,6 +210,7 @@ absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> pl
   }
   HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
   SceneSearch scene(placements, options);
+  scene.moving_ = std::move(moving);
   bool is_made = true;
   if (boxes.has_value()) {
     scene.boxes_ = *std::move(boxes);
@@ -261,8 +274,16 @@ void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {
   scene_ = &scene;
   a_ = a;
   first_ = scene.FirstCandidate(a);
-  box_ = GrownBy(scene.boxes_[a], scene.options_->query.clearance.value_or(0));
-  cursor_ = scene.tree_.Begin();
+  const double clearance = scene.options_->query.clearance.value_or(0);
+  if (scene.moving_.empty()) {
+    box_ = GrownBy(scene.boxes_[a], clearance);
+    cursor_ = scene.tree_.Begin();
+  } else {
+    const auto& [start, end] = scene.moving_[a];
+    moving_ = {GrownBy(start, clearance), GrownBy(end, clearance)};
+    waiting_.clear();
+    if (!scene.tree_.empty()) waiting_.push_back(0);
+  }
   is_gathered_ = false;
   listed_.clear();
   marked_.clear();
@@ -270,10 +291,40 @@ void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {
   next_ = 0;
 }
 
+bool SceneCandidates::AppendMeeting(uint64_t nodes) {
+  const size_t before = listed_.size();
+  const uint32_t tree_first = scene_->tree_first_;
+  const bool is_done =
+      scene_->tree_.AppendMeeting(box_, first_ - tree_first, nodes, cursor_, listed_);
+  for (size_t i = before; i < listed_.size(); ++i) listed_[i] += tree_first;
+  return is_done;
+}
+
+bool SceneCandidates::AppendMeetingInMotion(uint64_t nodes) {
+  const BoxTree& tree = scene_->tree_;
+  for (; !waiting_.empty() && nodes > 0; --nodes) {
+    const uint32_t node = waiting_.back();
+    waiting_.pop_back();
+    // At each time, the boxes of a subtree are within the box around its motions.
+    if (!MayMeet(moving_, {tree.box(node), tree.box(node)})) continue;
+    if (!tree.is_leaf(node)) {
+      const auto [left, right] = tree.children(node);
+      waiting_.push_back(right);
+      waiting_.push_back(left);
+      continue;
+    }
+    for (const uint32_t index : tree.indices(node)) {
+      const uint32_t b = index + scene_->tree_first_;
+      if (b >= first_ && MayMeet(moving_, scene_->moving_[b])) listed_.push_back(b);
+    }
+  }
+  return waiting_.empty();
+}
+
 bool SceneCandidates::Gather(uint64_t nodes) {
   if (is_gathered_) return true;
   const size_t before = listed_.size();
-  is_gathered_ = scene_->tree_.AppendMeeting(box_, first_, nodes, cursor_, listed_);
+  is_gathered_ = scene_->moving_.empty() ? AppendMeeting(nodes) : AppendMeetingInMotion(nodes);
   const auto is_ignored = [this](uint32_t b) { return scene_->IsIgnored(a_, b); };
   listed_.erase(
       std::remove_if(listed_.begin() + static_cast<ptrdiff_t>(before), listed_.end(), is_ignored),

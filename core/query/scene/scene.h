@@ -17,6 +17,7 @@
 #include "core/query/body/body_search.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
+#include "core/query/motion/swept_box.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
 #include "core/query/terms/query_options.h"
@@ -73,9 +74,13 @@ class SceneSearch {
   // per placement. CANCELLED: should_stop returned true. Cost: O(n log n).
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
-  // Takes precomputed boxes: BoundingBox of each placement.
+  // Takes precomputed boxes: BoundingBox of each placement, at rest; otherwise MovingBoxOf. The
+  // answers of Ask are about placements at rest.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options, std::vector<Box> boxes);
+  static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
+                                          const SceneOptions& options,
+                                          std::vector<MovingBox> boxes);
 
   // Pairs selected by the groups and movers.
   uint64_t pairs() const { return pairs_; }
@@ -91,8 +96,8 @@ class SceneSearch {
 
   // Memory of the boxes and their tree.
   size_t MemoryBytes() const {
-    return boxes_.capacity() * sizeof(Box) + first_others_.capacity() * sizeof(uint32_t) +
-           tree_.MemoryBytes() + sizeof *this;
+    return boxes_.capacity() * sizeof(Box) + moving_.capacity() * sizeof(MovingBox) +
+           first_others_.capacity() * sizeof(uint32_t) + tree_.MemoryBytes() + sizeof *this;
   }
 
  private:
@@ -102,7 +107,8 @@ class SceneSearch {
 
   static absl::StatusOr<SceneSearch> MakeWith(std::span<const PlacedHull> placements,
                                               const SceneOptions& options,
-                                              std::optional<std::vector<Box>> boxes);
+                                              std::optional<std::vector<Box>> boxes,
+                                              std::vector<MovingBox> moving);
   // Both return false if should_stop returned true; the result must then be discarded.
   bool ComputeBoxes();
   bool BuildTree();
@@ -124,19 +130,23 @@ class SceneSearch {
   QueryOptions first_look_;
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
   // For each placement, the next one, beyond those of its own group if that group ignores itself.
-  // Empty without ignored groups. A search skips subtrees of lower indices, so rays, which ignore
-  // each other and come first, cost nothing to each other.
+  // Empty without ignored groups. A search skips subtrees of lower indices.
   std::vector<uint32_t> first_others_;
   std::vector<Box> boxes_;
+  // Parallel to boxes_, which are around them; empty if all placements are at rest.
+  std::vector<MovingBox> moving_;
+  // The boxes from the first candidate of any placement on: a tree of a thousand hulls, without the
+  // rays that precede them. Index 0 of the tree is the placement tree_first_.
   BoxTree tree_{std::span<const Box>()};
+  uint32_t tree_first_ = 0;
   uint64_t pairs_ = 0;
   uint32_t size_ = 0;
 };
 
 // The candidates of one placement: the placements after it, in ascending order, with boxes that
-// intersect its own (grown by the clearance) and that the groups do not exclude. The search is
-// resumable between any two steps. Memory: at most n / 8 bytes, for any number of candidates among
-// the n placements.
+// intersect its own (grown by the clearance), in motion at some time (MayMeet), and that the groups
+// do not exclude. The search is resumable between any two steps. Memory: at most n / 8 bytes, for
+// any number of candidates among the n placements.
 class SceneCandidates {
  public:
   // Starts with placement `a` of a scene, which must outlive this object. Requires: a <
@@ -151,15 +161,23 @@ class SceneCandidates {
   std::optional<uint32_t> Next();
 
   size_t MemoryBytes() const {
-    return listed_.capacity() * sizeof(uint32_t) + marked_.capacity() * sizeof(uint64_t);
+    return listed_.capacity() * sizeof(uint32_t) + marked_.capacity() * sizeof(uint64_t) +
+           waiting_.capacity() * sizeof(uint32_t);
   }
 
  private:
+  // Append candidates from at most `nodes` nodes of the tree; return true if none is left.
+  bool AppendMeeting(uint64_t nodes);
+  bool AppendMeetingInMotion(uint64_t nodes);
+
   const SceneSearch* scene_ = nullptr;
   uint32_t a_ = 0;
   uint32_t first_ = 0;
   Box box_;
   BoxTree::Cursor cursor_;
+  // In motion: the box, and the nodes still to visit.
+  MovingBox moving_;
+  std::vector<uint32_t> waiting_;
   bool is_gathered_ = false;
   // A few candidates are listed. Larger sets use a bit for each placement, which also sorts them.
   std::vector<uint32_t> listed_;

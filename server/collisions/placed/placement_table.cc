@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "core/query/motion/swept_box.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -256,9 +255,9 @@ void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
   if (!valid.ok()) malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), valid));
 }
 
-Box PlacementTable::SweptBoxOf(size_t i) const {
-  if (!is_answerable(i)) return Box::Empty();
-  return is_body(i) ? SweptBox(MovingBodyAt(i)) : SweptBox(MovingAt(i));
+MovingBox PlacementTable::MovingBoxAt(size_t i) const {
+  if (!is_answerable(i)) return {Box::Empty(), Box::Empty()};
+  return is_body(i) ? MovingBoxOf(MovingBodyAt(i)) : MovingBoxOf(MovingAt(i));
 }
 
 size_t PlacementTable::MemoryBytes() const {

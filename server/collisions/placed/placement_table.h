@@ -21,6 +21,7 @@
 #include "core/query/box_tree.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/motion/moving_body.h"
+#include "core/query/motion/swept_box.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/motion.h"
 #include "core/query/terms/pose.h"
@@ -88,11 +89,12 @@ class PlacementTable {
   MovingHull MovingAt(size_t i) const { return {HullAt(i), MotionAt(i), RadiusAt(i)}; }
   // As MovingAt, for a hull or body. Requires has_bodies().
   MovingBody MovingBodyAt(size_t i) const { return {bodies_[i].body(), MotionAt(i), RadiusAt(i)}; }
-  // Bounding box of a placement, world frame: BoundingBox; with motions, SweptBox.
+  // Bounding box of a placement at rest, world frame.
   Box BoxOf(size_t i) const {
-    if (has_motions()) return SweptBoxOf(i);
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
+  // Box of a placement in motion; empty if it is not answerable.
+  MovingBox MovingBoxAt(size_t i) const;
   // The hull of a placement; empty for a body, or if it is not answerable.
   const QueryHull& HullAt(size_t i) const;
   // As HullAt, but for a body the hull of a piece.
@@ -192,7 +194,6 @@ class PlacementTable {
   void CheckEnd(size_t i, const char* of, const char* after);
   Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
   double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
-  Box SweptBoxOf(size_t i) const;
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
