@@ -266,6 +266,27 @@ inline constexpr double kPiecePlaneErrorFactor = 1024 * kUnitRoundoff;
 // The total is below 300 u (S + D). Proven.
 inline constexpr double kTranslatedGapErrorFactor = 512 * kUnitRoundoff;
 
+// The time (n . p) / (n . d) at which the path of a vertex p of A - B along d crosses the plane of
+// a facet, in double-double arithmetic (facet_entry.cc). Rotations are multiplied by the squared
+// norm N, at most 4, of their scaled quaternions: entries err by 9 u^2 N. X and Y are the sizes of
+// the edges, exact in the frame of one hull, times the norm of its rotation. Edges err by (27 + 15
+// + 18) u^2 X < 64 u^2 X per component and are at most sqrt(3) X. Their cross product n errs by
+// (474 + 18) u^2 X Y and is at most 3 X Y. n . (N R a) errs by 3 (853 + 180 + 26) u^2 X Y N M and
+// by 94 u^2 X Y N M of sums, its quotient by N by 26 u^2 of itself, at most 136 u^2 X Y M more:
+// 3410 u^2 X Y M. n . (t_B - t_A) errs by 1580 u^2 X Y |t|, the sums by less than 60 u^2 X Y S: n .
+// p errs by less than 3500 u^2 X Y S. With L the sum of the largest components of both
+// displacements, d errs by 3 u^2 L, and n . d by less than 1610 u^2 X Y L. If the computed |n . d|
+// is above twice that, the quotient of the computed values errs by at most 2 (3500 S + 1610 |time|
+// L) u^2 X Y / |n . d|, its rounding by 17 u^2 |time|, which is less than 160 |time| L u^2 X Y / |n
+// . d|. The total is below 7000 u^2 X Y (S + |time| L) / |n . d|; 8192 u^2 leaves slack for the
+// rounding of the bound. Times X Y (S + |time| L) / |n . d|, for S + L between kEntryMinSize and
+// kEntryMaxSize and edges of at least kEntryMinEdge: then underflow adds less than 2^-800, and the
+// bound is above 2^-480. Proven.
+inline constexpr double kEntryTimeErrorFactor = 8192 * kUnitRoundoff * kUnitRoundoff;
+inline constexpr double kEntryMinSize = 0x1p-100;
+inline constexpr double kEntryMaxSize = 0x1p100;
+inline constexpr double kEntryMinEdge = 0x1p-140;
+
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
 // with a radius errs by u more. The margins r |n| of the plane above, with |n| the larger of both
 // ends, enter its bound like c; an earlier end adds 3 u to the length. Proven.

@@ -68,6 +68,17 @@ absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
   return absl::OkStatus();
 }
 
+// Requires: valid arguments, neither hull empty, and IsInOrder(a, b).
+absl::StatusOr<FirstContact> FindInOrder(const MovingHull& a, const MovingHull& b,
+                                         const MotionOptions& options) {
+  // With radii, the time of a translation is irrational in general.
+  const bool rounded = a.is_rounded() || b.is_rounded();
+  if (!rounded && IsTranslation(a.X_WB) && IsTranslation(b.X_WB)) {
+    return TranslationSearch(a, b, options).Run();
+  }
+  return TurningSearch(a, b, options).Run();
+}
+
 }  // namespace
 
 absl::Status ValidateMotionOptions(const MotionOptions& options) {
@@ -88,17 +99,10 @@ absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingH
   if (absl::Status s = ValidateMoving("a", a); !s.ok()) return s;
   if (absl::Status s = ValidateMoving("b", b); !s.ok()) return s;
   if (a.hull.empty() || b.hull.empty()) return FirstContact();
-  if (!IsInOrder(a, b)) {
-    absl::StatusOr<FirstContact> contact = FindFirstContact(b, a, options);
-    if (contact.ok()) contact = Mirrored(*std::move(contact));
-    return contact;
-  }
-  // With radii, the time of a translation is irrational in general.
-  const bool rounded = a.is_rounded() || b.is_rounded();
-  if (!rounded && IsTranslation(a.X_WB) && IsTranslation(b.X_WB)) {
-    return TranslationSearch(a, b, options).Run();
-  }
-  return TurningSearch(a, b, options).Run();
+  if (IsInOrder(a, b)) return FindInOrder(a, b, options);
+  absl::StatusOr<FirstContact> contact = FindInOrder(b, a, options);
+  if (contact.ok()) contact = Mirrored(*std::move(contact));
+  return contact;
 }
 
 }  // namespace hulld

@@ -15,16 +15,13 @@ constexpr double kRelativeWidth = 0x1p-10;
 }  // namespace
 
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
-                                        const std::function<bool()>& should_stop,
-                                        FloatCombination* point) {
+                                        const std::function<bool()>& should_stop) {
   if (pair.usable()) {
     SeparationGoal goal;
     // With radii, the gap may be any share of the distance.
     const bool rounded = pair.a().is_rounded() || pair.b().is_rounded();
     goal.relative_error = rounded ? 0 : kRelativeWidth;
-    const SeparationBounds bounds = BoundDistance(pair, first, {}, goal);
-    if (point != nullptr) *point = bounds.point;
-    return bounds.direction;
+    return BoundDistance(pair, first, {}, goal).direction;
   }
   return ExactNearestUnit(pair, should_stop);
 }

@@ -5,32 +5,23 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 #include "core/base/check.h"
-#include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_search.h"
+#include "core/query/floating/facet_entry.h"
 #include "core/query/floating/float_pair.h"
+#include "core/query/floating/path_cast.h"
 #include "core/query/ladder.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/sweep.h"
-#include "core/query/placed/placed_hull.h"
-#include "core/query/terms/pose.h"
-#include "core/query/terms/pose_product.h"
 
 namespace hulld {
 namespace {
 
-// Floating point ends when the gap is this small relative to the pair, or after this many steps;
-// exact queries do the rest. Choices.
-constexpr double kLeastRelativeGap = 0x1p-46;
-constexpr int kMostFloatSteps = 24;
-// Share of the gap that a step in floating point leaves open, more than rounding takes. A choice.
-constexpr double kOpenShare = 0x1p-10;
 // Factor between the strides of successive exact queries. A choice.
 constexpr int64_t kStrideFactor = 16;
 
@@ -72,14 +63,30 @@ IntegerVector ToExact(const std::variant<Vector, IntegerVector>& direction) {
   return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
 }
 
-Vector DisplacementOf(const Motion& motion) { return motion.end.t - motion.start.t; }
+// A time in [0, 1] as a fraction, numerator / 2^bits.
+struct BinaryTime {
+  Integer numerator;
+  int bits;
+};
+BinaryTime ToBinary(double time) {
+  const int bits = time == 0 ? 0 : std::max(0, -LowestBitExponent(time));
+  return {ToInteger(time, -bits), bits};
+}
 
-// Returns the direction of the point of a path that is nearest to the origin, of unit length up to
-// rounding. Zero if it is the origin.
-Vector NearestOnPath(const Vector& start, const Vector& displacement) {
-  const double squared = displacement.squaredNorm();
-  const double time = squared > 0 ? std::clamp(-start.dot(displacement) / squared, 0.0, 1.0) : 0;
-  return (start + time * displacement).normalized();
+IntegerVector Shifted(const IntegerVector& v, int bits) {
+  return {v.x << bits, v.y << bits, v.z << bits};
+}
+
+int SignOfDeterminant(const IntegerVector& p, const IntegerVector& q, const IntegerVector& r) {
+  return Sign(Dot(p, Cross(q, r)));
+}
+
+// Returns true if the origin is strictly inside the tetrahedron.
+bool IsInside(const IntegerVector& p, const IntegerVector& q, const IntegerVector& r,
+              const IntegerVector& s) {
+  const int side = SignOfDeterminant(p, q, r);
+  return side != 0 && SignOfDeterminant(p, r, s) == side && SignOfDeterminant(p, s, q) == side &&
+         SignOfDeterminant(q, s, r) == side;
 }
 
 }  // namespace
@@ -102,112 +109,93 @@ TranslationSearch::Middle& TranslationSearch::middle() {
 }
 
 absl::StatusOr<FirstContact> TranslationSearch::Run() {
-  if (absl::Status s = AdvanceInFloatingPoint(); !s.ok()) return s;
+  if (poll_.Step()) return MotionStopped();
+  Cast();
   if (absl::Status s = TryFacet(); !s.ok()) return s;
   if (absl::Status s = Narrow(); !s.ok()) return s;
   return Conclude();
 }
 
-absl::Status TranslationSearch::AdvanceInFloatingPoint() {
-  const PairAt at_start(a_, b_, 0);
-  const FloatPair& start = at_start.pair();
-  const Vector of_a = DisplacementOf(a_.X_WB);
-  const Vector of_b = DisplacementOf(b_.X_WB);
-  const Vector displacement = of_b - of_a;
-  const double size = start.size() + of_a.cwiseAbs().maxCoeff() + of_b.cwiseAbs().maxCoeff();
-  if (!start.usable() || !IsFilterSize(size)) return absl::OkStatus();
-  // Lower bounds of the gap along a direction of about unit length at time 0, and at a later time.
-  const auto gap_at_start = [&](const Vector& n) {
-    return -start.Farthest(n).value - start.SupportError(n);
-  };
-  const auto gap_at = [&](double gap_before, const Vector& n, double time) {
-    return gap_before + time * n.dot(displacement) - kTranslatedGapErrorFactor * size;
-  };
-  Vector toward = -Vector(start.CenterDifference());
-  if (toward.isZero(0)) return absl::OkStatus();
-  if (const Vector n = NearestOnPath(toward, displacement); !n.isZero(0)) {
-    // Balls around the hulls, then the hulls.
-    const double reach = a_.hull.radius() + b_.hull.radius();
-    const auto separates = [&](double gap) {
-      return gap_at(gap, n, 0) > 0 && gap_at(gap, n, 1) > 0;
-    };
-    if (separates(n.dot(toward) - reach) || separates(gap_at_start(n))) {
-      TakeSeparatedFrom(0, n);
-      return absl::OkStatus();
-    }
+void TranslationSearch::Cast() {
+  const FloatPair& start = start_.pair();
+  const RelativePath path(start, a_.X_WB, b_.X_WB);
+  if (!start.usable() || !IsFilterSize(path.size)) return;
+  const PathCast cast = CastPath(start, path);
+  if (cast.outcome == PathCast::Outcome::kSeparated) return TakeSeparatedFrom(0, cast.direction);
+  if (cast.outcome == PathCast::Outcome::kFacet) {
+    facet_ = cast.facet;
+    // Certificates need the exact normal.
+    const std::optional<BetweenTimes> entry =
+        options_.want_certificate ? std::nullopt
+                                  : FindEntry(start, path, a_.X_WB, b_.X_WB, *facet_);
+    if (entry) return TakeEntry(entry->before, entry->after, Relation::kOverlapping);
   }
-  std::optional<PoseProduct> product;
-  std::optional<PlacedHull> moved;
-  std::optional<FloatPair> later;
-  for (int step = 0; step < kMostFloatSteps; ++step) {
-    if (poll_.Step()) return MotionStopped();
-    if (step > 0) {
-      // Rounded: every claim is about `start`.
-      const Pose& before = b_.X_WB.start;
-      const Pose X_WB{before.q, before.t + lower_ * displacement};
-      if (IsIdentity(b_.X_BH)) {
-        moved.emplace(b_.hull, X_WB);
-      } else {
-        product.emplace(X_WB, b_.X_BH);
-        moved.emplace(b_.hull, *product);
-      }
-      later.emplace(start.a(), *moved);
-      if (!later->usable()) return absl::OkStatus();
-    }
-    const absl::StatusOr<Vector> found =
-        NearestDirection(step > 0 ? *later : start, toward, options_.should_stop, &nearest_);
-    if (!found.ok()) return found.status();
-    const Vector& n = *found;
-    if (n.isZero(0)) return absl::OkStatus();
-    const double gap_before = gap_at_start(n);
-    const double gap = gap_at(gap_before, n, lower_);
-    if (!(gap > kLeastRelativeGap * size)) return absl::OkStatus();
+  if (cast.separated_until > 0) {
+    lower_ = cast.separated_until;
     lower_excluded_ = true;
-    const double speed = -n.dot(displacement);
-    const double until = lower_ + gap / speed * (1 - kOpenShare);
-    const bool to_end = !(speed > 0) || !(until < 1);
-    if (!(gap_at(gap_before, n, to_end ? 1 : until) > 0)) return absl::OkStatus();
-    if (to_end) {
-      TakeSeparatedFrom(lower_, n);
-      return absl::OkStatus();
-    }
-    if (!(until > lower_)) return absl::OkStatus();
-    lower_ = until;
-    intervals_.push_back({lower_, n, std::nullopt});
-    toward = n;
+    intervals_ = {{lower_, cast.direction, std::nullopt}};
   }
-  return absl::OkStatus();
 }
 
-// Finds the time exactly if the origin enters a solid C through the inside of the nearest triangle.
+void TranslationSearch::TakeEntry(double before, double after, Relation relation) {
+  lower_ = before;
+  lower_excluded_ = before < after;
+  upper_ = after;
+  upper_state_ = Upper::kContact;
+  relation_ = relation;
+  // There is no better direction at lower_.
+  raised_ = true;
+}
+
+// Finds the time exactly if the origin enters C through the triangle at which the cast ended. If
+// its line crosses the border of the triangle, or C is flat, it may only graze C.
 absl::Status TranslationSearch::TryFacet() {
-  if (upper_state_ != Upper::kUnknown || nearest_.count != 3) return absl::OkStatus();
-  ExactPair& pair = middle().pair;
-  const IntegerVector& half = middle().half;
-  const IntegerVector p = pair.Difference(nearest_.pairs[0]);
-  const IntegerVector q = pair.Difference(nearest_.pairs[1]);
-  const IntegerVector r = pair.Difference(nearest_.pairs[2]);
+  if (upper_state_ != Upper::kUnknown || !facet_) return absl::OkStatus();
+  ExactPair pair(start_.pair(), options_.should_stop);
+  const IntegerVector p = pair.Difference((*facet_)[0]);
+  const IntegerVector q = pair.Difference((*facet_)[1]);
+  const IntegerVector r = pair.Difference((*facet_)[2]);
+  // The displacement in units of the pair over 2^shift.
+  const Vector& end_a = a_.X_WB.end.t;
+  const Vector& end_b = b_.X_WB.end.t;
+  const int exponent = LowestBitExponent(end_a, LowestBitExponent(end_b, pair.exponent()));
+  const int shift = pair.exponent() - exponent;
+  const IntegerVector of_a = ToInteger(end_a, exponent) - ToInteger(a_.X_WB.start.t, exponent);
+  const IntegerVector of_b = ToInteger(end_b, exponent) - ToInteger(b_.X_WB.start.t, exponent);
+  const IntegerVector d = pair.norm() * (of_b - of_a);
   // The sides of the path on which the edges pass.
-  const int side = Sign(Dot(half, Cross(p, q)));
-  if (side == 0 || Sign(Dot(half, Cross(q, r))) != side || Sign(Dot(half, Cross(r, p))) != side) {
-    return absl::OkStatus();
-  }
+  const auto [least, most] = std::minmax(
+      {SignOfDeterminant(d, p, q), SignOfDeterminant(d, q, r), SignOfDeterminant(d, r, p)});
+  if (least < 0 && most > 0) return absl::OkStatus();
   IntegerVector n = Cross(q - p, r - p);
-  if (Sign(Dot(n, half)) > 0) n = -n;
-  const Integer speed = Dot(n, half);
+  Integer speed = Dot(n, d);
+  if (Sign(speed) > 0) {
+    n = -n;
+    speed = -speed;
+  }
   const Integer reach = Dot(n, p);
-  const bool is_facet = Dot(n, pair.Farthest(n).w) == reach && SpanOf(pair).dimension == 3;
+  const bool is_facet = !speed.is_zero() && Dot(n, pair.Farthest(n).w) == reach;
   if (pair.stopped()) return MotionStopped();
   // Before time 0 or at the end, the other steps decide.
-  if (!is_facet || speed.is_zero() || Sign(-reach - speed) < 0) return absl::OkStatus();
-  const FloorTime entry = RoundDown(-reach - speed, -2 * speed);
+  if (!is_facet || Sign(reach) > 0) return absl::OkStatus();
+  const FloorTime entry = RoundDown(-reach << shift, -speed);
   if (entry.value == 1) return absl::OkStatus();
-  lower_ = entry.value;
-  lower_excluded_ = !entry.exact;
+  const bool is_inside = least * most != 0 && SpanOf(pair).dimension == 3;
+  TakeEntry(entry.value, entry.exact ? entry.value : std::nextafter(entry.value, 1.0),
+            is_inside ? Relation::kOverlapping : Relation::kTouching);
+  if (options_.want_certificate && entry.exact) {
+    proof_ = Certificate{n, {facet_->begin(), facet_->end()}};
+  } else if (options_.want_certificate) {
+    const ExactCorner inner = pair.Farthest(-n);
+    const BinaryTime time = ToBinary(upper_);
+    const auto at_upper = [&](const IntegerVector& w) {
+      return Shifted(w, shift + time.bits) - time.numerator * d;
+    };
+    if (IsInside(at_upper(p), at_upper(q), at_upper(r), at_upper(inner.w))) {
+      proof_ = Certificate{{}, {(*facet_)[0], (*facet_)[1], (*facet_)[2], inner.pair}};
+    }
+  }
   intervals_ = {{lower_, std::move(n), std::nullopt}};
-  upper_ = entry.exact ? lower_ : std::nextafter(lower_, 1.0);
-  upper_state_ = Upper::kContact;
-  relation_ = Relation::kOverlapping;
   return absl::OkStatus();
 }
 
@@ -266,6 +254,11 @@ absl::Status TranslationSearch::QueryAt(double time) {
 
 // Takes a direction that separates the pair at a time.
 absl::Status TranslationSearch::TakeSeparating(double time, Direction direction) {
+  const auto is_at_rest = [](const Motion& motion) { return motion.start.t == motion.end.t; };
+  if (is_at_rest(a_.X_WB) && is_at_rest(b_.X_WB)) {
+    TakeSeparatedFrom(0, std::move(direction));
+    return absl::OkStatus();
+  }
   const IntegerVector n = ToExact(direction);
   const Integer speed = Dot(n, middle().half);
   if (Sign(speed) >= 0) {
@@ -339,6 +332,10 @@ FirstContact TranslationSearch::Separated() {
 
 absl::Status TranslationSearch::AddCertificate(FirstContact& contact) {
   if (lower_ > 0) contact.intervals = std::move(intervals_);
+  if (proof_) {
+    contact.certificate = *std::move(proof_);
+    return absl::OkStatus();
+  }
   absl::StatusOr<Answer> answer =
       PairAt(a_, b_, upper_).Check(/*want_certificate=*/true, options_.should_stop);
   if (!answer.ok()) return answer.status();

@@ -3,6 +3,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <variant>
@@ -13,8 +14,9 @@
 #include "core/query/exact/exact_pair.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/motion/pair_at.h"
+#include "core/query/terms/certificate.h"
 #include "core/query/terms/relation.h"
-#include "core/query/terms/separation_bounds.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -23,9 +25,10 @@ namespace hulld {
 // for all w of C - t d separates the pair at t; if n.d < 0, also at all times before the one at
 // which the plane reaches the origin, a rational number; otherwise at all times after t.
 //
-// Directions come from floating point while they advance, each proven at both ends of its interval,
-// which usually ends at the triangle of C that the origin enters; one exact test of it then gives
-// the time. Otherwise, directions come from exact queries at doubles. These close in on the first
+// A cast in floating point usually proves a plane that separates the pair throughout, or ends at
+// the triangle of C that the origin enters. Double-double arithmetic proves the entry between two
+// doubles; if that fails, or a certificate is requested, one exact test of the triangle gives the
+// time. Otherwise, directions come from exact queries at doubles. These close in on the first
 // contact from both sides: each moves either the time before which the pair is separated, or the
 // earliest time known to be in contact or after it, until the two are adjacent doubles. A contact
 // between adjacent doubles that none of them shows is found by one exact query of the swept pair.
@@ -34,7 +37,7 @@ class TranslationSearch {
   // All arguments must outlive the search. Requires: neither hull is empty, and both motions are
   // valid translations.
   TranslationSearch(const MovingHull& a, const MovingHull& b, const MotionOptions& options)
-      : a_(a), b_(b), options_(options), poll_(options.should_stop, 1) {}
+      : a_(a), b_(b), options_(options), poll_(options.should_stop, 1), start_(a, b, 0) {}
 
   // CANCELLED: should_stop returned true.
   absl::StatusOr<FirstContact> Run();
@@ -53,7 +56,8 @@ class TranslationSearch {
   // Knowledge about upper_.
   enum class Upper { kUnknown, kContact, kSeparatedAfter };
 
-  absl::Status AdvanceInFloatingPoint();
+  void Cast();
+  void TakeEntry(double before, double after, Relation relation);
   absl::Status TryFacet();
   absl::Status Narrow();
   absl::Status RaiseToNearest();
@@ -70,10 +74,14 @@ class TranslationSearch {
   const MovingHull& b_;
   const MotionOptions& options_;
   StopPoll poll_;
+  // The pair at time 0.
+  const PairAt start_;
   // Built on demand.
   std::optional<Middle> middle_;
-  // The point of C that was nearest at the end of floating point.
-  FloatCombination nearest_;
+  // The triangle at which the cast ended.
+  std::optional<std::array<VertexPair, 3>> facet_;
+  // If requested, the proof of the contact at upper_ from this triangle.
+  std::optional<Certificate> proof_;
 
   // The pair is separated at all times before lower_, as the intervals prove, and at lower_ itself
   // if lower_excluded_.
@@ -90,7 +98,7 @@ class TranslationSearch {
   // Number of doubles from lower_ to the next query, and how often it may still return to 1.
   int64_t stride_ = 1;
   int restarts_left_ = 16;
-  // True if the direction in which the pair is nearest at lower_ was tried.
+  // True if the direction in which the pair is nearest at lower_ was tried, or is known.
   bool raised_ = false;
 };
 

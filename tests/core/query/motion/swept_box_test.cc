@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -17,8 +16,8 @@ namespace swept_box_test {
 
 using oracle::Rational;
 
-// The common time of both boxes that is deepest along the axis where they meet least: -1 if they
-// are disjoint throughout, 0 if they only touch, 1 otherwise. In rationals.
+// Returns -1 if the boxes are disjoint at each time, 0 if they meet at one time only, and otherwise
+// 1; in rationals.
 int BruteForceMeeting(const MovingBox& a, const MovingBox& b) {
   Rational begin = 0;
   Rational end = 1;
