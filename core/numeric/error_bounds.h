@@ -29,10 +29,10 @@ inline constexpr double kOrient2dErrorFactor = (3 + 16 * kUnitRoundoff) * kUnitR
 // rounding the bound itself. Proven.
 inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
 
-// The slope of that bound, kPlaneErrorFactor times |e||f|, is stored as a float. It rounds once as
-// a double, by u, and once more with this factor; conversion to a float, normal between
-// kPlaneMinSlope and kPlaneMaxSlope, loses up to 2^-24 of it. 1 + 2^-20 outweighs these losses, so
-// the float is not below the slope: 2^-20 > 2^-24 + 2^-43 + 2 u. Proven.
+// The slope of that bound, kPlaneErrorFactor |e||f|, is stored as a float that must not be below
+// the exact slope. The product and the multiplication by this factor round once each, by u; the
+// conversion to a float, normal between kPlaneMinSlope and kPlaneMaxSlope, loses at most 2^-24. 1 +
+// 2^-20 outweighs all three: 2^-20 > 2^-24 + 2^-43 + 2 u. Proven.
 inline constexpr double kPlaneSlopeRoundUp = 1 + 0x1p-20;
 
 // The side of a facet's plane on which the audit finds a point (audit.cc): n . (p - a), n the exact
@@ -81,12 +81,12 @@ inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 // largest component. Proven.
 inline constexpr double kProductTranslationError = 256 * kUnitRoundoff * kUnitRoundoff;
 
-// The same translation at a time of a motion. Its q is interpolated: each component errs by e = 18
-// u^2, and the largest, m, is at most |q|. Numerators of the entries and the squared norm change by
-// at most 4 e |q|, entries by 8 e / m: 432 u^2 / m |t_P| in total. The products of components err
-// by 5 u^2 of themselves, entries by 10 u^2: 30 u^2 |t_P|; t_B, interpolated between x0 and x1, by
-// 9 u^2 (|x0| + |x1|): both are within the slack of kProductTranslationError. Times |t_P| / m.
-// Proven.
+// The same translation at a time of a motion. Interpolation adds an error of e = 18 u^2 to each
+// component of q; the largest component, m, is at most |q|. Numerators of the entries and the
+// squared norm change by at most 4 e |q|, so entries change by 8 e / m and the translation by 432
+// u^2 / m |t_P|. Products of components err by 5 u^2 of themselves: 10 u^2 per entry, 30 u^2 |t_P|
+// in total. Interpolating t_B between x0 and x1 adds 9 u^2 (|x0| + |x1|). Both are within the slack
+// of kProductTranslationError. Times |t_P| / m. Proven.
 inline constexpr double kProductTurnError = 512 * kUnitRoundoff * kUnitRoundoff;
 
 // The difference of two translations, at least one of which belongs to a product of poses. The
