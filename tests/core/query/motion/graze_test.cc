@@ -56,12 +56,19 @@ std::vector<Passage> Passages() {
                                       {2, 1, -1}, {2, -1, 1}, {2, 1, 1}};
   const std::vector<Vector> far_tip = Shifted(Octahedron(), {2, 0, 0});
   const Vector z(0, 0, 1);
+  // A tip rolls over a face, as the teeth of gears do, so that the nearest direction turns.
+  Motion rolling = Swinging(-z);
+  rolling.start.t = rolling.end.t = {2, 0, 0};
   const Vector tilted(0.6, 0, 0.8);
   const Pose shifted = {{1, 1, 0, 0}, {0.25, 0, 0}};
   const std::vector<Vector> back = Shifted(Octahedron(), {-0.25, 0, 0});
   return {
       {"vertex and face", {Octahedron(), Swinging(z)}, {wall}},
       {"vertex and turning face", {Octahedron(), Swinging(tilted)}, {wall, Swinging({1, 0, 0})}},
+      {"vertex and rolling face", {Box(1, 0.5, 0.5), Swinging(z)}, {Octahedron(), rolling}},
+      {"ball and rolling face",
+       {Box(1, 0.5, 0.5), Swinging(z)},
+       {Scaled(Octahedron(), 0.75), rolling, 0.25}},
       {"edge and face", {ridge, Swinging(z)}, {wall}},
       {"edge and edge", {ridge, Swinging(tilted)}, {across}},
       {"vertex and edge", {Octahedron(), Swinging(tilted)}, {across}},
@@ -83,7 +90,9 @@ std::vector<Passage> Passages() {
 OwnMoving Moving(const Part& part, double scale, double shift) {
   Part scaled = part;
   scaled.X_BH.t *= scale;
-  for (Pose* pose : {&scaled.motion.start, &scaled.motion.end}) pose->t.x() += scale * shift;
+  for (Pose* pose : {&scaled.motion.start, &scaled.motion.end}) {
+    pose->t = scale * (pose->t + shift * Vector::UnitX());
+  }
   return OwnMoving(Scaled(part.points, scale), scaled.motion, scale * part.radius, scaled.X_BH);
 }
 
@@ -166,7 +175,7 @@ TEST(Graze, AnswersAgreeWithDenseSamples) {
     times.push_back(Rational(1, 2) + step);
   }
   for (const Passage& passage : Passages()) {
-    if (passage.a.radius > 0) continue;
+    if (passage.a.radius > 0 || passage.b.radius > 0) continue;
     for (const double gap : {1e-7, 1e-10, 1e-13, -1e-13, -1e-10}) {
       SCOPED_TRACE(testing::Message() << passage.name << ", " << gap);
       const OwnMoving a = Moving(passage.a, 1, 0);
