@@ -31,6 +31,9 @@ constexpr double kLeastShare = 0x1p-4;
 constexpr double kGrowth = 4;
 // A tolerable step that is shorter than this makes no progress. A choice.
 constexpr double kShortestStep = 0x1p-50;
+// Floating point finds the direction between hulls that are nearer than this share of their size
+// too inaccurately for long steps. A choice.
+constexpr double kExactShare = 0x1p-36;
 // Share of the last length below which a tolerable step is not tried before the search is stuck. A
 // choice.
 constexpr double kLeastTolerableShare = 0x1p-8;
@@ -69,8 +72,9 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
           separated_ == 0 ? RelationAt(0) : Relation::kSeparated;
       if (!relation.ok()) return relation.status();
       if (*relation != Relation::kSeparated) return Contact(0, *relation);
-      // Floating point may find no good direction so near.
-      found = NextExactStep();
+      exact_ = true;
+      turns_ = false;
+      found = NextStep();
       if (!found.ok()) return found.status();
       if (!*found) return ConcludeStuck();
     }
@@ -82,14 +86,17 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       may_tolerate = false;
     }
     if (options_.want_certificate) {
-      intervals_.push_back({step.until,
-                            direction_,
-                            step.plane.found.offset,
-                            {{step.plane.end_direction, step.plane.found.end_offset}}});
+      // In place: g++ 12 warns of a variant that is moved there.
+      SeparatedInterval& interval = intervals_.emplace_back();
+      interval.until = step.until;
+      interval.direction = direction_;
+      interval.offset = step.plane.found.offset;
+      interval.end = {step.plane.end_direction, step.plane.found.end_offset};
     }
     turns_ = step.plane.end_direction != direction_;
     last_length_ = step.until - separated_;
     last_gap_ = step.gap;
+    exact_ = step.plane.found.gap <= kExactShare * plane_.size();
     direction_ = step.plane.end_direction;
     separated_ = step.until;
     if (separated_ == 1 || separated_ > options_.latest) {
@@ -115,14 +122,11 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
 
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) const {
   const PairAt at(a_, b_, time);
+  if (exact_) return ExactNearestUnit(at.pair(), options_.should_stop);
   const Vector first =
       direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
   if (at.pair().usable() && first.isZero(0)) return Vector(Vector::UnitX());
   return NearestDirection(at.pair(), first, options_.should_stop);
-}
-
-absl::StatusOr<Vector> TurningSearch::ExactDirectionAt(double time) const {
-  return ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
 }
 
 // Tries a plane of constant direction n and, if it fails and `turns`, one that turns from n to the
@@ -147,13 +151,6 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
     if (!n.ok()) return n.status();
     direction_ = *n;
   }
-  return FindStep(direction_);
-}
-
-absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextExactStep() {
-  const absl::StatusOr<Vector> n = ExactDirectionAt(separated_);
-  if (!n.ok()) return n.status();
-  direction_ = *n;
   return FindStep(direction_);
 }
 
@@ -224,7 +221,6 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   double length = last_length_;
   const double shortest =
       thorough ? kShortestStep : std::max(kShortestStep, kLeastTolerableShare * last_length_);
-  bool is_exact = false;
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
@@ -235,19 +231,18 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
       if (plane->found.proven || until - time < shortest) break;
     }
     if (!plane->found.proven) {
-      if (is_exact || !thorough) return time;
-      // Floating point may find no good direction so near.
-      const absl::StatusOr<Vector> exact = ExactDirectionAt(time);
+      if (exact_ || !thorough) return time;
+      exact_ = true;
+      const absl::StatusOr<Vector> exact = DirectionAt(time);
       if (!exact.ok()) return exact.status();
       if (exact->isZero(0)) return time;
       n = *exact;
-      is_exact = true;
       continue;
     }
-    is_exact = false;
     length = until - time;
     time = until;
     n = plane->end_direction;
+    exact_ = std::abs(plane->found.gap) <= kExactShare * plane_.size();
     const absl::StatusOr<Vector> nearest = DirectionAt(time);
     if (!nearest.ok()) return nearest.status();
     // The nearest direction is unreliable if the hulls meet; the previous one may then be better.

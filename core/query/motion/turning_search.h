@@ -56,11 +56,9 @@ class TurningSearch {
 
   absl::StatusOr<Relation> RelationAt(double time) const;
   absl::StatusOr<Vector> DirectionAt(double time) const;
-  absl::StatusOr<Vector> ExactDirectionAt(double time) const;
   absl::StatusOr<Plane> TryPlane(const Vector& n, double start, double end, bool turns,
                                  double margin = 0) const;
   absl::StatusOr<std::optional<Step>> NextStep();
-  absl::StatusOr<std::optional<Step>> NextExactStep();
   absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
   absl::StatusOr<bool> StaysWithinResolution();
@@ -85,6 +83,8 @@ class TurningSearch {
   // The nearest direction turns faster than the gap closes.
   bool turns_ = false;
   double last_gap_ = std::numeric_limits<double>::infinity();
+  // Directions are exact but for their rounding: the hulls are too near for floating point.
+  bool exact_ = false;
 };
 
 }  // namespace hulld
