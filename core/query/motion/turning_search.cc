@@ -31,9 +31,10 @@ constexpr double kLeastShare = 0x1p-4;
 constexpr double kGrowth = 4;
 // A tolerable step that is shorter than this makes no progress. A choice.
 constexpr double kShortestStep = 0x1p-50;
-// Floating point finds the direction between hulls that are nearer than this share of their size
-// too inaccurately for long steps. A choice.
+// Between hulls that are nearer than this share of their size, a step shorter than the second share
+// of the last one may be due to the error of a floating-point direction. Choices.
 constexpr double kExactShare = 0x1p-36;
+constexpr double kPoorShare = 0x1p-6;
 // Share of the last length below which a tolerable step is not tried before the search is stuck. A
 // choice.
 constexpr double kLeastTolerableShare = 0x1p-8;
@@ -67,18 +68,21 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
     if (poll_.Step()) return MotionStopped();
     absl::StatusOr<std::optional<Step>> found = NextStep();
     if (!found.ok()) return found.status();
-    if (!*found) {
-      const absl::StatusOr<Relation> relation =
-          separated_ == 0 ? RelationAt(0) : Relation::kSeparated;
-      if (!relation.ok()) return relation.status();
-      if (*relation != Relation::kSeparated) return Contact(0, *relation);
+    if (!*found || IsPoor(**found)) {
+      if (!*found && separated_ == 0) {
+        const absl::StatusOr<Relation> relation = RelationAt(0);
+        if (!relation.ok()) return relation.status();
+        if (*relation != Relation::kSeparated) return Contact(0, *relation);
+      }
       exact_ = true;
       turns_ = false;
-      found = NextStep();
-      if (!found.ok()) return found.status();
-      if (!*found) return ConcludeStuck();
+      absl::StatusOr<std::optional<Step>> exact = NextStep();
+      if (!exact.ok()) return exact.status();
+      if (!*found && !*exact) return ConcludeStuck();
+      if (*exact && (!*found || (*exact)->until > (*found)->until)) found = std::move(exact);
     }
     const Step& step = **found;
+    direction_ = step.direction;
     if (may_tolerate && step.gap <= resolution_) {
       const absl::StatusOr<bool> stays = StaysWithinResolution();
       if (!stays.ok()) return stays.status();
@@ -96,7 +100,7 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
     turns_ = step.plane.end_direction != direction_;
     last_length_ = step.until - separated_;
     last_gap_ = step.gap;
-    exact_ = step.plane.found.gap <= kExactShare * plane_.size();
+    exact_ = exact_ && step.plane.found.gap <= kExactShare * plane_.size();
     direction_ = step.plane.end_direction;
     separated_ = step.until;
     if (separated_ == 1 || separated_ > options_.latest) {
@@ -154,6 +158,12 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
   return FindStep(direction_);
 }
 
+// Returns true if an exact direction may give a much longer step.
+bool TurningSearch::IsPoor(const Step& step) const {
+  return !exact_ && step.gap <= kExactShare * plane_.size() &&
+         step.until - separated_ < kPoorShare * last_length_;
+}
+
 // Returns a long interval for which a plane of direction n at its start is proven, or none if there
 // is no progress.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const Vector& n) {
@@ -161,7 +171,7 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const
   const MovingPlane::Result start = plane_.Try(n, n, separated_, separated_);
   if (!start.proven) return std::nullopt;
   turns_ = turns_ || start.gap > kTurnedShare * last_gap_;
-  Step step = {separated_, {start, n}, start.gap, 2};
+  Step step = {separated_, n, {start, n}, start.gap, 2};
   Plane failed = step.plane;
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
   for (int i = 0; i < kMostTrials || step.until == separated_; ++i) {
@@ -224,25 +234,25 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
+    const double poor = exact_ || !thorough ? shortest : std::max(shortest, kPoorShare * length);
     absl::StatusOr<Plane> plane;
     for (;; until = time + (until - time) / 2) {
       plane = TryPlane(n, time, until, /*turns=*/true, margin);
       if (!plane.ok()) return plane.status();
-      if (plane->found.proven || until - time < shortest) break;
+      if (plane->found.proven || until - time < poor) break;
     }
     if (!plane->found.proven) {
       if (exact_ || !thorough) return time;
       exact_ = true;
       const absl::StatusOr<Vector> exact = DirectionAt(time);
       if (!exact.ok()) return exact.status();
-      if (exact->isZero(0)) return time;
-      n = *exact;
+      if (!exact->isZero(0)) n = *exact;
       continue;
     }
     length = until - time;
     time = until;
     n = plane->end_direction;
-    exact_ = std::abs(plane->found.gap) <= kExactShare * plane_.size();
+    exact_ = exact_ && std::abs(plane->found.gap) <= kExactShare * plane_.size();
     const absl::StatusOr<Vector> nearest = DirectionAt(time);
     if (!nearest.ok()) return nearest.status();
     // The nearest direction is unreliable if the hulls meet; the previous one may then be better.

@@ -47,6 +47,7 @@ class TurningSearch {
   // A plane from separated_ to `until`.
   struct Step {
     double until;
+    Vector direction;
     Plane plane;
     // The gap along the direction at separated_.
     double gap;
@@ -59,6 +60,7 @@ class TurningSearch {
   absl::StatusOr<Plane> TryPlane(const Vector& n, double start, double end, bool turns,
                                  double margin = 0) const;
   absl::StatusOr<std::optional<Step>> NextStep();
+  bool IsPoor(const Step& step) const;
   absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
   absl::StatusOr<bool> StaysWithinResolution();
