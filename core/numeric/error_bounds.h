@@ -280,12 +280,8 @@ inline constexpr double kTranslatedGapErrorFactor = 512 * kUnitRoundoff;
 // L) u^2 X Y / |n . d|, its rounding by 17 u^2 |time|, which is less than 160 |time| L u^2 X Y / |n
 // . d|. The total is below 7000 u^2 X Y (S + |time| L) / |n . d|; 8192 u^2 leaves slack for the
 // rounding of the bound. Times X Y (S + |time| L) / |n . d|, for S + L between kEntryMinSize and
-// kEntryMaxSize and edges of at least kEntryMinEdge: then underflow adds less than 2^-800, and the
-// bound is above 2^-480. Proven.
+// kEntryMaxSize and edges of at least kEntryMinEdge. Proven.
 inline constexpr double kEntryTimeErrorFactor = 8192 * kUnitRoundoff * kUnitRoundoff;
-inline constexpr double kEntryMinSize = 0x1p-100;
-inline constexpr double kEntryMaxSize = 0x1p100;
-inline constexpr double kEntryMinEdge = 0x1p-140;
 
 // The length of a computed unit direction is at most 1 + 8 u, by that of its rounding; the product
 // with a radius errs by u more. The margins r |n| of the plane above, with |n| the larger of both

@@ -119,6 +119,13 @@ inline constexpr double kInterpolationLeastRemainder = 0x1p-40;
 inline constexpr double kMotionMinSize = 0x1p-700;
 inline constexpr double kMotionMaxSize = 0x1p900;
 
+// The time at which a path crosses a facet (see kEntryTimeErrorFactor): underflow loses at most
+// 2^-1074, multiplied by at most two sizes and small factors, below 2^-800; the bound, times the
+// slope, is at least 2^13 u^2 times the least sizes of two edges and a pair, 2^-473. Proven.
+inline constexpr double kEntryMinSize = 0x1p-100;
+inline constexpr double kEntryMaxSize = 0x1p100;
+inline constexpr double kEntryMinEdge = 0x1p-140;
+
 // Above this, the bound of a gap along a textbook axis is itself accurate: it is far above the
 // underflow threshold. Proven.
 inline constexpr double kGapMinBound = 0x1p-900;

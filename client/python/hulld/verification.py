@@ -419,7 +419,7 @@ class _MovingPiece:
         crossed = (_dot(n0, x1) + _dot(n1, x0) - offset0 - offset1) / 2
         constants = _product(norms, (_dot(n0, x0) - offset0, crossed, _dot(n1, x1) - offset1))
         # Of each axis of the hull, over pairs of a form and a direction.
-        middle = tuple((x + y) / 2 for x, y in zip(n0, n1))
+        middle = (n0[0] + n1[0]) / 2, (n0[1] + n1[1]) / 2, (n0[2] + n1[2]) / 2
         directions = [
             [
                 [_dot(n, (rows[0][k], rows[1][k], rows[2][k])) for n in (n0, middle, n1)]

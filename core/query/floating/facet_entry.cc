@@ -7,6 +7,7 @@
 
 #include "core/numeric/double_double.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
 #include "core/query/terms/separation_bounds.h"
 

@@ -82,22 +82,15 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       if (*exact && (!*found || (*exact)->until > (*found)->until)) found = std::move(exact);
     }
     const Step& step = **found;
-    direction_ = step.direction;
-    if (may_tolerate && step.gap <= resolution_) {
-      const absl::StatusOr<bool> stays = StaysWithinResolution();
-      if (!stays.ok()) return stays.status();
-      if (*stays) return WithoutContact(Relation::kWithinTolerance);
-      may_tolerate = false;
-    }
     if (options_.want_certificate) {
       // In place: g++ 12 warns of a variant that is moved there.
       SeparatedInterval& interval = intervals_.emplace_back();
       interval.until = step.until;
-      interval.direction = direction_;
+      interval.direction = step.direction;
       interval.offset = step.plane.found.offset;
       interval.end = {step.plane.end_direction, step.plane.found.end_offset};
     }
-    turns_ = step.plane.end_direction != direction_;
+    turns_ = step.plane.end_direction != step.direction;
     last_length_ = step.until - separated_;
     last_gap_ = step.gap;
     exact_ = exact_ && step.plane.found.gap <= kExactShare * plane_.size();
@@ -113,6 +106,12 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       const absl::StatusOr<Relation> relation = RelationAt(time);
       if (!relation.ok()) return relation.status();
       if (*relation != Relation::kSeparated) return Contact(time, *relation);
+    }
+    if (may_tolerate && step.gap <= resolution_) {
+      const absl::StatusOr<bool> stays = StaysWithinResolution();
+      if (!stays.ok()) return stays.status();
+      if (*stays) return WithoutContact(Relation::kWithinTolerance);
+      may_tolerate = false;
     }
   }
 }

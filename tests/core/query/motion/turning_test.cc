@@ -187,17 +187,19 @@ TEST(Turning, GrazesAreNeitherMissedNorInvented) {
   EXPECT_EQ(Find(box, wall, options).relation, Relation::kOverlapping);
 }
 
-TEST(Turning, AFinerResolutionSeparatesNearerMisses) {
+TEST(Turning, MissesBelowTheAccuracyOfPlanesAreWithinTolerance) {
   const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
-  const OwnMoving wall(Box(0.5, 5, 5), AtRest({std::sqrt(2.0) + 1e-4 + 0.5, 0, 0}));
-  MotionOptions options;
-  options.resolution = 1e-3;
-  const FirstContact coarse = Find(box, wall, options);
-  EXPECT_EQ(coarse.relation, Relation::kWithinTolerance);
-  EXPECT_FALSE(coarse.contact_time.has_value());
-  EXPECT_LT(coarse.separated_until, 1);
-  options.resolution = 1e-6;
-  EXPECT_EQ(Find(box, wall, options).relation, Relation::kSeparated);
+  const auto passing = [&](double gap) {
+    const OwnMoving wall(Box(0.5, 5, 5), AtRest({std::sqrt(2.0) + gap + 0.5, 0, 0}));
+    MotionOptions options;
+    options.resolution = 1e-3;
+    return Find(box, wall, options);
+  };
+  EXPECT_EQ(passing(1e-4).relation, Relation::kSeparated);
+  const FirstContact near = passing(1e-14);
+  EXPECT_EQ(near.relation, Relation::kWithinTolerance);
+  EXPECT_FALSE(near.contact_time.has_value());
+  EXPECT_LT(near.separated_until, 1);
 }
 
 // A point on a circle about the other hull: the plane of a step comes within the resolution, the
