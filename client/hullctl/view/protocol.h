@@ -50,8 +50,9 @@ namespace hulld {
 //              only; endPose: the end of its motion, null if it has none. Later messages name
 //              objects and files by their index here. contacts: the waypoints with a colliding
 //              pair. named: the first pair that the file names; empty if it names none. watch: the
-//              messages of a recorded watch, as in the contract; empty if there is none. Placements
-//              are objects. `collisions` is ignored with a watch of pairs, `hull` with one of hulls.
+//              messages of a recorded watch, as in the contract; empty if there is none.
+//              Placements are objects. `collisions` is ignored with a watch of pairs, `hull` with
+//              one of hulls.
 //   objects    {scene, objects}: appends objects to that scene.
 //   hull       {event}: a HullEvent of the contract: a hull or a body changed, appeared, or was
 //              deleted.
