@@ -34,7 +34,7 @@ constexpr double kShortestStep = 0x1p-50;
 // Between hulls that are nearer than this share of their size, a step shorter than the second share
 // of the last one may be due to the error of a floating-point direction. Choices.
 constexpr double kExactShare = 0x1p-36;
-constexpr double kPoorShare = 0x1p-6;
+constexpr double kPoorShare = 0x1p-8;
 // Share of the last length below which a tolerable step is not tried before the search is stuck. A
 // choice.
 constexpr double kLeastTolerableShare = 0x1p-8;
