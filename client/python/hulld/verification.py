@@ -418,7 +418,7 @@ class _MovingPiece:
         norms = [norm for _, norm in forms]
         crossed = (_dot(n0, x1) + _dot(n1, x0) - offset0 - offset1) / 2
         constants = _product(norms, (_dot(n0, x0) - offset0, crossed, _dot(n1, x1) - offset1))
-        # Of each axis of the hull, over pairs of a form and a direction.
+        # For each axis of the hull: its dot product with each direction, turned by each form.
         middle = (n0[0] + n1[0]) / 2, (n0[1] + n1[1]) / 2, (n0[2] + n1[2]) / 2
         directions = [
             [

@@ -15,10 +15,9 @@
 
 namespace hulld {
 
-// Finds the first contact of two hulls of which at least one turns, by conservative advancement
-// (Mirtich 1996). At a time that is known to be separated, the direction in which the hulls are
-// nearest gives a plane, and the longest interval found for which MovingPlane proves it leads to
-// the next time. If the plane fails within max_time_error, an exact query at a double may prove
+// Finds the first contact of two hulls, at least one of which rotates, by conservative advancement
+// (Mirtich 1996). While the hulls are separated, the direction of their least distance gives a
+// plane. MovingPlane proves it for an interval, as long as possible, whose end is the next time. If the plane fails within max_time_error, an exact query at a double may prove
 // contact.
 //
 // A plane of constant direction takes most of the gap along it, so a transversal contact needs few

@@ -151,8 +151,8 @@ class RegisteredHull {
   // counts as held for readers until the last of them releases it, even if the hull ends first.
   // Cost: O(log n) for the first reader, O(1) for later ones.
   std::shared_ptr<const ServedHull> Serve();
-  // Load what IsReady and Serve read into the processor's caches, for several hulls at once: first
-  // this object, then the objects that it refers to.
+  // Prefetch the data that IsReady and Serve read: Prefetch this object, PrefetchParts the objects
+  // that it refers to. Call the first for several hulls, then the second, so that misses overlap.
   void Prefetch() const;
   void PrefetchParts() const;
   // Approximate bytes that the current version shares with readers, as last counted.

@@ -24,7 +24,7 @@ from hulld.robot.answers import MotionContact
 from hulld.robot.description import NO_MOTION
 from hulld.robot.motion_bounds import MOST_TURN, MotionBound
 
-# As in client/hullctl/robot/continuous_check.cc.
+# The limits of client/hullctl/robot/continuous_check.cc.
 _MOST_SEARCHES = 4096
 _MOST_SPANS = 4096
 _SPANS_PER_SEARCH = 8

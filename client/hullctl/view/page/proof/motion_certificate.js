@@ -311,7 +311,7 @@ function checkBodies(relation, contact, certificates, a, b) {
 export const motionProblem = (relation, contact, certificate, a, b) =>
     problemOf(() => checkPair(relation, contact, certificate, a, b));
 
-// As above, for bodies: a and b are lists of all their pieces; certificates: one for each pair of
-// pieces, up to separatedUntil.
+// Like motionProblem, for bodies. a and b list all pieces; each pair of pieces has one certificate,
+// which proves its separation up to separatedUntil.
 export const bodiesMotionProblem = (relation, contact, certificates, a, b) =>
     problemOf(() => checkBodies(relation, contact, certificates, a, b));
