@@ -17,8 +17,8 @@ namespace hulld {
 
 // Finds the first contact of two hulls, at least one of which rotates, by conservative advancement
 // (Mirtich 1996). While the hulls are separated, the direction of their least distance gives a
-// plane. MovingPlane proves it for an interval, as long as possible, whose end is the next time. If the plane fails within max_time_error, an exact query at a double may prove
-// contact.
+// plane. MovingPlane proves it for an interval, as long as possible, whose end is the next time. If
+// the plane fails within max_time_error, an exact query at a double may prove contact.
 //
 // A plane of constant direction takes most of the gap along it, so a transversal contact needs few
 // steps. Past a graze, the nearest direction turns before the gap closes; there the plane turns,
