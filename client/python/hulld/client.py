@@ -539,14 +539,14 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Containment:
-        """Which points are inside a hull or body, on its boundary, or outside: exact, for the
-        doubles given.
+        """Tells for each point whether it is inside a hull or body, on its boundary, or outside:
+        exactly, for the doubles given.
 
         points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: its
-        pose in the world. separation, max_error: as in check_collision; the distance, or minus the
-        depth. A point in a seam of two pieces of a body is on both, so on the body. The points go
-        in as few calls as the server's limits allow, each about the current version of the hull;
-        `timeout` is for each.
+        pose in the world. separation, max_error: as in check_collision; the distance, or the
+        negative depth. A point where two pieces of a body meet counts as on its boundary. The
+        points are sent in as few calls as the server's limits allow; each call answers for the
+        current version of the hull and has its own `timeout`.
 
         NotFoundError: no such hull.
         """

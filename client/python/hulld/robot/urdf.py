@@ -224,9 +224,9 @@ def _check_mimics(joints: dict[str, Element]) -> None:
 
 
 def read_disabled_pairs(path: str | os.PathLike[str], robot: Description) -> set[tuple[int, int]]:
-    """The pairs of links that an SRDF file disables, the lower index first: those of
-    disable_collisions, and those of disable_default_collisions without enable_collisions.
-    ValueError names file and line: malformed XML, or a link that the robot lacks."""
+    """Returns the pairs of links that an SRDF file disables, the lower index first:
+    disable_collisions, and disable_default_collisions minus enable_collisions. ValueError, with
+    file and line: malformed XML, or an unknown link."""
     links = {link.name: index for index, link in enumerate(robot.links)}
     root = read_xml(path, "robot")
 
