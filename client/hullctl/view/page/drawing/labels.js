@@ -52,22 +52,24 @@ export class Labels {
 
   // Places each label above its object in the picture, or below it. Hides it if it would
   // overlap a label that matters more or the buttons, or if the object is out of the picture.
+  // Reads all sizes before it writes: reading after a write makes the browser lay out the page.
   place() {
+    const taken = this.buttonBoxes();
     const shown = [];
     for (const [object, row] of this.rows) {
+      row.box = null;
       row.anchor = this.anchorOf(object);
-      row.element.hidden = true;
       if (!row.anchor) continue;
       row.rank = this.isOfPair(object) ? -1 : row.anchor.distance;
       shown.push(row);
     }
-    const taken = this.buttonBoxes();
     for (const row of shown.sort((a, b) => a.rank - b.rank)) {
-      const box = this.freeBox(row, taken);
-      if (!box) continue;
-      taken.push(box);
-      row.element.hidden = false;
-      row.element.style.transform = `translate(${box.left}px, ${box.top}px)`;
+      row.box = this.freeBox(row, taken);
+      if (row.box) taken.push(row.box);
+    }
+    for (const {element, box} of this.rows.values()) {
+      element.hidden = !box;
+      if (box) element.style.transform = `translate(${box.left}px, ${box.top}px)`;
     }
   }
 
