@@ -6,6 +6,7 @@ import asyncio
 import inspect
 import os
 import pathlib
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -31,15 +32,24 @@ def client(server: hulld.LocalServer) -> Iterator[hulld.Client]:
 
 
 class Blocking:
-    """An asynchronous object, used like its synchronous twin: one test tries both."""
+    """An asynchronous object, used like its synchronous twin: one test tries both.
+
+    The loop runs in a thread of its own, so that any thread may call.
+    """
 
     def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
         self._target = target
         self._loop = loop
 
+    def _run(self, awaitable: Any) -> Any:
+        async def wait() -> Any:
+            return await awaitable
+
+        return asyncio.run_coroutine_threadsafe(wait(), self._loop).result()
+
     def _settle(self, value: Any) -> Any:
         if inspect.isawaitable(value):
-            value = self._loop.run_until_complete(value)
+            value = self._run(value)
         if hasattr(value, "__anext__") or hasattr(value, "__aenter__"):
             return Blocking(value, self._loop)
         return value
@@ -54,7 +64,7 @@ class Blocking:
             async def start() -> Any:
                 return value(*arguments, **options)
 
-            return self._settle(self._loop.run_until_complete(start()))
+            return self._settle(self._run(start()))
 
         return call
 
@@ -71,7 +81,7 @@ class Blocking:
         return self._settle(self._target.__aenter__())
 
     def __exit__(self, *error: Any) -> None:
-        self._loop.run_until_complete(self._target.__aexit__(*error))
+        self._run(self._target.__aexit__(*error))
 
 
 @pytest.fixture(params=["sync", "async"])
@@ -80,7 +90,8 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     clients: list[Any] = []
     loop = asyncio.new_event_loop() if request.param == "async" else None
     if loop is not None:
-        asyncio.set_event_loop(loop)
+        thread = threading.Thread(target=loop.run_forever)
+        thread.start()
 
     def make(server: str, **options: Any) -> Any:
         made = (
@@ -95,7 +106,9 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     for made in clients:
         made.close()
     if loop is not None:
-        loop.run_until_complete(loop.shutdown_asyncgens())
+        asyncio.run_coroutine_threadsafe(loop.shutdown_asyncgens(), loop).result()
+        loop.call_soon_threadsafe(loop.stop)
+        thread.join()
         loop.close()
 
 

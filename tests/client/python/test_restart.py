@@ -82,14 +82,14 @@ def running(tmp_path: pathlib.Path) -> Iterator[Restartable]:
     server.kill()
 
 
-def outlives_a_restart(server: Restartable, call: Callable[[], Any]) -> Any:
-    """The answer of `call`, which begins while the server is gone."""
+def outlive_a_restart(server: Restartable, *calls: Callable[[], Any]) -> list[Any]:
+    """The answers of `calls`, which begin while the server is gone."""
     server.kill()
-    with concurrent.futures.ThreadPoolExecutor(1) as thread:
-        answer = thread.submit(call)
-        server.refuse(REFUSED, answer.done)
+    with concurrent.futures.ThreadPoolExecutor(len(calls)) as threads:
+        answers = [threads.submit(call) for call in calls]
+        server.refuse(REFUSED, lambda: any(answer.done() for answer in answers))
         server.start()
-        return answer.result()
+        return [answer.result() for answer in answers]
 
 
 def test_every_safe_call_outlives_a_restart(connect: Any, running: Restartable) -> None:
@@ -97,7 +97,8 @@ def test_every_safe_call_outlives_a_restart(connect: Any, running: Restartable) 
     client.append_points("cube", CUBE, create=True)
     client.put_body("body", ["cube"])
     pair = ["cube", ("body", (3, 0, 0))]
-    for call in (
+    outlive_a_restart(
+        running,
         client.get_status,
         lambda: client.create_hull("cube", if_absent=True),
         lambda: client.get_hull("cube"),
@@ -109,8 +110,7 @@ def test_every_safe_call_outlives_a_restart(connect: Any, running: Restartable) 
         lambda: list(client.iter_find_collisions(pair)),
         lambda: client.append_points("cube", CUBE),
         lambda: next(iter(client.watch_hulls())),
-    ):
-        outlives_a_restart(running, call)
+    )
 
 
 def test_an_open_append_goes_on_after_a_restart(connect: Any, running: Restartable) -> None:
@@ -122,7 +122,7 @@ def test_an_open_append_goes_on_after_a_restart(connect: Any, running: Restartab
             appender.append(CUBE[4:])
             return appender.finish()
 
-        done = outlives_a_restart(running, append_the_rest)
+        [done] = outlive_a_restart(running, append_the_rest)
     assert done.points_acknowledged == 8
     assert client.get_hull("cube").info.vertex_count == 8
 
@@ -157,7 +157,8 @@ def test_hullctl_waits_for_a_server_as_long_as_it_is_told(running: Restartable) 
     def status() -> subprocess.CompletedProcess[str]:
         return hullctl("list", "--timeout", f"{TIMEOUT}s")
 
-    assert outlives_a_restart(running, status).returncode == 0
+    [answer] = outlive_a_restart(running, status)
+    assert answer.returncode == 0
     running.kill()
     assert hullctl("list").returncode == 3
 
