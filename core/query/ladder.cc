@@ -9,6 +9,7 @@
 #include "core/numeric/expansion.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_search.h"
+#include "core/query/exact/lattice_contact.h"
 #include "core/query/floating/float_search.h"
 
 namespace hulld {
@@ -190,6 +191,17 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
                                              Purpose purpose,
                                              const std::function<bool()>& should_stop,
                                              Decision& decision) {
+  if (end != nullptr) {
+    if (const std::optional<LatticeContact> contact = FindLatticeContact(pair, *end)) {
+      decision.relation = Relation::kTouching;
+      decision.rung = Rung::kExact;
+      ++decision.directions_tried;
+      decision.pair_count = 3;
+      std::copy(contact->pairs.begin(), contact->pairs.end(), decision.pairs.begin());
+      decision.axis = contact->axis;
+      return absl::OkStatus();
+    }
+  }
   absl::StatusOr<ExactSearchResult> found =
       SearchExactly(pair, end, purpose == Purpose::kEvidence, should_stop);
   if (!found.ok()) return found.status();
