@@ -48,6 +48,15 @@ constexpr double kNormalRelativeError = kMaxNormalAngle * kMaxNormalAngle / 8;
 // Frobenius norm of two differences of computed vertices of A errs by no more. Times S. Proven.
 constexpr double kSpanErrorFactor = 1024 * kUnitRoundoff;
 
+// Lower bounds of the distance in a plane of the origin from an edge of two computed Minkowski
+// vertices p and q, n . (p x q) / |q - p| for a unit vector n across the plane (length within 8 u
+// of 1): each vertex errs by sqrt(3) * 128 u S = 222 u S and is at most 7 S, so the product by 2 *
+// 7 * 223 u S^2, and by 11 u * 49 S^2 for rounding and the length of n: below 4000 u S^2. The
+// length of the edge errs by 2 * 222 u S and rounding of at most 14 S by 6 u: below 600 u S.
+// Proven.
+constexpr double kEdgeMomentErrorFactor = 4096 * kUnitRoundoff;
+constexpr double kEdgeLengthErrorFactor = 1024 * kUnitRoundoff;
+
 // Returns the absolute separation from its bounds: their midpoint, and half their width rounded up.
 // The midpoint is positive because the upper bound is.
 Separation MiddleOf(const SeparationBounds& bounds) {
@@ -115,13 +124,12 @@ class SeparationSearch {
     return AddExactWitness(answer);
   }
 
-  // Separated pairs only: floating point cannot order two facets at about the same depth.
   absl::Status AddNormal(SeparationAnswer& answer) {
     if (!nearest_ && core_ != Relation::kTouching) {
       if (AddFloatNormal(answer)) return absl::OkStatus();
       SeparationGoal goal;
       if (core_ == Relation::kSeparated) goal.relative_error = kNormalRelativeError;
-      Bound(goal, false);
+      Bound(goal, true);
       if (poll_.stopped()) return Stopped();
       if (AddFloatNormal(answer)) return absl::OkStatus();
       if (absl::Status s = FindExactly(); !s.ok()) return s;
@@ -366,14 +374,18 @@ class SeparationSearch {
     return true;
   }
 
-  // Adds the normal of a separated pair: the direction from a point v of A - B, as computed, to the
-  // origin. Returns false if its bound would exceed kMaxNormalAngle. Some point p of A - B is
-  // within kCombinationErrorFactor of v and no longer than the upper bound, so the angle between p
-  // and the nearest point follows from both bounds, and that between v and p from their distance.
+  // Adds the normal. Returns false if its bound would exceed kMaxNormalAngle. Outside facets only
+  // that of a separated pair is known: the direction from a point v of A - B, as computed, to the
+  // origin. Some point p of A - B is within kCombinationErrorFactor of v and no longer than the
+  // upper bound, so the angle between p and the nearest point follows from both bounds, and that
+  // between v and p from their distance.
   bool AddFloatNormal(SeparationAnswer& answer) const {
-    if (core_ != Relation::kSeparated || bounds_.point.count == 0 || !(bounds_.low > 0)) {
-      return false;
+    if (bounds_.point.count == 0 || !(bounds_.low > 0)) return false;
+    if (const double angle = AngleAtFacet(); angle <= kMaxNormalAngle) {
+      answer.normal = Normal{bounds_.direction, angle};
+      return true;
     }
+    if (core_ != Relation::kSeparated) return false;
     const double width = (bounds_.high - bounds_.low) / bounds_.high;
     const double rounding = kCombinationErrorFactor * pair_.size() / bounds_.low;
     const double angle =
@@ -381,6 +393,47 @@ class SeparationSearch {
     if (!(angle <= kMaxNormalAngle)) return false;
     answer.normal = Normal{TowardOrigin(pair_, bounds_).normalized(), angle};
     return true;
+  }
+
+  // Returns an upper bound of the angle between `bounds_.direction` and the normal if the point
+  // that attains the separation is inside a facet of known corners p_i, otherwise infinity. Let m
+  // be the distance of the axis through the origin along the direction from the edges, seen along
+  // the axis: points of the facet project onto m e for all e across.
+  //
+  // Separated: n is minus the direction, the nearest point lies along cos(t) n + sin(t) e, and no
+  // point of A - B is nearer along it than the lower bound l. With n.p_i <= h, the point of the
+  // facet at -m e gives h cos(t) - m sin(t) >= l, so sin(t) <= (h - l) / m.
+  //
+  // Overlapping: n is the direction, the only facet of a polytope in A - B that comes within the
+  // upper bound h of the origin is across it, and A - B reaches no farther than h along the nearest
+  // direction u = cos(t) n + sin(t) e. The ray along u leaves the polytope within h, so through
+  // this facet. With n.p_i >= l, cos(t) >= l / h, and the point of the facet at m e gives l cos(t)
+  // + m sin(t) <= h. So sin(t) <= (h - l^2 / h) / m <= 2 (h - l) / m.
+  double AngleAtFacet() const {
+    if (bounds_.point.count != 3 || IsZero(bounds_.direction)) return kInfinity;
+    // In units near the size.
+    const double unit = UnitOf(pair_.size());
+    const double size = pair_.size() / unit;
+    const bool apart = core_ == Relation::kSeparated;
+    const PlainVector n = apart ? Vector(-bounds_.direction) : bounds_.direction;
+    std::array<PlainVector, 3> p;
+    for (int i = 0; i < 3; ++i) p[i] = 1 / unit * pair_.Difference(bounds_.point.pairs[i]);
+    const double turn = Dot(n, Cross(p[1] - p[0], p[2] - p[0])) > 0 ? 1 : -1;
+    double most = 0;
+    double margin = kInfinity;
+    for (int i = 0; i < 3; ++i) {
+      const PlainVector& q = p[(i + 1) % 3];
+      most = std::max(most, Dot(n, p[i]));
+      const double moment = turn * Dot(n, Cross(p[i], q)) - kEdgeMomentErrorFactor * size * size;
+      margin = std::min(margin, moment / (Norm(q - p[i]) + kEdgeLengthErrorFactor * size));
+    }
+    const double gap =
+        apart ? most - bounds_.low / unit : 2 * (bounds_.high - bounds_.facet_low) / unit;
+    const bool ahead = apart || bounds_.facet_low > kReachErrorFactor * pair_.size();
+    if (!(margin > 0) || !ahead) return kInfinity;
+    // A sine below 2^-19 is exceeded by its angle by less than 2^-39 of it.
+    return (gap + 2 * kReachErrorFactor * size) / margin * kNearestAngleRoundUp +
+           kUnitDirectionAngle;
   }
 
   // Returns the weighted sum of vertices of A, or of B, in the world frame.

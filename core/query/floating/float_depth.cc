@@ -234,8 +234,8 @@ class Expansion {
     return some ? low : 0;
   }
 
-  // Finds the point of the surface nearest to the origin: on one of the triangles of the nearest
-  // facet, if that facet is flat.
+  // Finds the point of the surface nearest to the origin, on one of the triangles of the nearest
+  // facet if that facet is flat.
   void FindPoint() {
     double least = INFINITY;
     uint32_t nearest = 0;
@@ -250,12 +250,27 @@ class Expansion {
     if (least == INFINITY) return;
     const NearestPart part = NearestOn(nearest);
     const auto& corners = surface_.facets()[nearest].corners;
+    bounds_.direction = planes_[nearest].n;
+    bounds_.facet_low = unit_ * LowAlong(planes_[nearest].n);
     bounds_.point_length = least * unit_;
     bounds_.point.count = part.count;
     for (uint32_t i = 0; i < part.count; ++i) {
       bounds_.point.pairs[i] = corners_[corners[part.corners[i]]].pair;
       bounds_.point.weights[i] = part.weights[i];
     }
+  }
+
+  // Returns the least n . p over the corners of facets that may be within the upper bound.
+  double LowAlong(const PlainVector& n) const {
+    const double most = (bounds_.high + kTriangleDistanceErrorFactor * pair_.size()) * per_unit_;
+    double low = INFINITY;
+    for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (!surface_.facets()[i].alive || planes_[i].distance > most) continue;
+      for (const uint32_t corner : surface_.facets()[i].corners) {
+        low = std::min(low, Dot(n, corners_[corner].w));
+      }
+    }
+    return low;
   }
 
   NearestPart NearestOn(uint32_t facet) const {

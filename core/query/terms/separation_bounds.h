@@ -40,8 +40,12 @@ struct FloatCombination {
 // Bounds proven in floating point of the distance of the origin from A - B, or from its boundary.
 struct SeparationBounds {
   double low = 0;
-  // Distances: the unit direction, up to rounding, along which `low` is proven; zero if none is.
+  // A unit direction, up to rounding; zero if none is known. Distances: that along which `low` is
+  // proven. Depths, if a point is requested: the outward normal n of the point's facet of a
+  // polytope in A - B. All facets of it that may be within `high` of the origin lie at n . p >=
+  // facet_low, up to the rounding of n . p.
   Vector direction = Vector::Zero();
+  double facet_low = 0;
   double high = std::numeric_limits<double>::infinity();
   // The best point found that attains the distance; count 0 if unknown.
   FloatCombination point;

@@ -242,5 +242,48 @@ TEST(Normal, EmptyHullsAndQuestionsWithToleranceHaveNone) {
       Shows(*CheckCollision(cube, Pose(), cube, At(0, 0.75, 0), options)->normal, {0, 1, 0}));
 }
 
+// Integers find the normal if no bound in floating point suffices for the separation.
+TEST(Normal, FloatingPointIsWithinItsBoundOfIntegers) {
+  const uint64_t seed = TestSeed(20261127);
+  SCOPED_TRACE(seed);
+  Random random(seed);
+  constexpr int kRounds = 400;
+  int in_floating_point[2] = {};
+  int asked[2] = {};
+  for (int round = 0; round < kRounds; ++round) {
+    const double scale = std::ldexp(1.0, random.Between(-40, 40));
+    const auto hull = [&] {
+      return BuildHull(Scaled(RandomOnSphere(random, random.Between(6, 30), 1), scale));
+    };
+    const Hull a = hull();
+    const Hull b = hull();
+    Pose X_WA;
+    Pose X_WB;
+    for (double& q : X_WA.q) q = random.Real(-1, 1);
+    for (double& q : X_WB.q) q = random.Real(-1, 1);
+    X_WB.t = scale * random.Real(0.2, 2.5) * RandomOnSphere(random, 1, 1)[0];
+    const auto found = CheckCollision(a, X_WA, b, X_WB, WantNormal());
+    QueryOptions options = WantNormal();
+    options.want_separation = true;
+    options.max_error = 0;
+    const auto exact = CheckCollision(a, X_WA, b, X_WB, options);
+    ASSERT_TRUE(found.ok() && exact.ok());
+    ASSERT_EQ(exact->normal->angle_bound, kUnitDirectionAngle);
+    const Vector& n = found->normal->direction;
+    const Vector& truth = exact->normal->direction;
+    EXPECT_GT(n.dot(truth), 0);
+    EXPECT_LE(n.cross(truth).norm(), found->normal->angle_bound + 2 * kUnitDirectionAngle)
+        << Describe(a, X_WA, b, X_WB);
+    EXPECT_NEAR(n.norm(), 1, 1e-15);
+    const int kind = found->relation == Relation::kSeparated ? 1 : 0;
+    ++asked[kind];
+    in_floating_point[kind] += found->normal->angle_bound > kUnitDirectionAngle ? 1 : 0;
+  }
+  for (const int kind : {0, 1}) {
+    EXPECT_GT(asked[kind], kRounds / 8);
+    EXPECT_GT(10 * in_floating_point[kind], 8 * asked[kind]);
+  }
+}
+
 }  // namespace normal_test
 }  // namespace hulld
