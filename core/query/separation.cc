@@ -382,7 +382,8 @@ class SeparationSearch {
   bool AddFloatNormal(SeparationAnswer& answer) const {
     if (bounds_.point.count == 0 || !(bounds_.low > 0)) return false;
     if (const double angle = AngleAtFacet(); angle <= kMaxNormalAngle) {
-      answer.normal = Normal{bounds_.direction, angle};
+      // 0 stays +0.
+      answer.normal = Normal{(Vector::Zero() + bounds_.direction).normalized(), angle};
       return true;
     }
     if (core_ != Relation::kSeparated) return false;
