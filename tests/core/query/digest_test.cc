@@ -110,6 +110,10 @@ void AddAnswer(Digest& digest, const Answer& answer) {
     digest.Add(answer.witness->p_WB);
     digest.Add(answer.witness->error);
   }
+  if (answer.normal) {
+    digest.Add(answer.normal->direction);
+    digest.Add(answer.normal->angle_bound);
+  }
   if (answer.axis) {
     digest.Add(answer.axis->direction);
     digest.Add(static_cast<uint64_t>(answer.axis->kind));
@@ -140,6 +144,7 @@ QueryOptions Everything() {
   options.want_certificate = true;
   options.want_separation = true;
   options.want_witness = true;
+  options.want_normal = true;
   options.clearance = 1e-3;
   return options;
 }
@@ -389,9 +394,9 @@ TEST_P(DigestTest, IsThatOfEveryProcessor) {
   for (const auto& [what, digest] : digests) hashes[what] = digest.hash();
   const std::map<std::string, uint64_t> expected = {
       {"questions", 7004395885791083578u}, {"snapshots", 13234861685057146501u},
-      {"answers", 5266656793038777644u},   {"large hulls", 816355231107481206u},
-      {"growth", 18348015413602966233u},   {"bodies", 8037201080533130467u},
-      {"scenes", 4486313835332567660u},    {"simplifications", 12435222911359296737u},
+      {"answers", 733688001018582019u},    {"large hulls", 4366546040457203483u},
+      {"growth", 18348015413602966233u},   {"bodies", 1773424271649371886u},
+      {"scenes", 13507953563172268000u},   {"simplifications", 12435222911359296737u},
   };
   EXPECT_EQ(hashes, expected);
 }
