@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <utility>
 
 #include "core/base/check.h"
 #include "core/numeric/double_double.h"
@@ -92,6 +91,8 @@ struct MovingPlane::Bounds {
   // Coefficients of |q|^2, of degree 2 and 4.
   Quadratic norms;
   Quartic weights;
+  // Their inverses, rounded.
+  Quartic inverse_weights;
   // The larger of |q|^2 at both ends.
   double weight = 0;
   // For each coefficient of |q|^2 n.p, its largest value over all vertices.
@@ -105,14 +106,16 @@ struct MovingPlane::Bounds {
   double HeightOver(double offset, double end_offset) const {
     const Quartic offsets = Product(norms, Elevated(offset, end_offset));
     double height = -kInfinity;
-    for (int i = 0; i < 5; ++i) height = std::max(height, (most[i] - offsets[i]) / weights[i]);
+    for (int i = 0; i < 5; ++i)
+      height = std::max(height, (most[i] - offsets[i]) * inverse_weights[i]);
     return height;
   }
-  // Returns true if all coefficients are below those of the offsets. `sizes`: lengths that the
-  // offsets are sums of.
+  // Returns the error bound of `most` with offsets. `sizes`: lengths that the offsets are sums of.
+  double ErrorWith(double sizes) const { return error + kMotionPlaneErrorFactor * weight * sizes; }
+  // Returns true if all coefficients are below those of the offsets.
   bool IsBelow(double offset, double end_offset, double sizes) const {
     const Quartic offsets = Product(norms, Elevated(offset, end_offset));
-    const double all = error + kMotionPlaneErrorFactor * weight * sizes;
+    const double all = ErrorWith(sizes);
     bool below = true;
     for (int i = 0; i < 5; ++i) below = below && most[i] + all < offsets[i];
     return below;
@@ -149,8 +152,8 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_star
                                           const Vector& n_end, double start, double end) {
   Bounds bounds;
   if (!(side.size <= kMotionMaxSize)) return bounds;
-  const Quaternion p = At(side.q0, side.q1, start);
-  const Quaternion q = At(side.q0, side.q1, end);
+  const Quaternion p = side.at_rest ? side.q0 : At(side.q0, side.q1, start);
+  const Quaternion q = side.at_rest ? side.q0 : At(side.q0, side.q1, end);
   if (std::min(LargestOf(p), LargestOf(q)) < kInterpolationLeastRemainder) return bounds;
   bounds.norms = {Dot(p, p), Dot(p, q), Dot(q, q)};
   bounds.weights = Product(bounds.norms, {1, 1, 1});
@@ -171,8 +174,8 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_star
     x.z = Interpolated(side.x0.z(), side.x1.z(), t).high;
     return x;
   };
-  const PlainVector x0 = position(start);
-  const PlainVector x1 = position(end);
+  const PlainVector x0 = side.at_rest ? PlainVector(side.x0) : position(start);
+  const PlainVector x1 = side.at_rest ? x0 : position(end);
   Quartic moved = Product(
       bounds.norms,
       {hulld::Dot(n0, x0), (hulld::Dot(n0, x1) + hulld::Dot(n1, x0)) / 2, hulld::Dot(n1, x1)});
@@ -188,6 +191,9 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_star
   if (is_constant) {
     bounds.weights.fill(bounds.norms[0]);
     bounds.most.fill(bounds.most[0]);
+    bounds.inverse_weights.fill(1 / bounds.norms[0]);
+  } else {
+    for (int i = 0; i < 5; ++i) bounds.inverse_weights[i] = 1 / bounds.weights[i];
   }
   const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
   const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
@@ -202,25 +208,29 @@ MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double 
   const Bounds a = BoundsOf(a_, n0, n1, start, end);
   const Bounds b = BoundsOf(b_, -n0, -n1, start, end);
   if (!a.usable || !b.usable) return result;
-  // The offset keeps pace with A or with B.
-  double shift = 0;
-  for (const auto& [side, sign] : {std::pair(&a, 1), std::pair(&b, -1)}) {
-    const double offset = sign * (side->most[0] / side->weights[0]);
-    const double end_offset = sign * (side->most[4] / side->weights[4]);
+  const std::array<double, 2> of_a = {a.most[0] / a.weights[0], a.most[4] / a.weights[4]};
+  const std::array<double, 2> of_b = {-b.most[0] / b.weights[0], -b.most[4] / b.weights[4]};
+  result.end_gap = (of_b[1] - b_.radius) - (of_a[1] + a_.radius);
+  // The offset stays in the middle, or keeps pace with A or with B.
+  for (const double share : {0.5, 0.0, 1.0}) {
+    const double offset = (1 - share) * of_a[0] + share * of_b[0];
+    const double end_offset = (1 - share) * of_a[1] + share * of_b[1];
     const double low = a.HeightOver(offset, end_offset) + a_.radius;
     const double high = -b.HeightOver(-offset, -end_offset) - b_.radius;
     if (!(high - low > result.gap)) continue;
-    result = {false, offset, end_offset, high - low};
-    shift = low / 2 + high / 2;
+    const double shift = low / 2 + high / 2;
+    result.gap = high - low;
+    result.offset = offset + shift;
+    result.end_offset = end_offset + shift;
+    if (result.gap > 2 * margin) break;
   }
-  result.offset += shift;
-  result.end_offset += shift;
   const double margin_a = a_.radius + margin;
   const double margin_b = b_.radius + margin;
   const double sizes = std::max(std::abs(result.offset), std::abs(result.end_offset)) +
                        std::abs(margin) + (a_.radius + b_.radius);
   result.proven = a.IsBelow(result.offset - margin_a, result.end_offset - margin_a, sizes) &&
                   b.IsBelow(-result.offset - margin_b, -result.end_offset - margin_b, sizes);
+  result.gap -= a.ErrorWith(sizes) / a.weight + b.ErrorWith(sizes) / b.weight;
   return result;
 }
 

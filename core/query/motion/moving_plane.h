@@ -36,9 +36,11 @@ class MovingPlane {
     bool proven = false;
     double offset = 0;
     double end_offset = 0;
-    // Width of the range in which both offsets may move together, up to rounding; a lower bound of
-    // the least separation. -infinity if a hull turns too far for a statement.
+    // Width of the range in which both offsets may move together, less error bounds; a lower bound
+    // of the least separation, up to rounding. -infinity if a hull turns too far for a statement.
     double gap = -std::numeric_limits<double>::infinity();
+    // The gap along the direction at the end, up to rounding.
+    double end_gap = -std::numeric_limits<double>::infinity();
   };
   // Tries the direction that turns from n0 to n1 (world frame, from A toward B, of unit length up
   // to rounding) from time `start` to `end`. A margin may be negative. Requires: 0 <= start <= end

@@ -1,6 +1,7 @@
 #include "core/query/motion/nearest_direction.h"
 
-#include "core/numeric/integer.h"
+#include <span>
+
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/floating/float_distance.h"
@@ -15,13 +16,17 @@ constexpr double kRelativeWidth = 0x1p-10;
 }  // namespace
 
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
+                                        FloatCombination& nearest,
                                         const std::function<bool()>& should_stop) {
   if (pair.usable()) {
     SeparationGoal goal;
     // With radii, the gap may be any share of the distance.
     const bool rounded = pair.a().is_rounded() || pair.b().is_rounded();
     goal.relative_error = rounded ? 0 : kRelativeWidth;
-    return BoundDistance(pair, first, {}, goal).direction;
+    const SeparationBounds bounds =
+        BoundDistance(pair, first, std::span(nearest.pairs).first(nearest.count), goal);
+    nearest = bounds.point;
+    return bounds.direction;
   }
   return ExactNearestUnit(pair, should_stop);
 }

@@ -8,14 +8,18 @@
 #include "core/numeric/integer.h"
 #include "core/numeric/vector.h"
 #include "core/query/floating/float_pair.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 
 // Returns the direction from A to B in which they are nearest, of unit length up to rounding. No
 // claim depends on its accuracy: it is that of floating point if pair.usable(), and exact but for
 // its rounding otherwise. Zero if the pair meets, or floating point finds no direction. `first`: an
-// initial direction, not zero. CANCELLED: should_stop, which may be empty, returned true.
+// initial direction, not zero. `nearest`: pairs where the search begins, if any, such as those that
+// were nearest shortly before; those that are nearest at the end. CANCELLED: should_stop, which may
+// be empty, returned true.
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
+                                        FloatCombination& nearest,
                                         const std::function<bool()>& should_stop);
 
 // Returns the same direction, exact but for the rounding to unit length. Errors: as above.

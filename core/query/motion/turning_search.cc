@@ -27,6 +27,10 @@ constexpr double kTurnedShare = 0.25;
 constexpr double kLeastCosine = 0.5;
 // Trials keep this share of an interval away from its ends. A choice.
 constexpr double kLeastShare = 0x1p-4;
+// Leaps are given up after this many that failed. A choice.
+constexpr int kMostFailedLeaps = 3;
+// Share of the last step over which the rate of the gap is taken. A choice.
+constexpr double kRateShare = 0x1p-10;
 // Factor between the lengths of successive steps, at first trial. A choice.
 constexpr double kGrowth = 4;
 // A tolerable step that is shorter than this makes no progress. A choice.
@@ -35,6 +39,15 @@ constexpr double kShortestStep = 0x1p-50;
 // of the last one may be due to the error of a floating-point direction. Choices.
 constexpr double kExactShare = 0x1p-36;
 constexpr double kPoorShare = 0x1p-8;
+// An exact direction is expensive: only this many trials of a step take one at their end, and steps
+// are given up below this length or share of the last one, whichever is less. Choices.
+constexpr int kMostExactTrials = 10;
+constexpr double kShortestExactStep = 0x1p-40;
+constexpr double kShortestExactShare = 0x1p-12;
+// A contact is looked for at this many times after the search is stuck, each this much farther
+// away, before tolerable planes. Choices.
+constexpr int kMostSoonTimes = 8;
+constexpr double kSoonGrowth = 4;
 // Share of the last length below which a tolerable step is not tried before the search is stuck. A
 // choice.
 constexpr double kLeastTolerableShare = 0x1p-8;
@@ -48,6 +61,14 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap,
   const double share = (turned ? std::sqrt(lost) : lost) * (1 - kLeftShare / 2);
   if (!(share > 0)) return proven + length / 2;
   return proven + length * std::clamp(share, kLeastShare, 1 - kLeastShare);
+}
+
+// Returns the least positive root of a + b x + c x^2, or infinity. Requires: a > 0.
+double SmallestRoot(double a, double b, double c) {
+  const double squared = b * b - 4 * a * c;
+  if (!(squared >= 0)) return kInfinity;
+  const double root = 2 * a / (std::sqrt(squared) - b);
+  return root > 0 ? root : kInfinity;
 }
 
 }  // namespace
@@ -123,20 +144,20 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
   return answer->relation;
 }
 
-absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) const {
+absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) {
   const PairAt at(a_, b_, time);
   if (exact_) return ExactNearestUnit(at.pair(), options_.should_stop);
   const Vector first =
       direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
   if (at.pair().usable() && first.isZero(0)) return Vector(Vector::UnitX());
-  return NearestDirection(at.pair(), first, options_.should_stop);
+  return NearestDirection(at.pair(), first, nearest_pairs_, options_.should_stop);
 }
 
 // Tries a plane of constant direction n and, if it fails and `turns`, one that turns from n to the
 // nearest direction at the end.
 absl::StatusOr<TurningSearch::Plane> TurningSearch::TryPlane(const Vector& n, double start,
                                                              double end, bool turns,
-                                                             double margin) const {
+                                                             double margin) {
   Plane plane = {plane_.Try(n, n, start, end, margin), n};
   if (plane.found.proven || !turns) return plane;
   const absl::StatusOr<Vector> at_end = DirectionAt(end);
@@ -163,19 +184,59 @@ bool TurningSearch::IsPoor(const Step& step) const {
          step.until - separated_ < kPoorShare * last_length_;
 }
 
+// Returns a time at which contact is likely, with `gap` along the nearest direction n: where the
+// parabola through this gap, the last one, and the present rate vanishes. Infinite if nowhere.
+double TurningSearch::LikelyContact(const Vector& n, double gap) const {
+  if (!(last_gap_ < kInfinity)) return kInfinity;
+  const double soon = std::min(1.0, separated_ + kRateShare * last_length_);
+  const double rate = (plane_.Try(n, n, separated_, soon).end_gap - gap) / (soon - separated_);
+  const double curvature = (last_gap_ - gap + rate * last_length_) / (last_length_ * last_length_);
+  return separated_ + SmallestRoot(gap, rate, curvature);
+}
+
+// Tries a step along a plane that turns, to shortly before a likely time of contact.
+absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double contact,
+                                                                         const Vector& n,
+                                                                         double gap) {
+  const double length = contact - separated_;
+  const double share = std::min(kLeftShare, length / last_length_);
+  const double until = contact - std::max(share * length, options_.max_time_error / 4);
+  if (!(until > separated_ && until <= 1)) return std::nullopt;
+  const absl::StatusOr<Vector> at_end = DirectionAt(until);
+  if (!at_end.ok()) return at_end.status();
+  if (!(n.dot(*at_end) > kLeastCosine)) return std::nullopt;
+  const MovingPlane::Result turned = plane_.Try(n, *at_end, separated_, until);
+  // Past a graze, the gap is not nearly closed.
+  if (!turned.proven || turned.end_gap > 4 * kLeftShare * gap) return std::nullopt;
+  return Step{until, n, {turned, *at_end}, gap, contact};
+}
+
 // Returns a long interval for which a plane of direction n at its start is proven, or none if there
 // is no progress.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const Vector& n) {
   if (n.isZero(0)) return std::nullopt;
   const MovingPlane::Result start = plane_.Try(n, n, separated_, separated_);
   if (!start.proven) return std::nullopt;
-  turns_ = turns_ || start.gap > kTurnedShare * last_gap_;
-  Step step = {separated_, n, {start, n}, start.gap, 2};
+  // Up to rounding, without the error bound.
+  const double gap = start.end_gap;
+  if (failed_leaps_ < kMostFailedLeaps) {
+    const double contact = LikelyContact(n, gap);
+    if (contact <= separated_ + last_length_) {
+      const absl::StatusOr<std::optional<Step>> leap = LeapTo(contact, n, gap);
+      if (!leap.ok() || *leap) return leap;
+      ++failed_leaps_;
+    }
+  }
+  turns_ = turns_ || gap > kTurnedShare * last_gap_;
+  Step step = {separated_, n, {start, n}, gap, 2};
   Plane failed = step.plane;
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
+  const double shortest = std::min(kShortestExactStep, kShortestExactShare * last_length_);
   for (int i = 0; i < kMostTrials || step.until == separated_; ++i) {
     if (!(trial > step.until) || trial == step.failed) break;
-    const absl::StatusOr<Plane> plane = TryPlane(n, separated_, trial, turns_);
+    if (exact_ && trial - separated_ < shortest) break;
+    const bool turns = turns_ && (!exact_ || i < kMostExactTrials);
+    const absl::StatusOr<Plane> plane = TryPlane(n, separated_, trial, turns);
     if (!plane.ok()) return plane.status();
     if (plane->found.proven) {
       step.until = trial;
@@ -273,6 +334,13 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
       PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
   if (!near.ok()) return near.status();
   if (*near) {
+    const absl::StatusOr<double> soon = FindContactSoon(latest);
+    if (!soon.ok()) return soon.status();
+    if (*soon <= 1) {
+      const absl::StatusOr<Relation> met = RelationAt(*soon);
+      if (!met.ok()) return met.status();
+      return Contact(*soon, *met);
+    }
     const absl::StatusOr<double> tolerable = TolerableUntil(/*thorough=*/true);
     if (!tolerable.ok()) return tolerable.status();
     const absl::StatusOr<double> contact = FindLateContact(*tolerable);
@@ -289,21 +357,39 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
       "of range; add a pose between them");
 }
 
+// Returns a time of contact, early if that is simple, or a time above 1 if none is found soon, or
+// the hulls, apart at `latest`, are first farther apart than the resolution.
+absl::StatusOr<double> TurningSearch::FindContactSoon(double latest) const {
+  double time = latest;
+  for (int i = 0; i < kMostSoonTimes && time < 1; ++i) {
+    const absl::StatusOr<bool> near =
+        PairAt(a_, b_, time).IsWithin(resolution_, options_.should_stop);
+    if (!near.ok()) return near.status();
+    if (!*near) return 2;
+    time = std::min(1.0, separated_ + kSoonGrowth * (time - separated_));
+    const absl::StatusOr<Relation> relation = RelationAt(time);
+    if (!relation.ok()) return relation.status();
+    if (*relation != Relation::kSeparated) return FindEarlierContact(time);
+  }
+  return 2;
+}
+
 // Returns a time of contact, early if that is simple, or a time above 1 if none is found. The
 // separation between separated_ and it is below rounding, and not proven. The hulls probably meet
 // at `likely`, or soon after.
 absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
-  double contact = 2;
-  for (double length = 0; contact > 1; length = std::max(kShortestStep, kGrowth * length)) {
+  for (double length = 0;; length = std::max(kShortestStep, kGrowth * length)) {
     const double time = std::min(1.0, likely + length);
     const absl::StatusOr<Relation> relation = RelationAt(time);
     if (!relation.ok()) return relation.status();
-    if (*relation != Relation::kSeparated) {
-      contact = time;
-    } else if (time == 1) {
-      return contact;
-    }
+    if (*relation != Relation::kSeparated) return FindEarlierContact(time);
+    if (time == 1) return 2;
   }
+}
+
+// Returns a time of contact at most max_time_error after one without, if doubles allow it.
+// `contact` is a time of contact.
+absl::StatusOr<double> TurningSearch::FindEarlierContact(double contact) const {
   double apart = separated_;
   while (contact - apart > options_.max_time_error) {
     const double time = apart + (contact - apart) / 2;

@@ -12,6 +12,7 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/motion/moving_plane.h"
 #include "core/query/terms/relation.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 
@@ -25,6 +26,10 @@ namespace hulld {
 // too, from the direction at one end of the interval to that at the other. It loses the square of
 // the interval's length, so a graze needs a number of steps proportional to the logarithm of its
 // gap.
+//
+// Toward a contact, a parabola through the gap, its rate, and the last gap predicts the time. A
+// plane that turns leads to shortly before it, so the steps converge faster than by a constant
+// factor, and few exact queries prove the contact. Failed predictions end these leaps.
 //
 // Once the gap is within the resolution, planes that the hulls may cross by the resolution decide
 // if the least separation of the remaining motion is within it, too.
@@ -50,22 +55,26 @@ class TurningSearch {
     Plane plane;
     // The gap along the direction at separated_.
     double gap;
-    // The earliest time at which the plane failed; above 1 if none.
+    // The earliest time at which the plane failed, or contact is likely; above 1 if none.
     double failed;
   };
 
   absl::StatusOr<Relation> RelationAt(double time) const;
-  absl::StatusOr<Vector> DirectionAt(double time) const;
+  absl::StatusOr<Vector> DirectionAt(double time);
   absl::StatusOr<Plane> TryPlane(const Vector& n, double start, double end, bool turns,
-                                 double margin = 0) const;
+                                 double margin = 0);
   absl::StatusOr<std::optional<Step>> NextStep();
   bool IsPoor(const Step& step) const;
+  double LikelyContact(const Vector& n, double gap) const;
+  absl::StatusOr<std::optional<Step>> LeapTo(double contact, const Vector& n, double gap);
   absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
   absl::StatusOr<bool> StaysWithinResolution();
   absl::StatusOr<double> TolerableUntil(bool thorough);
   absl::StatusOr<FirstContact> ConcludeStuck();
+  absl::StatusOr<double> FindContactSoon(double latest) const;
   absl::StatusOr<double> FindLateContact(double likely) const;
+  absl::StatusOr<double> FindEarlierContact(double contact) const;
   absl::StatusOr<FirstContact> Contact(double time, Relation relation);
   FirstContact WithoutContact(Relation relation);
 
@@ -84,6 +93,9 @@ class TurningSearch {
   // The nearest direction turns faster than the gap closes.
   bool turns_ = false;
   double last_gap_ = std::numeric_limits<double>::infinity();
+  int failed_leaps_ = 0;
+  // The pairs that were last nearest in floating point.
+  FloatCombination nearest_pairs_;
   // Directions are exact but for their rounding: the hulls are too near for floating point.
   bool exact_ = false;
 };

@@ -131,7 +131,7 @@ constexpr double kScales[] = {1, 3e-18};
 constexpr int kDigitStep = 2;
 #endif
 // Exact arithmetic asks several times in a step.
-constexpr int kMostPolls = 5000;
+constexpr int kMostPolls = 2500;
 
 TEST(Graze, StepsGrowWithTheLogarithmOfTheGap) {
   for (const Passage& passage : Passages()) {

@@ -343,6 +343,33 @@ TEST(Turning, RoundedShapesOfExtremeSizeAreRefused) {
   }
 }
 
+// q(t) vanishes if and only if q1 = -s q0. Otherwise it turns by nearly half a turn at once.
+TEST(Turning, OnlyRotationsThatVanishAreInvalid) {
+  const OwnMoving far(Box(1, 1, 1), AtRest({0, 0, 9}));
+  for (const std::array<double, 4>& q0 :
+       {std::array<double, 4>{1, 0, 0, 0}, {0.1, 0.7, -0.3, 0.5}}) {
+    for (const double scale : {1.0, 2.0}) {
+      Motion motion = {{q0, Vector::Zero()}, {q0, Vector::Zero()}};
+      for (double& component : motion.end.q) component *= -scale;
+      EXPECT_TRUE(absl::IsInvalidArgument(ValidateMotion(motion)));
+      const OwnMoving vanishing(Box(1, 2, 3), motion);
+      EXPECT_TRUE(
+          absl::IsInvalidArgument(FindFirstContact(vanishing.moving(), far.moving()).status()));
+      for (size_t i = 0; i < 4; ++i) {
+        SCOPED_TRACE(testing::Message() << q0[0] << " " << scale << " " << i);
+        if (q0[i] == 0 && i > 1) continue;
+        Motion nearly = motion;
+        nearly.end.q[i] = std::nextafter(nearly.end.q[i], 9);
+        // A multiple of the axis of the only component is opposite, too.
+        EXPECT_EQ(ValidateMotion(nearly).ok(), !(q0[0] == 1 && i == 0));
+        nearly.end.q[i] = motion.end.q[i] + (q0[i] == 0 ? 1e-9 : 1e-9 * scale);
+        if (!ValidateMotion(nearly).ok()) continue;
+        EXPECT_EQ(Find(OwnMoving(Box(1, 2, 3), nearly), far).relation, Relation::kSeparated);
+      }
+    }
+  }
+}
+
 TEST(Turning, RotationsThatNearlyVanishAreRefusedOrDecided) {
   // Half a turn within 1e-16 of the time.
   const Motion flip = {{{1, 0, 0, 0}, {0, 0, 0}}, {{-1, 1e-16, 0, 0}, {0, 0, 0}}};
