@@ -73,9 +73,27 @@ void ByteSource::SkipByteOrderMark() {
   if (start.substr(0, 3) == "\xEF\xBB\xBF") {
     begin_ += 3;
   } else if (start.substr(0, 2) == "\xFE\xFF" || start.substr(0, 2) == "\xFF\xFE") {
-    status_ = absl::InvalidArgumentError(
-        absl::StrCat(name_, " is UTF-16 text; convert it first: iconv -f UTF-16 -t UTF-8"));
+    status_ = Utf16Error();
   }
+}
+
+absl::Status ByteSource::Utf16Error() const {
+  return absl::InvalidArgumentError(
+      absl::StrCat(name_, " is UTF-16 text; convert it first: iconv -f UTF-16 -t UTF-8"));
+}
+
+absl::Status ByteSource::CheckStart() {
+  constexpr std::pair<std::string_view, const char*> kCompressed[] = {
+      {"\x1F\x8B", "gzip"},  {"PK\x03\x04", "zip"},        {"BZh", "bzip2"},
+      {"\xFD\x37zXZ", "xz"}, {"\x28\xB5\x2F\xFD", "zstd"}, {"7z\xBC\xAF", "7-Zip"}};
+  const std::string_view start = Peek(6);
+  for (const auto& [magic, format] : kCompressed) {
+    if (start.substr(0, magic.size()) != magic) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat(name_, " is compressed (", format, "); decompress it first"));
+  }
+  const std::string_view mark = start.substr(0, 2);
+  return mark == "\xFE\xFF" || mark == "\xFF\xFE" ? Utf16Error() : status_;
 }
 
 bool ByteSource::FindLineEnd(size_t from, size_t* length) {

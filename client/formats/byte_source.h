@@ -43,6 +43,10 @@ class ByteSource {
   // call.
   std::string_view Peek(size_t size);
 
+  // Returns an error if the file is compressed or UTF-16 text, by its first bytes, which stay to be
+  // read. Otherwise binary readers would misread such a file.
+  absl::Status CheckStart();
+
   // Returns the error that stopped reading; OK at the end of the file.
   const absl::Status& status() const { return status_; }
 
@@ -71,6 +75,7 @@ class ByteSource {
   // in the buffer.
   bool FindLineEnd(size_t from, size_t* length);
   void SkipByteOrderMark();
+  absl::Status Utf16Error() const;
 
   int descriptor_;
   std::string name_;

@@ -77,7 +77,7 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
   std::array<double, 3> xyz;
   for (size_t axis = 0; axis < 3; ++axis) {
     if (columns[axis] >= cells.size()) {
-      return source.ErrorAtLine(absl::StrCat("the row has ", cells.size(), " columns; ",
+      return source.ErrorAtLine(absl::StrCat("the row has ", Counted(cells.size(), "column"), "; ",
                                              std::string(1, "xyz"[axis]), " is column ",
                                              columns[axis] + 1));
     }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <assimp/Importer.hpp>
+#include <charconv>
 #include <cmath>
 #include <exception>
 #include <functional>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/formats/length_scale.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
 
@@ -41,14 +43,25 @@ NodeTransform Compose(const NodeTransform& parent, const aiMatrix4x4& local) {
   return product;
 }
 
-void Apply(const NodeTransform& X, const aiVector3D& p, double* out) {
-  for (int row = 0; row < 3; ++row) {
-    const double* const m = X.m[row];
-    out[row] = m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3];
+// Placement of a mesh in the scene: the transform of its node, then the factor from the file's unit
+// to meters.
+struct MeshPlacement {
+  NodeTransform X_WM;
+  LengthScale unit;
+  bool is_identity() const { return X_WM.is_identity && unit.is_one(); }
+};
+
+std::array<double, 3> operator*(const MeshPlacement& placement, const aiVector3D& p) {
+  std::array<double, 3> q = {p.x, p.y, p.z};
+  for (size_t row = 0; row < 3; ++row) {
+    const double* const m = placement.X_WM.m[row];
+    if (!placement.X_WM.is_identity) q[row] = m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3];
+    q[row] = placement.unit.Apply(q[row]);
   }
+  return q;
 }
 
-absl::Status AddPoints(const std::string& path, const aiMesh& mesh, const NodeTransform& X_WM,
+absl::Status AddPoints(const std::string& path, const aiMesh& mesh, const MeshPlacement& placement,
                        PointCollector* points) {
   for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
     const auto error_at = [&](const std::string& message) {
@@ -57,27 +70,25 @@ absl::Status AddPoints(const std::string& path, const aiMesh& mesh, const NodeTr
     };
     const aiVector3D& p = mesh.mVertices[i];
     absl::Status status;
-    if (X_WM.is_identity) {
+    if (placement.is_identity()) {
       status = points->AddFloat(p.x, p.y, p.z, error_at);
     } else {
-      double q[3];
-      Apply(X_WM, p, q);
-      status = points->Add(q[0], q[1], q[2], error_at);
+      const auto [x, y, z] = placement * p;
+      status = points->Add(x, y, z, error_at);
     }
     if (!status.ok()) return status;
   }
   return absl::OkStatus();
 }
 
-absl::Status AddTriangles(const std::string& path, const aiMesh& mesh, const NodeTransform& X_WM,
-                          TriangleMesh* to) {
+absl::Status AddTriangles(const std::string& path, const aiMesh& mesh,
+                          const MeshPlacement& placement, TriangleMesh* to) {
   const size_t first = to->vertices.size();
   if (first + mesh.mNumVertices > std::numeric_limits<uint32_t>::max()) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": too many vertices"));
   }
   for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-    std::array<double, 3>& p = to->vertices.emplace_back();
-    Apply(X_WM, mesh.mVertices[i], p.data());
+    const std::array<double, 3>& p = to->vertices.emplace_back(placement * mesh.mVertices[i]);
     if (!std::isfinite(p[0] + p[1] + p[2])) {
       return absl::InvalidArgumentError(absl::StrCat(path, ": vertex ", i, " is not finite"));
     }
@@ -99,23 +110,32 @@ absl::Status AddTriangles(const std::string& path, const aiMesh& mesh, const Nod
   return absl::OkStatus();
 }
 
-using MeshVisitor =
-    std::function<absl::Status(const aiMesh& mesh, const NodeTransform& X_WM, const aiNode& node)>;
+using MeshVisitor = std::function<absl::Status(const aiMesh& mesh, const MeshPlacement& placement,
+                                               const aiNode& node)>;
+
+// Returns the factor that assimp makes the transform of the root, a float. Its shortest decimal
+// text is that of the file, so 3 inches become the double nearest to 0.0762, rounded once.
+LengthScale UnitOf(const aiScene& scene) {
+  char text[32];
+  const char* const end =
+      std::to_chars(text, text + sizeof(text), scene.mRootNode->mTransformation.a1).ptr;
+  return LengthScale::FromText({text, static_cast<size_t>(end - text)}).value_or(LengthScale());
+}
 
 absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
-  std::vector<std::pair<const aiNode*, NodeTransform>> pending = {
-      {scene.mRootNode, NodeTransform()}};
+  std::vector<std::pair<const aiNode*, MeshPlacement>> pending = {
+      {scene.mRootNode, {NodeTransform(), UnitOf(scene)}}};
   while (!pending.empty()) {
-    const auto [node, X_WP] = pending.back();
+    auto [node, placement] = pending.back();
     pending.pop_back();
-    const NodeTransform X_WN = Compose(X_WP, node->mTransformation);
+    if (node != scene.mRootNode) placement.X_WM = Compose(placement.X_WM, node->mTransformation);
     for (unsigned i = 0; i < node->mNumMeshes; ++i) {
-      absl::Status status = visit(*scene.mMeshes[node->mMeshes[i]], X_WN, *node);
+      absl::Status status = visit(*scene.mMeshes[node->mMeshes[i]], placement, *node);
       if (!status.ok()) return status;
     }
     // Pushed in reverse, so that the order is the file's.
     for (unsigned i = node->mNumChildren; i > 0; --i) {
-      pending.emplace_back(node->mChildren[i - 1], X_WN);
+      pending.emplace_back(node->mChildren[i - 1], placement);
     }
   }
   return absl::OkStatus();
@@ -126,6 +146,8 @@ absl::Status ReadThroughAssimp(const std::string& path, const MeshVisitor& visit
   Assimp::Importer importer;
   // COLLADA: otherwise assimp rotates files that are not Y_UP.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  // Otherwise assimp draws the nodes of a scene without meshes, and invents vertices.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   const aiScene* scene = nullptr;
   std::string problem;
   try {
@@ -142,10 +164,10 @@ absl::Status ReadThroughAssimp(const std::string& path, const MeshVisitor& visit
 
 absl::Status ReadDae(const std::string& path, PointCollector* points) {
   bool is_empty = true;
-  absl::Status read =
-      ReadThroughAssimp(path, [&](const aiMesh& mesh, const NodeTransform& X_WM, const aiNode&) {
+  absl::Status read = ReadThroughAssimp(
+      path, [&](const aiMesh& mesh, const MeshPlacement& placement, const aiNode&) {
         is_empty = is_empty && mesh.mNumVertices == 0;
-        return AddPoints(path, mesh, X_WM, points);
+        return AddPoints(path, mesh, placement, points);
       });
   if (!read.ok() || !is_empty) return read;
   return absl::InvalidArgumentError(absl::StrCat(path, ": it contains no vertex"));
@@ -154,14 +176,14 @@ absl::Status ReadDae(const std::string& path, PointCollector* points) {
 absl::Status ReadDaeParts(const std::string& path, std::vector<MeshPart>* parts) {
   std::map<const aiNode*, size_t> part_of;
   return ReadThroughAssimp(
-      path, [&](const aiMesh& mesh, const NodeTransform& X_WM, const aiNode& node) {
+      path, [&](const aiMesh& mesh, const MeshPlacement& placement, const aiNode& node) {
         if (mesh.mNumFaces == 0) return absl::OkStatus();
         const auto [entry, is_new] = part_of.emplace(&node, parts->size());
         if (is_new) {
           const aiString& name = node.mName.length > 0 ? node.mName : mesh.mName;
           parts->push_back({name.C_Str(), {}});
         }
-        return AddTriangles(path, mesh, X_WM, &(*parts)[entry->second].mesh);
+        return AddTriangles(path, mesh, placement, &(*parts)[entry->second].mesh);
       });
 }
 

@@ -1,6 +1,5 @@
 // glTF 2.0 (Khronos, 2017; ISO/IEC 12113:2022): JSON that describes nodes, meshes, and accessors
 // into buffers, which lie in the JSON, beside it, or in one binary file (GLB) with it.
-#include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <google/protobuf/struct.pb.h>
@@ -72,22 +71,6 @@ bool IsKnownExtension(const std::string& name) {
     if (name.rfind(prefix, 0) == 0) return true;
   }
   return false;
-}
-
-std::string PercentDecoded(const std::string& text) {
-  const auto digit = [](char c) {
-    const size_t found = std::string_view("0123456789abcdef")
-                             .find(absl::ascii_tolower(static_cast<unsigned char>(c)));
-    return found == std::string_view::npos ? -1 : static_cast<int>(found);
-  };
-  std::string decoded;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const bool escaped =
-        text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 && digit(text[i + 2]) >= 0;
-    decoded += escaped ? static_cast<char>(16 * digit(text[i + 1]) + digit(text[i + 2])) : text[i];
-    if (escaped) i += 2;
-  }
-  return decoded;
 }
 
 // After an error, every function returns immediately, and Run returns the error.
@@ -204,6 +187,8 @@ class GltfWalk {
     std::string json = bytes.substr(0, 4) == "glTF" ? SplitGlb(bytes) : std::move(bytes);
     if (json.substr(0, 3) == "\xEF\xBB\xBF") json.erase(0, 3);
     if (!ok()) return;
+    // Some writers pad the chunk with zeros instead of spaces.
+    while (!json.empty() && json.back() == '\0') json.pop_back();
     const auto parsed = google::protobuf::util::JsonStringToMessage(json, &root_);
     if (!parsed.ok()) {
       const std::string problem(parsed.message().data(), parsed.message().size());
@@ -412,65 +397,74 @@ class GltfWalk {
     return indices;
   }
 
-  // Returns a position as KHR_mesh_quantization defines it: integers unchanged, or divided by the
-  // largest one.
-  static std::array<double, 3> Position(const unsigned char* bytes, ScalarType type,
-                                        bool normalized) {
+  template <size_t kSize>
+  using Elements = std::vector<std::array<double, kSize>>;
+
+  // Returns an element, integers unchanged, or divided by the largest one, as KHR_mesh_quantization
+  // defines it for positions.
+  template <size_t kSize>
+  static std::array<double, kSize> ElementAt(const unsigned char* bytes, ScalarType type,
+                                             bool normalized) {
     double largest = 1;
     if (normalized && type == ScalarType::kInt8) largest = 127;
     if (normalized && type == ScalarType::kUint8) largest = 255;
     if (normalized && type == ScalarType::kInt16) largest = 32767;
     if (normalized && type == ScalarType::kUint16) largest = 65535;
-    std::array<double, 3> p;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const double value = LoadScalar(type, bytes + axis * SizeOf(type), false);
-      p[axis] = largest == 1 ? value : std::max(value / largest, -1.0);
+    std::array<double, kSize> element;
+    for (size_t i = 0; i < kSize; ++i) {
+      const double value = LoadScalar(type, bytes + i * SizeOf(type), false);
+      element[i] = largest == 1 ? value : std::max(value / largest, -1.0);
     }
-    return p;
+    return element;
   }
 
-  std::vector<std::array<double, 3>> Positions(size_t index, bool* is_float) {
+  // Returns the elements of an accessor of type VEC3, VEC4, or MAT4.
+  template <size_t kSize>
+  Elements<kSize> ElementsOf(size_t index, bool* is_float = nullptr) {
     const std::string what = absl::StrCat("accessors[", index, "]");
     const Struct& accessor = Element("accessors", index);
     const size_t count = IntegerOf(accessor, "count").value_or(0);
     const auto type = TypeOf(accessor, what);
-    std::vector<std::array<double, 3>> positions;
-    if (!ok()) return positions;
-    if (TextOf(accessor, "type") != "VEC3" || *type == ScalarType::kUint32) {
-      Fail(absl::StrCat(
-          what, " is not a position: it must be VEC3 of floats or of 8- or 16-bit integers"));
+    Elements<kSize> elements;
+    if (!ok()) return elements;
+    const std::string shape = kSize == 3 ? "VEC3" : kSize == 4 ? "VEC4" : "MAT4";
+    if (TextOf(accessor, "type") != shape || *type == ScalarType::kUint32) {
+      const char* const role = kSize == 3 ? "a position" : kSize == 4 ? "of joints" : "a transform";
+      Fail(absl::StrCat(what, " is not ", role, ": it must be ", shape,
+                        " of floats or of 8- or 16-bit integers"));
     }
     const bool has_view = Find(accessor, "bufferView") != nullptr;
     const bool has_sparse = Find(accessor, "sparse") != nullptr;
     if (count == 0 || (!has_view && (!has_sparse || count > file_bytes_))) {
-      Fail(absl::StrCat(what, " has no positions: neither a count nor a bufferView"));
+      Fail(absl::StrCat(what, " has no ", kSize == 3 ? "positions" : "elements",
+                        ": neither a count nor a bufferView"));
     }
     const Value* const normalized_value = Find(accessor, "normalized");
     const bool normalized = normalized_value != nullptr && normalized_value->bool_value();
-    const size_t size = 3 * SizeOf(*type);
-    if (!ok()) return positions;
+    const size_t size = kSize * SizeOf(*type);
+    if (!ok()) return elements;
     if (has_view) {
       const View view = ViewOf(accessor, count, size, what);
       for (size_t i = 0; i < count && ok(); ++i) {
-        positions.push_back(Position(view.at(i), *type, normalized));
+        elements.push_back(ElementAt<kSize>(view.at(i), *type, normalized));
       }
     } else {
-      positions.resize(count);
+      elements.resize(count);
     }
     if (has_sparse) {
       const Struct& sparse = ObjectOf(accessor, "sparse");
       const size_t changed = IntegerOf(sparse, "count").value_or(0);
       const std::vector<uint32_t> indices =
           Indices(ObjectOf(sparse, "indices"), changed, count, what + ".sparse.indices");
-      if (!ok() || changed == 0) return positions;
+      if (!ok() || changed == 0) return elements;
       const View values =
           ViewOf(ObjectOf(sparse, "values"), changed, size, what + ".sparse.values");
       for (size_t i = 0; i < changed && ok(); ++i) {
-        positions[indices[i]] = Position(values.at(i), *type, normalized);
+        elements[indices[i]] = ElementAt<kSize>(values.at(i), *type, normalized);
       }
     }
-    *is_float = *type == ScalarType::kFloat;
-    return positions;
+    if (is_float != nullptr) *is_float = *type == ScalarType::kFloat;
+    return elements;
   }
 
   // Meshes ----------------------------------------------------------------------------------------
@@ -490,8 +484,97 @@ class GltfWalk {
     return triangles;
   }
 
-  void VisitPrimitive(const Struct& object, const Affine* X_WN, Primitive* primitive) {
-    const Value* const position = Find(ObjectOf(object, "attributes"), "POSITION");
+  // Adds the displacements of morph targets, each times its weight.
+  void Morph(const Struct& object, const std::vector<double>& weights, Primitive* primitive) {
+    const auto& targets = ListOf(object, "targets").values();
+    const size_t count = std::min(weights.size(), static_cast<size_t>(targets.size()));
+    for (size_t target = 0; target < count && ok(); ++target) {
+      const Value* const position =
+          Find(targets[static_cast<int>(target)].struct_value(), "POSITION");
+      if (weights[target] == 0 || position == nullptr) continue;
+      const auto shifts = ElementsOf<3>(Integer(*position, "POSITION"));
+      auto& vertices = primitive->mesh.vertices;
+      if (ok() && shifts.size() != vertices.size()) {
+        Fail(absl::StrCat("a morph target has ", Counted(shifts.size(), "position"), " for ",
+                          Counted(vertices.size(), "vertex", "vertices")));
+      }
+      for (size_t i = 0; i < vertices.size() && ok(); ++i) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+          vertices[i][axis] += weights[target] * shifts[i][axis];
+        }
+      }
+      primitive->is_float = false;
+    }
+  }
+
+  // Moves each vertex by the weighted mean of its joints' transforms, as they stand in the file.
+  // Returns false if the primitive has no joints.
+  bool Bend(const Struct& attributes, const std::vector<Affine>& joints, Primitive* primitive) {
+    auto& vertices = primitive->mesh.vertices;
+    std::vector<std::array<double, 3>> sums(vertices.size());
+    std::vector<double> totals(vertices.size());
+    for (size_t set = 0; ok(); ++set) {
+      const Value* const joint = Find(attributes, absl::StrCat("JOINTS_", set));
+      const Value* const weight = Find(attributes, absl::StrCat("WEIGHTS_", set));
+      if (set == 0 && joint == nullptr) return false;
+      if (joint == nullptr || weight == nullptr) break;
+      const auto indices = ElementsOf<4>(Integer(*joint, "JOINTS"));
+      const auto weights = ElementsOf<4>(Integer(*weight, "WEIGHTS"));
+      if (ok() && (indices.size() != vertices.size() || weights.size() != vertices.size())) {
+        Fail("a primitive has more or fewer joints than vertices");
+      }
+      for (size_t i = 0; i < vertices.size() && ok(); ++i) {
+        for (size_t k = 0; k < 4; ++k) {
+          if (weights[i][k] == 0) continue;
+          if (!(indices[i][k] >= 0 && indices[i][k] < static_cast<double>(joints.size()))) {
+            Fail(absl::StrCat("vertex ", i, " has the joint ", indices[i][k], ", but the skin has ",
+                              joints.size()));
+            break;
+          }
+          const auto moved = joints[static_cast<size_t>(indices[i][k])] * vertices[i];
+          for (size_t axis = 0; axis < 3; ++axis) sums[i][axis] += weights[i][k] * moved[axis];
+          totals[i] += weights[i][k];
+        }
+      }
+    }
+    for (size_t i = 0; i < vertices.size() && ok(); ++i) {
+      if (totals[i] == 0) Fail(absl::StrCat("vertex ", i, " has no weight of a joint"));
+      // Rounding makes the sum of the weights inexact.
+      for (size_t axis = 0; axis < 3; ++axis) vertices[i][axis] = sums[i][axis] / totals[i];
+    }
+    primitive->is_float = false;
+    return true;
+  }
+
+  // Returns the transform of each joint of a skin, from the mesh to the scene.
+  std::vector<Affine> JointsOf(size_t index) {
+    const Struct& skin = Element("skins", index);
+    std::vector<Affine> joints;
+    for (const Value& joint : ListOf(skin, "joints").values()) {
+      const size_t node = Integer(joint, "joints");
+      if (!ok()) return {};
+      if (node >= X_WN_.size() || !X_WN_[node].has_value()) {
+        Fail(absl::StrCat("skins[", index, "]: the joint nodes[", node, "] is not in the scene"));
+        return {};
+      }
+      joints.push_back(*X_WN_[node]);
+    }
+    const auto inverse = IntegerOf(skin, "inverseBindMatrices");
+    if (!ok() || !inverse) return joints;
+    const auto matrices = ElementsOf<16>(*inverse);
+    if (ok() && matrices.size() < joints.size()) {
+      Fail(absl::StrCat("skins[", index, "] has fewer inverseBindMatrices than joints"));
+    }
+    for (size_t i = 0; i < joints.size() && ok(); ++i) {
+      joints[i] = joints[i] * FromColumns({matrices[i].begin(), matrices[i].end()});
+    }
+    return joints;
+  }
+
+  void VisitPrimitive(const Struct& object, const Affine* X_WN, const Struct& node,
+                      const std::vector<double>& weights, Primitive* primitive) {
+    const Struct& attributes = ObjectOf(object, "attributes");
+    const Value* const position = Find(attributes, "POSITION");
     if (!ok() || position == nullptr) return;
     if (Find(ObjectOf(object, "extensions"), "KHR_draco_mesh_compression") != nullptr &&
         Find(Element("accessors", Integer(*position, "POSITION")), "bufferView") == nullptr) {
@@ -500,7 +583,7 @@ class GltfWalk {
     const size_t mode = IntegerOf(object, "mode").value_or(4);
     if (mode > 6) return Fail(absl::StrCat("a primitive has an unknown mode ", mode));
     std::vector<std::array<double, 3>>& vertices = primitive->mesh.vertices;
-    vertices = Positions(Integer(*position, "POSITION"), &primitive->is_float);
+    vertices = ElementsOf<3>(Integer(*position, "POSITION"), &primitive->is_float);
     std::vector<uint32_t> corners;
     if (const auto index = IntegerOf(object, "indices"); ok() && index) {
       const Struct& accessor = Element("accessors", *index);
@@ -516,6 +599,14 @@ class GltfWalk {
     if (!ok()) return;
     primitive->mesh.triangles = Triangles(corners, mode);
     vertices_ += vertices.size();
+    Morph(object, weights, primitive);
+    const auto skin = IntegerOf(node, "skin");
+    // The joints alone place a mesh with a skin.
+    if (ok() && skin && Bend(attributes, JointsOf(*skin), primitive)) {
+      if (ok()) status_ = visit_(*primitive);
+      return;
+    }
+    if (!ok()) return;
     if (X_WN != nullptr) {
       for (auto& vertex : vertices) vertex = *X_WN * vertex;
       primitive->is_float = false;
@@ -523,13 +614,26 @@ class GltfWalk {
     status_ = visit_(*primitive);
   }
 
-  // X_WN: null for the identity.
-  void VisitMesh(size_t mesh, const Affine* X_WN, Primitive primitive) {
-    for (const Value& value : ListOf(Element("meshes", mesh), "primitives").values()) {
+  // X_WN: null for the identity. node: empty if the file has none.
+  void VisitMesh(size_t index, const Affine* X_WN, const Struct& node, Primitive primitive) {
+    const Struct& mesh = Element("meshes", index);
+    const Struct& weighted = Find(node, "weights") != nullptr ? node : mesh;
+    const std::vector<double> weights =
+        NumbersOf(weighted, "weights", ListOf(weighted, "weights").values_size());
+    for (const Value& value : ListOf(mesh, "primitives").values()) {
       if (!value.has_struct_value()) Fail("a primitive is not an object");
       if (!ok()) return;
-      VisitPrimitive(value.struct_value(), X_WN, &primitive);
+      VisitPrimitive(value.struct_value(), X_WN, node, weights, &primitive);
     }
+  }
+
+  Affine FromColumns(const std::vector<double>& columns) {
+    if (columns[3] != 0 || columns[7] != 0 || columns[11] != 0 || columns[15] != 1) {
+      Fail("the last row of a matrix is not 0 0 0 1");
+    }
+    Affine X;
+    for (size_t i = 0; i < 12; ++i) X.m[i % 3][i / 3] = columns[i / 3 * 4 + i % 3];
+    return X;
   }
 
   // Returns nullopt if the node has no transform.
@@ -540,10 +644,7 @@ class GltfWalk {
     const std::vector<double> s = NumbersOf(node, "scale", 3);
     Affine X;
     if (!columns.empty()) {
-      if (columns[3] != 0 || columns[7] != 0 || columns[11] != 0 || columns[15] != 1) {
-        Fail("the last row of a node's matrix is not 0 0 0 1");
-      }
-      for (size_t i = 0; i < 12; ++i) X.m[i % 3][i / 3] = columns[i / 3 * 4 + i % 3];
+      X = FromColumns(columns);
     } else {
       if (!q.empty()) {
         const double x = q[0], y = q[1], z = q[2], w = q[3];
@@ -562,7 +663,9 @@ class GltfWalk {
 
   // Depth first, in the order of the file. A node has at most one parent.
   void VisitNodes(const std::vector<size_t>& roots) {
-    std::vector<bool> visited(CountOf("nodes"));
+    X_WN_.resize(CountOf("nodes"));
+    std::vector<bool> is_moved(CountOf("nodes"));
+    std::vector<size_t> order;
     std::vector<std::pair<size_t, std::optional<Affine>>> pending;
     for (size_t i = roots.size(); i > 0; --i) pending.emplace_back(roots[i - 1], std::nullopt);
     while (!pending.empty() && ok()) {
@@ -570,21 +673,28 @@ class GltfWalk {
       pending.pop_back();
       const Struct& node = Element("nodes", index);
       if (!ok()) return;
-      if (visited[index]) return Fail(absl::StrCat("nodes[", index, "] has several parents"));
-      visited[index] = true;
+      if (X_WN_[index]) return Fail(absl::StrCat("nodes[", index, "] has several parents"));
       if (Find(ObjectOf(node, "extensions"), "EXT_mesh_gpu_instancing") != nullptr) {
         return RefuseExtension("EXT_mesh_gpu_instancing");
       }
       std::optional<Affine> X_WN = TransformOf(node);
       if (X_WP) X_WN = X_WN ? *X_WP * *X_WN : *X_WP;
-      std::string name = TextOf(node, "name");
-      if (name.empty()) name = absl::StrCat("nodes[", index, "]");
-      if (const auto mesh = IntegerOf(node, "mesh"); ok() && mesh) {
-        VisitMesh(*mesh, X_WN ? &*X_WN : nullptr, {name, index, {}, false});
-      }
+      X_WN_[index] = X_WN.value_or(Affine());
+      is_moved[index] = X_WN.has_value();
+      order.push_back(index);
       const auto& children = ListOf(node, "children").values();
       for (int i = children.size(); i > 0; --i) {
         pending.emplace_back(Integer(children[i - 1], "children"), X_WN);
+      }
+    }
+    for (const size_t index : order) {
+      if (!ok()) return;
+      const Struct& node = Element("nodes", index);
+      std::string name = TextOf(node, "name");
+      if (name.empty()) name = absl::StrCat("nodes[", index, "]");
+      if (const auto mesh = IntegerOf(node, "mesh"); ok() && mesh) {
+        VisitMesh(*mesh, is_moved[index] ? &*X_WN_[index] : nullptr, node,
+                  {name, index, {}, false});
       }
     }
   }
@@ -614,7 +724,7 @@ class GltfWalk {
     for (size_t i = 0; i < CountOf("meshes") && ok(); ++i) {
       std::string name = TextOf(Element("meshes", i), "name");
       if (name.empty()) name = absl::StrCat("meshes[", i, "]");
-      VisitMesh(i, nullptr, {name, i, {}, false});
+      VisitMesh(i, nullptr, Struct::default_instance(), {name, i, {}, false});
     }
   }
 
@@ -624,6 +734,8 @@ class GltfWalk {
   Struct root_;
   std::optional<std::string> binary_;
   std::vector<std::optional<std::string>> buffers_;
+  // Transforms of the scene's nodes.
+  std::vector<std::optional<Affine>> X_WN_;
   size_t file_bytes_ = 0;
   size_t vertices_ = 0;
 };

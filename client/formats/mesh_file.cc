@@ -188,6 +188,7 @@ absl::Status ReadNamedParts(const std::string& path, PointFormat format,
                             std::vector<MeshPart>* parts) {
   auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
+  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
   switch (format) {
     case PointFormat::kObj:
       return ReadObjParts(source->get(), parts);
@@ -233,21 +234,10 @@ absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {
   }
   std::vector<uint32_t> corners;
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
-    if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
-    uint64_t size = 0;
-    bool ok = ParseUnsigned(NextToken(&content), &size);
-    corners.clear();
-    for (uint64_t corner = 0; ok && corner < size; ++corner) {
-      uint64_t index = 0;
-      ok = ParseUnsigned(NextToken(&content), &index) && index < mesh->vertices.size();
-      corners.push_back(static_cast<uint32_t>(index));
-    }
-    if (!ok)
-      return source->ErrorAtLine(
-          "a face needs its number of corners and that many vertices, as in 3 0 1 2");
+    if (absl::Status status = reader.NextFace(i, &corners); !status.ok()) return status;
     AddPolygon(corners, mesh);
   }
-  return absl::OkStatus();
+  return reader.Finish();
 }
 
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
@@ -255,8 +245,9 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
   if (!format.ok()) return format.status();
   auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
+  absl::Status status = (*source)->CheckStart();
+  if (!status.ok()) return status;
   TriangleMesh mesh;
-  absl::Status status;
   switch (*format) {
     case PointFormat::kObj:
       status = ReadObjMesh(source->get(), &mesh);

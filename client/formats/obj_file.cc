@@ -40,9 +40,9 @@ class ObjWalk {
     const std::string_view keyword = NextToken(&rest);
     if (keyword == "v") {
       ++vertices_;
-      return receiver_.vertex(rest);
+      return receiver_.vertex(WithoutComment(rest));
     }
-    if (keyword == "f") return TakeFace(rest.substr(0, rest.find('#')));
+    if (keyword == "f") return TakeFace(WithoutComment(rest));
     if ((keyword == "o" || keyword == "g") && receiver_.name) receiver_.name(keyword, Trim(rest));
     return absl::OkStatus();
   }

@@ -19,7 +19,7 @@ bool IsPositionFirst(std::string_view keyword) {
 bool OffReader::NextContent(std::string_view* content) {
   std::string_view line;
   while (source_->ReadLine(&line)) {
-    *content = Trim(line.substr(0, line.find('#')));
+    *content = Trim(WithoutComment(line));
     if (!content->empty()) return true;
   }
   return false;
@@ -28,7 +28,13 @@ bool OffReader::NextContent(std::string_view* content) {
 absl::Status OffReader::ReadHeader() {
   std::string_view rest;
   if (!NextContent(&rest)) return source_->Truncated("before the keyword OFF");
-  const std::string_view keyword = NextToken(&rest);
+  std::string_view keyword = NextToken(&rest);
+  // Files of ModelNet lack the white space in between: OFF8 12 0.
+  if (const size_t digits = keyword.find_first_of("0123456789");
+      digits != std::string_view::npos && IsPositionFirst(keyword.substr(0, digits))) {
+    rest = {keyword.data() + digits, static_cast<size_t>(rest.end() - keyword.data()) - digits};
+    keyword = keyword.substr(0, digits);
+  }
   if (!IsPositionFirst(keyword)) {
     return source_->ErrorAtLine(absl::StrCat(
         Quoted(keyword), " is not OFF, COFF, NOFF or STOFF; other kinds are not supported"));
@@ -52,9 +58,30 @@ absl::Status OffReader::NextVertex(uint64_t index, std::string_view* content) {
   return source_->Truncated(absl::StrCat("after ", index, " of ", vertex_count_, " vertices"));
 }
 
-absl::Status OffReader::NextFace(uint64_t index, std::string_view* content) {
-  if (NextContent(content)) return absl::OkStatus();
-  return source_->Truncated(absl::StrCat("after ", index, " of ", face_count_, " faces"));
+absl::Status OffReader::NextFace(uint64_t index, std::vector<uint32_t>* corners) {
+  std::string_view content;
+  if (!NextContent(&content)) {
+    return source_->Truncated(absl::StrCat("after ", index, " of ", face_count_, " faces"));
+  }
+  uint64_t size = 0;
+  bool ok = ParseUnsigned(NextToken(&content), &size);
+  corners->clear();
+  for (uint64_t corner = 0; ok && corner < size; ++corner) {
+    uint64_t vertex = 0;
+    ok = ParseUnsigned(NextToken(&content), &vertex) && vertex < vertex_count_;
+    corners->push_back(static_cast<uint32_t>(vertex));
+  }
+  if (ok) return absl::OkStatus();
+  return source_->ErrorAtLine(
+      "a face needs its number of corners and that many vertices, as in 3 0 1 2");
+}
+
+absl::Status OffReader::Finish() {
+  std::string_view content;
+  if (!NextContent(&content)) return source_->status();
+  return source_->ErrorAtLine(
+      absl::StrCat("the file goes on after ", Counted(vertex_count_, "vertex", "vertices"), " and ",
+                   Counted(face_count_, "face"), ", the counts of its header"));
 }
 
 absl::Status ReadOff(ByteSource* source, PointCollector* points) {
@@ -70,11 +97,12 @@ absl::Status ReadOff(ByteSource* source, PointCollector* points) {
     if (status.ok()) status = AddTextPoint(*source, content, points);
     if (!status.ok()) return status;
   }
-  // The faces are not needed, but reading them detects truncation.
+  // The faces are not needed, but reading them detects truncation and wrong counts.
+  std::vector<uint32_t> corners;
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
-    if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
+    if (absl::Status status = reader.NextFace(i, &corners); !status.ok()) return status;
   }
-  return absl::OkStatus();
+  return reader.Finish();
 }
 
 }  // namespace hulld

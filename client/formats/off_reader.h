@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string_view>
+#include <vector>
 
 #include "client/formats/byte_source.h"
 
@@ -22,8 +23,11 @@ class OffReader {
 
   // Reads the line of the next vertex, the `index`-th.
   absl::Status NextVertex(uint64_t index, std::string_view* content);
-  // Reads the line of the next face, the `index`-th. Faces follow all vertices.
-  absl::Status NextFace(uint64_t index, std::string_view* content);
+  // Reads the next face, the `index`-th. Faces follow all vertices.
+  absl::Status NextFace(uint64_t index, std::vector<uint32_t>* corners);
+  // Requires that all faces were read. INVALID_ARGUMENT if more follows: a wrong count makes
+  // readers take vertices for faces.
+  absl::Status Finish();
 
   // Reads the next line that is not blank, without comments. Returns false at the end.
   bool NextContent(std::string_view* content);

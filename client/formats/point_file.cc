@@ -31,6 +31,7 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
   absl::StatusOr<std::unique_ptr<ByteSource>> source = ByteSource::Open(request.path);
   if (!source.ok()) return source.status();
   (*source)->ReportProgress(request.progress);
+  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
   switch (request.format) {
     case PointFormat::kObj:
       return ReadObj(source->get(), points);
@@ -65,7 +66,9 @@ absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
         "dae cannot be read from standard input; save it to a file first");
   }
   // Reports plainly why a file cannot be opened.
-  if (auto source = ByteSource::Open(request.path); !source.ok()) return source.status();
+  auto source = ByteSource::Open(request.path);
+  if (!source.ok()) return source.status();
+  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
   return ReadDae(request.path, points);
 }
 

@@ -51,13 +51,14 @@ class StlText {
 
   absl::Status Ended(std::string_view missing) const {
     if (!source_->status().ok()) return source_->status();
-    return source_->ErrorAtLine(absl::StrCat("the file ends after ", facets_, " facets, before ",
-                                             std::string(missing), "; is it complete?"));
+    return source_->ErrorAtLine(absl::StrCat("the file ends after ", Counted(facets_, "facet"),
+                                             ", before ", std::string(missing),
+                                             "; is it complete?"));
   }
 
   absl::Status Unexpected(std::string_view expected) const {
-    return source_->ErrorAtLine(absl::StrCat(Quoted(word_), " after ", facets_, " facets where \"",
-                                             std::string(expected), "\" is expected"));
+    return source_->ErrorAtLine(absl::StrCat(Quoted(word_), " after ", Counted(facets_, "facet"),
+                                             " where \"", std::string(expected), "\" is expected"));
   }
 
   absl::Status Expect(std::string_view keyword) {
@@ -142,10 +143,10 @@ absl::Status WalkBinaryStl(ByteSource* source, const StlReceiver& receiver) {
   if (!source->status().ok()) return source->status();
   const uint64_t extra = source->offset() - at;
   if (count == 0 || (extra > 0 && extra % kTriangleBytes == 0)) {
-    return error_at(
-        absl::StrCat("the header declares ", count, " triangles and ", extra,
-                     " bytes follow them; correct the count at byte 80, or cut the file "
-                     "at the last triangle"));
+    return error_at(absl::StrCat("the header declares ", Counted(count, "triangle"), " and ",
+                                 Counted(extra, "byte"),
+                                 " follow them; correct the count at byte 80, or cut the file "
+                                 "at the last triangle"));
   }
   return absl::OkStatus();
 }
@@ -161,6 +162,8 @@ absl::Status WalkStl(ByteSource* source, const StlReceiver& receiver) {
   std::string_view start = source->Peek(kBytesToClassify);
   if (!source->status().ok()) return source->status();
   if (std::any_of(start.begin(), start.end(), IsControl)) return WalkBinaryStl(source, receiver);
+  if (start.empty())
+    return absl::InvalidArgumentError(source->name() + ": not an STL file: it is empty");
   if (start.substr(0, 3) == "\xEF\xBB\xBF") start.remove_prefix(3);
   const std::string_view word = NextToken(&start);
   if (absl::EqualsIgnoreCase(absl::string_view(word.data(), word.size()), "solid")) {

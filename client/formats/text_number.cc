@@ -43,6 +43,16 @@ bool IsHuge(std::string_view text) {
   return exponent + (negative ? -written : written) > 0;
 }
 
+// Parses 1.#INF and its kin without a sign. Printing with a precision adds zeros.
+bool ParseNonFinite(std::string_view text, double* value) {
+  while (!text.empty() && text.back() == '0') text.remove_suffix(1);
+  const bool is_infinite = text == "1.#INF";
+  if (!is_infinite && text != "1.#QNAN" && text != "1.#SNAN" && text != "1.#IND") return false;
+  *value = is_infinite ? std::numeric_limits<double>::infinity()
+                       : std::numeric_limits<double>::quiet_NaN();
+  return true;
+}
+
 // Returns the length of the UTF-8 character at the start of the text, which is not empty; 0 if it
 // is malformed. Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
 size_t CharacterLength(std::string_view text) {
@@ -71,7 +81,11 @@ NumberText ParseDouble(std::string_view text, double* value) {
   const char* const end = text.data() + text.size();
   double magnitude = 0;
   const auto [stop, error] = std::from_chars(text.data(), end, magnitude);
-  if (stop != end || error == std::errc::invalid_argument) return NumberText::kNoNumber;
+  if (stop != end || error == std::errc::invalid_argument) {
+    if (!ParseNonFinite(text, &magnitude)) return NumberText::kNoNumber;
+    *value = negative ? -magnitude : magnitude;
+    return NumberText::kNumber;
+  }
   if (error == std::errc::result_out_of_range) {
     if (IsHuge(text)) return NumberText::kTooLarge;
     magnitude = 0;
@@ -107,6 +121,34 @@ std::string_view Trim(std::string_view text) {
   while (!text.empty() && IsSpace(text.front())) text.remove_prefix(1);
   while (!text.empty() && IsSpace(text.back())) text.remove_suffix(1);
   return text;
+}
+
+std::string_view WithoutComment(std::string_view line) {
+  size_t mark = line.find('#');
+  while (mark != std::string_view::npos && mark > 0 && line[mark - 1] == '.') {
+    mark = line.find('#', mark + 1);
+  }
+  return line.substr(0, mark);
+}
+
+std::string PercentDecoded(std::string_view text) {
+  const auto digit = [](char c) {
+    const size_t found = std::string_view("0123456789abcdefABCDEF").find(c);
+    return found == std::string_view::npos ? -1 : static_cast<int>(found < 16 ? found : found - 6);
+  };
+  std::string decoded;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const bool escaped =
+        text[i] == '%' && i + 2 < text.size() && digit(text[i + 1]) >= 0 && digit(text[i + 2]) >= 0;
+    decoded += escaped ? static_cast<char>(16 * digit(text[i + 1]) + digit(text[i + 2])) : text[i];
+    if (escaped) i += 2;
+  }
+  return decoded;
+}
+
+std::string Counted(uint64_t count, const std::string& noun, const std::string& plural) {
+  const std::string& text = count == 1 ? noun : plural;
+  return std::to_string(count) + " " + (text.empty() ? noun + "s" : text);
 }
 
 std::string Quoted(std::string_view text) {

@@ -19,7 +19,8 @@ enum class NumberText {
 
 // Parses the nearest double (ties to even) of a decimal number with an optional sign, '+' included.
 // The whole text must be the number. A number nearer to 0 than to any other double becomes 0 with
-// its sign. Independent of the locale.
+// its sign. 1.#INF, 1.#QNAN, 1.#SNAN, and 1.#IND, as old C libraries of Windows write them, are
+// infinity and NaN. Independent of the locale.
 NumberText ParseDouble(std::string_view text, double* value);
 
 // Parses a decimal number without a sign that fits 64 bits.
@@ -35,12 +36,22 @@ std::string_view NextToken(std::string_view* rest);
 // Returns the text without spaces at both ends.
 std::string_view Trim(std::string_view text);
 
+// Returns the line without the comment that starts at its first '#'. The one in 1.#QNAN is part of
+// a number.
+std::string_view WithoutComment(std::string_view line);
+
 // Returns the text in double quotes, shortened and with unprintable characters replaced, for an
 // error message.
 std::string Quoted(std::string_view text);
 
 // Returns the text with "?" in place of control characters and of bytes that are not UTF-8.
 std::string Printable(std::string_view text);
+
+// Returns the text with each %XX replaced by its byte, as in URIs.
+std::string PercentDecoded(std::string_view text);
+
+// Returns "1 facet" or "2 facets". plural: by default, the noun with an "s".
+std::string Counted(uint64_t count, const std::string& noun, const std::string& plural = "");
 
 // Returns the defect in the text of a coordinate, such as `"abc" is not a number`.
 std::string NumberProblem(NumberText kind, std::string_view text);

@@ -203,6 +203,11 @@ absl::Status ReadAscii(ByteSource* source, const Layout& layout, uint64_t count,
         if (kind != NumberText::kNumber) return source->ErrorAtLine(NumberProblem(kind, token));
       }
     }
+    // Extra values mean that the columns are not those of the header.
+    if (const std::string_view token = NextToken(&line); !token.empty()) {
+      return source->ErrorAtLine(absl::StrCat(Quoted(token), " is beyond the ", layout.row,
+                                              " values of a point that FIELDS and COUNT declare"));
+    }
     absl::Status status = points->AddScaled(xyz[0], xyz[1], xyz[2], error_at);
     if (!status.ok()) return status;
   }

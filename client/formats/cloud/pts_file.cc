@@ -16,7 +16,7 @@ absl::Status ReadPts(ByteSource* source, PointCollector* points) {
   bool is_first = true;
   std::string_view line;
   while (source->ReadLine(&line)) {
-    const std::string_view content = Trim(line.substr(0, line.find('#')));
+    const std::string_view content = Trim(WithoutComment(line));
     if (content.empty() || content.substr(0, 2) == "//") continue;
     std::string_view rest = content;
     const std::string_view first = NextToken(&rest);

@@ -46,8 +46,9 @@ absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
   std::string_view line;
   while (source->ReadLine(&line)) {
-    const std::string_view content = Trim(line.substr(0, line.find('#')));
-    if (content.empty()) continue;
+    const std::string_view content = Trim(WithoutComment(line));
+    // CloudCompare writes a header //X Y Z.
+    if (content.empty() || content.substr(0, 2) == "//") continue;
     std::string_view rest = content;
     bool separated = false;
     for (int i = 0; i < 3; ++i) {

@@ -7,11 +7,6 @@
 
 namespace hulld {
 
-std::string Counted(uint64_t count, const std::string& noun, const std::string& plural) {
-  const std::string& text = count == 1 ? noun : plural;
-  return std::to_string(count) + " " + (text.empty() ? noun + "s" : text);
-}
-
 Table& Table::Row(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
   return *this;

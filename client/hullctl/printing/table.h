@@ -1,15 +1,13 @@
 #ifndef HULLD_CLIENT_HULLCTL_PRINTING_TABLE_H_
 #define HULLD_CLIENT_HULLCTL_PRINTING_TABLE_H_
 
-#include <cstdint>
 #include <ostream>
 #include <string>
 #include <vector>
 
-namespace hulld {
+#include "client/formats/text_number.h"
 
-// Returns "1 hull" or "2 hulls". plural: by default, the noun with an "s".
-std::string Counted(uint64_t count, const std::string& noun, const std::string& plural = "");
+namespace hulld {
 
 // Rows of text in columns as wide as their widest cell.
 class Table {

@@ -144,6 +144,84 @@ TEST(GltfFile, SparseAccessorsReplacePositions) {
               HasSubstr("reaches beyond its buffer"));
 }
 
+// A morph target that moves by (2, 4, 8), and a second one by (100, 0, 0).
+std::string MorphGltf(const std::string& mesh_weights, const std::string& node_weights) {
+  const std::string bytes = Bytes(kTriangle) + Bytes<float>({2, 4, 8, 2, 4, 8, 2, 4, 8}) +
+                            Bytes<float>({100, 0, 0, 100, 0, 0, 100, 0, 0});
+  std::string text =
+      Gltf(bytes, kFloats, node_weights.empty() ? "" : R"(,"weights":)" + node_weights);
+  text = Replaced(text, R"({"POSITION":0}}])",
+                  absl::StrCat(R"({"POSITION":0},"targets":[{"POSITION":1},{"POSITION":2}]}])",
+                               mesh_weights.empty() ? "" : R"(,"weights":)" + mesh_weights));
+  const std::string accessor = R"({"bufferView":0,"type":"VEC3","componentType":5126,"count":3)";
+  return Replaced(text, accessor + "}",
+                  absl::StrCat(accessor, "},", accessor, R"(,"byteOffset":36},)", accessor,
+                               R"(,"byteOffset":72})"));
+}
+
+TEST(GltfFile, MorphTargetsMoveVerticesByTheirWeights) {
+  const auto read = [](const std::string& mesh, const std::string& node) {
+    const PointsRead points = ReadText(MorphGltf(mesh, node), PointFormat::kGltf);
+    EXPECT_TRUE(points.status.ok()) << points.status;
+    return points.xyz();
+  };
+  const double x = 0.1f;
+  EXPECT_THAT(read("", ""), ElementsAre(x, 0, 0, 1, 0, 0, 0, 2, 0));
+  EXPECT_THAT(read("[0,0]", ""), ElementsAre(x, 0, 0, 1, 0, 0, 0, 2, 0));
+  EXPECT_THAT(read("[0.5,0]", ""), ElementsAre(x + 1, 2, 4, 2, 2, 4, 1, 4, 4));
+  EXPECT_THAT(read("[0.5,1]", ""), ElementsAre(x + 1 + 100, 2, 4, 102, 2, 4, 101, 4, 4));
+  // The node's weights win.
+  EXPECT_THAT(read("[9,9]", "[-0.5,0]"), ElementsAre(x - 1, -2, -4, 0, -2, -4, -1, 0, -4));
+  EXPECT_THAT(Error(Replaced(MorphGltf("[1,0]", ""), R"("count":3,"byteOffset":36)",
+                             R"("count":2,"byteOffset":36)")),
+              HasSubstr("a morph target has 2 positions for 3 vertices"));
+}
+
+// The first vertex hangs on nodes[1], the second on nodes[2], the third on both.
+std::string SkinGltf() {
+  const std::string bytes = Bytes(kTriangle) +
+                            Bytes<uint8_t>({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}) +
+                            Bytes<float>({1, 0, 0, 0, 1, 0, 0, 0, 0.25f, 0.75f, 0, 0}) +
+                            Bytes<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}) +
+                            Bytes<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -3, 0, 0, 1});
+  std::string text =
+      Gltf(bytes, kFloats,
+           R"(,"skin":0,"translation":[1000,0,0]},{"translation":[0,0,8]},{"translation":[3,4,0])",
+           R"("skins":[{"joints":[1,2],"inverseBindMatrices":3}],)");
+  text = Replaced(text, R"("nodes":[0])", R"("nodes":[0,1,2])");
+  text = Replaced(text, R"("POSITION":0)", R"("POSITION":0,"JOINTS_0":1,"WEIGHTS_0":2)");
+  return Replaced(text, R"("count":3}])",
+                  R"("count":3},
+      {"bufferView":0,"byteOffset":36,"type":"VEC4","componentType":5121,"count":3},
+      {"bufferView":0,"byteOffset":48,"type":"VEC4","componentType":5126,"count":3},
+      {"bufferView":0,"byteOffset":96,"type":"MAT4","componentType":5126,"count":2}])");
+}
+
+TEST(GltfFile, SkinsPlaceVerticesByTheirJoints) {
+  const PointsRead read = ReadText(SkinGltf(), PointFormat::kGltf);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(0.1f, 0, 8, 1, 4, 0, 0, 5, 2));
+}
+
+TEST(GltfFile, SkinsThatDoNotFitTheirMeshAreErrors) {
+  const auto error = [](const std::string& from, const std::string& to) {
+    return Error(Replaced(SkinGltf(), from, to));
+  };
+  EXPECT_THAT(error(R"("nodes":[0,1,2])", R"("nodes":[0,1])"),
+              HasSubstr("skins[0]: the joint nodes[2] is not in the scene"));
+  EXPECT_THAT(error(R"("joints":[1,2])", R"("joints":[1])"),
+              HasSubstr("vertex 1 has the joint 1, but the skin has 1"));
+  EXPECT_THAT(error(R"("joints":[1,2])", R"("joints":[1,2,1])"),
+              HasSubstr("fewer inverseBindMatrices than joints"));
+  EXPECT_THAT(error(R"("skin":0)", R"("skin":1)"), HasSubstr("skins[1] is out of range"));
+  EXPECT_THAT(error(R"("componentType":5121,"count":3)", R"("componentType":5121,"count":2)"),
+              HasSubstr("more or fewer joints than vertices"));
+  EXPECT_THAT(error(R"("byteOffset":36,"type":"VEC4","componentType":5121)",
+                    R"("byteOffset":50,"type":"VEC4","componentType":5120)"),
+              HasSubstr("vertex 0 has the joint -128, but the skin has 2"));
+  EXPECT_THAT(error(R"("type":"MAT4")", R"("type":"MAT3")"), HasSubstr("must be MAT4"));
+}
+
 TEST(GltfFile, BoundsAreChecked) {
   const std::string good = Gltf(Bytes(kTriangle), kFloats);
   const auto error = [&](const std::string& from, const std::string& to) {
@@ -189,10 +267,15 @@ TEST(GltfFile, BinaryFormIsReadAndCutOnesAreRefused) {
                               absl::StrCat(R"(,"uri":")", DataUri(Bytes(kTriangle)), "\""), "");
   while (json.size() % 4 != 0) json += ' ';
   const auto size = [](size_t value) { return Bytes<uint32_t>({static_cast<uint32_t>(value)}); };
-  const std::string body =
-      size(json.size()) + "JSON" + json + size(36) + std::string("BIN\0", 4) + Bytes(kTriangle);
-  const std::string glb = "glTF" + size(2) + size(12 + body.size()) + body;
+  const auto glb_of = [&](const std::string& text) {
+    const std::string body =
+        size(text.size()) + "JSON" + text + size(36) + std::string("BIN\0", 4) + Bytes(kTriangle);
+    return "glTF" + size(2) + size(12 + body.size()) + body;
+  };
+  const std::string glb = glb_of(json);
   EXPECT_EQ(ReadText(glb, PointFormat::kGltf).counts.points, 3u);
+  // Some writers pad with zeros.
+  EXPECT_EQ(ReadText(glb_of(json + std::string(4, '\0')), PointFormat::kGltf).counts.points, 3u);
   for (size_t length = 4; length < glb.size(); ++length) {
     EXPECT_THAT(Error(glb.substr(0, length)), HasSubstr("FILE: byte ")) << length;
   }

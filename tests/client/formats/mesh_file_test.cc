@@ -1,5 +1,6 @@
 #include "client/formats/mesh_file.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -127,6 +128,34 @@ TEST(MeshFile, ColladaComesInMetersWithItsAxesAsTheyAre) {
   ASSERT_TRUE(parts.ok()) << parts.status();
   ASSERT_EQ(parts->size(), 1u);
   EXPECT_EQ((*parts)[0].name, "plate");
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+  const size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+// 3 inches are the double nearest to 0.0762, not 3 times a rounded factor.
+TEST(MeshFile, ColladaUnitsAreRoundedOnce) {
+  for (const auto& [unit, length] : {std::pair("0.0254", 0.0762), std::pair("0.3048", 0.9144),
+                                     std::pair("0.001", 0.003), std::pair("1e-6", 3e-6)}) {
+    std::string text = Replaced(kCollada, "meter=\"0.01\"", absl::StrCat("meter=\"", unit, "\""));
+    text = Replaced(text, "<translate>100 0 0</translate>", "<translate>1 0 0</translate>");
+    text = Replaced(text, "0 0 0 200", "0 0 0 2");
+    const TempFile file("plate.dae", text);
+    const PointsRead read = ReadFile(file.path(), PointFormat::kDae);
+    ASSERT_TRUE(read.status.ok()) << read.status;
+    EXPECT_EQ(read.xyz()[3], length) << unit;
+  }
+}
+
+// assimp would draw the nodes.
+TEST(MeshFile, ColladaWithoutMeshesHasNoPoints) {
+  const TempFile file("plate.dae", Replaced(kCollada, "<instance_geometry url=\"#plate-mesh\"/>",
+                                            "<node><translate>0 7 0</translate></node>"));
+  EXPECT_THAT(ReadFile(file.path(), PointFormat::kDae).error(), HasSubstr("contains no vertex"));
+  EXPECT_FALSE(ReadParts(file.path(), SplitBy::kName).ok());
 }
 
 }  // namespace mesh_file_test

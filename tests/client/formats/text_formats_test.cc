@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "client/formats/mesh_file.h"
 #include "tests/client/formats/point_reading.h"
 
 namespace hulld {
@@ -60,6 +61,23 @@ TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
 TEST(XyzFile, SkipsCommentsAndBlankLines) {
   EXPECT_THAT(ReadText("# x y z\n\n  1 2 3 # end\r\n\t\n4\t5\t6", PointFormat::kXyz).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST(XyzFile, HeadersOfCloudCompareAreComments) {
+  EXPECT_THAT(ReadText("//X Y Z R G B\n1 2 3 0 0 0\n", PointFormat::kXyz).xyz(),
+              ElementsAre(1, 2, 3));
+}
+
+// Cut at the comment mark, the third coordinate would be 1.
+TEST(XyzFile, InfinitiesWithACommentMarkAreNotCut) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kPts}) {
+    EXPECT_EQ(ReadText("1 2 3\n4 5 1.#INF\n", format).error(),
+              "FILE:2: point 2 has z = infinity; skip such points with --skip-nonfinite");
+  }
+  EXPECT_THAT(ReadText("OFF\n1 0 0\n1 2 -1.#IND\n", PointFormat::kOff).error(),
+              HasSubstr("z = NaN"));
+  EXPECT_THAT(ReadText("v 1 2 1.#QNAN\n", PointFormat::kObj).error(), HasSubstr("z = NaN"));
+  EXPECT_THAT(ReadText("v 1 2 3#c\n", PointFormat::kObj).xyz(), ElementsAre(1, 2, 3));
 }
 
 TEST(XyzFile, NumbersMayBeSeparatedByCommasOrSemicolons) {
@@ -197,6 +215,27 @@ TEST(OffFile, FacesWithoutVerticesAreAnError) {
             "FILE:2: the file declares 1 faces, but no vertex");
 }
 
+// A count of vertices that is too small makes faces of the last ones.
+TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
+  const std::string rows = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n";
+  const auto error = [&](const std::string& counts) {
+    return ReadText("OFF\n" + counts + "\n" + rows, PointFormat::kOff).error();
+  };
+  EXPECT_EQ(error("4 2 0"), "");
+  EXPECT_THAT(error("3 2 0"), HasSubstr("FILE:"));
+  EXPECT_THAT(error("3 3 0"), HasSubstr("FILE:"));
+  EXPECT_EQ(error("4 1 0"),
+            "FILE:8: the file goes on after 4 vertices and 1 face, the counts of its header");
+  EXPECT_THAT(ReadText("OFF\n1 1 0\n1 2 3\n3 0 0 1\n", PointFormat::kOff).error(),
+              HasSubstr("FILE:4: a face needs its number of corners"));
+}
+
+TEST(OffFile, CountsMayFollowTheKeywordDirectly) {
+  EXPECT_THAT(ReadText("OFF1 0 0\n1 2 3\n", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("COFF1 0 0\n1 2 3 9 9 9 9\n", PointFormat::kOff).xyz(),
+              ElementsAre(1, 2, 3));
+}
+
 TEST(OffFile, RefusesUnknownContent) {
   EXPECT_THAT(ReadText("4OFF\n1 0 0\n1 2 3 4\n", PointFormat::kOff).error(),
               HasSubstr("FILE:1: \"4OFF\" is not OFF"));
@@ -303,6 +342,10 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
   EXPECT_THAT(
       ReadText(std::string(kPcdHead) + "DATA ascii\n0 1 2 3 0 0 0\n", PointFormat::kPcd).error(),
       HasSubstr("after 1 of 2 points"));
+  EXPECT_EQ(ReadText(std::string(kPcdHead) + "POINTS 1\nWIDTH 1\nDATA ascii\n0 1 2 3 0 0 0 8\n",
+                     PointFormat::kPcd)
+                .error(),
+            "FILE:13: \"8\" is beyond the 7 values of a point that FIELDS and COUNT declare");
   EXPECT_EQ(
       ReadText("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", PointFormat::kPcd)
           .error(),
@@ -315,6 +358,22 @@ TEST(Formats, AreKnownByExtensionInAnyCase) {
   EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
               HasSubstr("--format"));
   EXPECT_FALSE(PointFormatOfPath("x.docx").ok());
+}
+
+TEST(Formats, CompressedAndUtf16FilesAreRefusedAsSuch) {
+  for (const std::string& name : PointFormatNames()) {
+    const PointFormat format = *PointFormatFromName(name);
+    EXPECT_EQ(ReadText("\x1F\x8B\x08 123456", format).error(),
+              "FILE is compressed (gzip); decompress it first")
+        << name;
+    EXPECT_THAT(ReadText("PK\x03\x04 123456", format).error(), HasSubstr("(zip)")) << name;
+    EXPECT_THAT(ReadText(std::string("\xFF\xFEs\0o\0", 6), format).error(),
+                HasSubstr("is UTF-16 text"))
+        << name;
+    if (!IsMeshFormat(format)) continue;
+    const TempFile file("a." + name, "\x1F\x8B\x08 123456");
+    EXPECT_THAT(std::string(ReadMesh(file.path()).status().message()), HasSubstr("(gzip)")) << name;
+  }
 }
 
 TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {

@@ -77,6 +77,23 @@ TEST(TextNumber, ReadsNanAndInfinityAsSuch) {
   EXPECT_EQ(Parsed("-Infinity"), -HUGE_VAL);
 }
 
+TEST(TextNumber, ReadsTheSpellingsOfOldWindowsLibraries) {
+  for (const char* text : {"1.#QNAN", "-1.#IND", "1.#SNAN", "-1.#IND00", "1.#QNAN0"}) {
+    EXPECT_TRUE(std::isnan(Parsed(text))) << text;
+  }
+  EXPECT_EQ(Parsed("1.#INF"), HUGE_VAL);
+  EXPECT_EQ(Parsed("-1.#INF00"), -HUGE_VAL);
+  for (const char* text : {"1.#", "1.#X", "2.#INF", "#INF", "1.#INF1"}) {
+    EXPECT_EQ(KindOf(text), NumberText::kNoNumber) << text;
+  }
+}
+
+TEST(TextNumber, CommentsDoNotStartWithinNumbers) {
+  EXPECT_EQ(WithoutComment("1 2 3#c"), "1 2 3");
+  EXPECT_EQ(WithoutComment("1 2 1.#INF # 4"), "1 2 1.#INF ");
+  EXPECT_EQ(WithoutComment("# a.# b"), "");
+}
+
 TEST(TextNumber, RefusesOtherText) {
   for (const char* text :
        {"",   "-",    "+",   ".",  "abc", "1x",     "+-1",   "--1",  "-+1",   "++1",

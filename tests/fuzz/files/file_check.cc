@@ -525,6 +525,10 @@ void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* con
 
 const std::vector<std::string>& FileTokens() {
   static const auto* const tokens = new std::vector<std::string>{"nan",
+                                                                 "1.#INF",
+                                                                 "\"skin\":0,",
+                                                                 "\"weights\":[1],",
+                                                                 "\"JOINTS_0\":0,",
                                                                  "-inf",
                                                                  "1e308",
                                                                  "1e309",
