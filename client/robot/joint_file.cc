@@ -134,8 +134,8 @@ absl::StatusOr<bool> WaypointReader::Next(std::vector<double>* free_values) {
     const std::vector<std::string_view> cells = CellsOf(line);
     if (cells.empty()) continue;
     if (cells.size() != columns_.size()) {
-      return source_->ErrorAtLine(
-          absl::StrCat("the header has ", columns_.size(), " columns, this row ", cells.size()));
+      return source_->ErrorAtLine(absl::StrCat(
+          "the header has ", Counted(columns_.size(), "column"), ", this row ", cells.size()));
     }
     *free_values = rest_;
     for (size_t i = 0; i < cells.size(); ++i) {

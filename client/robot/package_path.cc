@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <system_error>
 
 #include "client/formats/text_number.h"
@@ -21,6 +22,14 @@ constexpr size_t kMostFolders = 10000;
 bool IsFile(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
+}
+
+// Returns the file `folder`/`name`. URIs may hold escapes such as %20, and so may names of files.
+std::optional<std::string> FileIn(const fs::path& folder, const std::string& name) {
+  for (const std::string& spelled : {name, PercentDecoded(name)}) {
+    if (IsFile(folder / spelled)) return (folder / spelled).string();
+  }
+  return std::nullopt;
 }
 
 // Returns the folders named `package` below `folder`, level by level, each level in order of names.
@@ -91,12 +100,15 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
     in_package = true;
   }
   if (!in_package) {
-    if (name.rfind("file://", 0) == 0) rest = name.substr(7);
-    const fs::path path = fs::path(rest).is_absolute()
-                              ? fs::path(rest)
-                              : fs::path(paths.description).parent_path() / rest;
-    if (IsFile(path)) return path.string();
-    return absl::NotFoundError(absl::StrCat("no such file: ", path.string()));
+    for (const std::string scheme : {"file://localhost/", "file:///", "file://", "file:"}) {
+      if (name.rfind(scheme, 0) != 0) continue;
+      rest = (scheme.size() > 7 ? "/" : "") + name.substr(scheme.size());
+      break;
+    }
+    // An absolute path replaces the folder.
+    const fs::path folder = fs::path(paths.description).parent_path();
+    if (auto file = FileIn(folder, rest); file.has_value()) return *file;
+    return absl::NotFoundError(absl::StrCat("no such file: ", (folder / rest).string()));
   }
   const size_t slash = rest.find('/');
   const std::string package = rest.substr(0, slash);
@@ -106,8 +118,7 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
   }
   std::vector<std::string> tried;
   for (const fs::path& folder : FoldersOf(paths, package)) {
-    const fs::path path = folder / rest.substr(slash + 1);
-    if (IsFile(path)) return path.string();
+    if (auto file = FileIn(folder, rest.substr(slash + 1)); file.has_value()) return *file;
     if (std::find(tried.begin(), tried.end(), folder.string()) == tried.end()) {
       tried.push_back(folder.string());
     }

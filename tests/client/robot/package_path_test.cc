@@ -69,7 +69,17 @@ TEST_F(PackagePath, OtherNamesAreFiles) {
   EXPECT_EQ(Resolve("a.stl"), file);
   EXPECT_EQ(Resolve("file://" + file), file);
   EXPECT_EQ(Resolve(file), file);
+  EXPECT_EQ(Resolve("file://localhost" + file), file);
+  EXPECT_EQ(Resolve("file:" + file), file);
   EXPECT_THAT(Resolve("b.stl"), HasSubstr("no such file"));
+}
+
+TEST_F(PackagePath, UrisMayHoldEscapes) {
+  const std::string file = Make("ws/src/arm_description/my part.stl");
+  const std::string percent = Make("ws/src/arm_description/my%20tool.stl");
+  EXPECT_EQ(Resolve("package://arm_description/my%20part.stl"), file);
+  EXPECT_EQ(Resolve("file://" + At("ws/src/arm_description/my%20part.stl")), file);
+  EXPECT_EQ(Resolve("package://arm_description/my%20tool.stl"), percent);
 }
 
 TEST_F(PackagePath, RefusalSaysWhereItWasLookedFor) {

@@ -111,7 +111,12 @@ def read_pieces(
             f"{path}: meshes are read from stl and obj; convert it, or read it with another "
             "library, as with load_mesh=trimesh.load_mesh"
         )
-    mesh = reader(path, path.read_bytes(), scale)
+    data = path.read_bytes()
+    if data[:2] == b"\x1f\x8b":
+        raise ValueError(f"{path} is compressed (gzip); decompress it first")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise ValueError(f"{path} is UTF-16 text; convert it first: iconv -f UTF-16 -t UTF-8")
+    mesh = reader(path, data, scale)
     if split:
         pieces = mesh.pieces()
         if len(pieces) > 1 and all(piece.is_convex() for piece in pieces):
@@ -133,7 +138,7 @@ def _number(word: str, factor: Fraction, place: str) -> float:
     """The double nearest to a decimal number times the factor. ValueError: not a finite number."""
     try:
         value = float(word) if factor == 1 else float(Fraction(word) * factor)
-        if "_" not in word and abs(value) < float("inf"):
+        if not set("_/") & set(word) and abs(value) < float("inf"):
             return value
     except (ValueError, OverflowError, ZeroDivisionError):
         pass
@@ -267,24 +272,27 @@ def _read_text_stl(
 
     text = words()
 
+    def read() -> str:
+        """The number of facets, as in "1 facet"."""
+        return f"{len(parts)} facet" + "s" * (len(parts) != 1)
+
     def take(expected: str) -> tuple[str, str]:
         """The next word, and the name behind it. ValueError: it is not `expected`."""
         place, word, name = next(text, ("", "", ""))
         if not place:
             raise ValueError(
-                f"{end}: the file ends after {len(parts)} facets, before {expected}; is it "
-                "complete?"
+                f"{end}: the file ends after {read()}, before {expected}; is it complete?"
             )
         if expected and word.lower() not in expected.split(" or "):
             raise ValueError(
-                f'{place}: {word!r} after {len(parts)} facets where "{expected}" is expected'
+                f'{place}: {word!r} after {read()} where "{expected}" is expected'
             )
         return word.lower(), name
 
     for place, word, name in text:
         if word != "solid":
             raise ValueError(
-                f'{place}: {word!r} after {len(parts)} facets where "solid" is expected'
+                f'{place}: {word!r} after {read()} where "solid" is expected'
             )
         part = number_of.setdefault(name, len(number_of))
         while take("facet or endsolid")[0] == "facet":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import urllib.parse
 from collections.abc import Iterator, Mapping
 
 _PACKAGE_DEPTH = 3
@@ -14,7 +15,7 @@ def resolve_file(
     name: str, description: str | os.PathLike[str], packages: Mapping[str, str | os.PathLike[str]]
 ) -> pathlib.Path:
     """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
-    the description's folder.
+    the description's folder. If no file has the name, its escapes such as %20 are decoded.
 
     A package is the first folder with the file among: that of `packages`, alone; DIR/PACKAGE, or
     DIR itself if it is named PACKAGE, for each DIR of ROS_PACKAGE_PATH, and packages at most three
@@ -23,17 +24,18 @@ def resolve_file(
     """
     scheme, separator, rest = name.partition("://")
     if not separator or scheme == "file":
-        path = pathlib.Path(description).parent / (rest if separator else name)
-        if path.is_file():
+        rest = name.removeprefix("file://localhost").removeprefix("file://").removeprefix("file:")
+        folder = pathlib.Path(description).parent
+        if (path := _file_in(folder, rest)) is not None:
             return path
-        raise FileNotFoundError(f"no such file: {path}")
+        raise FileNotFoundError(f"no such file: {folder / rest}")
     package, _, file = rest.partition("/")
     if scheme not in ("package", "model") or not package or not file:
         raise FileNotFoundError(f"{name!r} is not a package file; write package://PACKAGE/FILE")
     tried: dict[str, None] = {}
     for folder in _folders_of(package, description, packages):
-        if (folder / file).is_file():
-            return folder / file
+        if (path := _file_in(folder, file)) is not None:
+            return path
         tried[str(folder)] = None
     named = [*tried][:8]
     more = f" and {len(tried) - len(named)} more" if len(tried) > len(named) else ""
@@ -41,6 +43,14 @@ def resolve_file(
         f"no folder of the package {package!r} holds {file}; set its folder with "
         f"packages={{{package!r}: DIR}} (looked in {', '.join(named)}{more})"
     )
+
+
+def _file_in(folder: pathlib.Path, name: str) -> pathlib.Path | None:
+    """folder/name. URIs may hold escapes such as %20, and so may names of files."""
+    for spelled in (name, urllib.parse.unquote(name)):
+        if (folder / spelled).is_file():
+            return folder / spelled
+    return None
 
 
 def _folders_of(

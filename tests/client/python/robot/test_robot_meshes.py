@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import pathlib
 import struct
 from fractions import Fraction
@@ -72,8 +73,10 @@ def test_stl_is_read_in_both_forms(tmp_path: pathlib.Path) -> None:
         (binary_stl(TRIANGLES)[:-1], "cut short after 1 of 2 triangles"),
         (binary_stl(TRIANGLES, count=1), "declares 1 triangles and 50 bytes follow"),
         (binary_stl(TRIANGLES[:0]), "declares 0 triangles"),
+        (gzip.compress(binary_stl(TRIANGLES)), "is compressed"),
+        ("solid\n".encode("utf-16"), "is UTF-16 text"),
         (binary_stl(TRIANGLES * np.float32("nan")), "triangle 0 has a coordinate not finite"),
-        (f"solid\n{FACET}".encode(), "8: the file ends after 1 facets, before .*; is it complete?"),
+        (f"solid\n{FACET}".encode(), "8: the file ends after 1 facet, before .*; is it complete?"),
         (f"solid\n{FACET[:56]}".encode(), "ends after 0 facets"),
         (
             f"solid\n{FACET.replace('endloop', 'vertex 1 1 1')}endsolid".encode(),
@@ -173,6 +176,9 @@ def test_packages_are_searched_in_order(
     assert resolve_file(name, urdf, {}) == above
     assert resolve_file("../meshes/a.stl", urdf, {}).samefile(above)
     assert resolve_file(f"file://{above}", urdf, {}) == above
+    assert resolve_file(f"file://localhost{above}", urdf, {}) == above
+    assert resolve_file(f"file:{above}", urdf, {}) == above
+    assert resolve_file(f"file://{str(above).replace('a.stl', '%61.stl')}", urdf, {}) == above
     assert resolve_file(str(above), urdf, {}) == above
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
     assert resolve_file(name, urdf, {}) == ament
