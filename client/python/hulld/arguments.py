@@ -115,7 +115,7 @@ def hull_id(value: Any, name: str = "hull_id") -> str:
 def as_array(values: Any, name: str) -> npt.NDArray[Any]:
     """`values` as an array that holds the same numbers.
 
-    ValueError: masked elements; a list of numbers that no array type
+    ValueError: masked elements; rows of different lengths; a list of numbers that no array type
     holds exactly. TypeError: an array of objects that are not numbers.
     """
     if _holds_masked(values):
@@ -127,6 +127,10 @@ def as_array(values: Any, name: str) -> npt.NDArray[Any]:
         array = np.asarray(values)
     except OverflowError:
         array = np.asarray(values, object)
+    except ValueError as error:
+        if "inhomogeneous" not in str(error):
+            raise
+        raise ValueError(f"{name} has rows of different lengths") from None
     if array.dtype.kind == "O":
         return _doubles_of(array, name)
     # numpy makes doubles of lists that mix integers and floats, and rounds the integers.

@@ -38,6 +38,11 @@ def test_a_coordinate_that_is_not_finite_is_named(bad: float) -> None:
         hulld.as_points(points)
 
 
+def test_rows_of_different_lengths_are_named() -> None:
+    with pytest.raises(ValueError, match="^points has rows of different lengths$"):
+        hulld.as_points([[1, 2, 3], [1, 2]])
+
+
 def test_integers_pass_where_a_double_holds_them() -> None:
     exact = np.array([[2**53, -(2**60), 2**62]])
     assert hulld.as_points(exact).tolist() == [[2.0**53, -(2.0**60), 2.0**62]]

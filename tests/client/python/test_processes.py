@@ -104,6 +104,27 @@ def test_a_child_may_connect_if_every_client_was_closed(server: hulld.LocalServe
     assert done.stdout == "True\n", done.stderr
 
 
+def test_a_fork_returns_while_a_channel_reconnects(server: hulld.LocalServer) -> None:
+    script = (
+        "import os, sys, hulld\n"
+        "client = hulld.Client(sys.argv[1])\n"
+        "client.get_status()\n"
+        "gone = hulld.Client('127.0.0.1:1', timeout=0.5)\n"
+        "for _ in range(4):\n"
+        "    try:\n"
+        "        gone.get_status()\n"
+        "    except hulld.HulldError:\n"
+        "        pass\n"
+        "    if (child := os.fork()) == 0:\n"
+        "        os._exit(0)\n"
+        "    os.waitpid(child, 0)\n"
+        "print(client.check_health())\n"
+    )
+    command = [sys.executable, "-c", script, server.address]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
+    assert done.stdout == "True\n", done.stderr
+
+
 async def ask_a_new_client(address: str) -> None:
     async with hulld.AsyncClient(address) as client:
         await client.get_status()

@@ -33,6 +33,9 @@ class Channel:
             if self._closed:
                 raise FailedPreconditionError("the client is closed; create a new one")
             if self._channel is None:
+                # gRPC's own support of forks blocks a fork forever while a channel reconnects, and
+                # forked processes make no calls anyway.
+                os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
                 self._channel = self._opener(self._connection, self._pem_files)
                 _open_channels.add(self)
             return self._channel
