@@ -56,8 +56,6 @@ absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint
   *total_bytes = 0;
   bool known = true;
   for (const std::string& path : input.files) {
-    const absl::StatusOr<PointFormat> format = FormatOf(path, input.format);
-    if (!format.ok()) return format.status();
     struct stat info = {};
     if (path != "-" && stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) {
       *total_bytes += static_cast<uint64_t>(info.st_size);
@@ -68,6 +66,8 @@ absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint
     if (path != "-" && !S_ISFIFO(info.st_mode)) {
       if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
     }
+    const absl::StatusOr<PointFormat> format = FormatOf(path, input.format);
+    if (!format.ok()) return format.status();
     ReadRequest request{path, *format, {}, {}};
     request.options.points_per_block = input.chunk_points;
     request.options.skip_nonfinite = input.skip_nonfinite;

@@ -657,7 +657,8 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
     if (first.contains(i)) movers = scene.size();
   }
   if (!first.empty()) scene.request.set_movers(movers);
-  scene.request.set_ignore_same_group(true);
+  // Refused without groups, which a scene without placements has none of.
+  scene.request.set_ignore_same_group(count > 0);
   for (const auto& [a, b] : classes.ignored()) {
     scene.request.add_ignored_group_pairs(a);
     scene.request.add_ignored_group_pairs(b);

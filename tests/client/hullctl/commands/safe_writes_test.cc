@@ -48,6 +48,13 @@ TEST_F(SafeWrites, AppendCreatesNoHullOfAFileThatIsRefused) {
   }
 }
 
+TEST_F(SafeWrites, AppendNamesDirectoriesAndMissingFilesOfAnyExtension) {
+  EXPECT_EQ(Ask({"append", "new", testing::TempDir(), "--create"}).err,
+            "hullctl: " + testing::TempDir() + " is a directory; pass a file\n");
+  EXPECT_THAT(Ask({"append", "new", "/no/such/file", "--create"}).err,
+              HasSubstr("cannot open /no/such/file: No such file"));
+}
+
 TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
   const TempFile empty("empty.xyz", "# nothing\n");
   const Ran ran = Ask({"append", "new", empty.path(), "--create"});

@@ -87,6 +87,15 @@ TEST(YamlScene, BodiesArePlacedAsAWhole) {
   EXPECT_THAT(scene->NamesOfPieces(0, 3, {-1, 3}), ElementsAre("", ""));
 }
 
+// The server refuses ignore_same_group without groups.
+TEST(YamlScene, WithoutPlacementsIsAnEmptyRequest) {
+  const auto scene =
+      ToScene(Parse("hulls: {a: {box: [1, 1, 1]}}\n"), "cell.yaml", BodyForm::kWhole);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ(scene->size(), 0u);
+  EXPECT_FALSE(scene->request.ignore_same_group());
+}
+
 TEST(YamlScene, BodiesArePutAsTheyAreWritten) {
   const v1::PutBodyRequest request = BodyRequest(Parse(kCell).bodies[0]);
   EXPECT_EQ(request.body_id(), "cell/corner");
