@@ -8,6 +8,9 @@
 #include <chrono>
 #include <iterator>
 #include <limits>
+#include <map>
+#include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -74,6 +77,85 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
   return RocksDbStore::Open(std::move(options));
 }
 
+// State of the registry and the store at an exposition of metrics.
+struct Measured {
+  CacheStatistics cache;
+  RegistrySizes sizes;
+  CommitStatistics commits;
+  std::chrono::nanoseconds longest_hold{0};
+  StoreFailures failures;
+  StoreDisk disk;
+};
+
+template <auto kPart, auto kField>
+double Get(const Measured& now) {
+  return static_cast<double>((now.*kPart).*kField);
+}
+
+// A metric read from that state.
+struct Reading {
+  const char* name;
+  const char* help;
+  double (*read)(const Measured& now);
+  // Name and value of its label; null: none.
+  const char* label = nullptr;
+  const char* value = nullptr;
+};
+
+constexpr Reading kGauges[] = {
+    {"hulld_hulls", "Hulls in the store.", Get<&Measured::sizes, &RegistrySizes::hull_count>},
+    {"hulld_bodies", "Bodies in the store.", Get<&Measured::sizes, &RegistrySizes::body_count>},
+    {"hulld_vertices", "Vertices of all hulls.",
+     Get<&Measured::sizes, &RegistrySizes::vertex_count>},
+    {"hulld_registry_lock_hold_max_seconds",
+     "Longest hold of the registry's lock within the last one to two minutes.",
+     [](const Measured& now) { return std::chrono::duration<double>(now.longest_hold).count(); }},
+    {"hulld_store_read_only", "1 while the store refuses changes, else 0.",
+     Get<&Measured::commits, &CommitStatistics::failing>},
+    {"hulld_cache_bytes",
+     "Estimated bytes charged against the memory limit: hulls in memory, points in flight, "
+     "streams.",
+     Get<&Measured::cache, &CacheStatistics::bytes>},
+    {"hulld_cache_reading_bytes",
+     "Part of hulld_cache_bytes held by readers: requested versions and long answers.",
+     Get<&Measured::cache, &CacheStatistics::reading_bytes>},
+    {"hulld_cache_writing_bytes",
+     "Part of hulld_cache_bytes held by writers: growing hulls, points in flight, streams.",
+     Get<&Measured::cache, &CacheStatistics::writing_bytes>},
+    {"hulld_cache_limit_bytes", "Limit of hulld_cache_bytes (--memory-limit).",
+     Get<&Measured::cache, &CacheStatistics::limit_bytes>},
+    {"hulld_store_disk_bytes", "Bytes of the store's files.",
+     Get<&Measured::disk, &StoreDisk::bytes>},
+    {"hulld_store_log_bytes", "Part of hulld_store_disk_bytes taken by the log.",
+     Get<&Measured::disk, &StoreDisk::log_bytes>},
+    {"hulld_store_free_bytes", "Free bytes on the store's disk.",
+     [](const Measured& now) {
+       // NaN compares less than no number, so no alert fires.
+       return now.disk.free_bytes.has_value() ? static_cast<double>(*now.disk.free_bytes)
+                                              : std::numeric_limits<double>::quiet_NaN();
+     }},
+    {"hulld_store_stalled", "1 while the store throttles or stops writes, else 0.",
+     Get<&Measured::disk, &StoreDisk::is_stalled>},
+};
+constexpr char kLookups[] = "hulld_cache_lookups_total";
+constexpr char kLookupsHelp[] = "Hull lookups, by cache hit or miss.";
+constexpr char kFailures[] = "hulld_store_failures_total";
+constexpr char kFailuresHelp[] = "Failed store operations, by operation.";
+constexpr Reading kCounters[] = {
+    {kLookups, kLookupsHelp, Get<&Measured::cache, &CacheStatistics::hits>, "result", "hit"},
+    {kLookups, kLookupsHelp, Get<&Measured::cache, &CacheStatistics::misses>, "result", "miss"},
+    {"hulld_cache_evictions_total", "Hulls evicted from memory.",
+     Get<&Measured::cache, &CacheStatistics::evictions>},
+    {"hulld_store_damaged_records_total", "Stored records with a wrong checksum or content.",
+     Get<&Measured::cache, &CacheStatistics::damaged>},
+    {kFailures, kFailuresHelp, Get<&Measured::failures, &StoreFailures::write>, "operation",
+     "write"},
+    {kFailures, kFailuresHelp, Get<&Measured::failures, &StoreFailures::sync>, "operation", "sync"},
+    {kFailures, kFailuresHelp, Get<&Measured::failures, &StoreFailures::read>, "operation", "read"},
+    {"hulld_store_stalls_total", "Times that the store throttled or stopped writes to catch up.",
+     Get<&Measured::disk, &StoreDisk::stalls>},
+};
+
 }  // namespace
 
 Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
@@ -111,48 +193,21 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
 
 void Server::AddSizesToMetrics() {
   registry_.SetMetrics(metrics_.store());
-  metrics_.AddRefresh([this] {
-    const auto advance = [](prometheus::Counter& counter, uint64_t now) {
-      const double passed = static_cast<double>(now) - counter.Value();
-      if (passed > 0) counter.Increment(passed);
-    };
-    const StoreMetrics& store = metrics_.store();
-    const CacheStatistics cache = registry_.Cache();
-    advance(store.cache_hits, cache.hits);
-    advance(store.cache_misses, cache.misses);
-    advance(store.cache_evictions, cache.evictions);
-    advance(store.damaged_records, cache.damaged);
-    const StoreFailures failures = store_->failures();
-    advance(store.write_failures, failures.write);
-    advance(store.sync_failures, failures.sync);
-    advance(store.read_failures, failures.read);
-    store.cache_bytes.Set(static_cast<double>(cache.bytes));
-    store.cache_reading_bytes.Set(static_cast<double>(cache.reading_bytes));
-    store.cache_writing_bytes.Set(static_cast<double>(cache.writing_bytes));
-    store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
-    store.read_only.Set(registry_.Commits().failing ? 1 : 0);
-    if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
-      store.disk_bytes.Set(static_cast<double>(disk->bytes));
-      store.log_bytes.Set(static_cast<double>(disk->log_bytes));
-      // NaN compares less than no number, so no alert fires.
-      store.free_bytes.Set(disk->free_bytes.has_value() ? static_cast<double>(*disk->free_bytes)
-                                                        : std::numeric_limits<double>::quiet_NaN());
-      store.stalled.Set(disk->is_stalled ? 1 : 0);
-      advance(store.stalls, disk->stalls);
-    }
+  const auto measured = std::make_shared<Measured>();
+  metrics_.AddRefresh([this, measured] {
+    *measured = {registry_.Cache(),   registry_.Sizes(),
+                 registry_.Commits(), registry_.Holds().longest,
+                 store_->failures(),  store_->disk().value_or(StoreDisk{.free_bytes = 0})};
   });
-  metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
-                    [this] { return static_cast<double>(registry_.Sizes().hull_count); });
-  metrics_.AddGauge("hulld_bodies", "Bodies in the store.",
-                    [this] { return static_cast<double>(registry_.Sizes().body_count); });
-  metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
-                    "Longest hold of the registry's lock within the last one to two minutes.",
-                    [this] {
-                      const std::chrono::duration<double> longest = registry_.Holds().longest;
-                      return longest.count();
-                    });
-  metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
-                    [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
+  for (const Reading& each : kGauges) {
+    metrics_.AddGauge(each.name, each.help, [&each, measured] { return each.read(*measured); });
+  }
+  for (const Reading& each : kCounters) {
+    std::map<std::string, std::string> labels;
+    if (each.label != nullptr) labels[each.label] = each.value;
+    metrics_.AddCounter(each.name, each.help, labels,
+                        [&each, measured] { return each.read(*measured); });
+  }
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
@@ -202,29 +257,18 @@ absl::Status Server::Listen(const Config& config) {
 }
 
 void Server::AddDescriptorsToMetrics() {
-  prometheus::Gauge& descriptors =
-      metrics_.AddGauge("process_open_fds", "Open file descriptors of the process.");
-  prometheus::Gauge& connections =
-      metrics_.AddGauge("hulld_connections", "Open client connections.");
-  metrics_.AddRefresh([this, &descriptors, &connections] {
-    descriptors.Set(static_cast<double>(CountDescriptors()));
-    connections.Set(static_cast<double>(connection_table_.size()));
-  });
+  metrics_.AddGauge("process_open_fds", "Open file descriptors of the process.",
+                    [] { return static_cast<double>(CountDescriptors()); });
+  metrics_.AddGauge("hulld_connections", "Open client connections.",
+                    [this] { return static_cast<double>(connection_table_.size()); });
   metrics_.AddGauge("hulld_half_open_streams",
                     "Streams with an incomplete first message, without TLS.",
                     [] { return static_cast<double>(HalfOpenStreams()); });
-  std::vector<prometheus::Counter*> closed;
   for (size_t i = 1; i < FrameGuard::kVerdictCount; ++i) {
-    closed.push_back(
-        &metrics_.AddCounter("hulld_connections_closed_total", "",
-                             {{"reason", FrameGuard::Name(static_cast<FrameGuard::Verdict>(i))}}));
+    metrics_.AddCounter("hulld_connections_closed_total", "",
+                        {{"reason", FrameGuard::Name(static_cast<FrameGuard::Verdict>(i))}},
+                        [i] { return static_cast<double>(ClosedByGuard()[i]); });
   }
-  metrics_.AddRefresh([closed] {
-    const auto counts = ClosedByGuard();
-    for (size_t i = 0; i < closed.size(); ++i) {
-      closed[i]->Increment(static_cast<double>(counts[i + 1]) - closed[i]->Value());
-    }
-  });
 }
 
 void Server::BeginDrain() {

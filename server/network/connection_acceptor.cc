@@ -88,10 +88,6 @@ bool IsWildcard(const std::string& host) { return host == "0.0.0.0" || host == "
 
 }  // namespace
 
-Descriptor::~Descriptor() {
-  if (number_ >= 0) close(number_);
-}
-
 absl::StatusOr<std::unique_ptr<ConnectionAcceptor>> ConnectionAcceptor::Listen(
     const ListenAddress& address, ConnectionTable& table, Metrics& metrics) {
   std::unique_ptr<ConnectionAcceptor> acceptor(new ConnectionAcceptor(address, table, metrics));

@@ -19,28 +19,11 @@
 
 #include "server/network/connection_table.h"
 #include "server/network/frame_guard.h"
+#include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics.h"
 
 namespace hulld::server {
-
-// A descriptor that closes itself.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  ~Descriptor();
-  int number() const { return number_; }
-  // Releases the ownership.
-  int Release() { return std::exchange(number_, -1); }
-
- private:
-  int number_;
-};
 
 // Accepts connections within the limits of a table and passes them to gRPC. gRPC's own listener
 // stops accepting permanently after descriptors run out (CVE-2023-4785). Runs one thread that never

@@ -2,10 +2,15 @@
 
 #include <dirent.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <memory>
 
 namespace hulld::server {
+
+Descriptor::~Descriptor() {
+  if (number_ >= 0) close(number_);
+}
 
 uint64_t CountDescriptors() {
   const std::unique_ptr<DIR, int (*)(DIR*)> directory(

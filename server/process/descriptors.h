@@ -2,8 +2,28 @@
 #define HULLD_SERVER_PROCESS_DESCRIPTORS_H_
 
 #include <cstdint>
+#include <utility>
 
 namespace hulld::server {
+
+// A descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  ~Descriptor();
+
+  int number() const { return number_; }
+  // Releases the ownership.
+  int Release() { return std::exchange(number_, -1); }
+
+ private:
+  int number_;
+};
 
 // Returns the number of open descriptors of this process; 0 without /proc. Cost: ~1 us each.
 uint64_t CountDescriptors();

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdio>
+#include <memory>
 
 #include "server/settings/cpu_limit.h"
 
@@ -20,19 +21,6 @@ constexpr int kMappedBytes = 8 << 20;
 // some MiB.
 constexpr int kKeptBytes = 32 << 20;
 
-// Returns the resident anonymous memory of this process; 0 if the system does not report it.
-size_t AnonymousBytes() {
-  std::FILE* const file = std::fopen("/proc/self/statm", "r");
-  if (file == nullptr) return 0;
-  size_t total = 0;
-  size_t resident = 0;
-  size_t of_files = 0;
-  const int read = std::fscanf(file, "%zu %zu %zu", &total, &resident, &of_files);
-  std::fclose(file);
-  if (read != 3) return 0;
-  return (resident - of_files) * static_cast<size_t>(sysconf(_SC_PAGESIZE));
-}
-
 }  // namespace
 
 void SetUpHeap() {
@@ -41,9 +29,24 @@ void SetUpHeap() {
   mallopt(M_TRIM_THRESHOLD, kKeptBytes);
 }
 
+ResidentMemory ReadResidentMemory() {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
+      std::fopen("/proc/self/statm", "r"),
+      [](std::FILE* opened) { return opened != nullptr ? std::fclose(opened) : 0; });
+  size_t total = 0;
+  size_t resident = 0;
+  size_t of_files = 0;
+  if (file == nullptr ||
+      std::fscanf(file.get(), "%zu %zu %zu", &total, &resident, &of_files) != 3) {
+    return {};
+  }
+  const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
+  return {resident * page, (resident - of_files) * page};
+}
+
 bool GiveBackFreeMemory() {
   const struct mallinfo2 heap = mallinfo2();
-  if (AnonymousBytes() < heap.uordblks + heap.hblkhd + kWorthIt) return false;
+  if (ReadResidentMemory().anonymous_bytes < heap.uordblks + heap.hblkhd + kWorthIt) return false;
   malloc_trim(0);
   return true;
 }

@@ -12,23 +12,14 @@
 #include <charconv>
 #include <cstring>
 
+#include "server/process/descriptors.h"
+
 namespace hulld::server {
 namespace {
 
-// A file descriptor that closes itself.
-class Socket {
- public:
-  Socket(int family, int protocol) : fd_(socket(family, SOCK_STREAM | SOCK_CLOEXEC, protocol)) {}
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  ~Socket() {
-    if (fd_ >= 0) close(fd_);
-  }
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
+int OpenSocket(int family, int protocol) {
+  return socket(family, SOCK_STREAM | SOCK_CLOEXEC, protocol);
+}
 
 bool IsPort(const std::string& text) {
   int port = -1;
@@ -44,12 +35,12 @@ absl::Status Malformed(const char* flag, const std::string& text, const char* wh
 
 // Returns 0, or the errno of binding.
 int TryBind(const addrinfo& info) {
-  const Socket socket(info.ai_family, info.ai_protocol);
-  if (socket.fd() < 0) return errno;
+  const Descriptor socket(OpenSocket(info.ai_family, info.ai_protocol));
+  if (socket.number() < 0) return errno;
   const int yes = 1;
-  setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (bind(socket.fd(), info.ai_addr, info.ai_addrlen) != 0) return errno;
-  return listen(socket.fd(), 1) == 0 ? 0 : errno;
+  setsockopt(socket.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (bind(socket.number(), info.ai_addr, info.ai_addrlen) != 0) return errno;
+  return listen(socket.number(), 1) == 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -104,11 +95,11 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 
 absl::Status CheckSocketFree(const ListenAddress& address) {
   if (!address.is_unix()) return absl::OkStatus();
-  const Socket socket(AF_UNIX, 0);
+  const Descriptor socket(OpenSocket(AF_UNIX, 0));
   sockaddr_un name = {};
   name.sun_family = AF_UNIX;
   std::memcpy(name.sun_path, address.path.c_str(), address.path.size() + 1);
-  if (connect(socket.fd(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
+  if (connect(socket.number(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
     return absl::OkStatus();
   }
   return absl::UnavailableError(

@@ -1,5 +1,6 @@
 #include "server/process/log.h"
 
+#include <absl/time/time.h>
 #include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/formatter.h>
@@ -8,11 +9,8 @@
 
 #include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <utility>
-
-#include "core/base/check.h"
 
 namespace hulld::server {
 namespace {
@@ -43,35 +41,15 @@ std::string FormatText(const LogFields& fields) {
   return text;
 }
 
-spdlog::level::level_enum ToSpdlog(LogLevel level) {
-  switch (level) {
-    case LogLevel::kDebug:
-      return spdlog::level::debug;
-    case LogLevel::kInfo:
-      return spdlog::level::info;
-    case LogLevel::kWarn:
-      return spdlog::level::warn;
-    case LogLevel::kError:
-      return spdlog::level::err;
-  }
-  HULLD_UNREACHABLE();
-}
-
 class JsonFormatter : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
-    const auto since_epoch = message.time.time_since_epoch();
-    const auto millis = std::chrono::duration_cast<std::chrono::milliseconds>(since_epoch).count();
-    const std::time_t seconds = static_cast<std::time_t>(millis / 1000);
-    std::tm utc = {};
-    gmtime_r(&seconds, &utc);
-    char time[64];
-    const size_t length = std::strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S", &utc);
-    std::snprintf(time + length, sizeof time - length, ".%03dZ", static_cast<int>(millis % 1000));
+    const std::string time = absl::FormatTime("%Y-%m-%dT%H:%M:%E3SZ",
+                                              absl::FromChrono(message.time), absl::UTCTimeZone());
     const auto level = spdlog::level::to_string_view(message.level);
     const std::string line =
-        "{\"time\":\"" + std::string(time) + "\",\"level\":\"" +
-        std::string(level.data(), level.size()) + "\",\"message\":\"" +
+        "{\"time\":\"" + time + "\",\"level\":\"" + std::string(level.data(), level.size()) +
+        "\",\"message\":\"" +
         JsonEscape(std::string(message.payload.data(), message.payload.size())) + "\"" +
         (current_fields == nullptr ? "" : FormatJson(*current_fields)) + "}\n";
     out.append(line.data(), line.data() + line.size());
@@ -191,12 +169,10 @@ void RouteLibraryLogs() {
   google::protobuf::SetLogHandler(LogForProtobuf);
 }
 
-bool IsLogged(LogLevel level) { return spdlog::should_log(ToSpdlog(level)); }
-
 void LogEvent(LogLevel level, const std::string& message, const LogFields& fields) {
-  if (!is_json) return spdlog::log(ToSpdlog(level), "{}{}", message, FormatText(fields));
+  if (!is_json) return spdlog::log(level, "{}{}", message, FormatText(fields));
   current_fields = &fields;
-  spdlog::log(ToSpdlog(level), "{}", message);
+  spdlog::log(level, "{}", message);
   current_fields = nullptr;
 }
 

@@ -1,6 +1,8 @@
 #ifndef HULLD_SERVER_PROCESS_LOG_H_
 #define HULLD_SERVER_PROCESS_LOG_H_
 
+#include <spdlog/common.h>
+
 #include <chrono>
 #include <cstdint>
 #include <mutex>
@@ -42,7 +44,7 @@ class LineBudget {
 inline constexpr int kLibraryLines = 20;
 void RouteLibraryLogs();
 
-enum class LogLevel { kDebug, kInfo, kWarn, kError };
+using LogLevel = spdlog::level::level_enum;
 
 // A field of a line, as in code=NOT_FOUND.
 struct LogField {
@@ -57,8 +59,6 @@ struct LogField {
   bool is_number = false;
 };
 using LogFields = std::vector<LogField>;
-
-bool IsLogged(LogLevel level);
 
 // Logs a message with fields: appended as " name=value", quoted if necessary, or as members of the
 // JSON object.

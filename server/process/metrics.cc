@@ -2,15 +2,13 @@
 
 #include <grpcpp/grpcpp.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
-#include <cstdio>
-#include <memory>
 #include <utility>
 
 #include "core/base/check.h"
 #include "server/contract/status_map.h"
 #include "server/process/descriptors.h"
+#include "server/process/heap.h"
 
 namespace hulld::server {
 namespace {
@@ -48,65 +46,16 @@ Family<prometheus::Histogram>& AddHistograms(prometheus::Registry& registry, con
 }
 
 StoreMetrics AddStore(prometheus::Registry& registry) {
-  auto& failures =
-      AddCounters(registry, "hulld_store_failures_total", "Failed store operations, by operation.");
-  auto& lookups =
-      AddCounters(registry, "hulld_cache_lookups_total", "Hull lookups, by cache hit or miss.");
   return {
       AddHistograms(registry, "hulld_store_commit_duration_seconds",
                     "Time from submitting a change to the store to its acknowledgment.")
           .Add({}, LatencyBuckets()),
       AddHistograms(registry, "hulld_store_commit_changes", "Changes per committed write.")
           .Add({}, CountBuckets()),
-      failures.Add({{"operation", "write"}}),
-      failures.Add({{"operation", "sync"}}),
-      failures.Add({{"operation", "read"}}),
-      AddCounters(registry, "hulld_store_damaged_records_total",
-                  "Stored records with a wrong checksum or content.")
-          .Add({}),
-      AddGauges(registry, "hulld_store_read_only", "1 while the store refuses changes, else 0.")
-          .Add({}),
-      lookups.Add({{"result", "hit"}}),
-      lookups.Add({{"result", "miss"}}),
-      AddCounters(registry, "hulld_cache_evictions_total", "Hulls evicted from memory.").Add({}),
-      AddGauges(registry, "hulld_cache_bytes",
-                "Estimated bytes charged against the memory limit: hulls in memory, points in "
-                "flight, streams.")
-          .Add({}),
-      AddGauges(registry, "hulld_cache_reading_bytes",
-                "Part of hulld_cache_bytes held by readers: requested versions and long answers.")
-          .Add({}),
-      AddGauges(
-          registry, "hulld_cache_writing_bytes",
-          "Part of hulld_cache_bytes held by writers: growing hulls, points in flight, streams.")
-          .Add({}),
-      AddGauges(registry, "hulld_cache_limit_bytes", "Limit of hulld_cache_bytes (--memory-limit).")
-          .Add({}),
       AddHistograms(registry, "hulld_snapshot_duration_seconds",
                     "Time to build the canonical snapshot of a hull version.")
           .Add({}, LatencyBuckets()),
-      AddGauges(registry, "hulld_store_disk_bytes", "Bytes of the store's files.").Add({}),
-      AddGauges(registry, "hulld_store_log_bytes",
-                "Part of hulld_store_disk_bytes taken by the log.")
-          .Add({}),
-      AddGauges(registry, "hulld_store_free_bytes", "Free bytes on the store's disk.").Add({}),
-      AddCounters(registry, "hulld_store_stalls_total",
-                  "Times that the store throttled or stopped writes to catch up.")
-          .Add({}),
-      AddGauges(registry, "hulld_store_stalled",
-                "1 while the store throttles or stops writes, else 0.")
-          .Add({}),
   };
-}
-
-// Returns the resident memory of this process; 0 without /proc.
-double ResidentBytes() {
-  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen("/proc/self/statm", "r"),
-                                                   [](FILE* f) { return f ? fclose(f) : 0; });
-  unsigned long long total = 0;
-  unsigned long long resident = 0;
-  if (file == nullptr || std::fscanf(file.get(), "%llu %llu", &total, &resident) != 2) return 0;
-  return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 double ProcessorSeconds() {
@@ -187,13 +136,9 @@ void Metrics::AddProcess() {
       .SetToCurrentTime();
   AddGauge("process_max_fds", "Maximum number of open file descriptors of the process.",
            [] { return static_cast<double>(MostDescriptors()); });
-  AddGauge("process_resident_memory_bytes", "Resident memory of the process.", ResidentBytes);
-  prometheus::Counter& processor =
-      AddCounters(registry_, "process_cpu_seconds_total", "Processor time of the process.").Add({});
-  refresh_.push_back([&processor] {
-    const double passed = ProcessorSeconds() - processor.Value();
-    if (passed > 0) processor.Increment(passed);
-  });
+  AddGauge("process_resident_memory_bytes", "Resident memory of the process.",
+           [] { return static_cast<double>(ReadResidentMemory().bytes); });
+  AddCounter("process_cpu_seconds_total", "Processor time of the process.", {}, ProcessorSeconds);
 }
 
 void Metrics::CountCall(Rpc rpc, absl::StatusCode code,
@@ -261,15 +206,20 @@ prometheus::Counter& Metrics::AddCounter(const std::string& name, const std::str
   return AddCounters(registry_, name.c_str(), help.c_str()).Add(labels);
 }
 
-prometheus::Gauge& Metrics::AddGauge(const std::string& name, const std::string& help) {
-  return AddGauges(registry_, name, help).Add({});
+void Metrics::AddCounter(const std::string& name, const std::string& help,
+                         const std::map<std::string, std::string>& labels,
+                         std::function<double()> read) {
+  prometheus::Counter& counter = AddCounter(name, help, labels);
+  AddRefresh([&counter, read = std::move(read)] {
+    const double passed = read() - counter.Value();
+    if (passed > 0) counter.Increment(passed);
+  });
 }
 
 void Metrics::AddGauge(const std::string& name, const std::string& help,
                        std::function<double()> read) {
   prometheus::Gauge& gauge = AddGauges(registry_, name, help).Add({});
-  const std::lock_guard lock(refresh_mutex_);
-  refresh_.push_back([&gauge, read = std::move(read)] { gauge.Set(read()); });
+  AddRefresh([&gauge, read = std::move(read)] { gauge.Set(read()); });
 }
 
 void Metrics::AddRefresh(std::function<void()> refresh) {

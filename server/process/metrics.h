@@ -25,41 +25,14 @@
 
 namespace hulld::server {
 
-// Metrics of the store and of the hull cache. Comments give the names in Prometheus.
+// Timings of the store. Comments give the names in Prometheus.
 struct StoreMetrics {
   // hulld_store_commit_duration_seconds: from submission of a change to its acknowledgement.
   prometheus::Histogram& commit_seconds;
   // hulld_store_commit_changes: changes per batch written to the store.
   prometheus::Histogram& commit_changes;
-  // hulld_store_failures_total{operation="write"|"sync"|"read"}.
-  prometheus::Counter& write_failures;
-  prometheus::Counter& sync_failures;
-  prometheus::Counter& read_failures;
-  // hulld_store_damaged_records_total: records with a wrong checksum or content.
-  prometheus::Counter& damaged_records;
-  // hulld_store_read_only: 1 while changes are refused.
-  prometheus::Gauge& read_only;
-  // hulld_cache_lookups_total{result="hit"|"miss"}, hulld_cache_evictions_total.
-  prometheus::Counter& cache_hits;
-  prometheus::Counter& cache_misses;
-  prometheus::Counter& cache_evictions;
-  // hulld_cache_bytes: memory counted against the limit; hulld_cache_reading_bytes and
-  // hulld_cache_writing_bytes: its parts; hulld_cache_limit_bytes: --memory-limit.
-  prometheus::Gauge& cache_bytes;
-  prometheus::Gauge& cache_reading_bytes;
-  prometheus::Gauge& cache_writing_bytes;
-  prometheus::Gauge& cache_limit_bytes;
   // hulld_snapshot_duration_seconds: building the canonical snapshot of a version.
   prometheus::Histogram& snapshot_seconds;
-  // hulld_store_disk_bytes: all files. hulld_store_log_bytes: log files. hulld_store_free_bytes:
-  // free space of the disk.
-  prometheus::Gauge& disk_bytes;
-  prometheus::Gauge& log_bytes;
-  prometheus::Gauge& free_bytes;
-  // hulld_store_stalls_total: number of times that the store slowed down or stopped changes because
-  // it could not keep up; hulld_store_stalled: 1 while it does.
-  prometheus::Counter& stalls;
-  prometheus::Gauge& stalled;
 };
 
 // Metrics of a pool of threads.
@@ -110,13 +83,14 @@ class Metrics : public prometheus::Collectable {
   // Adds a counter of a family. The family has the help text of its first counter.
   prometheus::Counter& AddCounter(const std::string& name, const std::string& help,
                                   const std::map<std::string, std::string>& labels);
-  // Adds a gauge that the caller updates.
-  prometheus::Gauge& AddGauge(const std::string& name, const std::string& help);
+  // Adds a counter read at each exposition, as below.
+  void AddCounter(const std::string& name, const std::string& help,
+                  const std::map<std::string, std::string>& labels, std::function<double()> read);
   // Adds a gauge read at each exposition. State used by `read` must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
 
-  // Adds a callback that runs before each exposition and updates metrics counted elsewhere. Its
-  // state must outlive the exposition.
+  // Adds a callback that runs at each exposition, before the reading of metrics that are added
+  // later. Its state must outlive the exposition.
   void AddRefresh(std::function<void()> refresh);
 
   // Returns the metrics for Prometheus.

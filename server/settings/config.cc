@@ -299,6 +299,16 @@ class Parser {
         ->capture_default_str();
   }
 
+  void AddFlag(const std::string& name, bool& value, const std::string& description) {
+    app_.add_flag("--" + name, value, description)
+        ->envname(EnvironmentName(name))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+  }
+
+  void AddSeconds(const std::string& name, double& value, const std::string& description) {
+    Add(name, value, description)->check(CLI::Validator(CheckSeconds, ""))->type_name("SECONDS");
+  }
+
   static std::chrono::milliseconds ToMilliseconds(double seconds) {
     return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
   }
@@ -310,19 +320,14 @@ class Parser {
   void AddServing() {
     Add("listen", config_.listen,
         "Address to listen on: host:port, [v6]:port or unix:path; port 0 picks a free port");
-    app_.add_flag(
-            "--insecure", config_.insecure,
+    AddFlag("insecure", config_.insecure,
             "Allow --listen without TLS on addresses that other machines can reach. Anyone on "
-            "the path can then read and change all traffic, including tokens")
-        ->envname(EnvironmentName("insecure"))
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+            "the path can then read and change all traffic, including tokens");
     Add("threads", config_.threads, "Threads that compute answers; 0: one per usable processor")
         ->check(CLI::Range(0, 1024));
     AddStore();
-    Add("drain-timeout", drain_timeout_seconds_,
-        "Time that running calls may take after SIGTERM or SIGINT")
-        ->check(CLI::Validator(CheckSeconds, ""))
-        ->type_name("SECONDS");
+    AddSeconds("drain-timeout", drain_timeout_seconds_,
+               "Time that running calls may take after SIGTERM or SIGINT");
     AddObservation();
     Add("log-level", config_.log_level, "Minimum level of logged messages")
         ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
@@ -357,14 +362,10 @@ class Parser {
   void AddObservation() {
     Add("metrics-address", config_.metrics_address,
         "Address of metrics for Prometheus over HTTP (/metrics): host:port; empty: none");
-    app_.add_flag("--metrics-insecure", config_.metrics_insecure,
-                  "Allow --metrics-address on addresses that other machines can reach; metrics are "
-                  "neither encrypted nor authenticated")
-        ->envname(EnvironmentName("metrics-insecure"))
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("slow-request", slow_request_seconds_, "Log requests that take longer; 0: none")
-        ->check(CLI::Validator(CheckSeconds, ""))
-        ->type_name("SECONDS");
+    AddFlag("metrics-insecure", config_.metrics_insecure,
+            "Allow --metrics-address on addresses that other machines can reach; metrics are "
+            "neither encrypted nor authenticated");
+    AddSeconds("slow-request", slow_request_seconds_, "Log requests that take longer; 0: none");
   }
 
   void AddGuard() {
@@ -385,16 +386,16 @@ class Parser {
   void AddLimits() {
     Limits& limits = config_.limits;
     AddLimit("max-points-per-chunk", limits.max_points_per_chunk,
-             "Points in one message of AppendPoints", kAnyNumber);
+             "Points in one message of AppendPoints");
     AddLimit("max-vertices-per-hull", limits.max_vertices_per_hull, "Vertices of one hull",
              kMaxVertexIndex);
-    AddLimit("max-hulls", limits.max_hulls, "Hulls and bodies in the store", kAnyNumber);
-    AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch, "Pairs in one BatchCheckCollisions",
-             kAnyNumber);
+    AddLimit("max-hulls", limits.max_hulls, "Hulls and bodies in the store");
+    AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch,
+             "Pairs in one BatchCheckCollisions");
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
-             "Candidate axes of one pair under TEXTBOOK_SAT", kAnyNumber);
+             "Candidate axes of one pair under TEXTBOOK_SAT");
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
-             "Writers of one hull with a stored sequence", kAnyNumber);
+             "Writers of one hull with a stored sequence");
     AddLimit(
         "max-pieces-per-body", limits.max_pieces_per_body,
         "Pieces of one body; answers beyond 10000 may exceed the default limit of gRPC clients, "
@@ -412,47 +413,42 @@ class Parser {
     AddSize("max-message-bytes", limits.max_message_bytes, "Size of one message from a client",
             kMaxGrpcMessageBytes, 1);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
-             "Points that one hull can receive in total", kAnyNumber);
+             "Points that one hull can receive in total");
     AddLimit("max-placements", limits.max_placements,
-             "Placements of one batch, scene, or stream of poses", kAnyNumber);
+             "Placements of one batch, scene, or stream of poses");
     AddCallLimits();
   }
 
   void AddCallLimits() {
     Limits& limits = config_.limits;
     AddLimit("max-connections", limits.max_connections,
-             "Open connections; beyond the limit, the longest idle one is closed", kAnyNumber);
+             "Open connections; beyond the limit, the longest idle one is closed");
     AddLimit("max-connections-per-address", limits.max_connections_per_address,
-             "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt",
-             kAnyNumber);
+             "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt");
     AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
              "Open streams without a token: reflection, and watches of health after a connection's "
-             "first",
-             kAnyNumber);
-    AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams", kAnyNumber);
+             "first");
+    AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams");
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
-             "Calls waiting for a thread; more are refused", kAnyNumber);
+             "Calls waiting for a thread; more are refused");
     AddLimit(
         "max-calls-per-client", limits.max_calls_per_client,
         "Concurrent calls of one client (a token or, without tokens, an address), including open "
-        "streams",
-        kAnyNumber);
+        "streams");
     AddLimit("max-streams-per-client", limits.max_streams_per_client,
-             "Open streams of points or poses of one client", kAnyNumber);
+             "Open streams of points or poses of one client");
     AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
-             "Concurrent batches and scenes", kAnyNumber);
+             "Concurrent batches and scenes");
     AddLimit("max-batches-per-client", limits.max_batches_per_client,
-             "Concurrent batches and scenes of one client", kAnyNumber);
-    Add("max-request-time", max_request_seconds_,
-        "Time that one request may take; for streams of poses, per message; streams of points "
-        "are exempt; 0: unlimited")
-        ->check(CLI::Validator(CheckSeconds, ""))
-        ->type_name("SECONDS");
+             "Concurrent batches and scenes of one client");
+    AddSeconds("max-request-time", max_request_seconds_,
+               "Time that one request may take; for streams of poses, per message; streams of "
+               "points are exempt; 0: unlimited");
   }
 
   // CLI::Range alone would take -1 for the largest number.
   void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
-                uint64_t most) {
+                uint64_t most = kAnyNumber) {
     const auto check = [most](const std::string& text) -> std::string {
       uint64_t number = 0;
       const char* end = text.data() + text.size();

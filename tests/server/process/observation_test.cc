@@ -466,7 +466,7 @@ TEST_F(Observation, SlowRequestsAreLoggedWithTheirSizes) {
 
 TEST(LogEventTest, TextIsQuotedAndEscapedWhereNeeded) {
   const CapturedLog log;
-  LogEvent(LogLevel::kInfo, "done",
+  LogEvent(LogLevel::info, "done",
            {{"id", "a/b"}, {"name", "two words"}, {"bad", "a\n\"b\""}, {"count", uint64_t{3}}});
   EXPECT_EQ(log.text(), "info done id=a/b name=\"two words\" bad=\"a\\u000a\\\"b\\\"\" count=3\n");
 }
