@@ -36,37 +36,6 @@ const char* RoleName(Permission permission) {
   return "admin";
 }
 
-Permission PermissionFor(Rpc rpc) {
-  switch (rpc) {
-    case Rpc::kHealthWatch:
-    case Rpc::kServerReflectionInfo:
-      return Permission::kNone;
-    case Rpc::kGetHull:
-    case Rpc::kGetHullMesh:
-    case Rpc::kListHulls:
-    case Rpc::kCheckCollision:
-    case Rpc::kBatchCheckCollisions:
-    case Rpc::kStreamCollisions:
-    case Rpc::kFindCollisions:
-    case Rpc::kGetStatus:
-    case Rpc::kWatchHulls:
-    case Rpc::kWatchCollisions:
-    case Rpc::kGetBody:
-    case Rpc::kListBodies:
-      return Permission::kRead;
-    case Rpc::kCreateHull:
-    case Rpc::kAppendPoints:
-    case Rpc::kDeleteHull:
-    case Rpc::kReplaceHull:
-    case Rpc::kPutBody:
-    case Rpc::kDeleteBody:
-      return Permission::kWrite;
-    case Rpc::kSaveBackup:
-      return Permission::kAdmin;
-  }
-  return Permission::kAdmin;
-}
-
 absl::Status CheckPermission(const Caller& caller, Rpc rpc) {
   const Permission needed = PermissionFor(rpc);
   if (caller.permission >= needed) return absl::OkStatus();

@@ -7,27 +7,12 @@
 #include <cstdint>
 #include <string>
 
+#include "server/contract/rpc.h"
+
 namespace hulld::server {
-
-enum class Rpc;
-
-// Permissions of a caller. Each includes the previous ones.
-enum class Permission {
-  // Open to everyone, without a token.
-  kNone,
-  // Reads only.
-  kRead,
-  // Changes hulls and bodies.
-  kWrite,
-  // Administers the whole store.
-  kAdmin,
-};
 
 // Returns the name of the role with this permission: "none", "read-only", "read-write", or "admin".
 const char* RoleName(Permission permission);
-
-// Returns the permission that a call needs. The only such table.
-Permission PermissionFor(Rpc rpc);
 
 // The caller of a call, with its rights. The default is the caller of a server without tokens, with
 // all rights.

@@ -1,6 +1,7 @@
 #include "server/access/token_table.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <openssl/crypto.h>
@@ -42,11 +43,7 @@ absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
   return text;
 }
 
-bool IsHex(const std::string& text) {
-  return std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
-  });
-}
+bool IsHex(const std::string& text) { return std::ranges::all_of(text, absl::ascii_isxdigit); }
 
 }  // namespace
 

@@ -27,13 +27,6 @@ absl::Status CheckSeesAll(const Caller& caller) {
 
 }  // namespace
 
-WriteReactor* BackupStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Store& store, const Registry& registry, WorkerPool& readers,
-                                  const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<BackupStream>(
-      new BackupStream(context, admission, store, registry, readers, request)));
-}
-
 BackupStream::~BackupStream() {
   std::error_code error;
   if (!directory_.empty()) std::filesystem::remove_all(directory_, error);

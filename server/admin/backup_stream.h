@@ -26,18 +26,14 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   // Removes the copy.
   ~BackupStream() override;
 
-  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Store& store, const Registry& registry, WorkerPool& readers,
-                             const grpc::ByteBuffer& request);
-
- private:
-  BackupStream(grpc::CallbackServerContext& context, Admission& admission, Store& store,
-               const Registry& registry, WorkerPool& readers, const grpc::ByteBuffer& request)
+  BackupStream(CallContext& context, Admission& admission, Store& store, const Registry& registry,
+               WorkerPool& readers, const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kSaveBackup),
         store_(store),
         registry_(registry),
         readers_(readers) {}
 
+ private:
   void Open() override;
   void OnSent() override;
 

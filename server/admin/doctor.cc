@@ -88,15 +88,12 @@ void PrintJson(const Report& report) {
                     "{\"hullId\":", JsonText(finding.hull_id),
                     ",\"finding\":", JsonText(finding.what), "}");
   }
-  std::printf(
-      "{\"storeId\":%s,\"revision\":\"%llu\",\"hulls\":\"%llu\",\"vertices\":\"%llu\",\"bodies\":"
-      "\"%llu\","
-      "\"damaged\":[%s],\"failure\":%s}\n",
-      JsonText(report.store_id).c_str(), static_cast<unsigned long long>(report.revision),
-      static_cast<unsigned long long>(report.hulls),
-      static_cast<unsigned long long>(report.vertices),
-      static_cast<unsigned long long>(report.bodies), findings.c_str(),
-      JsonText(report.failure).c_str());
+  const std::string text =
+      absl::StrCat("{\"storeId\":", JsonText(report.store_id), ",\"revision\":\"", report.revision,
+                   "\",\"hulls\":\"", report.hulls, "\",\"vertices\":\"", report.vertices,
+                   "\",\"bodies\":\"", report.bodies, "\",\"damaged\":[", findings,
+                   "],\"failure\":", JsonText(report.failure), "}\n");
+  std::fputs(text.c_str(), stdout);
 }
 
 void PrintText(const Report& report) {
@@ -105,11 +102,11 @@ void PrintText(const Report& report) {
   }
   if (!report.failure.empty()) std::printf("FAILED   %s\n", report.failure.c_str());
   const std::string bodies = report.bodies == 0 ? "" : absl::StrCat(", ", report.bodies, " bodies");
-  std::printf("store %s at revision %llu: %llu hulls with %llu vertices%s, %zu damaged\n",
-              report.store_id.c_str(), static_cast<unsigned long long>(report.revision),
-              static_cast<unsigned long long>(report.hulls),
-              static_cast<unsigned long long>(report.vertices), bodies.c_str(),
-              report.findings.size());
+  const std::string summary =
+      absl::StrCat("store ", report.store_id, " at revision ", report.revision, ": ", report.hulls,
+                   " hulls with ", report.vertices, " vertices", bodies, ", ",
+                   report.findings.size(), " damaged\n");
+  std::fputs(summary.c_str(), stdout);
 }
 
 absl::Status AcceptLoss(RocksDbOptions options) {

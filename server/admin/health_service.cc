@@ -35,8 +35,7 @@ HealthCheckResponse ResponseOf(HealthCheckResponse::ServingStatus status) {
 class HealthService::WatchCall
     : public RequestStream<QueuedStream<WriteReactor, HealthCheckResponse>, HealthCheckRequest> {
  public:
-  WatchCall(grpc::CallbackServerContext& context, HealthService& service,
-            const grpc::ByteBuffer& bytes)
+  WatchCall(CallContext& context, HealthService& service, const Bytes& bytes)
       : RequestStream(bytes, context, service.admission_, Rpc::kHealthWatch), service_(service) {}
   ~WatchCall() override {
     const std::lock_guard lock(service_.mutex_);
@@ -79,13 +78,11 @@ HealthService::Status HealthService::StatusOf(const std::string& service) const 
   return serving_ ? HealthCheckResponse::SERVING : HealthCheckResponse::NOT_SERVING;
 }
 
-grpc::ServerUnaryReactor* HealthService::Check(grpc::CallbackServerContext* context,
-                                               const grpc::ByteBuffer* request,
-                                               grpc::ByteBuffer* response) {
-  grpc::ServerUnaryReactor* const reactor = context->DefaultReactor();
+UnaryReactor* HealthService::Check(CallContext* context, const Bytes* request, Bytes* response) {
+  UnaryReactor* const reactor = context->DefaultReactor();
   HealthCheckRequest question;
   RequestMemory::Share share;
-  grpc::ByteBuffer bytes = TakenFrom(*request);
+  Bytes bytes = TakenFrom(*request);
   const absl::Status parsed = ParseRequest(bytes, admission_.request_memory(), &question, share);
   if (!parsed.ok()) {
     reactor->Finish(ToGrpc(parsed));
@@ -105,8 +102,7 @@ grpc::ServerUnaryReactor* HealthService::Check(grpc::CallbackServerContext* cont
   return reactor;
 }
 
-WriteReactor* HealthService::Watch(grpc::CallbackServerContext* context,
-                                   const grpc::ByteBuffer* request) {
+WriteReactor* HealthService::Watch(CallContext* context, const Bytes* request) {
   return WatchCall::Launch(std::make_shared<WatchCall>(*context, *this, *request));
 }
 

@@ -27,11 +27,8 @@ class HealthService : public HealthServiceOfBytes {
   // services: full names of the services. The admission must outlive this.
   HealthService(Admission& admission, std::vector<std::string> services);
 
-  grpc::ServerUnaryReactor* Check(grpc::CallbackServerContext* context,
-                                  const grpc::ByteBuffer* request,
-                                  grpc::ByteBuffer* response) override;
-  WriteReactor* Watch(grpc::CallbackServerContext* context,
-                      const grpc::ByteBuffer* request) override;
+  UnaryReactor* Check(CallContext* context, const Bytes* request, Bytes* response) override;
+  WriteReactor* Watch(CallContext* context, const Bytes* request) override;
 
   // Reports NOT_SERVING from now on, and ends every Watch after that report.
   void EndServing();

@@ -4,9 +4,9 @@
 
 namespace hulld::server {
 
-WriteReactor* MaintenanceService::SaveBackup(grpc::CallbackServerContext* context,
-                                             const grpc::ByteBuffer* request) {
-  return BackupStream::Start(*context, admission_, store_, registry_, readers_, *request);
+WriteReactor* MaintenanceService::SaveBackup(CallContext* context, const Bytes* request) {
+  return BackupStream::Launch(
+      std::make_shared<BackupStream>(*context, admission_, store_, registry_, readers_, *request));
 }
 
 }  // namespace hulld::server

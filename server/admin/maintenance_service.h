@@ -21,8 +21,7 @@ class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_
                      WorkerPool& readers)
       : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
 
-  WriteReactor* SaveBackup(grpc::CallbackServerContext* context,
-                           const grpc::ByteBuffer* request) override;
+  WriteReactor* SaveBackup(CallContext* context, const Bytes* request) override;
 
  private:
   Store& store_;

@@ -35,7 +35,7 @@ class ReflectionStream
     : public ReadingStream<PulledStream<BidiReactor, reflection::ServerReflectionResponse>,
                            reflection::ServerReflectionRequest> {
  public:
-  ReflectionStream(grpc::CallbackServerContext& context, Admission& admission,
+  ReflectionStream(CallContext& context, Admission& admission,
                    const std::vector<std::string>& services)
       : ReadingStream(context, admission, Rpc::kServerReflectionInfo), services_(services) {}
 
@@ -108,7 +108,7 @@ class ReflectionStream
 
 }  // namespace
 
-BidiReactor* ReflectionService::ServerReflectionInfo(grpc::CallbackServerContext* context) {
+BidiReactor* ReflectionService::ServerReflectionInfo(CallContext* context) {
   return ReflectionStream::Launch(
       std::make_shared<ReflectionStream>(*context, admission_, services_));
 }

@@ -26,7 +26,7 @@ class ReflectionService : public ReflectionServiceOfBytes {
   ReflectionService(Admission& admission, std::vector<std::string> services)
       : admission_(admission), services_(std::move(services)) {}
 
-  BidiReactor* ServerReflectionInfo(grpc::CallbackServerContext* context) override;
+  BidiReactor* ServerReflectionInfo(CallContext* context) override;
 
  private:
   Admission& admission_;

@@ -7,9 +7,8 @@
 
 namespace hulld::server {
 
-grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* context,
-                                                   const grpc::ByteBuffer* request,
-                                                   grpc::ByteBuffer* response) {
+UnaryReactor* StatusService::GetStatus(CallContext* context, const Bytes* request,
+                                       Bytes* response) {
   using StatusCall = UnaryCall<v1::GetStatusRequest, v1::GetStatusResponse>;
   return StatusCall::Start(*context, admission_, Rpc::kGetStatus, {request, response},
                            [this](StatusCall* call) {

@@ -19,9 +19,7 @@ class StatusService
   StatusService(Registry& registry, Admission& admission)
       : registry_(registry), admission_(admission) {}
 
-  grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
-                                      const grpc::ByteBuffer* request,
-                                      grpc::ByteBuffer* response) override;
+  UnaryReactor* GetStatus(CallContext* context, const Bytes* request, Bytes* response) override;
 
  private:
   void Fill(const Caller& caller, v1::GetStatusResponse* response) const;

@@ -20,41 +20,6 @@ constexpr std::chrono::milliseconds kRetryBatch(1000);
 // A polling call notices its deadline itself and reports it better than a cancellation.
 constexpr std::chrono::seconds kGrace(2);
 
-}  // namespace
-
-CallKind KindOf(Rpc rpc) {
-  switch (rpc) {
-    case Rpc::kCreateHull:
-    case Rpc::kGetHull:
-    case Rpc::kListHulls:
-    case Rpc::kDeleteHull:
-    case Rpc::kCheckCollision:
-    case Rpc::kGetStatus:
-    case Rpc::kPutBody:
-    case Rpc::kGetBody:
-    case Rpc::kListBodies:
-    case Rpc::kDeleteBody:
-      return CallKind::kUnary;
-    case Rpc::kBatchCheckCollisions:
-    case Rpc::kFindCollisions:
-      return CallKind::kBatch;
-    case Rpc::kGetHullMesh:
-      return CallKind::kDownload;
-    case Rpc::kAppendPoints:
-    case Rpc::kReplaceHull:
-    case Rpc::kStreamCollisions:
-    case Rpc::kSaveBackup:
-    case Rpc::kWatchHulls:
-    case Rpc::kWatchCollisions:
-    case Rpc::kHealthWatch:
-    case Rpc::kServerReflectionInfo:
-      return CallKind::kStream;
-  }
-  HULLD_UNREACHABLE();
-}
-
-namespace {
-
 bool IsAnonymous(Rpc rpc) { return PermissionFor(rpc) == Permission::kNone; }
 
 }  // namespace
@@ -64,18 +29,7 @@ bool UsesWriters(Rpc rpc) { return rpc == Rpc::kAppendPoints || rpc == Rpc::kRep
 Admission::Ticket::Ticket(Admission* admission, Rpc rpc)
     : admission_(admission), rpc_(rpc), kind_(KindOf(rpc)) {}
 
-Admission::Ticket::Ticket(Ticket&& other) noexcept
-    : admission_(std::exchange(other.admission_, nullptr)),
-      rpc_(other.rpc_),
-      kind_(other.kind_),
-      client_(other.client_),
-      share_(other.share_),
-      is_one_of_many_(other.is_one_of_many_),
-      connection_(other.connection_),
-      revocable_(other.revocable_),
-      is_revocable_(other.is_revocable_),
-      watched_(other.watched_),
-      is_watched_(other.is_watched_) {}
+Admission::Ticket::Ticket(Ticket&& other) noexcept : Ticket(other) { other.admission_ = nullptr; }
 
 ClientId Admission::Ticket::client() const { return {client_->second.number, connection_}; }
 
@@ -217,10 +171,10 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   }
   if (ticket.kind_ == CallKind::kStream && !IsAnonymous(arrival.rpc)) ++client.streams;
   if (!arrival.caller.name.empty() && arrival.lifetime != nullptr) {
-    ticket.revocable_ = revocable_.insert(
+    const auto call = revocable_.insert(
         revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime, arrival.on_revoked});
-    ticket.revocable_->list = &revocable_;
-    ticket.is_revocable_ = true;
+    call->list = &revocable_;
+    ticket.revocable_ = call;
   }
   Watch(arrival.call, &ticket);
   return ticket;
@@ -261,7 +215,6 @@ void Admission::Watch(grpc_call* call, Ticket* ticket) {
   const auto end = std::chrono::steady_clock::now() + limits_.max_request_time + kGrace;
   grpc_call_ref(call);
   ticket->watched_ = watched_.insert(watched_.end(), {end, call});
-  ticket->is_watched_ = true;
   if (watched_.size() == 1) watched_changed_.notify_all();
 }
 
@@ -315,11 +268,12 @@ void Admission::Leave(Ticket& ticket) {
   {
     // Notifies under the lock, because the waiting thread may destroy this after its release.
     const std::lock_guard lock(mutex_);
-    if (ticket.is_watched_) {
-      watched = ticket.watched_->call;
-      (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
+    if (ticket.watched_.has_value()) {
+      const auto call = *ticket.watched_;
+      watched = call->call;
+      (call->is_cancelled ? cancelled_ : watched_).erase(call);
     }
-    if (ticket.is_revocable_) ticket.revocable_->list->erase(ticket.revocable_);
+    if (ticket.revocable_.has_value()) (*ticket.revocable_)->list->erase(*ticket.revocable_);
     Ticket::Client& client = ticket.client_->second;
     HULLD_CHECK(client.running > 0);
     if (ticket.kind_ == CallKind::kBatch) {

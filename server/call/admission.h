@@ -31,20 +31,6 @@
 
 namespace hulld::server {
 
-// Load of a call on the server; determines the limits that apply to it.
-enum class CallKind {
-  // One request, one short answer.
-  kUnary,
-  // Thousands of pairs, computed in slices: --max-concurrent-batches.
-  kBatch,
-  // One request, an answer of many messages.
-  kDownload,
-  // Duration depends on the client or the size of the store: --max-streams-per-client.
-  kStream,
-};
-
-CallKind KindOf(Rpc rpc);
-
 class Authenticator;
 
 // True if a call waits for the writers' pool; false: for the readers' and the answers' pools.
@@ -112,6 +98,8 @@ class Admission {
       std::list<Revocable>* list = nullptr;
     };
     Ticket(Admission* admission, Rpc rpc);
+    // Of the move.
+    Ticket(const Ticket&) = default;
 
     Admission* admission_;
     Rpc rpc_;
@@ -122,11 +110,9 @@ class Admission {
     // The caller's connection in the ConnectionTable; 0: unknown.
     uint64_t connection_ = 0;
     // Set for calls with a token.
-    std::list<Revocable>::iterator revocable_;
-    bool is_revocable_ = false;
+    std::optional<std::list<Revocable>::iterator> revocable_;
     // Set for downloads and batches while --max-request-time limits them.
-    std::list<Watched>::iterator watched_;
-    bool is_watched_ = false;
+    std::optional<std::list<Watched>::iterator> watched_;
   };
 
   // The metrics must outlive this.

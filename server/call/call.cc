@@ -1,6 +1,7 @@
 #include "server/call/call.h"
 
 #include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
 
 #include <iterator>
 #include <utility>
@@ -110,7 +111,7 @@ void Call::CountLimit(const absl::Status& status) const {
 }
 
 void Call::Log(LogLevel level, const std::string& message, LogFields fields) const {
-  if (!IsLogged(level)) return;
+  if (!spdlog::should_log(level)) return;
   LogFields all = {{"rpc", RpcName(rpc_)}, {"request_id", request_id()}};
   if (trace_.has_value()) {
     all.push_back({"trace_id", trace_->trace_id()});
@@ -129,13 +130,13 @@ void Call::LogChange(const std::string& message, const LogField& changed, uint64
   all.push_back(changed);
   all.push_back({"revision", revision});
   all.insert(all.end(), fields.begin(), fields.end());
-  Log(LogLevel::kInfo, message, std::move(all));
+  Log(LogLevel::info, message, std::move(all));
 }
 
 void Call::LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const {
   const auto threshold = admission_.limits().slow_request;
   if (threshold == std::chrono::milliseconds::zero() || duration < threshold) return;
-  Log(LogLevel::kWarn, what,
+  Log(LogLevel::warn, what,
       {{"peer", peer_},
        {"code", absl::StatusCodeToString(status.code())},
        {"milliseconds", Milliseconds(duration)},
@@ -155,8 +156,8 @@ grpc::Status Call::End(const absl::Status& status) {
   CountLimit(status);
   if (absl::IsUnauthenticated(status)) metrics().CountAuthFailure("unauthenticated");
   if (absl::IsPermissionDenied(status)) metrics().CountAuthFailure("permission_denied");
-  const LogLevel level = IsFault(status.code()) ? LogLevel::kError : LogLevel::kDebug;
-  if (IsLogged(level)) {
+  const LogLevel level = IsFault(status.code()) ? LogLevel::err : LogLevel::debug;
+  if (spdlog::should_log(level)) {
     Log(level, "request failed",
         {{"peer", peer_},
          {"code", absl::StatusCodeToString(status.code())},

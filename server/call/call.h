@@ -16,6 +16,7 @@
 #include "server/access/caller.h"
 #include "server/call/admission.h"
 #include "server/call/call_lifetime.h"
+#include "server/call/message_bytes.h"
 #include "server/call/trace_context.h"
 #include "server/contract/rpc.h"
 #include "server/process/log.h"
@@ -29,7 +30,7 @@ namespace hulld::server {
 class Call {
  public:
   // Context and admission must outlive this.
-  Call(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
+  Call(CallContext& context, Admission& admission, Rpc rpc)
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
   Rpc rpc() const { return rpc_; }
@@ -105,7 +106,7 @@ class Call {
   std::string Client(const std::optional<PeerAddress>& peer) const;
   void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
 
-  grpc::CallbackServerContext& context_;
+  CallContext& context_;
   Admission& admission_;
   const Rpc rpc_;
   const Clock::time_point arrival_ = Clock::now();

@@ -18,13 +18,8 @@
 
 namespace hulld::server {
 
-// gRPC's reactors of the kinds of streams, over bytes (message_bytes.h).
-using ReadReactor = grpc::ServerReadReactor<grpc::ByteBuffer>;
-using WriteReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
-using BidiReactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
-
 // Base of all streaming calls: owns itself until gRPC is done with it, is admitted before anything
-// else, and finishes exactly once. Reactor: one of the above.
+// else, and finishes exactly once. Reactor: one of those of message_bytes.h.
 //
 // PulledStream and QueuedStream derive from this: replies made one by one, or queued.
 template <typename Reactor>
@@ -50,7 +45,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   }
 
  protected:
-  CallStream(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
+  CallStream(CallContext& context, Admission& admission, Rpc rpc)
       : call_(context, admission, rpc) {}
   // No reaction or task is in flight: each holds a reference.
   ~CallStream() override { HULLD_CHECK(finished_); }
@@ -116,7 +111,7 @@ class RequestStream : public Stream {
   // bytes: the request, moved out of the buffer that gRPC holds until the call ends. args: for
   // Stream.
   template <typename... Args>
-  explicit RequestStream(const grpc::ByteBuffer& bytes, Args&&... args)
+  explicit RequestStream(const Bytes& bytes, Args&&... args)
       : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
 
   // Requires that the call was admitted.
@@ -129,7 +124,7 @@ class RequestStream : public Stream {
     return ParseRequest(bytes_, this->call().request_memory(), &request_, share_);
   }
 
-  grpc::ByteBuffer bytes_;
+  Bytes bytes_;
   RequestMemory::Share share_;
   Request request_;
 };
@@ -211,7 +206,7 @@ class ReadingStream : public Stream {
   }
 
   // Buffer of gRPC's read.
-  grpc::ByteBuffer bytes_;
+  Bytes bytes_;
   RequestMemory::Share share_;
   Request request_;
   // Guards `reading_` if the stream has no mutex: a revocation ends a read from another thread.

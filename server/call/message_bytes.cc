@@ -19,8 +19,8 @@ absl::Status Malformed(const google::protobuf::Message& message) {
 
 }  // namespace
 
-absl::Status ParseRequest(grpc::ByteBuffer& bytes, RequestMemory& memory,
-                          google::protobuf::Message* message, RequestMemory::Share& share) {
+absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
+                          RequestMemory::Share& share) {
   {
     grpc::ProtoBufferReader reader(&bytes);
     google::protobuf::io::CodedInputStream input(&reader);
@@ -37,8 +37,8 @@ absl::Status ParseRequest(grpc::ByteBuffer& bytes, RequestMemory& memory,
   return is_message ? absl::OkStatus() : Malformed(*message);
 }
 
-grpc::ByteBuffer SerializeReply(const google::protobuf::Message& message) {
-  grpc::ByteBuffer bytes;
+Bytes SerializeReply(const google::protobuf::Message& message) {
+  Bytes bytes;
   bool is_owned = false;
   const grpc::Status serialized =
       grpc::SerializationTraits<google::protobuf::Message>::Serialize(message, &bytes, &is_owned);

@@ -3,6 +3,7 @@
 
 #include <absl/status/status.h>
 #include <google/protobuf/message.h>
+#include <grpcpp/grpcpp.h>
 #include <grpcpp/support/byte_buffer.h>
 
 #include "server/call/request_memory.h"
@@ -12,20 +13,27 @@ namespace hulld::server {
 // Messages as gRPC carries them. Calls exchange bytes instead of messages, because gRPC would parse
 // a request before authentication and without a limit.
 
+using Bytes = grpc::ByteBuffer;
+using CallContext = grpc::CallbackServerContext;
+using UnaryReactor = grpc::ServerUnaryReactor;
+using ReadReactor = grpc::ServerReadReactor<Bytes>;
+using WriteReactor = grpc::ServerWriteReactor<Bytes>;
+using BidiReactor = grpc::ServerBidiReactor<Bytes, Bytes>;
+
 // Parses a request of an admitted caller and frees its bytes. `share` then covers the message and
 // must live as long. INVALID_ARGUMENT: the bytes are not such a message. RESOURCE_EXHAUSTED: as
 // RequestMemory::Take; the message is not parsed then.
-absl::Status ParseRequest(grpc::ByteBuffer& bytes, RequestMemory& memory,
-                          google::protobuf::Message* message, RequestMemory::Share& share);
+absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
+                          RequestMemory::Share& share);
 
 // Moves out the bytes of a request that gRPC passes as const but no longer needs.
-inline grpc::ByteBuffer TakenFrom(const grpc::ByteBuffer& bytes) {
-  grpc::ByteBuffer taken;
-  taken.Swap(const_cast<grpc::ByteBuffer*>(&bytes));
+inline Bytes TakenFrom(const Bytes& bytes) {
+  Bytes taken;
+  taken.Swap(const_cast<Bytes*>(&bytes));
   return taken;
 }
 
-grpc::ByteBuffer SerializeReply(const google::protobuf::Message& message);
+Bytes SerializeReply(const google::protobuf::Message& message);
 
 }  // namespace hulld::server
 

@@ -45,7 +45,7 @@ class PulledStream : public CallStream<Reactor> {
 
   Reply reply_;
   // The serialized reply in flight.
-  grpc::ByteBuffer bytes_;
+  Bytes bytes_;
   bool writing_ = false;
 };
 

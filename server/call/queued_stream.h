@@ -147,7 +147,7 @@ class QueuedStream : public CallStream<Reactor> {
   // The mutex guards the members below.
   std::deque<Waiting> waiting_;
   // The serialized reply in flight, and the size with which it was queued.
-  grpc::ByteBuffer bytes_;
+  Bytes bytes_;
   size_t bytes_in_flight_ = 0;
   size_t unsent_bytes_ = 0;
   bool writing_ = false;

@@ -15,23 +15,23 @@ namespace hulld::server {
 
 // Request of a unary call, and the buffer of its response, held by gRPC until the call ends.
 struct UnaryBytes {
-  const grpc::ByteBuffer* request;
-  grpc::ByteBuffer* response;
+  const Bytes* request;
+  Bytes* response;
 };
 
 // A unary call, answered on any thread; owns itself until gRPC is done with it.
 template <typename Request, typename Response>
-class UnaryCall : public grpc::ServerUnaryReactor {
+class UnaryCall : public UnaryReactor {
  public:
   // Admits a call, parses its request, and passes it to `start`, which must ensure that End is
   // called exactly once, now or later. A refused or malformed call ends immediately.
   template <typename Step>
-  static grpc::ServerUnaryReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                                         Rpc rpc, const UnaryBytes& bytes, Step&& start) {
+  static UnaryReactor* Start(CallContext& context, Admission& admission, Rpc rpc,
+                             const UnaryBytes& bytes, Step&& start) {
     auto* call = new UnaryCall(context, admission, rpc, bytes.response);
     absl::Status begun = call->call_.Begin();
     if (begun.ok()) {
-      grpc::ByteBuffer request = TakenFrom(*bytes.request);
+      Bytes request = TakenFrom(*bytes.request);
       begun = ParseRequest(request, admission.request_memory(), &call->request_, call->share_);
     }
     if (begun.ok()) {
@@ -64,8 +64,7 @@ class UnaryCall : public grpc::ServerUnaryReactor {
   Response& response() { return response_; }
 
  private:
-  UnaryCall(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc,
-            grpc::ByteBuffer* response)
+  UnaryCall(CallContext& context, Admission& admission, Rpc rpc, Bytes* response)
       : call_(context, admission, rpc), response_bytes_(response) {}
 
   void OnCancel() override { call_.Cancel(); }
@@ -76,7 +75,7 @@ class UnaryCall : public grpc::ServerUnaryReactor {
   bool InternalInlineable() override { return true; }
 
   Call call_;
-  grpc::ByteBuffer* const response_bytes_;
+  Bytes* const response_bytes_;
   RequestMemory::Share share_;
   Request request_;
   Response response_;

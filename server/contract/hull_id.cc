@@ -1,5 +1,6 @@
 #include "server/contract/hull_id.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
@@ -8,12 +9,8 @@
 namespace hulld::server {
 namespace {
 
-// Unlike std::isalnum, independent of the locale.
-bool IsAlphanumeric(char c) {
-  return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-}
-
-bool IsInner(char c) { return IsAlphanumeric(c) || c == '.' || c == '_' || c == '-'; }
+// Independent of the locale.
+bool IsInner(char c) { return absl::ascii_isalnum(c) || c == '.' || c == '_' || c == '-'; }
 
 }  // namespace
 
@@ -30,7 +27,7 @@ absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field) 
       return absl::InvalidArgumentError(absl::StrCat(field, " \"", absl::Utf8SafeCEscape(id),
                                                      "\" has an empty segment at character ", i));
     }
-    if (!at_end && !(segment_start ? IsAlphanumeric(id[i]) : IsInner(id[i]))) {
+    if (!at_end && !(segment_start ? absl::ascii_isalnum(id[i]) : IsInner(id[i]))) {
       return absl::InvalidArgumentError(
           absl::StrCat(field, " \"", absl::Utf8SafeCEscape(id), "\" is malformed at character ", i,
                        "; IDs are segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by \"/\""));

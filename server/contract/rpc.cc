@@ -1,55 +1,59 @@
 #include "server/contract/rpc.h"
 
-#include "core/base/check.h"
+#include <cstddef>
 
 namespace hulld::server {
+namespace {
 
-const char* RpcName(Rpc rpc) {
-  switch (rpc) {
-    case Rpc::kCreateHull:
-      return "CreateHull";
-    case Rpc::kAppendPoints:
-      return "AppendPoints";
-    case Rpc::kGetHull:
-      return "GetHull";
-    case Rpc::kGetHullMesh:
-      return "GetHullMesh";
-    case Rpc::kListHulls:
-      return "ListHulls";
-    case Rpc::kDeleteHull:
-      return "DeleteHull";
-    case Rpc::kCheckCollision:
-      return "CheckCollision";
-    case Rpc::kBatchCheckCollisions:
-      return "BatchCheckCollisions";
-    case Rpc::kStreamCollisions:
-      return "StreamCollisions";
-    case Rpc::kFindCollisions:
-      return "FindCollisions";
-    case Rpc::kGetStatus:
-      return "GetStatus";
-    case Rpc::kReplaceHull:
-      return "ReplaceHull";
-    case Rpc::kSaveBackup:
-      return "SaveBackup";
-    case Rpc::kWatchHulls:
-      return "WatchHulls";
-    case Rpc::kWatchCollisions:
-      return "WatchCollisions";
-    case Rpc::kPutBody:
-      return "PutBody";
-    case Rpc::kGetBody:
-      return "GetBody";
-    case Rpc::kListBodies:
-      return "ListBodies";
-    case Rpc::kDeleteBody:
-      return "DeleteBody";
-    case Rpc::kHealthWatch:
-      return "HealthWatch";
-    case Rpc::kServerReflectionInfo:
-      return "ServerReflectionInfo";
+struct Properties {
+  Rpc rpc;
+  const char* name;
+  CallKind kind;
+  Permission permission;
+};
+
+// In the order of the enum.
+constexpr Properties kRpcs[] = {
+    {Rpc::kCreateHull, "CreateHull", CallKind::kUnary, Permission::kWrite},
+    {Rpc::kAppendPoints, "AppendPoints", CallKind::kStream, Permission::kWrite},
+    {Rpc::kGetHull, "GetHull", CallKind::kUnary, Permission::kRead},
+    {Rpc::kGetHullMesh, "GetHullMesh", CallKind::kDownload, Permission::kRead},
+    {Rpc::kListHulls, "ListHulls", CallKind::kUnary, Permission::kRead},
+    {Rpc::kDeleteHull, "DeleteHull", CallKind::kUnary, Permission::kWrite},
+    {Rpc::kCheckCollision, "CheckCollision", CallKind::kUnary, Permission::kRead},
+    {Rpc::kBatchCheckCollisions, "BatchCheckCollisions", CallKind::kBatch, Permission::kRead},
+    {Rpc::kStreamCollisions, "StreamCollisions", CallKind::kStream, Permission::kRead},
+    {Rpc::kFindCollisions, "FindCollisions", CallKind::kBatch, Permission::kRead},
+    {Rpc::kGetStatus, "GetStatus", CallKind::kUnary, Permission::kRead},
+    {Rpc::kReplaceHull, "ReplaceHull", CallKind::kStream, Permission::kWrite},
+    {Rpc::kSaveBackup, "SaveBackup", CallKind::kStream, Permission::kAdmin},
+    {Rpc::kWatchHulls, "WatchHulls", CallKind::kStream, Permission::kRead},
+    {Rpc::kWatchCollisions, "WatchCollisions", CallKind::kStream, Permission::kRead},
+    {Rpc::kPutBody, "PutBody", CallKind::kUnary, Permission::kWrite},
+    {Rpc::kGetBody, "GetBody", CallKind::kUnary, Permission::kRead},
+    {Rpc::kListBodies, "ListBodies", CallKind::kUnary, Permission::kRead},
+    {Rpc::kDeleteBody, "DeleteBody", CallKind::kUnary, Permission::kWrite},
+    {Rpc::kHealthWatch, "HealthWatch", CallKind::kStream, Permission::kNone},
+    {Rpc::kServerReflectionInfo, "ServerReflectionInfo", CallKind::kStream, Permission::kNone},
+};
+
+constexpr bool HoldsEachInOrder() {
+  size_t next = 0;
+  for (const Properties& each : kRpcs) {
+    if (static_cast<size_t>(each.rpc) != next++) return false;
   }
-  HULLD_UNREACHABLE();
+  return next == kRpcCount;
 }
+static_assert(HoldsEachInOrder());
+
+const Properties& PropertiesOf(Rpc rpc) { return kRpcs[static_cast<size_t>(rpc)]; }
+
+}  // namespace
+
+const char* RpcName(Rpc rpc) { return PropertiesOf(rpc).name; }
+
+CallKind KindOf(Rpc rpc) { return PropertiesOf(rpc).kind; }
+
+Permission PermissionFor(Rpc rpc) { return PropertiesOf(rpc).permission; }
 
 }  // namespace hulld::server

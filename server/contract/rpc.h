@@ -33,8 +33,35 @@ enum class Rpc {
 
 inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kServerReflectionInfo) + 1;
 
+// Load of a call on the server; determines the limits that apply to it.
+enum class CallKind {
+  // One request, one short answer.
+  kUnary,
+  // Thousands of pairs, computed in slices: --max-concurrent-batches.
+  kBatch,
+  // One request, an answer of many messages.
+  kDownload,
+  // Duration depends on the client or the size of the store: --max-streams-per-client.
+  kStream,
+};
+
+// Permissions of a caller. Each includes the previous ones.
+enum class Permission {
+  // Open to everyone, without a token.
+  kNone,
+  // Reads only.
+  kRead,
+  // Changes hulls and bodies.
+  kWrite,
+  // Administers the whole store.
+  kAdmin,
+};
+
 // Returns the name in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);
+CallKind KindOf(Rpc rpc);
+// Returns the permission that a call needs.
+Permission PermissionFor(Rpc rpc);
 
 }  // namespace hulld::server
 
