@@ -81,10 +81,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& con
     const absl::StatusOr<std::unique_ptr<Session>> session =
         Session::Open(*parsed, options.answer_time);
     if (!session.ok()) return session.status();
-    const absl::StatusOr<Rows> there =
-        (*session)->Run("SELECT to_regclass('hulld.store') IS NOT NULL");
-    if (!there.ok()) return there.status();
-    if (there->at(0, 0) != "t") return absl::NotFoundError("it contains no hulld store");
+    const absl::StatusOr<bool> has_store = HasTable(**session, "hulld.store");
+    if (!has_store.ok()) return has_store.status();
+    if (!*has_store) return absl::NotFoundError("it contains no hulld store");
   }
   absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
   if (!store.ok()) return store.status();

@@ -144,48 +144,35 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
 
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
   MigrationCounts counts;
-  absl::Status status = Prepare(target);
-  if (status.ok()) status = CopyHulls(target, &counts);
-  if (status.ok()) status = CopyBodies(target, &counts);
-  if (!status.ok()) return status;
+  if (absl::Status s = Prepare(target); !s.ok()) return s;
+  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
+  if (!last.ok()) return last.status();
+  Batch batch(target);
+  const auto copy = [&](const auto& records, const std::string& last_id,
+                        uint64_t* count) -> absl::Status {
+    for (const auto& each : records) {
+      ++*count;
+      if (IdOf(each) <= last_id) {
+        ++counts.resumed;
+        continue;
+      }
+      absl::StatusOr<std::vector<Change>> changes = ChangesOf(each);
+      if (!changes.ok()) return changes.status();
+      if (absl::Status s = batch.Add(*std::move(changes)); !s.ok()) return s;
+      progress_(counts.hulls + counts.bodies, all());
+    }
+    return batch.Flush();
+  };
+  if (absl::Status s = copy(hulls_, last->hull_id, &counts.hulls); !s.ok()) return s;
+  if (absl::Status s = copy(bodies_, last->body_id, &counts.bodies); !s.ok()) return s;
   return counts;
 }
 
-absl::Status Migration::CopyHulls(MigrationTarget& target, MigrationCounts* counts) {
-  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
-  if (!last.ok()) return last.status();
-  Batch batch(target);
-  for (const StoredHull& hull : hulls_) {
-    ++counts->hulls;
-    if (hull.record.hull_id <= last->hull_id) {
-      ++counts->resumed;
-      continue;
-    }
-    absl::StatusOr<std::vector<Change>> changes = ChangesOf(hull);
-    if (!changes.ok()) return changes.status();
-    if (absl::Status s = batch.Add(*std::move(changes)); !s.ok()) return s;
-    progress_(counts->hulls, all());
-  }
-  return batch.Flush();
-}
-
-absl::Status Migration::CopyBodies(MigrationTarget& target, MigrationCounts* counts) {
-  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
-  if (!last.ok()) return last.status();
-  Batch batch(target);
-  for (const StoredBody& body : bodies_) {
-    ++counts->bodies;
-    if (body.record.body_id <= last->body_id) {
-      ++counts->resumed;
-      continue;
-    }
-    std::vector<Change> changes(1);
-    changes[0].body = std::make_shared<StoredBody>(body);
-    changes[0].revision = body.record.revision;
-    if (absl::Status s = batch.Add(std::move(changes)); !s.ok()) return s;
-    progress_(counts->hulls + counts->bodies, all());
-  }
-  return batch.Flush();
+absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredBody& body) const {
+  std::vector<Change> changes(1);
+  changes[0].body = std::make_shared<StoredBody>(body);
+  changes[0].revision = body.record.revision;
+  return changes;
 }
 
 // Returns the state of a hull as changes: all vertices as one base, and each writer.

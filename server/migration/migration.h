@@ -50,9 +50,8 @@ class Migration {
   Migration(Store& source, Progress progress);
 
   absl::Status Prepare(MigrationTarget& target);
-  absl::Status CopyHulls(MigrationTarget& target, MigrationCounts* counts);
-  absl::Status CopyBodies(MigrationTarget& target, MigrationCounts* counts);
   absl::StatusOr<std::vector<Change>> ChangesOf(const StoredHull& hull) const;
+  absl::StatusOr<std::vector<Change>> ChangesOf(const StoredBody& body) const;
   absl::Status CompareHull(Store& copy, const StoredHull& hull, const StoredHull& other) const;
   uint64_t all() const { return hulls_.size() + bodies_.size(); }
 

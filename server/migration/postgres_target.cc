@@ -41,18 +41,14 @@ class PostgresTarget : public MigrationTarget {
   Store& store() override { return *store_; }
 
   absl::StatusOr<std::optional<MigrationSource>> ReadMark() override {
-    const absl::StatusOr<Rows> there =
-        session_->Run("SELECT to_regclass('hulld.migration') IS NOT NULL");
-    if (!there.ok()) return there.status();
-    if (there->at(0, 0) != "t") return std::nullopt;
-    const absl::StatusOr<std::vector<Rows>> rows =
-        session_->Ask(std::vector<Statement>{{.text = "SELECT store_id, revision FROM "
-                                                      "hulld.migration"}});
+    const absl::StatusOr<bool> is_marked = HasTable(*session_, "hulld.migration");
+    if (!is_marked.ok()) return is_marked.status();
+    if (!*is_marked) return std::nullopt;
+    const absl::StatusOr<Rows> rows =
+        session_->Ask({.text = "SELECT store_id, revision FROM hulld.migration"});
     if (!rows.ok()) return rows.status();
-    if (rows->front().count() != 1) {
-      return absl::DataLossError("the row of hulld.migration is missing");
-    }
-    return MigrationSource{std::string(rows->front().at(0, 0)), rows->front().bigint(0, 1)};
+    if (rows->count() != 1) return absl::DataLossError("the row of hulld.migration is missing");
+    return MigrationSource{std::string(rows->at(0, 0)), rows->bigint(0, 1)};
   }
 
   absl::Status Begin(const MigrationSource& source) override {

@@ -16,21 +16,6 @@ static_assert(sizeof(Vector) == 3 * sizeof(double));
 
 constexpr size_t kChecksumBytes = sizeof(uint32_t);
 
-template <typename T>
-std::string BigEndian(T number) {
-  std::string bytes(sizeof(T), '\0');
-  for (size_t i = 0; i < sizeof(T); ++i) {
-    bytes[i] = static_cast<char>(number >> (8 * (sizeof(T) - 1 - i)));
-  }
-  return bytes;
-}
-
-uint64_t FromBigEndian(std::string_view bytes) {
-  uint64_t number = 0;
-  for (const char c : bytes) number = number << 8 | static_cast<unsigned char>(c);
-  return number;
-}
-
 uint32_t Checksum(std::string_view key, std::string_view value) {
   const auto add = [](uLong sum, std::string_view text) {
     return crc32_z(sum, reinterpret_cast<const Bytef*>(text.data()), text.size());
@@ -47,6 +32,12 @@ absl::Status WrongSize(std::string_view value) {
 using StoredNumbers = std::array<uint64_t, 13>;
 
 }  // namespace
+
+uint64_t FromBigEndian(std::string_view bytes) {
+  uint64_t number = 0;
+  for (const char c : bytes) number = number << 8 | static_cast<unsigned char>(c);
+  return number;
+}
 
 std::string HullKey(std::string_view hull_id) {
   return std::string(1, kHullPrefix).append(hull_id);

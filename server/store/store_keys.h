@@ -50,6 +50,17 @@ inline constexpr char kBodyPrefix = 'p';
 // Vertices per part of a base: 768 KiB.
 inline constexpr size_t kBasePartVertices = 32768;
 
+// Returns the bytes of a number, the most significant first; and the number of such bytes.
+template <typename T>
+std::string BigEndian(T number) {
+  std::string bytes(sizeof(T), '\0');
+  for (size_t i = 0; i < sizeof(T); ++i) {
+    bytes[i] = static_cast<char>(number >> (8 * (sizeof(T) - 1 - i)));
+  }
+  return bytes;
+}
+uint64_t FromBigEndian(std::string_view bytes);
+
 std::string HullKey(std::string_view hull_id);
 std::string BodyKey(std::string_view body_id);
 // Lower bound of an incarnation's keys of one kind. IncarnationKey(prefix, incarnation + 1) is the

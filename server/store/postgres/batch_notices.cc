@@ -34,13 +34,7 @@ std::chrono::milliseconds UpTo(Clock::time_point end) {
 }  // namespace
 
 absl::StatusOr<uint64_t> LastBatch(Session& session) {
-  const absl::StatusOr<Rows> batch = session.Run("SELECT batch FROM hulld.store");
-  if (!batch.ok()) return batch.status();
-  uint64_t number = 0;
-  if (batch->count() != 1 || !absl::SimpleAtoi(std::string(batch->at(0, 0)), &number)) {
-    return absl::DataLossError("the row of hulld.store is missing");
-  }
-  return number;
+  return OnlyNumber(session.Run("SELECT batch FROM hulld.store"));
 }
 
 BatchNotices::BatchNotices(Opener open, std::chrono::milliseconds retry,

@@ -2,29 +2,15 @@
 
 #include <utility>
 
+#include "server/store/store_keys.h"
+
 namespace hulld::server {
-namespace {
 
-template <typename T>
-std::string NetworkOrder(T number) {
-  std::string bytes(sizeof(T), '\0');
-  for (size_t i = 0; i < sizeof(T); ++i) {
-    bytes[i] = static_cast<char>(number >> (8 * (sizeof(T) - 1 - i)));
-  }
-  return bytes;
-}
+std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
 
-}  // namespace
+uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
 
-std::string EncodeBigint(uint64_t number) { return NetworkOrder(number); }
-
-uint64_t DecodeBigint(std::string_view bytes) {
-  uint64_t number = 0;
-  for (const char c : bytes) number = number << 8 | static_cast<unsigned char>(c);
-  return number;
-}
-
-std::string EncodeInteger(uint32_t number) { return NetworkOrder(number); }
+std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
 
 void ArrayParameter::Add(std::string_view value) {
   ++count_;

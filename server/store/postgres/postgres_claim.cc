@@ -21,23 +21,18 @@ constexpr int kBeatsPerMeasure = 10;
 
 // Returns true if the tables exist. FAILED_PRECONDITION: a newer hulld made them.
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
-  const absl::StatusOr<Rows> exists = session.Run("SELECT to_regclass('hulld.store') IS NOT NULL");
-  if (!exists.ok()) return exists.status();
-  if (exists->at(0, 0) != "t") return false;
-  const absl::StatusOr<Rows> format = RunPatiently(session, "SELECT format FROM hulld.store");
-  if (!format.ok()) return format.status();
-  uint64_t number = 0;
-  if (format->count() != 1 || !absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {
-    return absl::DataLossError("the row of hulld.store is missing");
-  }
-  if (number <= kFormat) {
-    const absl::StatusOr<Rows> mark =
-        session.Run("SELECT to_regclass('hulld.migration') IS NOT NULL");
-    if (!mark.ok()) return mark.status();
-    if (options_.migrating || mark->at(0, 0) != "t") return true;
+  const absl::StatusOr<bool> exists = HasTable(session, "hulld.store");
+  if (!exists.ok() || !*exists) return exists;
+  const absl::StatusOr<uint64_t> number =
+      OnlyNumber(RunPatiently(session, "SELECT format FROM hulld.store"));
+  if (!number.ok()) return number.status();
+  if (*number <= kFormat) {
+    const absl::StatusOr<bool> is_marked = HasTable(session, "hulld.migration");
+    if (!is_marked.ok()) return is_marked;
+    if (options_.migrating || !*is_marked) return true;
     return UnfinishedMigration();
   }
-  return absl::FailedPreconditionError(absl::StrCat("the store is in format ", number,
+  return absl::FailedPreconditionError(absl::StrCat("the store is in format ", *number,
                                                     "; this hulld reads formats up to ", kFormat,
                                                     "; run the hulld version that wrote it"));
 }

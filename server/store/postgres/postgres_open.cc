@@ -385,21 +385,16 @@ absl::Status PostgresStore::MakeSchema(Session& session) {
 // Adds the totals that tables of a former format lack. No server commits during this, and servers
 // that would not maintain the totals are locked out and end. Cost: 0.7 s for a million hulls.
 absl::Status PostgresStore::AddTotals(Session& session) const {
-  const absl::StatusOr<Rows> format = session.Run("SELECT format FROM hulld.store");
-  if (!format.ok()) return format.status();
-  if (format->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
-  uint64_t number = 0;
-  if (!absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {
-    return absl::DataLossError("the format in hulld.store is not a number");
-  }
-  if (number >= kFormat) return absl::OkStatus();
+  const absl::StatusOr<uint64_t> number = OnlyNumber(session.Run("SELECT format FROM hulld.store"));
+  if (!number.ok()) return number.status();
+  if (*number >= kFormat) return absl::OkStatus();
   spdlog::info(
       "upgrading the tables from format {} to format {}: counting hulls, vertices, and bodies",
-      number, kFormat);
+      *number, kFormat);
   absl::Status status = session.Run(kAddTotals).status();
   if (status.ok()) status = session.Run(kPrepareCount).status();
   std::string counted;
-  if (status.ok() && number < kFormatThatCountsHulls) {
+  if (status.ok() && *number < kFormatThatCountsHulls) {
     const absl::StatusOr<Counted> hulls =
         CountAll(session, "hulld_count_hulls_after", options_.should_stop);
     status = hulls.status();

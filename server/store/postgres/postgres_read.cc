@@ -85,20 +85,26 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
   return ended();
 }
 
+absl::StatusOr<Rows> PostgresStore::ReadOne(Statement statement) {
+  std::vector<Statement> statements;
+  statements.push_back(std::move(statement));
+  absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+  if (!rows.ok()) return rows.status();
+  return std::move(rows->front());
+}
+
 absl::Status PostgresStore::ForEachRow(
     const char* statement, const std::function<void(const std::string&, std::string_view)>& visit) {
   std::string last;
   while (true) {
-    std::vector<Statement> statements(1);
-    statements[0] = {.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}};
-    const absl::StatusOr<std::vector<Rows>> answers = Read(std::move(statements));
-    if (!answers.ok()) return answers.status();
-    const Rows& rows = answers->front();
-    for (int i = 0; i < rows.count(); ++i) {
-      last = std::string(rows.at(i, 0));
-      visit(last, rows.at(i, 1));
+    const absl::StatusOr<Rows> rows =
+        ReadOne({.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}});
+    if (!rows.ok()) return rows.status();
+    for (int i = 0; i < rows->count(); ++i) {
+      last = std::string(rows->at(i, 0));
+      visit(last, rows->at(i, 1));
     }
-    if (static_cast<uint32_t>(rows.count()) < kRowsPerPortion) return absl::OkStatus();
+    if (static_cast<uint32_t>(rows->count()) < kRowsPerPortion) return absl::OkStatus();
   }
 }
 
@@ -117,10 +123,9 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
 absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::string> ids) {
   ArrayParameter asked(ArrayParameter::Element::kText);
   for (const std::string& id : ids) asked.Add(id);
-  const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_find", .parameters = {asked.Take()}}});
+  const absl::StatusOr<Rows> rows = ReadOne({.name = "hulld_find", .parameters = {asked.Take()}});
   if (!rows.ok()) return rows.status();
-  return FoundIn(rows->front(), "", SIZE_MAX);
+  return FoundIn(*rows, "", SIZE_MAX);
 }
 
 // Requests one extra row to detect more. An impossible prefix may hold characters that the database
@@ -129,13 +134,13 @@ absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefi
                                                         const std::string& after, size_t most,
                                                         RecordKinds kinds) {
   const bool may_be = std::ranges::all_of(prefix, [](char c) { return c > ' ' && c <= '~'; });
-  const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_list",
-             .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
-                            EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
-                            EncodeBigint(kMostListedBytes)}}});
+  const absl::StatusOr<Rows> rows =
+      ReadOne({.name = "hulld_list",
+               .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
+                              EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
+                              EncodeBigint(kMostListedBytes)}});
   if (!rows.ok()) return rows.status();
-  return FoundIn(rows->front(), prefix, most);
+  return FoundIn(*rows, prefix, most);
 }
 
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {
@@ -194,12 +199,11 @@ absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
     if (!read.ok()) return read.status();
     sealed = *std::move(read);
   } else {
-    std::vector<Statement> statements(1);
-    statements[0] = {.name = "hulld_sequence",
-                     .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}};
-    const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+    const absl::StatusOr<Rows> rows =
+        ReadOne({.name = "hulld_sequence",
+                 .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}});
     if (!rows.ok()) return rows.status();
-    if (rows->front().count() > 0) sealed = std::string(rows->front().at(0, 0));
+    if (rows->count() > 0) sealed = std::string(rows->at(0, 0));
   }
   if (sealed.empty()) return 0;
   return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), sealed);
@@ -208,15 +212,14 @@ absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
 absl::StatusOr<std::vector<WriterSequence>> PostgresStore::LoadWriters(const StoredHull& hull) {
   const std::string& id = hull.record.hull_id;
   const uint64_t incarnation = hull.record.create_revision;
-  std::vector<Statement> statements(1);
-  statements[0] = {.name = "hulld_writers", .parameters = {id, EncodeBigint(incarnation)}};
-  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+  const absl::StatusOr<Rows> rows =
+      ReadOne({.name = "hulld_writers", .parameters = {id, EncodeBigint(incarnation)}});
   if (!rows.ok()) return rows.status();
   std::vector<WriterSequence> writers;
-  for (int i = 0; i < rows->front().count(); ++i) {
-    const std::string writer_id(rows->front().at(i, 0));
+  for (int i = 0; i < rows->count(); ++i) {
+    const std::string writer_id(rows->at(i, 0));
     const absl::StatusOr<uint64_t> sequence =
-        UnsealSequence(id, WriterKey(incarnation, writer_id), rows->front().at(i, 1));
+        UnsealSequence(id, WriterKey(incarnation, writer_id), rows->at(i, 1));
     if (!sequence.ok()) return sequence.status();
     writers.push_back({writer_id, *sequence});
   }

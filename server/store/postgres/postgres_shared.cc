@@ -161,9 +161,8 @@ void NoteFormer(const Rows& rows, int row, PeerChange& change) {
 absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
 
 absl::Status MakeSharedTables(Session& session) {
-  const absl::StatusOr<Rows> exist = session.Run("SELECT to_regclass('hulld.changes') IS NOT NULL");
-  if (!exist.ok()) return exist.status();
-  if (exist->at(0, 0) == "t") return absl::OkStatus();
+  const absl::StatusOr<bool> exist = HasTable(session, "hulld.changes");
+  if (!exist.ok() || *exist) return exist.status();
   const absl::Status made = session.Run(kSharedTables).status();
   if (!made.ok()) session.Run("ROLLBACK").status().IgnoreError();
   return made;
@@ -326,14 +325,14 @@ void PostgresStore::GiveTurnBack(const absl::Status& status) {
 // the transaction: batches are serialized, and all earlier commits of peer servers are known. So
 // the new revisions are the next ones, and no server reads a batch before its predecessor. batch:
 // the batch that may have been committed if the session is lost.
-absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, SharedBatch* batch) {
+absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batch* batch) {
   absl::Status status = TakeTurn();
   std::vector<Change*> kept;
   for (Change* change : changes) {
     if (!peer_changes_.by_id.contains(change->id())) kept.push_back(change);
   }
   if (status.ok() && !kept.empty()) {
-    const SharedBatch next = {batch_ + 1, NumberChanges(kept, revision_), AddedBy(kept)};
+    const Batch next = {batch_ + 1, NumberChanges(kept, revision_), AddedBy(kept)};
     std::vector<Statement> statements = StatementsOf(kept);
     statements.push_back(ChangesRow(kept, next.number));
     statements.push_back(
@@ -342,20 +341,12 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
       statements.push_back(
           {.name = "hulld_prune", .parameters = {EncodeBigint(next.number - kKeptBatches)}});
     }
-    statements.push_back(Fence(next.revision, next.number, next.added));
+    statements.push_back(Fence(next));
     statements.push_back({.text = "COMMIT"});
-    writer_->TakeWarned();
     *batch = next;
-    status = writer_->Ask(statements).status();
-    if (status.ok() && writer_->TakeWarned()) {
-      // For example, the wait for a standby was interrupted: committed, but not replicated as
-      // required.
-      writer_ = nullptr;
-      return absl::Status(absl::StatusCode::kUnavailable,
-                          "PostgreSQL reported a warning during COMMIT");
-    }
+    status = writer_->AskToCommit(statements).status();
     if (status.ok()) {
-      KeepShared(next);
+      Keep(next);
       return status;
     }
   }
@@ -374,15 +365,6 @@ void PostgresStore::GiveNewId() {
     spdlog::error("cannot assign a new ID to the store: {}", std::string(status.message()));
 }
 
-void PostgresStore::KeepShared(const SharedBatch& batch) {
-  batch_ = batch.number;
-  seen_batch_ = batch_;
-  revision_ = batch.revision;
-  totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices,
-             totals_.bodies + batch.added.bodies};
-  if (notices_ != nullptr) notices_->Send(batch.number);
-}
-
 // Returns true if this server's batch was committed. Takes the turn: the transaction that held it
 // has ended then, and nothing of it can follow, because its COMMIT was sent before. Its sync covers
 // earlier commits.
@@ -395,10 +377,8 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   statements.push_back({.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}});
   statements.push_back({.name = "hulld_server", .parameters = {owner_}});
   statements.push_back({.text = "COMMIT"});
-  const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(statements);
+  const absl::StatusOr<std::vector<Rows>> rows = writer_->AskToCommit(statements);
   if (!rows.ok()) return rows.status();
-  if (writer_->TakeWarned())
-    return absl::UnavailableError("PostgreSQL reported a warning during COMMIT");
   const Rows& last = (*rows)[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
@@ -408,7 +388,7 @@ absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
   const Clock::time_point deadline = Clock::now() + options_.patience;
   for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
     absl::Status status;
-    SharedBatch batch;
+    Batch batch;
     if (writer_ == nullptr) {
       absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
       status = session.status();
@@ -423,32 +403,17 @@ absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
     }
     if (!SqlState(status).empty()) return WriteFailed(Refused(status));
     if (batch.number != 0) {
-      const absl::StatusOr<bool> committed = FindSharedOutcome(batch.number, deadline);
+      const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
       if (!committed.ok()) return WriteFailed(OutcomeUnknown(status));
       spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
                    std::string(status.message()), *committed ? "committed" : "not committed");
       if (*committed) {
-        KeepShared(batch);
+        Keep(batch);
         return absl::OkStatus();
       }
     }
     if (Clock::now() + pause >= deadline) return WriteFailed(Refused(status));
-    std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, pause, [this] { return ending_; })) {
-      return WriteFailed(Refused(status));
-    }
-  }
-}
-
-absl::StatusOr<bool> PostgresStore::FindSharedOutcome(uint64_t batch, Clock::time_point deadline) {
-  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
-    const absl::StatusOr<bool> outcome = SharedOutcome(batch);
-    if (outcome.ok()) return outcome;
-    writer_ = nullptr;
-    if (ViolatedConstraint(outcome.status()) == "store_fence") End(Superseded(""));
-    if (!ended().ok() || Clock::now() + pause >= deadline) return outcome;
-    std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, pause, [this] { return ending_; })) return outcome;
+    if (EndsWithin(pause)) return WriteFailed(Refused(status));
   }
 }
 
@@ -504,28 +469,24 @@ void PostgresStore::OnPeerCommit(std::function<void()> committed) {
 // Reads the sequence, and compares the hull's record with `hull`, in one snapshot.
 absl::StatusOr<std::string> PostgresStore::ReadSequence(const HullRecord& hull,
                                                         const std::string& writer_id) {
-  std::vector<Statement> statements(1);
-  statements[0] = {.name = "hulld_sequence_and_record",
-                   .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), writer_id}};
-  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
-  if (!rows.ok()) return rows.status();
-  const Rows& row = rows->front();
-  if (row.count() == 0) return Moved();
-  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.hull_id, row.at(0, 1));
+  const absl::StatusOr<Rows> row =
+      ReadOne({.name = "hulld_sequence_and_record",
+               .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), writer_id}});
+  if (!row.ok()) return row.status();
+  if (row->count() == 0) return Moved();
+  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.hull_id, row->at(0, 1));
   if (!now.ok()) return now.status();
   if (now->record != hull) return Moved();
-  return std::string(row.at(0, 0));
+  return std::string(row->at(0, 0));
 }
 
 // Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.
 absl::Status PostgresStore::WhyDamaged(const StoredHull& hull, const absl::Status& damage) {
-  std::vector<Statement> statements(1);
-  statements[0] = {.name = "hulld_record", .parameters = {hull.record.hull_id}};
-  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+  const absl::StatusOr<Rows> rows =
+      ReadOne({.name = "hulld_record", .parameters = {hull.record.hull_id}});
   if (!rows.ok()) return rows.status();
-  if (rows->front().count() == 0) return Moved();
-  const absl::StatusOr<StoredHull> now =
-      UnsealStoredHull(hull.record.hull_id, rows->front().at(0, 0));
+  if (rows->count() == 0) return Moved();
+  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.record.hull_id, rows->at(0, 0));
   if (!now.ok()) return now.status();
   return now->record.revision == hull.record.revision ? damage : Moved();
 }

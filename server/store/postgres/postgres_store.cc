@@ -70,33 +70,24 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
 
 // Writes the revision, the batch number and the resulting totals, if the epoch is still this
 // server's.
-Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const {
+Statement PostgresStore::Fence(const Batch& batch) const {
   return {.name = "hulld_fence",
-          .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch()),
-                         EncodeBigint(added.hulls), EncodeBigint(added.vertices),
-                         EncodeBigint(added.bodies)}};
+          .parameters = {EncodeBigint(batch.revision), EncodeBigint(batch.number),
+                         EncodeBigint(epoch()), EncodeBigint(batch.added.hulls),
+                         EncodeBigint(batch.added.vertices), EncodeBigint(batch.added.bodies)}};
 }
 
 // Runs one transaction. If the session is lost, it may have been committed; after other errors it
 // was not.
-absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t revision,
-                                    uint64_t batch) {
+absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, const Batch& batch) {
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   // First, so that a superseded server writes nothing.
-  statements.push_back(Fence(revision, batch, AddedBy(changes)));
+  statements.push_back(Fence(batch));
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
   statements.push_back({.text = "COMMIT"});
-  writer_->TakeWarned();
-  const absl::Status status = writer_->Ask(statements).status();
-  if (status.ok() && !writer_->TakeWarned()) return status;
-  if (status.ok()) {
-    // For example, the wait for a standby was interrupted: committed, but not replicated as
-    // required.
-    writer_ = nullptr;
-    return absl::Status(absl::StatusCode::kUnavailable,
-                        "PostgreSQL reported a warning during COMMIT");
-  }
+  const absl::Status status = writer_->AskToCommit(statements).status();
+  if (status.ok()) return status;
   // A failed transaction cannot be committed, and ends with its session at the latest.
   if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
   return status;
@@ -104,15 +95,33 @@ absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint
 
 // Returns true if the batch was committed. UNAVAILABLE: unknown at the deadline.
 absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_point deadline) {
-  for (std::chrono::milliseconds pause = kFirstRetryPause;;
-       pause = std::min(2 * pause, kLongestRetryPause)) {
-    const absl::StatusOr<bool> outcome = Reclaim(batch);
+  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
+    const absl::StatusOr<bool> outcome = options_.shared ? SharedOutcome(batch) : Reclaim(batch);
     if (outcome.ok()) return outcome;
     writer_ = nullptr;
-    if (Clock::now() + pause >= deadline) return outcome;
-    std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, pause, [this] { return ending_; })) return outcome;
+    if (options_.shared && ViolatedConstraint(outcome.status()) == "store_fence") {
+      End(Superseded(""));
+    }
+    // A server that is active alone finds the outcome even after its end.
+    if (options_.shared && !ended().ok()) return outcome;
+    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return outcome;
   }
+}
+
+// Waits; returns true if this server ends meanwhile.
+bool PostgresStore::EndsWithin(std::chrono::milliseconds pause) {
+  std::unique_lock lock(mutex_);
+  return wake_.wait_for(lock, pause, [this] { return ending_; });
+}
+
+// Records a committed batch.
+void PostgresStore::Keep(const Batch& batch) {
+  batch_ = batch.number;
+  seen_batch_ = batch_;
+  revision_ = batch.revision;
+  totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices,
+             totals_.bodies + batch.added.bodies};
+  if (notices_ != nullptr) notices_->Send(batch.number);
 }
 
 // Raises the epoch in a new session. This waits for the batch's transaction to end if it has locked
@@ -121,14 +130,13 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   if (!session.ok()) return session.status();
   writer_ = *std::move(session);
-  const absl::StatusOr<Rows> claimed =
-      writer_->Ask({.name = "hulld_reclaim", .parameters = {owner_}});
-  if (!claimed.ok()) return claimed.status();
-  if (writer_->TakeWarned())
-    return absl::UnavailableError("PostgreSQL reported a warning during COMMIT");
-  if (claimed->count() == 0) return OutcomeBeforePeers(batch);
-  epoch_ = claimed->bigint(0, 0);
-  const uint64_t found = claimed->bigint(0, 1);
+  const Statement reclaim = {.name = "hulld_reclaim", .parameters = {owner_}};
+  const absl::StatusOr<std::vector<Rows>> rows = writer_->AskToCommit(std::span(&reclaim, 1));
+  if (!rows.ok()) return rows.status();
+  const Rows& claimed = rows->front();
+  if (claimed.count() == 0) return OutcomeBeforePeers(batch);
+  epoch_ = claimed.bigint(0, 0);
+  const uint64_t found = claimed.bigint(0, 1);
   if (found >= batch_) return found >= batch;
   // The database lost acknowledged commits: an outage without sync, or a restore of an earlier
   // state. It will assign their revisions to other changes, so this is a different store now.
@@ -162,16 +170,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   if (options_.shared) return CommitShared(changes);
   if (absl::Status s = ended(); !s.ok()) return s;
   if (!unknown_.ok()) return unknown_;
-  const uint64_t batch = batch_ + 1;
-  const uint64_t revision = NumberChanges(changes, revision_);
-  const auto keep = [&] {
-    const StoreTotals added = AddedBy(changes);
-    batch_ = batch;
-    revision_ = revision;
-    totals_ = {totals_.hulls + added.hulls, totals_.vertices + added.vertices,
-               totals_.bodies + added.bodies};
-    return absl::OkStatus();
-  };
+  const Batch batch = {batch_ + 1, NumberChanges(changes, revision_), AddedBy(changes)};
   const Clock::time_point deadline = Clock::now() + options_.patience;
   while (true) {
     if (writer_ == nullptr) {
@@ -180,8 +179,11 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       if (!session.ok()) return WriteFailed(Refused(session.status()));
       writer_ = *std::move(session);
     }
-    const absl::Status status = Attempt(changes, revision, batch);
-    if (status.ok()) return keep();
+    const absl::Status status = Attempt(changes, batch);
+    if (status.ok()) {
+      Keep(batch);
+      return status;
+    }
     if (ViolatedConstraint(status) == "store_fence") {
       ++write_failures_;
       End(Superseded(""));
@@ -189,14 +191,17 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
     }
     // The database answered with an error, so the batch was not committed.
     if (!SqlState(status).empty()) return WriteFailed(Refused(status));
-    const absl::StatusOr<bool> committed = FindOutcome(batch, deadline);
+    const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
     if (!committed.ok()) {
       unknown_ = OutcomeUnknown(status);
       return WriteFailed(unknown_);
     }
     spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
                  std::string(status.message()), *committed ? "committed" : "not committed");
-    if (*committed) return keep();
+    if (*committed) {
+      Keep(batch);
+      return absl::OkStatus();
+    }
     if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     if (Clock::now() >= deadline) return WriteFailed(Refused(status));
   }

@@ -142,7 +142,7 @@ class PostgresStore : public Store, public PeerFeed {
   // Owner of a shared store.
   static constexpr char kSeveralServers[] = "several servers";
   // A batch as it will be if committed; number 0: none was sent.
-  struct SharedBatch {
+  struct Batch {
     uint64_t number = 0;
     uint64_t revision = 0;
     // Change of the totals, modulo 2^64.
@@ -184,9 +184,11 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status ended() const;
 
   // Committing. batch: its number.
-  Statement Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const;
-  absl::Status Attempt(std::span<const Change* const> changes, uint64_t revision, uint64_t batch);
+  Statement Fence(const Batch& batch) const;
+  absl::Status Attempt(std::span<const Change* const> changes, const Batch& batch);
+  void Keep(const Batch& batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
+  bool EndsWithin(std::chrono::milliseconds pause);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforePeers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
@@ -206,11 +208,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status CommitShared(std::span<Change* const> changes);
   absl::Status TakeTurn();
   void GiveTurnBack(const absl::Status& status);
-  absl::Status AttemptShared(std::span<Change* const> changes, SharedBatch* batch);
-  void KeepShared(const SharedBatch& batch);
+  absl::Status AttemptShared(std::span<Change* const> changes, Batch* batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
-  absl::StatusOr<bool> FindSharedOutcome(uint64_t batch,
-                                         std::chrono::steady_clock::time_point deadline);
   absl::Status EndStuckTurns();
   void StartNotices();
   bool HearsPeers() const;
@@ -222,8 +221,9 @@ class PostgresStore : public Store, public PeerFeed {
   // Visits every row of a table, in byte order of the IDs: its ID and its sealed value.
   absl::Status ForEachRow(const char* statement,
                           const std::function<void(const std::string&, std::string_view)>& visit);
-  // Returns the results of statements that ran while this was the active server.
+  // Return the results of statements that ran while this was the active server.
   absl::StatusOr<std::vector<Rows>> Read(std::vector<Statement> statements);
+  absl::StatusOr<Rows> ReadOne(Statement statement);
 
   const PostgresOptions options_;
   const Conninfo conninfo_;

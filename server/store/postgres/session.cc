@@ -2,6 +2,7 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/cord.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 #include <poll.h>
@@ -245,6 +246,27 @@ absl::StatusOr<Rows> Session::Ask(Statement statement) {
   absl::StatusOr<std::vector<Rows>> rows = Ask(std::span<const Statement>(&statement, 1));
   if (!rows.ok()) return rows.status();
   return std::move(rows->front());
+}
+
+absl::StatusOr<std::vector<Rows>> Session::AskToCommit(std::span<const Statement> statements) {
+  warned_ = false;
+  absl::StatusOr<std::vector<Rows>> rows = Ask(statements);
+  if (rows.ok() && warned_) return Lost("PostgreSQL reported a warning during COMMIT");
+  return rows;
+}
+
+absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows) {
+  if (!rows.ok()) return rows.status();
+  uint64_t number = 0;
+  if (rows->count() == 1 && absl::SimpleAtoi(std::string(rows->at(0, 0)), &number)) return number;
+  return absl::DataLossError("the row of hulld.store is missing");
+}
+
+absl::StatusOr<bool> HasTable(Session& session, const std::string& name) {
+  const absl::StatusOr<Rows> found =
+      session.Run(absl::StrCat("SELECT to_regclass('", name, "') IS NOT NULL"));
+  if (!found.ok()) return found.status();
+  return found->at(0, 0) == "t";
 }
 
 }  // namespace hulld::server

@@ -71,8 +71,9 @@ class Session {
   // Returns the payloads of the notices (LISTEN) received since the last call.
   std::vector<std::string> TakeNotices();
 
-  // True if PostgreSQL sent a warning since the last call.
-  bool TakeWarned() { return std::exchange(warned_, false); }
+  // As Ask for statements that commit. A warning counts as a loss: for example, the wait for a
+  // standby was interrupted, so the transaction is committed, but not replicated as required.
+  absl::StatusOr<std::vector<Rows>> AskToCommit(std::span<const Statement> statements);
   // As in 150018.
   int server_version() const { return PQserverVersion(connection_.get()); }
   // Describes the location without secrets: "database hulld at db.example".
@@ -93,6 +94,12 @@ class Session {
   absl::Status lost_;
   bool warned_ = false;
 };
+
+// Returns the number in the only row of a query about the store. DATA_LOSS: there is no such row.
+absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows);
+
+// Returns true if a table exists. name: as in "hulld.store".
+absl::StatusOr<bool> HasTable(Session& session, const std::string& name);
 
 }  // namespace hulld::server
 
