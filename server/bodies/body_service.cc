@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
 #include <optional>
 #include <unordered_map>
 #include <utility>
@@ -12,11 +11,9 @@
 #include "server/contract/status_map.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/catalog/body.h"
-#include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"
-#include "server/wire/page_token.h"
 
 namespace hulld::server {
 namespace {
@@ -67,12 +64,16 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
   return body;
 }
 
-void EncodeBody(const Body& body, v1::BodyInfo* message) {
-  message->set_body_id(body.record().body_id);
-  message->set_create_revision(body.record().create_revision);
-  message->set_revision(body.record().revision);
-  message->set_piece_count(body.pieces().size());
-  message->set_damaged(!body.damage().ok());
+void EncodeBody(const HullChange& body, v1::BodyInfo* message) {
+  message->set_body_id(body.record.hull_id);
+  message->set_create_revision(body.record.create_revision);
+  message->set_revision(body.record.revision);
+  message->set_piece_count(body.piece_count);
+  message->set_damaged(body.damaged);
+}
+
+void AddListed(const HullChange& body, v1::ListBodiesResponse& response) {
+  EncodeBody(body, response.add_bodies());
 }
 
 void EncodePose(const Pose& pose, v1::Pose* message) {
@@ -91,18 +92,14 @@ std::optional<uint64_t> IfRevision(const Request& request) {
 
 }  // namespace
 
-grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* context,
-                                               const grpc::ByteBuffer* request,
-                                               grpc::ByteBuffer* response) {
+UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, Bytes* response) {
   return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
                         [this](PutCall* call) {
                           readers_.Submit([this, call] { Put(call); }, call->call().client());
                         });
 }
 
-grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* context,
-                                               const grpc::ByteBuffer* request,
-                                               grpc::ByteBuffer* response) {
+UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
         call->EndOn(readers_,
@@ -110,23 +107,14 @@ grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* cont
       });
 }
 
-grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* context,
-                                                  const grpc::ByteBuffer* request,
-                                                  grpc::ByteBuffer* response) {
+UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
-        EndFresh(
-            registry_, readers_, call,
-            [this, call](std::chrono::nanoseconds staleness) {
-              return List(call->request(), call->call(), staleness, &call->response());
-            },
-            !registry_.store().finds_records());
+        EndListed(registry_, readers_, call, Rpc::kListBodies, registry_.bodies(), AddListed);
       });
 }
 
-grpc::ServerUnaryReactor* BodyService::DeleteBody(grpc::CallbackServerContext* context,
-                                                  const grpc::ByteBuffer* request,
-                                                  grpc::ByteBuffer* response) {
+UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(*context, admission_, Rpc::kDeleteBody, {request, response},
                            [this](DeleteCall* call) { Delete(call); });
 }
@@ -175,38 +163,13 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
   EncodeHeader(registry_.store(), AsOf{found.store_revision, *staleness},
                response->mutable_header());
-  EncodeBody(*body, response->mutable_body());
+  EncodeBody(body->Describe(), response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
   for (const StoredPiece& piece : body->pieces()) {
     v1::Placement* const placement = response->add_pieces();
     placement->set_hull_id(body->hull_ids()[piece.hull]);
     EncodePose(piece.X_BP, placement->mutable_pose());
     placement->set_radius(piece.radius);
-  }
-  return absl::OkStatus();
-}
-
-absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call& call,
-                               std::chrono::nanoseconds staleness,
-                               v1::ListBodiesResponse* response) {
-  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
-  if (!prefix.ok()) return prefix.status();
-  const absl::StatusOr<std::string> after =
-      DecodePageToken(Rpc::kListBodies, request.page_token(), *prefix);
-  if (!after.ok()) return after.status();
-  const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::StatusOr<BodyPage> page =
-      registry_.bodies().List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                              [&call] { return call.ShouldStop(); });
-  if (!page.ok()) return page.status();
-  EncodeHeader(registry_.store(), AsOf{page->store_revision, staleness},
-               response->mutable_header());
-  for (const std::shared_ptr<const Body>& body : page->bodies) {
-    EncodeBody(*body, response->add_bodies());
-  }
-  if (page->more) {
-    response->set_next_page_token(
-        EncodePageToken(Rpc::kListBodies, *prefix, page->bodies.back()->record().body_id));
   }
   return absl::OkStatus();
 }

@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-#include <chrono>
 
 #include "hulld/v1/body.grpc.pb.h"
 #include "server/call/admission.h"
@@ -28,18 +27,10 @@ class BodyService : public BodyServiceOfBytes {
   BodyService(Registry& registry, Admission& admission, WorkerPool& readers)
       : registry_(registry), admission_(admission), readers_(readers) {}
 
-  grpc::ServerUnaryReactor* PutBody(grpc::CallbackServerContext* context,
-                                    const grpc::ByteBuffer* request,
-                                    grpc::ByteBuffer* response) override;
-  grpc::ServerUnaryReactor* GetBody(grpc::CallbackServerContext* context,
-                                    const grpc::ByteBuffer* request,
-                                    grpc::ByteBuffer* response) override;
-  grpc::ServerUnaryReactor* ListBodies(grpc::CallbackServerContext* context,
-                                       const grpc::ByteBuffer* request,
-                                       grpc::ByteBuffer* response) override;
-  grpc::ServerUnaryReactor* DeleteBody(grpc::CallbackServerContext* context,
-                                       const grpc::ByteBuffer* request,
-                                       grpc::ByteBuffer* response) override;
+  UnaryReactor* PutBody(CallContext* context, const Bytes* request, Bytes* response) override;
+  UnaryReactor* GetBody(CallContext* context, const Bytes* request, Bytes* response) override;
+  UnaryReactor* ListBodies(CallContext* context, const Bytes* request, Bytes* response) override;
+  UnaryReactor* DeleteBody(CallContext* context, const Bytes* request, Bytes* response) override;
 
  private:
   using PutCall = UnaryCall<v1::PutBodyRequest, v1::PutBodyResponse>;
@@ -51,8 +42,6 @@ class BodyService : public BodyServiceOfBytes {
   void Put(PutCall* call);
   absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
                    v1::GetBodyResponse* response);
-  absl::Status List(const v1::ListBodiesRequest& request, const Call& call,
-                    std::chrono::nanoseconds staleness, v1::ListBodiesResponse* response);
   void Delete(DeleteCall* call);
 
   Registry& registry_;

@@ -34,11 +34,6 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 
 }  // namespace
 
-BidiReactor* AppendStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry) {
-  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, registry)));
-}
-
 void AppendStream::Open() {
   Locked([] {});
 }
@@ -186,7 +181,7 @@ void AppendStream::Fail(const absl::Status& status) {
   if (end().has_value()) return;
   End(status);
   if (!status.ok() && session_.has_value()) {
-    call().Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
+    call().Log(LogLevel::debug, "append ended early", {{"writer", session_->writer_id}});
   }
 }
 

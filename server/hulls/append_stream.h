@@ -25,17 +25,14 @@ namespace hulld::server {
 class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPointsResponse>,
                                           v1::AppendPointsRequest> {
  public:
-  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry);
+  AppendStream(CallContext& context, Admission& admission, Registry& registry)
+      : ReadingStream(context, admission, Rpc::kAppendPoints), registry_(registry) {}
 
  private:
   struct SequenceResult {
     uint64_t sequence = 0;
     absl::StatusOr<ChunkResult> result;
   };
-
-  AppendStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry)
-      : ReadingStream(context, admission, Rpc::kAppendPoints), registry_(registry) {}
 
   void Open() override;
   void OnDone() override;

@@ -3,7 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/hull/audit.h"
@@ -13,11 +13,9 @@
 #include "server/hulls/mesh_stream.h"
 #include "server/hulls/replace_stream.h"
 #include "server/hulls/watch_stream.h"
-#include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"
-#include "server/wire/page_token.h"
 
 namespace hulld::server {
 namespace {
@@ -28,27 +26,29 @@ void EncodeBox(const ServedHull& hull, v1::GetHullResponse* response) {
   EncodeVector(hull.high(), response->mutable_box_max());
 }
 
+void AddListed(const HullChange& hull, v1::ListHullsResponse& response) {
+  v1::HullInfo* info = response.add_hulls();
+  EncodeRecord(hull.record, info);
+  info->set_damaged(hull.damaged);
+}
+
 }  // namespace
 
-grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
-                                                  const grpc::ByteBuffer* request,
-                                                  grpc::ByteBuffer* response) {
+UnaryReactor* HullService::CreateHull(CallContext* context, const Bytes* request, Bytes* response) {
   return CreateCall::Start(*context, admission_, Rpc::kCreateHull, {request, response},
                            [this](CreateCall* call) { Create(call); });
 }
 
-BidiReactor* HullService::AppendPoints(grpc::CallbackServerContext* context) {
-  return AppendStream::Start(*context, admission_, registry_);
+BidiReactor* HullService::AppendPoints(CallContext* context) {
+  return AppendStream::Launch(std::make_shared<AppendStream>(*context, admission_, registry_));
 }
 
-ReadReactor* HullService::ReplaceHull(grpc::CallbackServerContext* context,
-                                      grpc::ByteBuffer* response) {
-  return ReplaceStream::Start(*context, admission_, registry_, writers_, response);
+ReadReactor* HullService::ReplaceHull(CallContext* context, Bytes* response) {
+  return ReplaceStream::Launch(
+      std::make_shared<ReplaceStream>(*context, admission_, registry_, writers_, response));
 }
 
-grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
-                                               const grpc::ByteBuffer* request,
-                                               grpc::ByteBuffer* response) {
+UnaryReactor* HullService::GetHull(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
         // The duration of an audit or of sums over the surface depends on the size of the hull.
@@ -59,35 +59,26 @@ grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* cont
       });
 }
 
-WriteReactor* HullService::GetHullMesh(grpc::CallbackServerContext* context,
-                                       const grpc::ByteBuffer* request) {
-  return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
+WriteReactor* HullService::GetHullMesh(CallContext* context, const Bytes* request) {
+  return MeshStream::Launch(
+      std::make_shared<MeshStream>(*context, admission_, registry_, long_readers_, *request));
 }
 
-grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
-                                                 const grpc::ByteBuffer* request,
-                                                 grpc::ByteBuffer* response) {
+UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request, Bytes* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
-        EndFresh(
-            registry_, readers_, call,
-            [this, call](std::chrono::nanoseconds staleness) {
-              return List(call->request(), call->call(), staleness, &call->response());
-            },
-            !registry_.store().finds_records());
+        EndListed(registry_, readers_, call, Rpc::kListHulls, registry_, AddListed);
       });
 }
 
-grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
-                                                  const grpc::ByteBuffer* request,
-                                                  grpc::ByteBuffer* response) {
+UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(*context, admission_, Rpc::kDeleteHull, {request, response},
                            [this](DeleteCall* call) { Delete(call); });
 }
 
-WriteReactor* HullService::WatchHulls(grpc::CallbackServerContext* context,
-                                      const grpc::ByteBuffer* request) {
-  return WatchStream::Start(*context, admission_, registry_, readers_, *request);
+WriteReactor* HullService::WatchHulls(CallContext* context, const Bytes* request) {
+  return WatchStream::Launch(
+      std::make_shared<WatchStream>(*context, admission_, registry_, readers_, *request));
 }
 
 void HullService::Create(CreateCall* call) {
@@ -145,33 +136,6 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   if (absl::IsCancelled(finding)) return finding;
   response->mutable_audit()->set_ok(finding.ok());
   if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
-  return absl::OkStatus();
-}
-
-absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
-                               std::chrono::nanoseconds staleness,
-                               v1::ListHullsResponse* response) {
-  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
-  if (!prefix.ok()) return prefix.status();
-  const absl::StatusOr<std::string> after =
-      DecodePageToken(Rpc::kListHulls, request.page_token(), *prefix);
-  if (!after.ok()) return after.status();
-  const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::StatusOr<HullPage> page =
-      registry_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                     [&call] { return call.ShouldStop(); });
-  if (!page.ok()) return page.status();
-  EncodeHeader(registry_.store(), AsOf{page->store_revision, staleness},
-               response->mutable_header());
-  for (const ListedHull& hull : page->hulls) {
-    v1::HullInfo* info = response->add_hulls();
-    EncodeRecord(hull.record, info);
-    info->set_damaged(hull.damaged);
-  }
-  if (page->more) {
-    response->set_next_page_token(
-        EncodePageToken(Rpc::kListHulls, *prefix, page->hulls.back().record.hull_id));
-  }
   return absl::OkStatus();
 }
 

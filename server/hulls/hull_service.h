@@ -3,7 +3,6 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <chrono>
 
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/admission.h"
@@ -40,25 +39,14 @@ class HullService : public HullServiceOfBytes {
         readers_(readers),
         long_readers_(long_readers) {}
 
-  grpc::ServerUnaryReactor* CreateHull(grpc::CallbackServerContext* context,
-                                       const grpc::ByteBuffer* request,
-                                       grpc::ByteBuffer* response) override;
-  BidiReactor* AppendPoints(grpc::CallbackServerContext* context) override;
-  ReadReactor* ReplaceHull(grpc::CallbackServerContext* context,
-                           grpc::ByteBuffer* response) override;
-  grpc::ServerUnaryReactor* GetHull(grpc::CallbackServerContext* context,
-                                    const grpc::ByteBuffer* request,
-                                    grpc::ByteBuffer* response) override;
-  WriteReactor* GetHullMesh(grpc::CallbackServerContext* context,
-                            const grpc::ByteBuffer* request) override;
-  grpc::ServerUnaryReactor* ListHulls(grpc::CallbackServerContext* context,
-                                      const grpc::ByteBuffer* request,
-                                      grpc::ByteBuffer* response) override;
-  grpc::ServerUnaryReactor* DeleteHull(grpc::CallbackServerContext* context,
-                                       const grpc::ByteBuffer* request,
-                                       grpc::ByteBuffer* response) override;
-  WriteReactor* WatchHulls(grpc::CallbackServerContext* context,
-                           const grpc::ByteBuffer* request) override;
+  UnaryReactor* CreateHull(CallContext* context, const Bytes* request, Bytes* response) override;
+  BidiReactor* AppendPoints(CallContext* context) override;
+  ReadReactor* ReplaceHull(CallContext* context, Bytes* response) override;
+  UnaryReactor* GetHull(CallContext* context, const Bytes* request, Bytes* response) override;
+  WriteReactor* GetHullMesh(CallContext* context, const Bytes* request) override;
+  UnaryReactor* ListHulls(CallContext* context, const Bytes* request, Bytes* response) override;
+  UnaryReactor* DeleteHull(CallContext* context, const Bytes* request, Bytes* response) override;
+  WriteReactor* WatchHulls(CallContext* context, const Bytes* request) override;
 
  private:
   using CreateCall = UnaryCall<v1::CreateHullRequest, v1::CreateHullResponse>;
@@ -70,8 +58,6 @@ class HullService : public HullServiceOfBytes {
   void Create(CreateCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
-  absl::Status List(const v1::ListHullsRequest& request, const Call& call,
-                    std::chrono::nanoseconds staleness, v1::ListHullsResponse* response);
   void Delete(DeleteCall* call);
 
   Registry& registry_;

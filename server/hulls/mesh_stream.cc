@@ -20,13 +20,6 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 
 }  // namespace
 
-WriteReactor* MeshStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                Registry& registry, WorkerPool& readers,
-                                const grpc::ByteBuffer& request) {
-  return Launch(
-      std::shared_ptr<MeshStream>(new MeshStream(context, admission, registry, readers, request)));
-}
-
 void MeshStream::Open() {
   RunOn(readers_, [this] {
     const absl::Status made = MakeHeader();

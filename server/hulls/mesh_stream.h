@@ -19,17 +19,13 @@ namespace hulld::server {
 class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMeshResponse>,
                                         v1::GetHullMeshRequest> {
  public:
-  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, WorkerPool& readers,
-                             const grpc::ByteBuffer& request);
-
- private:
-  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-             WorkerPool& readers, const grpc::ByteBuffer& request)
+  MeshStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& readers,
+             const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kGetHullMesh),
         registry_(registry),
         readers_(readers) {}
 
+ private:
   void Open() override;
   void OnSent() override;
 

@@ -12,13 +12,6 @@
 
 namespace hulld::server {
 
-ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Registry& registry, WorkerPool& writers,
-                                  grpc::ByteBuffer* response) {
-  return Launch(std::shared_ptr<ReplaceStream>(
-      new ReplaceStream(context, admission, registry, writers, response)));
-}
-
 void ReplaceStream::OnNoMessage(const absl::Status& why) {
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!why.ok()) return FinishCall(why);

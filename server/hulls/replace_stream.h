@@ -21,18 +21,15 @@ namespace hulld::server {
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
   // writers: the threads that build. response: as gRPC holds it until the call ends.
-  static ReadReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry, WorkerPool& writers, grpc::ByteBuffer* response);
-
- private:
-  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                WorkerPool& writers, grpc::ByteBuffer* response)
+  ReplaceStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& writers,
+                Bytes* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
         registry_(registry),
         writers_(writers),
         response_(response),
         charge_(registry.memory(), MemoryUse::kWriting) {}
 
+ private:
   void Open() override { Read(); }
   void OnMessage() override;
   void OnNoMessage(const absl::Status& why) override;
@@ -44,7 +41,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
 
   Registry& registry_;
   WorkerPool& writers_;
-  grpc::ByteBuffer* const response_;
+  Bytes* const response_;
   // Covers the builder until the registry has it.
   MemoryCharge charge_;
   Replacement replacement_;

@@ -54,13 +54,6 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
 
 }  // namespace
 
-WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry, WorkerPool& readers,
-                                 const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<WatchStream>(
-      new WatchStream(context, admission, registry, readers, request)));
-}
-
 void WatchStream::Open() {
   const absl::StatusOr<WatchTarget> target = ReadTarget();
   if (!target.ok()) return FinishCall(target.status());

@@ -22,17 +22,13 @@ namespace hulld::server {
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
-  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, WorkerPool& readers,
-                             const grpc::ByteBuffer& request);
-
- private:
-  WatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-              WorkerPool& readers, const grpc::ByteBuffer& request)
+  WatchStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& readers,
+              const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kWatchHulls),
         registry_(registry),
         readers_(readers) {}
 
+ private:
   void Open() override;
   void OnSent() override;
   void OnCancel() override;

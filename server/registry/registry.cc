@@ -83,27 +83,6 @@ absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
   return std::pair(resolved->as_of(), *std::move(hull));
 }
 
-absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
-                                        size_t page_size,
-                                        const std::function<bool()>& should_stop) {
-  if (state_.catalog.is_cache()) return records_.ListHulls(prefix, after, page_size, should_stop);
-  HullPage page;
-  const std::lock_guard lock(state_.mutex);
-  page.store_revision = state_.catalog.revision();
-  const HullTable::Entries& all = state_.catalog.hulls().entries();
-  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
-  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
-    if (!next->second.visible()) continue;
-    if (page.hulls.size() == page_size) {
-      page.more = true;
-      break;
-    }
-    HullChange hull = next->second.Describe(next->first);
-    page.hulls.push_back({std::move(hull.record), hull.damaged});
-  }
-  return page;
-}
-
 HoldStatistics Registry::Holds() const {
   const std::lock_guard lock(state_.mutex);
   return state_.mutex.Statistics();

@@ -28,6 +28,7 @@
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
 #include "server/registry/watch/change_feed.h"
+#include "server/registry/watch/page_source.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -113,8 +114,14 @@ class Registry {
   // Returns at most `page_size` hulls with IDs that start with `prefix` and follow `after` in byte
   // order. Queries the store if it finds records, so it must not run on a gRPC thread then.
   // UNAVAILABLE: the store cannot be read. CANCELLED: should_stop returned true.
-  absl::StatusOr<HullPage> List(const std::string& prefix, const std::string& after,
-                                size_t page_size, const std::function<bool()>& should_stop = {});
+  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
+                                  const std::function<bool()>& should_stop = {}) {
+    return records_.List({.prefix = std::move(prefix),
+                          .kinds = {.hulls = true},
+                          .after = std::move(after),
+                          .page_size = page_size},
+                         should_stop);
+  }
 
   // Puts small hulls to rest that no call named since the previous call of this (HullTable). Call
   // every few seconds. Cost: some 0.2 us per hull.

@@ -4,12 +4,20 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <string>
 #include <utility>
 
+#include "server/access/caller.h"
+#include "server/contract/rpc.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
+#include "server/settings/config.h"
 #include "server/wire/decode.h"
+#include "server/wire/encode.h"
+#include "server/wire/page_token.h"
 
 namespace hulld::server {
 
@@ -31,6 +39,36 @@ void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answ
         registry.barrier().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
+}
+
+// Ends a unary call that lists records, as EndFresh. lister: the Registry or the BodyRegistry.
+// add: adds an entry to the reply.
+template <typename UnaryCall, typename Lister, typename AddEntry>
+void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, Lister& lister,
+               AddEntry add) {
+  const auto answer = [&registry, &lister, call, rpc,
+                       add](std::chrono::nanoseconds staleness) -> absl::Status {
+    const auto& request = call->request();
+    const absl::StatusOr<std::string> prefix =
+        PrefixToList(call->call().caller(), request.prefix());
+    if (!prefix.ok()) return prefix.status();
+    const absl::StatusOr<std::string> after = DecodePageToken(rpc, request.page_token(), *prefix);
+    if (!after.ok()) return after.status();
+    const uint32_t asked =
+        request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
+    const absl::StatusOr<RecordPage> page =
+        lister.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                    [call] { return call->call().ShouldStop(); });
+    if (!page.ok()) return page.status();
+    EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
+                 call->response().mutable_header());
+    for (const HullChange& entry : page->entries) add(entry, call->response());
+    if (!page->more) return absl::OkStatus();
+    call->response().set_next_page_token(
+        EncodePageToken(rpc, *prefix, page->entries.back().record.hull_id));
+    return absl::OkStatus();
+  };
+  EndFresh(registry, pool, call, answer, !registry.store().finds_records());
 }
 
 }  // namespace hulld::server

@@ -1,7 +1,6 @@
 #include "server/registry/bodies/body_registry.h"
 
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
@@ -37,20 +36,12 @@ absl::Status HullHasTheId(const std::string& id) {
 }  // namespace
 
 absl::Status BodyRegistry::Load(Locked& locked) {
-  return state_.store.ForEachBody([&](const std::string& id,
-                                      const absl::StatusOr<StoredBody>& stored) {
-    // The server never writes two records for one ID. The hull wins: its vertices cannot be
-    // restored.
-    if (state_.catalog.hulls().contains(id)) {
-      spdlog::error(
-          "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of "
-          "the two",
-          id);
-      return;
-    }
-    state_.catalog.AddBody(locked, id, stored);
-    state_.catalog.NoteBodyFound();
-  });
+  return state_.store.ForEachBody(
+      [&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
+        if (state_.catalog.hulls().contains(id)) return Catalog::LogBodyUnderHull(id);
+        state_.catalog.AddBody(locked, id, stored);
+        state_.catalog.NoteBodyFound();
+      });
 }
 
 void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
@@ -174,27 +165,6 @@ void BodyRegistry::Complete(Locked& locked, const std::string& id,
     }
   }
   state_.catalog.bodies().DropSome(locked);
-}
-
-absl::StatusOr<BodyPage> BodyRegistry::List(const std::string& prefix, const std::string& after,
-                                            size_t page_size,
-                                            const std::function<bool()>& should_stop) {
-  if (state_.catalog.is_cache()) return records_.ListBodies(prefix, after, page_size, should_stop);
-  BodyPage page;
-  const std::lock_guard lock(state_.mutex);
-  page.store_revision = state_.catalog.revision();
-  const BodyTable::Entries& all = state_.catalog.bodies().entries();
-  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
-  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
-    const std::shared_ptr<const Body>& body = next->second.committed();
-    if (body == nullptr) continue;
-    if (page.bodies.size() == page_size) {
-      page.more = true;
-      break;
-    }
-    page.bodies.push_back(body);
-  }
-  return page;
 }
 
 // Looks up kMostLookupsPerHold bodies per hold and reads the unknown ones together. A reader of

@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registry_types.h"
@@ -19,6 +20,7 @@
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
+#include "server/registry/watch/page_source.h"
 
 namespace hulld::server {
 
@@ -65,8 +67,14 @@ class BodyRegistry {
   // As Find, but returns nullopt without blocking if the store would have to be read.
   std::optional<FoundBodies> TryFind(std::span<const std::string> ids);
   // As Registry::List. A page may hold fewer than page_size bodies although more follow.
-  absl::StatusOr<BodyPage> List(const std::string& prefix, const std::string& after,
-                                size_t page_size, const std::function<bool()>& should_stop = {});
+  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
+                                  const std::function<bool()>& should_stop = {}) {
+    return records_.List({.prefix = std::move(prefix),
+                          .kinds = {.bodies = true},
+                          .after = std::move(after),
+                          .page_size = page_size},
+                         should_stop);
+  }
 
  private:
   void PutLocked(Locked& locked, const std::shared_ptr<Body>& body,

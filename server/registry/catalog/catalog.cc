@@ -118,6 +118,13 @@ void Catalog::AddBody(Locked& locked, const std::string& id,
   hulls_.ForgetAbsent(id);
 }
 
+void Catalog::LogBodyUnderHull(const std::string& id) {
+  spdlog::error(
+      "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of the "
+      "two",
+      id);
+}
+
 void Catalog::EraseBody(Locked& locked, const std::string& id) {
   bodies_.Erase(locked, id);
   if (is_cache_) hulls_.NoteAbsent(id);

@@ -87,6 +87,9 @@ class Catalog {
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   // Replaces the known state of the body with the stored one.
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
+  // Logs that the store holds a body under the ID of a hull, which the server never writes. The
+  // hull wins: its vertices cannot be restored.
+  static void LogBodyUnderHull(const std::string& id);
   // Removes a body. Requires that it is here.
   void EraseBody(Locked& locked, const std::string& id);
 

@@ -106,18 +106,6 @@ struct Replacement {
   std::shared_ptr<LiveHull> live = nullptr;
 };
 
-struct ListedHull {
-  HullRecord record;
-  // The store cannot read the hull; only its ID is known.
-  bool damaged = false;
-};
-
-struct HullPage {
-  uint64_t store_revision = 0;
-  std::vector<ListedHull> hulls;
-  bool more = false;
-};
-
 // A body at one revision, shared by readers.
 class Body;
 
@@ -127,13 +115,6 @@ struct PutBodyResult {
   uint64_t piece_count = 0;
   // True if no body existed before.
   bool created = false;
-};
-
-struct BodyPage {
-  uint64_t store_revision = 0;
-  // Includes damaged bodies.
-  std::vector<std::shared_ptr<const Body>> bodies;
-  bool more = false;
 };
 
 // Bodies by ID, in the order of the request; null if absent. Each was current at some time during

@@ -1,7 +1,6 @@
 #include "server/registry/records/record_reader.h"
 
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -21,14 +20,6 @@ namespace {
 // IDs per store query, and threads that query.
 constexpr size_t kMostAtOnce = kMostLookupsPerHold;
 constexpr size_t kMostThreads = 2;
-
-// The server never writes two records for one ID. The hull wins: its vertices cannot be restored.
-void NoteBodyUnderHull(const std::string& id) {
-  spdlog::error(
-      "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of the "
-      "two",
-      id);
-}
 
 // The store reported an older revision than `asked_at`, its revision before the query.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
@@ -179,7 +170,7 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   const bool has_body = body != found.bodies.end();
   if (!has_hull && !has_body) return state_.catalog.hulls().NoteAbsent(id);
   if (!has_hull) return state_.catalog.AddBody(locked, id, body->second);
-  if (has_body) NoteBodyUnderHull(id);
+  if (has_body) Catalog::LogBodyUnderHull(id);
   state_.catalog.AddStored(id, hull->second);
 }
 
@@ -260,55 +251,24 @@ bool RecordReader::IsBehind(const FoundRecords& found) const {
       found.hulls, [this](const auto& hull) { return IsBehind(hull.first, hull.second); });
 }
 
-// Returns the store's list after the catalog has reached its revision.
-absl::StatusOr<FoundRecords> RecordReader::List(const std::string& prefix, const std::string& after,
-                                                size_t page_size, RecordKinds kinds,
-                                                const std::function<bool()>& should_stop) {
+absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
+                                              const std::function<bool()>& should_stop) {
   uint64_t asked_at = 0;
   {
-    const std::lock_guard lock(state_.mutex);
-    asked_at = state_.catalog.revision();
-  }
-  return AwaitReached(asked_at, state_.store.ListRecords(prefix, after, page_size, kinds),
-                      should_stop);
-}
-
-absl::StatusOr<BodyPage> RecordReader::ListBodies(const std::string& prefix,
-                                                  const std::string& after, size_t page_size,
-                                                  const std::function<bool()>& should_stop) {
-  {
     Locked locked(state_.mutex);
-    if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+    if (!state_.catalog.is_cache()) return CataloguedPage(request);
+    asked_at = state_.catalog.revision();
+    const absl::Status memory =
+        request.kinds.bodies ? state_.memory.Check(locked, MemoryUse::kReading) : absl::OkStatus();
+    if (!memory.ok()) return memory;
   }
-  const absl::StatusOr<FoundRecords> found =
-      List(prefix, after, page_size, {.bodies = true}, should_stop);
+  const absl::StatusOr<FoundRecords> found = AwaitReached(
+      asked_at,
+      state_.store.ListRecords(request.prefix, request.after, request.page_size, request.kinds),
+      should_stop);
   if (!found.ok()) return found.status();
-  BodyPage page;
-  page.store_revision = found->revision;
-  page.more = found->more;
-  for (const auto& [id, stored] : found->bodies) {
-    page.bodies.push_back(
-        std::make_shared<const Body>(id, stored, state_.memory, MemoryUse::kReading));
-  }
-  return page;
-}
-
-absl::StatusOr<HullPage> RecordReader::ListHulls(const std::string& prefix,
-                                                 const std::string& after, size_t page_size,
-                                                 const std::function<bool()>& should_stop) {
-  const absl::StatusOr<FoundRecords> found =
-      List(prefix, after, page_size, {.hulls = true}, should_stop);
-  if (!found.ok()) return found.status();
-  HullPage page;
-  page.store_revision = found->revision;
-  page.more = found->more;
   Locked locked(state_.mutex);
-  for (const auto& [id, stored] : found->hulls) {
-    locked.NoteLookupMaybeYield();
-    HullChange hull = Describe(id, stored);
-    page.hulls.push_back({std::move(hull.record), hull.damaged});
-  }
-  return page;
+  return Describe(*found, &locked);
 }
 
 // The catalog may know more about this version than its record: its box, or its damage.
@@ -328,15 +288,17 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-RecordPage RecordReader::Describe(const FoundRecords& found) const {
-  RecordPage page;
-  page.more = found.more;
-  for (const auto& [id, stored] : found.hulls) page.changes.push_back(Describe(id, stored));
+RecordPage RecordReader::Describe(const FoundRecords& found, Locked* yields) const {
+  RecordPage page = {.store_revision = found.revision, .more = found.more};
+  for (const auto& [id, stored] : found.hulls) {
+    if (yields != nullptr) yields->NoteLookupMaybeYield();
+    page.entries.push_back(Describe(id, stored));
+  }
   for (const auto& [id, stored] : found.bodies) {
     const StoredBody nothing = {{id, 0, 0}, {}, {}};
-    page.changes.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
+    page.entries.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
   }
-  std::ranges::sort(page.changes, {}, [](const HullChange& change) -> const std::string& {
+  std::ranges::sort(page.entries, {}, [](const HullChange& change) -> const std::string& {
     return change.record.hull_id;
   });
   return page;
@@ -353,24 +315,27 @@ RecordPage RecordReader::CataloguedPage(const PageRequest& request) const {
   };
   const auto& hulls = state_.catalog.hulls().entries();
   const auto& bodies = state_.catalog.bodies().entries();
-  auto hull = begin_of(hulls);
-  auto body = request.bodies ? begin_of(bodies) : bodies.end();
-  RecordPage page;
-  while (page.changes.size() < request.page_size) {
+  auto hull = request.kinds.hulls ? begin_of(hulls) : hulls.end();
+  auto body = request.kinds.bodies ? begin_of(bodies) : bodies.end();
+  RecordPage page = {.store_revision = state_.catalog.revision()};
+  while (true) {
     const bool has_hull = has_next(hulls, hull);
     const bool has_body = has_next(bodies, body);
     if (!has_hull && !has_body) return page;
-    if (!has_body || (has_hull && hull->first < body->first)) {
-      if (hull->second.visible()) page.changes.push_back(hull->second.Describe(hull->first));
+    const bool is_hull = !has_body || (has_hull && hull->first < body->first);
+    const bool is_visible = is_hull ? hull->second.visible() : body->second.committed() != nullptr;
+    page.more = is_visible && page.entries.size() == request.page_size;
+    if (page.more) return page;
+    if (is_visible) {
+      page.entries.push_back(is_hull ? hull->second.Describe(hull->first)
+                                     : body->second.committed()->Describe());
+    }
+    if (is_hull) {
       ++hull;
     } else {
-      const std::shared_ptr<const Body>& committed = body->second.committed();
-      if (committed != nullptr) page.changes.push_back(committed->Describe());
       ++body;
     }
   }
-  page.more = has_next(hulls, hull) || has_next(bodies, body);
-  return page;
 }
 
 void RecordReader::ReadPage(Locked& locked, PageRequest request,
@@ -381,17 +346,16 @@ void RecordReader::ReadPage(Locked& locked, PageRequest request,
       [this, request = std::move(request), done = std::move(done),
        asked_at = state_.catalog.revision()]() mutable {
         absl::StatusOr<FoundRecords> found =
-            request.ids.empty()
-                ? state_.store.ListRecords(request.prefix, request.after, request.page_size,
-                                           {.hulls = true, .bodies = request.bodies})
-                : state_.store.FindRecords(request.ids);
-        if (found.ok() && !request.bodies) found->bodies.clear();
+            request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
+                                                           request.page_size, request.kinds)
+                                : state_.store.FindRecords(request.ids);
+        if (found.ok() && !request.kinds.bodies) found->bodies.clear();
         Locked later(state_.mutex);
         WhenReached(later, asked_at, std::move(found),
                     [this, done = std::move(done)](Locked& now,
                                                    const absl::StatusOr<FoundRecords>& reached) {
                       if (!reached.ok()) return done(now, reached.status());
-                      done(now, Describe(*reached));
+                      done(now, Describe(*reached, nullptr));
                     });
       },
       kWatchReader);

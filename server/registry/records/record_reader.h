@@ -81,12 +81,11 @@ class RecordReader : public PeerChangeListener, public PageSource {
   void OnPeerChange(Locked& locked, const std::string& id,
                     const std::shared_ptr<RegisteredHull>& hull) override;
 
-  // As Registry::List and ListBodies. Query the store on this thread. Require that the thread does
-  // not hold the mutex (not checked: a mutex does not know its holder).
-  absl::StatusOr<HullPage> ListHulls(const std::string& prefix, const std::string& after,
-                                     size_t page_size, const std::function<bool()>& should_stop);
-  absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
-                                      size_t page_size, const std::function<bool()>& should_stop);
+  // As Registry::List and BodyRegistry::List, for a request by prefix. May query the store on this
+  // thread. Requires that the thread does not hold the mutex (not checked: a mutex does not know
+  // its holder).
+  absl::StatusOr<RecordPage> List(const PageRequest& request,
+                                  const std::function<bool()>& should_stop);
 
   void ReadPage(Locked& locked, PageRequest request,
                 std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) override;
@@ -123,11 +122,9 @@ class RecordReader : public PeerChangeListener, public PageSource {
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
   bool IsBehind(const FoundRecords& found) const;
 
-  absl::StatusOr<FoundRecords> List(const std::string& prefix, const std::string& after,
-                                    size_t page_size, RecordKinds kinds,
-                                    const std::function<bool()>& should_stop);
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  RecordPage Describe(const FoundRecords& found) const;
+  // yields: if not null, the mutex may be released between lookups.
+  RecordPage Describe(const FoundRecords& found, Locked* yields) const;
   RecordPage CataloguedPage(const PageRequest& request) const;
 
   RegistryState& state_;

@@ -36,7 +36,7 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& hull,
   catalog.NoteVertices(0, stored.record.vertex_count);
   catalog.Publish(stored.record.revision);
   catalog.NoteChange(*hull);
-  feed.NoteCreated(locked, hull);
+  feed.NoteHull(locked, ChangeKind::kCreated, hull);
 }
 
 void RegistryState::ApplyReplacement(Locked& locked, const HullPointer& former,
@@ -48,7 +48,7 @@ void RegistryState::ApplyReplacement(Locked& locked, const HullPointer& former,
   catalog.hulls().Insert(hull);
   catalog.Publish(stored.record.revision);
   catalog.NoteChange(*hull);
-  feed.NoteReplaced(locked, hull);
+  feed.NoteHull(locked, ChangeKind::kReplaced, hull);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
@@ -70,7 +70,7 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
   if (after.revision != before.revision) {
     catalog.Publish(after.revision);
     catalog.NoteVertices(before.vertex_count, after.vertex_count);
-    feed.NoteChanged(locked, hull);
+    feed.NoteHull(locked, ChangeKind::kChanged, hull);
   }
   preparer.ScheduleIfWorn(hull);
 }
@@ -166,7 +166,7 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
   catalog.statistics().grown += grew;
   if (grew) preparer.ScheduleIfWorn(hull);
   catalog.NoteChange(*hull);
-  if (is_new) feed.NoteChanged(locked, hull);
+  if (is_new) feed.NoteHull(locked, ChangeKind::kChanged, hull);
   return true;
 }
 
@@ -228,11 +228,11 @@ void RegistryState::NoteHull(Locked& locked, const HullPointer& hull, const Form
   if (former.body.has_value()) {
     feed.NoteBecameHull(locked, *former.body, hull);
   } else if (!former.was_known && hull->committed().record.create_revision <= since) {
-    feed.NoteChanged(locked, hull);
+    feed.NoteHull(locked, ChangeKind::kChanged, hull);
   } else if (former.hull != nullptr || former.ended_began != 0) {
-    feed.NoteReplaced(locked, hull);
+    feed.NoteHull(locked, ChangeKind::kReplaced, hull);
   } else {
-    feed.NoteCreated(locked, hull);
+    feed.NoteHull(locked, ChangeKind::kCreated, hull);
   }
 }
 

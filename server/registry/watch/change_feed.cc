@@ -93,16 +93,9 @@ ChangeFeed::Change ChangeFeed::ChangeOf(ChangeKind kind, const std::shared_ptr<c
   return {kind, true, record.revision, record.create_revision, nullptr, body};
 }
 
-void ChangeFeed::NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  Note(locked, hull->committed().record.hull_id, ChangeOf(ChangeKind::kCreated, hull));
-}
-
-void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  Note(locked, hull->committed().record.hull_id, ChangeOf(ChangeKind::kChanged, hull));
-}
-
-void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
-  Note(locked, hull->committed().record.hull_id, ChangeOf(ChangeKind::kReplaced, hull));
+void ChangeFeed::NoteHull(Locked& locked, ChangeKind kind,
+                          const std::shared_ptr<RegisteredHull>& hull) {
+  Note(locked, hull->committed().record.hull_id, ChangeOf(kind, hull));
 }
 
 void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision) {
@@ -399,7 +392,7 @@ absl::Status ChangeFeed::AddExisting(Locked& locked, const std::shared_ptr<Watch
         locked,
         {target.prefix,
          {target.ids.begin(), target.ids.end()},
-         target.bodies,
+         {.hulls = true, .bodies = target.bodies},
          catch_up.last_id,
          kMaxPerBatch},
         [this, watch, page = catch_up.page](Locked& now, absl::StatusOr<RecordPage> read) {
@@ -414,7 +407,7 @@ absl::Status ChangeFeed::AddExisting(Locked& locked, const std::shared_ptr<Watch
   }
   absl::StatusOr<RecordPage> page = **std::exchange(catch_up.page, nullptr);
   if (!page.ok()) return page.status();
-  for (HullChange& change : page->changes) {
+  for (HullChange& change : page->entries) {
     catch_up.last_id = change.record.hull_id;
     // A damaged hull or body may have no revision.
     const uint64_t after = catch_up.after_revision;

@@ -63,9 +63,7 @@ class ChangeFeed {
 
   // Note a committed change at the revision of its record, or at `revision`. Cost: O(log n) per
   // group that includes the ID, and one hash per length of a watched prefix.
-  void NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
-  void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
-  void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteHull(Locked& locked, ChangeKind kind, const std::shared_ptr<RegisteredHull>& hull);
   void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
   // former: the body that this one replaces, or null.
   void NoteBodyPut(Locked& locked, const BodyRecord* former,

@@ -4,31 +4,33 @@
 #include <absl/status/statusor.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 
-// Requests the existing hulls with a prefix, or the one with an ID, in the order of IDs.
+// Requests the existing records with a prefix, or the one with an ID, in the order of IDs.
 struct PageRequest {
   // Ignored unless `ids` is empty.
-  std::string prefix;
+  std::string prefix = {};
   // At most one ID.
-  std::vector<std::string> ids;
-  // Includes bodies.
-  bool bodies = false;
+  std::vector<std::string> ids = {};
+  RecordKinds kinds = {};
   // The page begins after this ID.
-  std::string after;
+  std::string after = {};
   size_t page_size = 0;
 };
 
-// Existing hulls and bodies by ID, each of kind PRESENT.
+// Existing hulls and bodies by ID, each of kind PRESENT, including damaged ones.
 struct RecordPage {
-  std::vector<HullChange> changes;
+  uint64_t store_revision = 0;
+  std::vector<HullChange> entries = {};
   // Further hulls or bodies follow.
   bool more = false;
 };

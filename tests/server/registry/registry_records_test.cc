@@ -258,11 +258,11 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   Start(1000);
   std::string after;
   for (int i = 0; i < 10; ++i) {
-    const absl::StatusOr<BodyPage> page = registry_.bodies().List("b", after, 5);
+    const absl::StatusOr<RecordPage> page = registry_.bodies().List("b", after, 5);
     ASSERT_TRUE(page.ok()) << page.status();
-    ASSERT_EQ(page->bodies.size(), 5);
+    ASSERT_EQ(page->entries.size(), 5);
     EXPECT_TRUE(page->more);
-    after = page->bodies.back()->record().body_id;
+    after = page->entries.back().record.hull_id;
   }
   EXPECT_EQ(after, "b59");
   EXPECT_EQ(store_.questions, 10);

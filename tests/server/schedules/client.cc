@@ -223,17 +223,17 @@ void Client::List() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
-  const absl::StatusOr<HullPage> listed_page = simulation_.registry.List("", "", kHulls);
+  const absl::StatusOr<RecordPage> listed_page = simulation_.registry.List("", "", kHulls);
   if (!listed_page.ok()) {
     if (MayFail(call, listed_page.status(), false)) return;
     Fail(call, absl::StrCat("wrong: ", listed_page.status().ToString()));
   }
-  const HullPage& page = *listed_page;
+  const RecordPage& page = *listed_page;
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
-    const auto listed = std::ranges::find_if(page.hulls, [&](const ListedHull& hull) {
+    const auto listed = std::ranges::find_if(page.entries, [&](const HullChange& hull) {
       return hull.record.hull_id == HullName(call.hull);
     });
-    const bool is_there = listed != page.hulls.end();
+    const bool is_there = listed != page.entries.end();
     const auto is_it = [&](const State& state) {
       return state.exists == is_there && (!is_there || state.record == listed->record);
     };

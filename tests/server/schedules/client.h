@@ -69,7 +69,8 @@ class Client {
   void DeleteBody();
   void FindBodies();
   void ListBodies();
-  void CheckBody(const Call& call, std::optional<uint64_t> revision, const Body* body);
+  void CheckBody(const Call& call, std::optional<uint64_t> revision,
+                 const std::optional<HullChange>& body);
   // Returns true if the ID may have belonged to the other kind.
   bool MayBeOther(const Call& call, const absl::Status& status, bool is_body);
   void Press();

@@ -92,7 +92,7 @@ void Client::DeleteBody() {
   const Call call = Begin(AnyHull());
   Scheduler::Current().Note("deletes body", call.hull);
   const auto check = [&](const absl::StatusOr<uint64_t>& result) {
-    if (absl::IsNotFound(result.status())) return CheckBody(call, std::nullopt, nullptr);
+    if (absl::IsNotFound(result.status())) return CheckBody(call, std::nullopt, std::nullopt);
     if (!result.ok()) {
       if (MayFail(call, result.status(), false)) return;
       Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
@@ -111,16 +111,19 @@ void Client::DeleteBody() {
 }
 
 // body: null for none. revision: the answer's, if it has one.
-void Client::CheckBody(const Call& call, std::optional<uint64_t> revision, const Body* body) {
+void Client::CheckBody(const Call& call, std::optional<uint64_t> revision,
+                       const std::optional<HullChange>& body) {
   const auto is_it = [&](const State& state) {
-    return body == nullptr ? !state.is_body : IsOf(state, body->record());
+    return !body.has_value()
+               ? !state.is_body
+               : IsOf(state, {{}, body->record.create_revision, body->record.revision});
   };
   const auto state = revision.has_value() ? ledger().FindAt(call.hull, call.since, *revision, is_it)
                                           : ledger().Find(call.hull, call.since, is_it);
   if (!state.has_value()) {
     Fail(call, absl::StrCat("a call is given ",
-                            body == nullptr ? "no body"
-                                            : absl::StrCat("a body at ", body->record().revision),
+                            !body.has_value() ? "no body"
+                                              : absl::StrCat("a body at ", body->record.revision),
                             " at revision ", revision.value_or(0)));
   }
   ledger().Report(call.hull, *state);
@@ -151,8 +154,9 @@ void Client::FindBodies() {
   }
   for (call.hull = 0; call.hull < ids.size(); ++call.hull) {
     const bool is_last = call.hull + 1 == ids.size();
-    const Body* const body = found.bodies[call.hull].get();
-    CheckBody(call, is_last ? std::optional(found.store_revision) : std::nullopt, body);
+    const std::shared_ptr<const Body>& body = found.bodies[call.hull];
+    CheckBody(call, is_last ? std::optional(found.store_revision) : std::nullopt,
+              body == nullptr ? std::nullopt : std::optional(body->Describe()));
     simulation_.reached.bodies_found += body != nullptr;
   }
 }
@@ -164,17 +168,18 @@ void Client::ListBodies() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
-  const absl::StatusOr<BodyPage> page = simulation_.registry.bodies().List("", "", kHulls);
+  const absl::StatusOr<RecordPage> page = simulation_.registry.bodies().List("", "", kHulls);
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;
     Fail(call, absl::StrCat("wrong: ", page.status().ToString()));
   }
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
-    const auto listed = std::ranges::find_if(page->bodies, [&](const auto& body) {
-      return body->record().body_id == HullName(call.hull);
+    const auto listed = std::ranges::find_if(page->entries, [&](const HullChange& body) {
+      return body.record.hull_id == HullName(call.hull);
     });
-    CheckBody(call, page->store_revision, listed == page->bodies.end() ? nullptr : listed->get());
+    CheckBody(call, page->store_revision,
+              listed == page->entries.end() ? std::nullopt : std::optional(*listed));
   }
   ledger().ReportRevision(page->store_revision);
 }

@@ -122,10 +122,10 @@ TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   FillThree();
   Flip(HullKey("b"));
   Start();
-  const HullPage page = hulls_->registry().List("", "", 10).value();
-  ASSERT_EQ(page.hulls.size(), 3);
-  EXPECT_FALSE(page.hulls[0].damaged);
-  EXPECT_TRUE(page.hulls[1].damaged);
+  const RecordPage page = hulls_->registry().List("", "", 10).value();
+  ASSERT_EQ(page.entries.size(), 3);
+  EXPECT_FALSE(page.entries[0].damaged);
+  EXPECT_TRUE(page.entries[1].damaged);
   EXPECT_EQ(hulls_->Create("b", true).status().code(), absl::StatusCode::kDataLoss);
   ExpectOnlyBIsDamaged();
 }

@@ -101,7 +101,7 @@ TEST_F(PostgresRecords, APrefixThatNoIdHasListsNothing) {
                                     std::string("\xc3\xa9"), std::string("a b")}) {
     const auto page = hulls_->registry().List(prefix, "", 10, {});
     ASSERT_TRUE(page.ok()) << page.status();
-    EXPECT_TRUE(page->hulls.empty());
+    EXPECT_TRUE(page->entries.empty());
   }
   EXPECT_EQ(hulls_->store().failures().read, 0);
 }
@@ -260,11 +260,11 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndHasANextPage) {
   std::vector<std::string> listed;
   size_t pages = 0;
   for (std::string after;;) {
-    const absl::StatusOr<BodyPage> page = hulls_->registry().bodies().List("large-", after, 1000);
+    const absl::StatusOr<RecordPage> page = hulls_->registry().bodies().List("large-", after, 1000);
     ASSERT_TRUE(page.ok()) << page.status();
-    ASSERT_FALSE(page->bodies.empty());
+    ASSERT_FALSE(page->entries.empty());
     ++pages;
-    for (const auto& body : page->bodies) listed.push_back(body->record().body_id);
+    for (const HullChange& body : page->entries) listed.push_back(body.record.hull_id);
     after = listed.back();
     if (!page->more) break;
   }
@@ -397,17 +397,17 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
   Start();
   std::vector<std::string> listed;
   for (std::string after;;) {
-    const absl::StatusOr<HullPage> page = hulls_->registry().List("", after, 1);
+    const absl::StatusOr<RecordPage> page = hulls_->registry().List("", after, 1);
     ASSERT_TRUE(page.ok()) << page.status();
-    ASSERT_EQ(page->hulls.size(), 1);
-    after = page->hulls.front().record.hull_id;
+    ASSERT_EQ(page->entries.size(), 1);
+    after = page->entries.front().record.hull_id;
     listed.push_back(after);
     if (!page->more) break;
   }
   EXPECT_EQ(listed, (std::vector<std::string>{"a", "b", "c"}));
   EXPECT_FALSE(hulls_->registry().List("b", "", 10)->more);
-  EXPECT_EQ(hulls_->registry().List("b", "", 10)->hulls.size(), 1);
-  EXPECT_TRUE(hulls_->registry().List("", "c", 10)->hulls.empty());
+  EXPECT_EQ(hulls_->registry().List("b", "", 10)->entries.size(), 1);
+  EXPECT_TRUE(hulls_->registry().List("", "c", 10)->entries.empty());
 }
 
 // One hull is not in memory, one is known to be deleted, one was recreated, and one was recreated
