@@ -4,7 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "server/collisions/placed/placed_answer.h"
+#include "core/base/check.h"
+#include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/wire/answer_columns.h"
@@ -32,63 +33,24 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 
 }  // namespace
 
-WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry, const PieceThreads& threads,
-                                 const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<BatchStream>(
-      new BatchStream(context, admission, registry, threads, request)));
-}
-
-BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Registry& registry, const PieceThreads& threads,
-                         const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry, threads,
-                    {kFirstPairs, kMostPairs}) {}
-
-bool BatchStream::IsShort() const {
-  return request().placements_size() + request().packed_placements().hulls_size() <=
-         kMostPlacementsPerSlice;
-}
+BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+    : PiecedReplies(request, context, Rpc::kBatchCheckCollisions, parts,
+                    {kFirstPairs, kMostPairs, kMostPlacementsPerSlice}) {}
 
 absl::Status BatchStream::Validate() {
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
-                       registry().limits(), call().lifetime());
-  if (!options.ok()) return options.status();
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
-  if (!freshness.ok()) return freshness.status();
-  freshness_ = *freshness;
-  options_ = *std::move(options);
-  absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
-                           call().caller(), registry().limits().max_placements, "the batch");
-  if (!table.ok()) return table.status();
-  table_ = *std::move(table);
-  if (table_.has_motions()) {
-    if (absl::Status s = ValidateForMotions(options_); !s.ok()) return s;
-    motion_options_ = MakeMotionOptions(request().wanted(), options_);
-  }
-  pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
+  if (absl::Status s = DecodePlacements(request().method(), "the batch"); !s.ok()) return s;
+  expected_pairs_ = CountUnits();
   // Each placement is used at most twice on average: placing it again costs less than the memory
   // for all of them.
-  const bool is_textbook = options_.method == Method::kTextbookSat;
-  if (!is_textbook && pair_count_ <= table_.size()) table_.PlaceOnDemand();
-  call().AddPairs(pair_count_);
+  const bool is_textbook = query_.method == Method::kTextbookSat;
+  if (!is_textbook && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
+  call().AddPairs(expected_pairs_);
   return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
 }
 
-absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
-  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
-                         freshness_};
-  if (!may_wait) return table_.TryResolve(registry(), options_, plan);
-  if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
-  return true;
-}
-
 absl::Status BatchStream::Prepare() {
-  is_plain_ = AsksRelationsOfHulls(options_, table_);
+  is_plain_ = AsksRelationsOfHulls(query_, table_);
   return absl::OkStatus();
 }
 
@@ -113,100 +75,73 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
 }
 
 // A started textbook pair holds memory, so a batch starts only one.
-bool BatchStream::MayRunAhead() const { return options_.method != Method::kTextbookSat; }
+bool BatchStream::MayRunAhead() const { return query_.method != Method::kTextbookSat; }
 
 absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
-  const bool is_textbook = options_.method == Method::kTextbookSat;
-  const uint64_t first = piece.next;
-  BatchColumns columns({}, request().wanted(), first);
-  RungCounts counts;
-  absl::Status status;
-  uint64_t pairs = 0;
+  const bool is_textbook = query_.method == Method::kTextbookSat;
   const bool looks_each_time = is_textbook || table_.has_bodies() || table_.has_motions();
+  uint64_t pairs = 0;
   do {
-    status = is_textbook ? AnswerByTextbook(piece, end, &columns, &counts)
-                         : Answer(piece, &columns, &counts);
+    if (absl::Status s = Answer(piece, end); !s.ok()) return s;
     ++pairs;
-  } while (status.ok() && piece.next < piece.end &&
+  } while (piece.next < piece.end &&
            ((!looks_each_time && pairs % kPairsPerPoll != 0) || Clock::now() < end));
-  if (!status.ok()) return status;
-  call().metrics().CountPairs(counts);
+  call().metrics().CountPairs(std::exchange(piece.rungs, {}));
   piece.is_done = piece.next == piece.end;
-  if (piece.next == first) return absl::OkStatus();
-  for (v1::BatchCheckCollisionsResponse& reply : columns.Take()) piece.Add(std::move(reply));
+  piece.EndReply();
   return absl::OkStatus();
 }
 
-absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts) {
-  const PlacedPair pair = PairAt(piece.next);
-  if (!IsAnswerable(pair)) {
-    columns->Add(
-        [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
-    ++piece.next;
-    return absl::OkStatus();
-  }
-  if (is_plain_) return AnswerRelation(piece, columns, counts);
-  if (table_.has_motions()) {
-    return Add(AskMoving(table_, pair.a, pair.b, motion_options_), piece, columns, counts);
-  }
-  return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
+template <typename AddRow>
+void BatchStream::Add(PairsPiece& piece, const AddRow& add_row) {
+  if (piece.row_bytes == 0) piece.rows.set_first_pair(piece.next);
+  piece.row_bytes += add_row(piece.rows.mutable_columns());
+  ++piece.next;
+  if (piece.row_bytes >= FullMessageBytes(request().wanted())) piece.EndReply();
 }
 
-// Fast path of AskPlaced and AddPlacedAnswer, which take 10 to 12 % more of the server's processor
+absl::Status BatchStream::Answer(PairsPiece& piece, Clock::time_point end) {
+  const PlacedPair pair = PairAt(piece.next);
+  if (!IsAnswerable(pair)) {
+    Add(piece,
+        [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
+    return absl::OkStatus();
+  }
+  if (is_plain_) return AnswerRelation(pair, piece);
+  if (!piece.search.has_value()) {
+    piece.search.emplace(table_, pair.a, pair.b, query_, motion_options_);
+    if (absl::Status s = piece.search->CheckMemory(registry()); !s.ok()) return s;
+  }
+  if (!piece.search->Advance(end)) return absl::OkStatus();
+  const PlacedAnswer& found = piece.search->answer();
+  if (absl::IsCancelled(found.answer.status())) return found.answer.status();
+  if (!found.answer.ok()) {
+    call().CountLimit(found.answer.status());
+  } else if (!found.contact.has_value()) {
+    piece.rungs.Add(found.answer->rung);
+  }
+  Add(piece, [&](v1::AnswerColumns* to) {
+    return AddPlacedAnswer(table_, pair.a, pair.b, found, request().wanted(), to);
+  });
+  piece.search.reset();
+  return absl::OkStatus();
+}
+
+// Fast path of PairSearch and AddPlacedAnswer, which take 10 to 12 % more of the server's processor
 // time if each pair has its own packed placements, and 2 % more if pairs share 128 placements.
 // **Observed**: close pairs of UR5 links over unix sockets, both variants alternating in either
 // order, medians of 9 and 7 rounds of remote_benchmark (0.74 us per pair instead of 0.82, and 0.65
 // instead of 0.73). Only this function exploits that most pairs need no more.
-absl::Status BatchStream::AnswerRelation(PairsPiece& piece, BatchColumns* columns,
-                                         RungCounts* counts) {
-  const PlacedPair pair = PairAt(piece.next);
+absl::Status BatchStream::AnswerRelation(const PlacedPair& pair, PairsPiece& piece) {
   std::optional<PlacedHull> made_a;
   std::optional<PlacedHull> made_b;
-  absl::StatusOr<hulld::Answer> answer =
-      CheckCollision(table_.PlacedAt(pair.a, &made_a), table_.PlacedAt(pair.b, &made_b), options_);
-  if (!answer.ok()) return Add({std::move(answer)}, piece, columns, counts);
-  ++piece.next;
-  counts->Add(answer->rung);
-  columns->Add([&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });
-  return absl::OkStatus();
-}
-
-absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point end,
-                                           BatchColumns* columns, RungCounts* counts) {
-  const PlacedPair pair = PairAt(piece.next);
-  const bool is_for_hulls = !table_.is_body(pair.a) && !table_.is_body(pair.b);
-  if (!IsAnswerable(pair) || !is_for_hulls) return Answer(piece, columns, counts);
-  if (!piece.check.has_value()) {
-    const PlacedHull& a = table_.placed()[pair.a];
-    const PlacedHull& b = table_.placed()[pair.b];
-    if (HoldsMuchForTextbook(a, b)) {
-      if (absl::Status s = registry().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
-    }
-    absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(a, b, options_);
-    if (!begun.ok()) return Add({begun.status()}, piece, columns, counts);
-    piece.check = *std::move(begun);
-  }
-  const absl::StatusOr<bool> done = piece.check->Advance(end);
-  if (!done.ok()) return done.status();
-  if (!*done) return absl::OkStatus();
-  PlacedAnswer answer = {piece.check->Finish()};
-  piece.check.reset();
-  return Add(std::move(answer), piece, columns, counts);
-}
-
-absl::Status BatchStream::Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
-                              RungCounts* counts) {
-  if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
-  const PlacedPair pair = PairAt(piece.next++);
-  if (answer.answer.ok()) {
-    if (!answer.contact.has_value()) counts->Add(answer.answer->rung);
-  } else {
-    answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
-    call().CountLimit(answer.answer.status());
-  }
-  columns->Add([&](v1::AnswerColumns* to) {
-    return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
-  });
+  const absl::StatusOr<hulld::Answer> answer =
+      CheckCollision(table_.PlacedAt(pair.a, &made_a), table_.PlacedAt(pair.b, &made_b), query_);
+  // No other error is possible for the relation of valid hulls at valid poses.
+  HULLD_CHECK(answer.ok() || absl::IsCancelled(answer.status()));
+  if (!answer.ok()) return answer.status();
+  piece.rungs.Add(answer->rung);
+  Add(piece, [&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });
   return absl::OkStatus();
 }
 

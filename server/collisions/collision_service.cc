@@ -3,7 +3,6 @@
 #include <absl/status/status.h>
 
 #include <memory>
-#include <optional>
 #include <utility>
 
 #include "server/collisions/batch_stream.h"
@@ -20,68 +19,47 @@ constexpr size_t kMostAnsweredInTurn = 32;
 
 }  // namespace
 
-grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
-                                                           const grpc::ByteBuffer* request,
-                                                           grpc::ByteBuffer* response) {
-  return CheckCall::Start(*context, admission_, Rpc::kCheckCollision, {request, response},
+UnaryReactor* CollisionService::CheckCollision(CallContext* context, const Bytes* request,
+                                               Bytes* response) {
+  return CheckCall::Start(*context, parts_.admission, Rpc::kCheckCollision, {request, response},
                           [this](CheckCall* call) { Check(call); });
 }
 
 void CollisionService::Check(CheckCall* call) {
-  pool_.NoteSingleCall();
-  absl::StatusOr<std::shared_ptr<PairQuestion>> read = PairQuestion::Read(registry_, call);
+  parts_.pool.NoteSingleCall();
+  absl::StatusOr<std::shared_ptr<PairQuestion>> read = PairQuestion::Read(parts_, call);
   if (!read.ok()) return call->End(read.status());
   const std::shared_ptr<PairQuestion> question = *std::move(read);
-  if (TryAnswer(*question)) return;
+  if (question->TryAnswer()) return;
   // A store with peer servers is queried first; no thread waits for its answer.
   const auto answer = [this, call, question](const absl::Status& status) {
     if (!status.ok()) return call->End(status);
     const bool may_answer = waiting_.count() < kMostAnsweredInTurn;
-    if (!may_answer || !TryAnswer(*question)) AnswerLater(question, call->call().client());
+    if (!may_answer || !question->TryAnswer()) AnswerLater(question, call->call().client());
   };
-  const bool waits = waiting_.AwaitFresh(registry_, question->lookup().plan.freshness,
-                                         question->should_stop(), answer);
+  const bool waits =
+      waiting_.AwaitFresh(parts_.registry, question->freshness(), question->should_stop(), answer);
   if (!waits) AnswerLater(question, call->call().client());
 }
 
-// Returns false if the hulls cannot be resolved without blocking.
-bool CollisionService::TryAnswer(PairQuestion& question) {
-  std::optional<Resolved> ready = TryResolvePlaced(registry_, question.ids(), question.lookup());
-  if (!ready.has_value()) return false;
-  question.Answer(*std::move(ready), pool_);
-  return true;
-}
-
-// Waits for the store, or for canonical snapshots or boxes of pieces to be built.
 void CollisionService::AnswerLater(std::shared_ptr<PairQuestion> question, ClientId client) {
-  readers_.Submit(
-      [this, question = std::move(question)] {
-        question->Answer(
-            ResolvePlaced(registry_, question->ids(), question->lookup(), question->should_stop()),
-            pool_);
-      },
-      client);
+  parts_.readers.Submit([question = std::move(question)] { question->Answer(); }, client);
 }
 
-WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
-                                                     const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, registry_, {long_readers_, pool_, waiting_},
-                            *request);
+WriteReactor* CollisionService::BatchCheckCollisions(CallContext* context, const Bytes* request) {
+  return BatchStream::Launch(std::make_shared<BatchStream>(*context, parts_, *request));
 }
 
-BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_, pool_,
-                                waiting_);
+BidiReactor* CollisionService::StreamCollisions(CallContext* context) {
+  return CollisionStream::Launch(std::make_shared<CollisionStream>(*context, parts_));
 }
 
-WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
-                                               const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, registry_, {long_readers_, pool_, waiting_},
-                            *request);
+WriteReactor* CollisionService::FindCollisions(CallContext* context, const Bytes* request) {
+  return SceneStream::Launch(std::make_shared<SceneStream>(*context, parts_, *request));
 }
 
-BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
-  return CollisionWatch::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
+BidiReactor* CollisionService::WatchCollisions(CallContext* context) {
+  return CollisionWatch::Launch(std::make_shared<CollisionWatch>(*context, parts_));
 }
 
 }  // namespace hulld::server

@@ -10,6 +10,7 @@
 #include "server/call/admission.h"
 #include "server/call/call_stream.h"
 #include "server/collisions/pair_question.h"
+#include "server/collisions/placed/collision_parts.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
@@ -35,36 +36,24 @@ class CollisionService : public CollisionServiceOfBytes {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
                    WorkerPool& long_readers, TaskPool& pool)
-      : registry_(registry),
-        admission_(admission),
-        readers_(readers),
-        long_readers_(long_readers),
-        pool_(pool) {}
+      : parts_{registry, admission, readers, long_readers, pool, waiting_} {}
 
   // Calls that wait for the store without a thread.
   size_t waiting() const { return waiting_.count(); }
 
-  grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
-                                           const grpc::ByteBuffer* request,
-                                           grpc::ByteBuffer* response) override;
-  WriteReactor* BatchCheckCollisions(grpc::CallbackServerContext* context,
-                                     const grpc::ByteBuffer* request) override;
-  BidiReactor* StreamCollisions(grpc::CallbackServerContext* context) override;
-  WriteReactor* FindCollisions(grpc::CallbackServerContext* context,
-                               const grpc::ByteBuffer* request) override;
-  BidiReactor* WatchCollisions(grpc::CallbackServerContext* context) override;
+  UnaryReactor* CheckCollision(CallContext* context, const Bytes* request,
+                               Bytes* response) override;
+  WriteReactor* BatchCheckCollisions(CallContext* context, const Bytes* request) override;
+  BidiReactor* StreamCollisions(CallContext* context) override;
+  WriteReactor* FindCollisions(CallContext* context, const Bytes* request) override;
+  BidiReactor* WatchCollisions(CallContext* context) override;
 
  private:
   void Check(CheckCall* call);
-  bool TryAnswer(PairQuestion& question);
   void AnswerLater(std::shared_ptr<PairQuestion> question, ClientId client);
 
-  Registry& registry_;
-  Admission& admission_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
-  TaskPool& pool_;
   WaitingCalls waiting_;
+  const CollisionParts parts_;
 };
 
 }  // namespace hulld::server

@@ -40,26 +40,18 @@ constexpr size_t kPairsPerHelper = 192;
 
 }  // namespace
 
-BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                    Registry& registry, WorkerPool& readers,
-                                    WorkerPool& long_readers, TaskPool& pool,
-                                    WaitingCalls& waiting) {
-  return Launch(std::shared_ptr<CollisionStream>(
-      new CollisionStream(context, admission, registry, readers, long_readers, pool, waiting)));
-}
-
 void CollisionStream::OnMessage() {
   call().BeginMessage();
   if (IsQuick()) {
-    pool_.NoteSingleCall();
+    parts_.pool.NoteSingleCall();
     return Handle();
   }
   // Resolving hulls may wait for the store; the first message resolves all of them.
-  if (!open_) return RunOn(long_readers_, [this] { Handle(); });
-  if (request().update().refresh_hulls()) return RunOn(readers_, [this] { Handle(); });
+  if (!open_) return RunOn(parts_.long_readers, [this] { Handle(); });
+  if (request().update().refresh_hulls()) return RunOn(parts_.readers, [this] { Handle(); });
   // Only the first slice of a step precedes batches.
   const bool is_short = request().update().placements_size() <= kMostShortUpdate;
-  if (is_short) return RunOn(pool_, [this] { Handle(); });
+  if (is_short) return RunOn(parts_.pool, [this] { Handle(); });
   RunOn(lane_, [this] { Handle(); });
 }
 
@@ -99,9 +91,9 @@ void CollisionStream::Handle() {
   const absl::Status status = HandleMessage();
   if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
   // No thread waits during a store query: an unresponsive store would block all of them.
-  WorkerPool& threads = messages_ == 0 ? long_readers_ : readers_;
-  const bool awaits = waiting_.AwaitFresh(
-      registry_, refresh_->freshness, [this] { return call().ShouldStop(); },
+  WorkerPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
+  const bool awaits = parts_.waiting.AwaitFresh(
+      parts_.registry, refresh_->freshness, [this] { return call().ShouldStop(); },
       [this, &threads, self = shared_from_this()](const absl::Status& fresh) {
         RunOn(threads, [this, fresh] { AnswerMessage(OfMessage(fresh)); });
       });
@@ -116,7 +108,7 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   request().Clear();
   if (!std::is_sorted(asked_.begin(), asked_.end())) std::sort(asked_.begin(), asked_.end());
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
-  table_.EncodeHeader(registry_.store(), reply().mutable_header());
+  table_.EncodeHeader(parts_.registry.store(), reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
   is_decided_ = false;
@@ -141,7 +133,7 @@ absl::Status CollisionStream::HandleMessage() {
         return absl::InvalidArgumentError(
             "open was sent twice; start a new stream for other placements or pairs");
       }
-      return HandleOpen();
+      return Prefixed("open: ", HandleOpen());
     case v1::StreamCollisionsRequest::kUpdate:
       if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
       ++messages_;
@@ -155,31 +147,29 @@ absl::Status CollisionStream::HandleMessage() {
 absl::Status CollisionStream::HandleOpen() {
   v1::CollisionStreamOpen& open = *request().mutable_open();
   absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
-                       call().lifetime());
-  if (!options.ok()) return Prefixed("open: ", options.status());
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
+                       parts_.registry.limits(), call().lifetime());
+  if (!options.ok()) return options.status();
   const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(open.freshness(), registry_.store(), call().message_arrival());
-  if (!freshness.ok()) return Prefixed("open: ", freshness.status());
+      DecodeFreshness(open.freshness(), parts_.registry.store(), call().message_arrival());
+  if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   const absl::Status resting =
       RefuseMotions(open.placements(), open.packed_placements(), "a stream");
-  if (!resting.ok()) return Prefixed("open: ", resting);
+  if (!resting.ok()) return resting;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
-                           registry_.limits().max_placements, "the stream");
-  if (!table.ok()) return Prefixed("open: ", table.status());
-  const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
-                                           registry_.limits().max_pairs_per_batch, "the stream");
-  if (!valid.ok()) return Prefixed("open: ", valid);
+                           parts_.registry.limits().max_placements, "the stream");
+  if (!table.ok()) return table.status();
+  const absl::Status valid = ValidatePairs(
+      open.pairs(), table->size(), parts_.registry.limits().max_pairs_per_batch, "the stream");
+  if (!valid.ok()) return valid;
   options_ = *std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
   table_ = *std::move(table);
 
-  if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) {
-    return Prefixed("open: ", s);
-  }
+  if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) return s;
 
   pairs_.reserve(static_cast<size_t>(open.pairs_size()) / 2);
   pairs_begin_.assign(table_.size() + 1, 0);
@@ -211,7 +201,7 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
   constexpr size_t kPerPair =
       sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char) + sizeof(Decided);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
-  return registry_.CheckMemory(MemoryUse::kReading);
+  return parts_.registry.CheckMemory(MemoryUse::kReading);
 }
 
 // Validates the whole update before applying any of it.
@@ -234,7 +224,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
 }
 
 absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
-  if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
+  if (absl::Status s = table_.Refresh(parts_.registry, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
   }
@@ -266,11 +256,8 @@ void CollisionStream::AddAnswer(uint32_t index) {
   PairState& pair = pairs_[index];
   const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
   PlacedAnswer answer;
-  if (answerable) answer = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
+  if (answerable) answer = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
   const bool is_answered = answerable && answer.answer.ok();
-  if (answerable && !is_answered) {
-    answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
-  }
   if (is_answered) rungs_.Add(answer.answer->rung);
   const v1::Relation relation =
       is_answered ? EncodeRelation(answer.answer->relation) : v1::RELATION_UNSPECIFIED;
@@ -297,7 +284,8 @@ void CollisionStream::DecideTogether() {
   } else if (!BeginDeciding()) {
     return EncodeDecided();
   }
-  const size_t wanted = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
+  const size_t wanted =
+      std::min<size_t>(parts_.pool.threads() - 1, asked_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
   for (size_t helpers = helpers_waiting_.load(); helpers < wanted; ++helpers) {
     ++helpers_waiting_;

@@ -16,12 +16,10 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/collisions/claimed_range.h"
+#include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
-#include "server/registry/waiting_calls.h"
 
 namespace hulld::server {
 
@@ -35,9 +33,11 @@ class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
  public:
-  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                            TaskPool& pool, WaitingCalls& waiting);
+  CollisionStream(CallContext& context, const CollisionParts& parts)
+      : ReadingStream(context, parts.admission, Rpc::kStreamCollisions),
+        parts_(parts),
+        lane_(parts.pool),
+        charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
  private:
   // State of a pair kept between answers.
@@ -57,18 +57,6 @@ class CollisionStream
     // True if the last answer differed.
     bool is_changed = false;
   };
-
-  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                  WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool,
-                  WaitingCalls& waiting)
-      : ReadingStream(context, admission, Rpc::kStreamCollisions),
-        registry_(registry),
-        readers_(readers),
-        long_readers_(long_readers),
-        pool_(pool),
-        lane_(pool),
-        waiting_(waiting),
-        charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override { Read(); }
   void OnMessage() override;
@@ -98,13 +86,9 @@ class CollisionStream
   void SendAnswered();
   void SendPart(bool last);
 
-  Registry& registry_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
-  TaskPool& pool_;
+  const CollisionParts& parts_;
   // Slices of long answers.
   TaskPool::Lane lane_;
-  WaitingCalls& waiting_;
   // Covers placements and pairs.
   MemoryCharge charge_;
 

@@ -18,13 +18,18 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/query/terms/answer.h"
 #include "server/call/queued_stream.h"
+#include "server/collisions/placed/collision_parts.h"
+#include "server/collisions/placed/placement_table.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/process/shared_loop.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
 #include "server/settings/config.h"
+#include "server/wire/decode.h"
 
 namespace hulld::server {
 
@@ -40,6 +45,11 @@ struct Piece {
   std::vector<size_t> reply_bytes = {};
   size_t bytes = 0;
   bool is_done = false;
+  // Rows of the next reply, and an upper estimate of their bytes.
+  Reply rows = {};
+  size_t row_bytes = 0;
+  // Counts since they were last taken.
+  RungCounts rungs = {};
 
   // For PiecedReplies: a slice is queued or running; bytes held before the slice; time of the
   // slices so far.
@@ -48,24 +58,15 @@ struct Piece {
   uint64_t units = 0;
   std::chrono::steady_clock::duration elapsed{0};
 
-  // Bytes held by the piece, excluding the replies.
-  size_t held_bytes() const { return 0; }
-
-  void Add(Reply reply) {
-    const size_t size = reply.ByteSizeLong();
+  // Ends the reply of the current rows, if any.
+  void EndReply() {
+    if (row_bytes == 0) return;
+    const size_t size = rows.ByteSizeLong();
     bytes += size;
     reply_bytes.push_back(size);
-    replies.push_back(std::move(reply));
+    replies.push_back(std::exchange(rows, {}));
+    row_bytes = 0;
   }
-};
-
-// Threads that prepare and compute a call.
-struct PieceThreads {
-  // For steps that may block.
-  WorkerPool& readers;
-  TaskPool& pool;
-  // Waits for freshness without a thread.
-  WaitingCalls& waiting;
 };
 
 // A stream with answers computed in pieces by all threads of a pool and sent in order. A piece is
@@ -75,7 +76,8 @@ struct PieceThreads {
 // bounded, and a client that does not read delays no other client. The call's memory, HeldBytes and
 // answers in flight, counts against --memory-limit.
 //
-// Work: state of a piece between slices, derived from Piece<Reply>.
+// Work: state of a piece between slices, derived from Piece<Reply>; its held_bytes() are the bytes
+// that it holds besides replies.
 template <typename Request, typename Reply, typename Work>
 class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Request> {
  protected:
@@ -95,37 +97,55 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kSmallReplyBytes = 32 << 10;
   static constexpr std::chrono::milliseconds kMostWait{2};
 
-  // Growth of pieces.
   struct Shape {
+    // Growth of pieces.
     uint64_t first_units;
     uint64_t most_units;
+    // Preparing this many placements takes about a slice, waits excluded.
+    int most_short_placements;
   };
 
-  PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
-                Admission& admission, Rpc rpc, Registry& registry, const PieceThreads& threads,
+  PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
                 const Shape& shape)
-      : Base(request, context, admission, rpc),
-        registry_(registry),
-        readers_(threads.readers),
-        lane_(threads.pool),
-        waiting_(threads.waiting),
-        most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
-        most_units_(shape.most_units),
-        charge_(registry.memory(), MemoryUse::kReading),
+      : Base(request, context, parts.admission, rpc),
+        registry_(parts.registry),
+        readers_(parts.long_readers),
+        lane_(parts.pool),
+        waiting_(parts.waiting),
+        most_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
+        shape_(shape),
+        charge_(parts.registry.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
-  // True if preparation takes about a slice, waits excluded.
-  virtual bool IsShort() const = 0;
-  // The call is prepared step by step, without the mutex, on one thread.
+  // The call is prepared step by step, without the mutex, on one thread; the hulls are resolved
+  // between these steps.
   virtual absl::Status Validate() = 0;
-  // Requires that the call is valid.
-  virtual const Freshness& freshness() const = 0;
-  // Resolves the hulls. Returns false if that may block and `may_wait` is false.
-  virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
   virtual absl::Status Prepare() { return absl::OkStatus(); }
   // Bytes held until the call ends, excluding pieces. Called without the mutex after each of these
   // steps.
-  virtual size_t HeldBytes() const = 0;
+  virtual size_t HeldBytes() const { return table_.MemoryBytes(); }
+
+  // For Validate: decodes the query, its freshness, and the placements. what: "the batch".
+  absl::Status DecodePlacements(v1::Method method, const char* what) {
+    const Request& request = this->request();
+    absl::StatusOr<QueryOptions> query = MakeQueryOptions(
+        method, request.wanted(), request.tolerance(), registry_.limits(), this->call().lifetime());
+    if (!query.ok()) return query.status();
+    query_ = *std::move(query);
+    const absl::StatusOr<Freshness> freshness =
+        DecodeFreshness(request.freshness(), registry_.store(), this->call().arrival());
+    if (!freshness.ok()) return freshness.status();
+    freshness_ = *freshness;
+    absl::StatusOr<PlacementTable> table =
+        PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
+                             this->call().caller(), registry_.limits().max_placements, what);
+    if (!table.ok()) return table.status();
+    table_ = *std::move(table);
+    if (!table_.has_motions()) return absl::OkStatus();
+    if (absl::Status s = ValidateForMotions(query_); !s.ok()) return s;
+    motion_options_ = MakeMotionOptions(request.wanted(), query_);
+    return absl::OkStatus();
+  }
 
   Registry& registry() { return registry_; }
 
@@ -160,22 +180,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Called after that, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
-  void RunSlice(Work& piece) {
-    const auto start = Clock::now();
-    const uint64_t before = piece.next;
-    absl::Status status = this->call().ShouldStop() ? this->call().StopStatus()
-                                                    : Advance(piece, start + TaskPool::kSliceTime);
-    if (this->call().ShouldStop()) status = this->call().StopStatus();
-    piece.elapsed += Clock::now() - start;
-    piece.units += piece.next - before;
-    this->Locked([this, &piece, &status] {
-      HULLD_CHECK(std::exchange(piece.is_running, false));
-      --running_;
-      if (!status.ok()) return this->End(status);
-      if (piece.is_done) AdaptUnits(piece);
-    });
-  }
-
   // Queues the replies of the piece in order.
   void DeliverReplies(Work& piece) {
     for (size_t i = 0; i < piece.replies.size(); ++i) {
@@ -197,7 +201,22 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     }
   }
 
+  // Written before the first piece.
+  QueryOptions query_;
+  // If a placement moves.
+  MotionOptions motion_options_;
+  PlacementTable table_;
+  // Pairs that the call asks about at least.
+  uint64_t expected_pairs_ = 0;
+
  private:
+  // True if preparation takes about a slice, waits excluded.
+  bool IsShort() const {
+    const int listed = this->request().placements_size();
+    return listed + this->request().packed_placements().hulls_size() <=
+           shape_.most_short_placements;
+  }
+
   // A short call with ready hulls need not wait for another thread.
   void Open() final {
     if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
@@ -215,15 +234,14 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
       this->RunOn(readers_, [this, status] { OpenWith(status, true); });
     };
-    return waiting_.AwaitFresh(registry_, freshness(), should_stop, open);
+    return waiting_.AwaitFresh(registry_, freshness_, should_stop, open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
     if (status.ok()) status = Charge();
     if (status.ok()) {
-      const absl::StatusOr<bool> resolved = ResolveHulls(may_wait);
+      const absl::StatusOr<bool> resolved = Resolve(may_wait);
       if (resolved.ok() && !*resolved) {
-        HULLD_CHECK(!may_wait);
         if (AwaitsFresh()) return;
         return this->RunOn(readers_, [this] { OpenWith(absl::OkStatus(), true); });
       }
@@ -243,6 +261,15 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
+  // Resolves the hulls. Returns false if that may block and `may_wait` is false.
+  absl::StatusOr<bool> Resolve(bool may_wait) {
+    const ReadPlan plan = {2 * expected_pairs_ / std::max<uint64_t>(1, table_.hull_count()), true,
+                           freshness_};
+    if (!may_wait) return table_.TryResolve(registry_, query_, plan);
+    if (absl::Status s = table_.Resolve(registry_, query_, plan); !s.ok()) return s;
+    return true;
+  }
+
   // RESOURCE_EXHAUSTED: no room for the call's memory. A small call is admitted regardless, so that
   // calls about a few hulls in memory are always served.
   absl::Status Charge() {
@@ -250,6 +277,22 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     charge_.Set(fixed_bytes_);
     if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
     return registry_.CheckMemory(MemoryUse::kReading);
+  }
+
+  void RunSlice(Work& piece) {
+    const auto start = Clock::now();
+    const uint64_t before = piece.next;
+    absl::Status status = this->call().ShouldStop() ? this->call().StopStatus()
+                                                    : Advance(piece, start + TaskPool::kSliceTime);
+    if (this->call().ShouldStop()) status = this->call().StopStatus();
+    piece.elapsed += Clock::now() - start;
+    piece.units += piece.next - before;
+    this->Locked([this, &piece, &status] {
+      HULLD_CHECK(std::exchange(piece.is_running, false));
+      --running_;
+      if (!status.ok()) return this->End(status);
+      if (piece.is_done) AdaptUnits(piece);
+    });
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
@@ -311,7 +354,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const double factor = std::chrono::duration<double>(TaskPool::kSliceTime) /
                           std::max<Clock::duration>(piece.elapsed, least);
     const double wanted = static_cast<double>(piece.units) * std::min(factor, 4.0);
-    piece_units_ = static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(most_units_)));
+    piece_units_ =
+        static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.most_units)));
   }
 
   Registry& registry_;
@@ -319,9 +363,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   TaskPool::Lane lane_;
   WaitingCalls& waiting_;
   const size_t most_pieces_;
-  const uint64_t most_units_;
+  const Shape shape_;
 
   // Owned by the opening thread while the call is opened.
+  Freshness freshness_;
   MemoryCharge charge_;
   size_t fixed_bytes_ = 0;
 

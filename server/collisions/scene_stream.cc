@@ -68,48 +68,19 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 
 }  // namespace
 
-WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry, const PieceThreads& threads,
-                                 const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<SceneStream>(
-      new SceneStream(context, admission, registry, threads, request)));
-}
-
-SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Registry& registry, const PieceThreads& threads,
-                         const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, registry, threads,
-                    {kFirstPlacements, kMostPlacements}) {}
-
-bool SceneStream::IsShort() const {
-  return request().placements_size() + request().packed_placements().hulls_size() <=
-         kMostBoxesPerSlice;
-}
+SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+    : PiecedReplies(request, context, Rpc::kFindCollisions, parts,
+                    {kFirstPlacements, kMostPlacements, kMostBoxesPerSlice}) {}
 
 absl::Status SceneStream::Validate() {
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
-                       registry().limits(), call().lifetime());
-  if (!options.ok()) return options.status();
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
-  if (!freshness.ok()) return freshness.status();
-  freshness_ = *freshness;
-  absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
-                           call().caller(), registry().limits().max_placements, "the scene");
-  if (!table.ok()) return table.status();
-  table_ = *std::move(table);
-  if (table_.has_motions()) {
-    if (absl::Status s = ValidateForMotions(*options); !s.ok()) return s;
-    motion_options_ = MakeMotionOptions(request().wanted(), *options);
-  }
+  if (absl::Status s = DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"); !s.ok()) return s;
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
   ignored_groups_ = IgnoredGroups(request());
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
-  options_.query = *std::move(options);
+  // The box and at least one pair of each placement.
+  expected_pairs_ = table_.size();
   return ValidateChoice();
 }
 
@@ -144,15 +115,6 @@ absl::Status SceneStream::ValidateLimit() const {
       "wanted.clearance, which may be infinite");
 }
 
-absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
-  // Expects the box and at least one pair of each placement.
-  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
-                         freshness_};
-  if (!may_wait) return table_.TryResolve(registry(), options_.query, plan);
-  if (absl::Status s = table_.Resolve(registry(), options_.query, plan); !s.ok()) return s;
-  return true;
-}
-
 absl::Status SceneStream::Prepare() {
   options_.bodies = table_.bodies();
   const bool moves = table_.has_motions();
@@ -170,18 +132,19 @@ absl::Status SceneStream::Prepare() {
   });
   if (call().ShouldStop()) return call().StopStatus();
   if (request().has_limit()) {
-    nearest_ = std::make_unique<NearestPairs>(request().limit(), boxes,
-                                              options_.query.max_error.value_or(0));
-    ranked_query_ = std::exchange(options_.query, WithoutDetails(options_.query));
+    nearest_ =
+        std::make_unique<NearestPairs>(request().limit(), boxes, query_.max_error.value_or(0));
+    ranked_query_ = std::exchange(query_, WithoutDetails(query_));
   }
   if (request().first_only()) {
     first_ = std::make_unique<FirstPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
-    ranked_query_ = options_.query;
+    ranked_query_ = query_;
     ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
   }
-  piece_query_ = options_.query;
+  piece_query_ = query_;
   piece_query_.threads = 1;
+  options_.query = query_;
   absl::StatusOr<SceneSearch> search =
       moves ? SceneSearch::Make(table_.placed(), options_, std::move(moving))
             : SceneSearch::Make(table_.placed(), options_, std::move(boxes));
@@ -243,7 +206,7 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
                                                   : Rank(a, *b, std::move(found->answer), piece);
     if (!ranked.ok()) return ranked;
   }
-  piece.AddRows();
+  piece.EndReply();
   piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
@@ -251,20 +214,15 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
 absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end) {
   do {
     const RankedPair& pair = ranked_[piece.next - search_->size()];
-    PlacedAnswer found = first_ != nullptr
-                             ? AskMoving(table_, pair.a, pair.b, ranked_motion_)
-                             : AskPlaced(table_, pair.a, pair.b, ranked_query_, nullptr);
+    const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
     if (absl::IsCancelled(found.answer.status())) return found.answer.status();
-    if (!found.answer.ok()) {
-      found.answer = NameLimit(table_, pair.a, pair.b, found.answer.status(), ranked_query_);
-    }
     const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
     // Details such as a certificate may be refused.
     Count(pair.relation, uint64_t{0} - 1, &piece.totals);
     Count(relation, 1, &piece.totals);
     ++piece.next;
   } while (piece.next < piece.end && Clock::now() < end);
-  piece.AddRows();
+  piece.EndReply();
   piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
@@ -272,14 +230,14 @@ absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end
 absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece) {
   PlacedAnswer found;
   if (table_.has_motions()) {
-    found = AskMoving(table_, a, b, motion_options_);
+    found = AskPlaced(table_, a, b, query_, motion_options_);
   } else {
     found.answer = search_->Ask(a, b, &found.of_body);
+    if (!found.answer.ok()) {
+      found.answer = NameLimit(table_, a, b, found.answer.status(), query_);
+    }
   }
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
-  if (!found.answer.ok()) {
-    found.answer = NameLimit(table_, a, b, found.answer.status(), options_.query);
-  }
   piece.totals.set_candidates(piece.totals.candidates() + 1);
   if (found.answer.ok() && !found.contact.has_value()) piece.rungs.Add(found.answer->rung);
   return found;
@@ -290,9 +248,9 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> an
   const bool may_be_near =
       answer.ok() && (answer->relation == Relation::kOverlapping || nearest_->MayBeNear(a, b));
   if (may_be_near) {
-    QueryOptions query = options_.query;
+    QueryOptions query = query_;
     query.want_separation = true;
-    answer = AskPlaced(table_, a, b, query, nullptr).answer;
+    answer = AskAtRest(table_, a, b, query, nullptr).answer;
   }
   if (absl::IsCancelled(answer.status())) return answer.status();
   const v1::Relation relation =
@@ -377,7 +335,7 @@ v1::Relation SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& a
   piece.row_bytes += kPairBytes + AddPlacedAnswer(table_, a, b, answer, request().wanted(),
                                                   rows.mutable_columns());
   const v1::Relation relation = rows.columns().relations(rows.pairs_size() / 2 - 1);
-  if (piece.row_bytes >= FullMessageBytes(request().wanted())) piece.AddRows();
+  if (piece.row_bytes >= FullMessageBytes(request().wanted())) piece.EndReply();
   return relation;
 }
 

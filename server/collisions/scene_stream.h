@@ -37,21 +37,12 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
     MeetingPieces pieces;
   };
   std::optional<Bodies> bodies;
-  // Rows of the next reply, and an upper estimate of their bytes.
-  v1::FindCollisionsResponse rows;
-  size_t row_bytes = 0;
   // Counts since the last delivery of the piece.
   v1::SceneTotals totals;
-  RungCounts rungs;
 
   size_t held_bytes() const {
     return candidates.MemoryBytes() + row_bytes +
            (bodies.has_value() ? bodies->pieces.MemoryBytes() : 0);
-  }
-
-  void AddRows() {
-    if (row_bytes > 0) Add(std::exchange(rows, {}));
-    row_bytes = 0;
   }
 };
 
@@ -63,18 +54,10 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
-  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, const PieceThreads& threads,
-                             const grpc::ByteBuffer& request);
+  SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request);
 
  private:
-  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-              const PieceThreads& threads, const grpc::ByteBuffer& request);
-
-  bool IsShort() const override;
   absl::Status Validate() override;
-  const Freshness& freshness() const override { return freshness_; }
-  absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
   size_t HeldBytes() const override;
@@ -106,11 +89,7 @@ class SceneStream
 
   // Written before the first piece.
   SceneOptions options_;
-  // If a placement moves.
-  MotionOptions motion_options_;
-  Freshness freshness_;
   std::vector<GroupPair> ignored_groups_;
-  PlacementTable table_;
   std::optional<SceneSearch> search_;
   // With every_piece: the query of a pair of pieces.
   QueryOptions piece_query_;

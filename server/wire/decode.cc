@@ -166,13 +166,6 @@ absl::Status ValidateEnd(const Motion& motion) {
       "motion; negate its components for the shorter path");
 }
 
-absl::StatusOr<Motion> DecodeMotion(const Pose& pose, const v1::Placement& placement) {
-  if (!placement.has_end_pose()) return Motion{pose, pose};
-  const Motion motion = {pose, ReadPose(placement.end_pose())};
-  if (absl::Status s = ValidateEnd(motion); !s.ok()) return Prefixed("end_pose.", s);
-  return motion;
-}
-
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
                                           SteadyClock::time_point began) {
   Freshness freshness;

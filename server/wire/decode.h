@@ -51,10 +51,6 @@ absl::Status ValidateRadius(double radius);
 // OK, or INVALID_ARGUMENT about the end of a motion with a valid start, naming the coordinate: it
 // is malformed, or the rotation vanishes on the way.
 absl::Status ValidateEnd(const Motion& motion);
-// Decodes the motion of a placement with this valid pose; without end_pose it is at rest.
-// INVALID_ARGUMENT: ValidateEnd.
-absl::StatusOr<Motion> DecodeMotion(const Pose& pose, const v1::Placement& placement);
-
 // Packed poses have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
 // Returns the i-th packed pose without validation (ValidatePose). Cost: 2 ns.

@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "core/query/collision.h"
-#include "core/query/motion/moving_body_search.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
@@ -14,8 +12,24 @@ namespace {
 
 // Two indices as varints.
 constexpr size_t kPiecesBytes = 10;
-// Tag and length of an entry within its message, and the row of a proof.
-constexpr size_t kAnswerEntryBytes = 10;
+// Tag and length of a proof within its message, and its row.
+constexpr size_t kProofBytes = 10;
+// Steps of a search of bodies between two reads of the clock. One of moving bodies takes some
+// microseconds at least.
+constexpr uint64_t kStepsAtRest = 64;
+constexpr uint64_t kStepsInMotion = 1;
+
+// True if a placement is a body. The query then takes about as long as many pairs of hulls.
+bool HasBody(const PlacementTable& table, uint32_t a, uint32_t b) {
+  return table.is_body(a) || table.is_body(b);
+}
+
+absl::StatusOr<Answer> AskHulls(const PlacementTable& table, uint32_t a, uint32_t b,
+                                const QueryOptions& options, PairCache* cache) {
+  std::optional<PlacedHull> made_a;
+  std::optional<PlacedHull> made_b;
+  return CheckCollision(table.PlacedAt(a, &made_a), table.PlacedAt(b, &made_b), options, cache);
+}
 
 size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
                  const std::optional<PiecePair>& pieces, v1::AnswerColumns* columns) {
@@ -35,20 +49,6 @@ size_t AddRow(const PlacementTable& table, const QueryHull& a, const QueryHull& 
   return table.has_motions() ? bytes + AddNoTimes(columns) : bytes;
 }
 
-// Encodes the proof of the answer; returns its bytes.
-size_t EncodeProof(const PlacementTable& table, uint32_t a, uint32_t b,
-                   const std::vector<PieceCertificate>& certificates, v1::PieceProof* proof) {
-  size_t bytes = kAnswerEntryBytes;
-  for (const PieceCertificate& certificate : certificates) {
-    v1::PieceCertificate* const message = proof->add_certificates();
-    EncodePieceCertificate(certificate, table.HullOfPiece(a, certificate.pieces.a).hull(),
-                           table.HullOfPiece(b, certificate.pieces.b).hull(), message);
-    bytes += kAnswerEntryBytes + message->ByteSizeLong();
-    if (bytes > Config::kMaxRowProofBytes) break;
-  }
-  return bytes;
-}
-
 // Adds the row of a pair with a body and its certificates. The proof is encoded aside, because it
 // may turn out too large.
 size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
@@ -60,7 +60,8 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),
                         answer, wanted, &row);
   v1::PieceProof* const proof = row.add_piece_proofs();
-  bytes += EncodeProof(table, a, b, answer.of_body.certificates, proof);
+  bytes += kProofBytes + AddCertificates(table, a, b, answer.of_body.certificates,
+                                         Config::kMaxRowProofBytes, proof->mutable_certificates());
   bool is_answered = row.pair_problems_size() == 0;
   if (is_answered && bytes > Config::kMaxRowProofBytes) {
     row.Clear();
@@ -83,42 +84,126 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 
 }  // namespace
 
-absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const absl::Status& status, const QueryOptions& options) {
-  return IsLongToAsk(table, a, b) ? NameProofLimit(status, options.max_depth_bytes)
-                                  : NameQueryLimit(status, options);
+absl::Status PairSearch::CheckMemory(Registry& registry) const {
+  const bool holds_much = options_.method == Method::kTextbookSat && !HasBody(table_, a_, b_) &&
+                          HoldsMuchForTextbook(table_.placed()[a_], table_.placed()[b_]);
+  return holds_much ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
+}
+
+bool PairSearch::Advance(Clock::time_point end) {
+  absl::StatusOr<bool> is_known = false;
+  if (std::holds_alternative<std::monostate>(search_)) is_known = Begin();
+  if (is_known.ok() && !*is_known) is_known = Continue(end);
+  if (is_known.ok() && !*is_known) return false;
+  if (!is_known.ok()) answer_.answer = is_known.status();
+  if (!answer_.answer.ok()) {
+    answer_.answer = NameLimit(table_, a_, b_, answer_.answer.status(), options_);
+  }
+  return true;
+}
+
+absl::StatusOr<bool> PairSearch::Begin() {
+  if (HasBody(table_, a_, b_)) {
+    if (table_.has_motions()) {
+      search_.emplace<MovingBodies>(table_, a_, b_, motion_);
+      return false;
+    }
+    if (absl::Status s = ValidateForBodies(options_); !s.ok()) return s;
+    search_.emplace<BodySearch>(table_.bodies()[a_], table_.bodies()[b_], options_);
+    return false;
+  }
+  if (table_.has_motions()) {
+    absl::StatusOr<FirstContact> contact =
+        FindFirstContact(table_.MovingAt(a_), table_.MovingAt(b_), motion_);
+    if (!contact.ok()) return contact.status();
+    Take(*std::move(contact), {});
+    return true;
+  }
+  if (options_.method == Method::kTextbookSat) {
+    absl::StatusOr<TextbookCheck> check =
+        TextbookCheck::Begin(table_.placed()[a_], table_.placed()[b_], options_);
+    if (!check.ok()) return check.status();
+    search_ = *std::move(check);
+    return false;
+  }
+  answer_.answer = AskHulls(table_, a_, b_, options_, nullptr);
+  return true;
+}
+
+absl::StatusOr<bool> PairSearch::Continue(Clock::time_point end) {
+  if (auto* const check = std::get_if<TextbookCheck>(&search_)) {
+    const absl::StatusOr<bool> is_known = check->Advance(end);
+    if (is_known.ok() && *is_known) answer_.answer = check->Finish();
+    return is_known;
+  }
+  auto* const at_rest = std::get_if<BodySearch>(&search_);
+  absl::StatusOr<bool> has_ended = false;
+  do {
+    has_ended = at_rest != nullptr ? at_rest->Advance(kStepsAtRest)
+                                   : std::get<MovingBodies>(search_).search.Advance(kStepsInMotion);
+  } while (has_ended.ok() && !*has_ended && Clock::now() < end);
+  if (!has_ended.ok() || !*has_ended) return has_ended;
+  if (at_rest == nullptr) {
+    BodyContact found = std::get<MovingBodies>(search_).search.Take();
+    Take(std::move(found.contact), std::move(found.of_body));
+    return true;
+  }
+  absl::StatusOr<BodyAnswer> found = at_rest->Take();
+  if (!found.ok()) return found.status();
+  answer_.answer = std::move(found->answer);
+  answer_.of_body = PiecesAnswer(*std::move(found));
+  return true;
+}
+
+void PairSearch::Take(FirstContact contact, PiecesAnswer of_body) {
+  answer_.answer.emplace().relation = contact.relation;
+  answer_.of_body = std::move(of_body);
+  answer_.contact = std::move(contact);
+}
+
+size_t PairSearch::MemoryBytes() const {
+  const auto* const check = std::get_if<TextbookCheck>(&search_);
+  return check == nullptr ? 0 : check->MemoryBytes();
 }
 
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const QueryOptions& options, PairCache* cache) {
-  if (!table.is_body(a) && !table.is_body(b)) {
-    std::optional<PlacedHull> made_a;
-    std::optional<PlacedHull> made_b;
-    return {CheckCollision(table.PlacedAt(a, &made_a), table.PlacedAt(b, &made_b), options, cache)};
-  }
-  if (absl::Status s = ValidateForBodies(options); !s.ok()) return {s};
-  absl::StatusOr<BodyAnswer> found = CheckBodies(table.bodies()[a], table.bodies()[b], options);
-  if (!found.ok()) return {found.status()};
-  return {std::move(found->answer), PiecesAnswer(*std::move(found))};
+                       const QueryOptions& options, const MotionOptions& motion) {
+  PairSearch search(table, a, b, options, motion);
+  while (!search.Advance(PairSearch::Clock::time_point::max())) continue;
+  return std::move(search.answer());
 }
 
-PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const MotionOptions& options) {
-  BodyContact found;
-  if (table.is_body(a) || table.is_body(b)) {
-    absl::StatusOr<BodyContact> of_bodies =
-        FindFirstContact(table.MovingBodyAt(a), table.MovingBodyAt(b), options);
-    if (!of_bodies.ok()) return {of_bodies.status()};
-    found = *std::move(of_bodies);
-  } else {
-    absl::StatusOr<FirstContact> of_hulls =
-        FindFirstContact(table.MovingAt(a), table.MovingAt(b), options);
-    if (!of_hulls.ok()) return {of_hulls.status()};
-    found.contact = *std::move(of_hulls);
+PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const QueryOptions& options, PairCache* cache) {
+  static const auto* const kNoMotion = new MotionOptions();
+  if (HasBody(table, a, b)) return AskPlaced(table, a, b, options, *kNoMotion);
+  PlacedAnswer found = {AskHulls(table, a, b, options, cache)};
+  if (!found.answer.ok()) {
+    found.answer = NameLimit(table, a, b, found.answer.status(), options);
   }
-  Answer answer;
-  answer.relation = found.contact.relation;
-  return {std::move(answer), std::move(found.of_body), std::move(found.contact)};
+  return found;
+}
+
+absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const absl::Status& status, const QueryOptions& options) {
+  return HasBody(table, a, b) ? NameProofLimit(status, options.max_depth_bytes)
+                              : NameQueryLimit(status, options);
+}
+
+size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const std::vector<PieceCertificate>& certificates, size_t most,
+                       google::protobuf::RepeatedPtrField<v1::PieceCertificate>* messages) {
+  // Tag and length.
+  constexpr size_t kEntryBytes = 4;
+  size_t bytes = 0;
+  for (const PieceCertificate& certificate : certificates) {
+    v1::PieceCertificate* const message = messages->Add();
+    EncodePieceCertificate(certificate, table.HullOfPiece(a, certificate.pieces.a).hull(),
+                           table.HullOfPiece(b, certificate.pieces.b).hull(), message);
+    bytes += kEntryBytes + message->ByteSizeLong();
+    if (bytes > most) break;
+  }
+  return bytes;
 }
 
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
@@ -127,8 +212,7 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   if (!table.has_bodies()) {
     return AddRow(table, table.HullAt(a), table.HullAt(b), answer, wanted, columns);
   }
-  const bool is_proven =
-      wanted.certificate() && answer.answer.ok() && (table.is_body(a) || table.is_body(b));
+  const bool is_proven = wanted.certificate() && answer.answer.ok() && HasBody(table, a, b);
   if (is_proven) return AddProvenAnswer(table, a, b, answer, wanted, columns);
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   const size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),

@@ -1,23 +1,33 @@
 #ifndef HULLD_SERVER_COLLISIONS_PLACED_PLACED_ANSWER_H_
 #define HULLD_SERVER_COLLISIONS_PLACED_PLACED_ANSWER_H_
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <variant>
+#include <vector>
 
 #include "core/query/body/body_search.h"
+#include "core/query/collision.h"
 #include "core/query/motion/first_contact.h"
+#include "core/query/motion/moving_body.h"
+#include "core/query/motion/moving_body_search.h"
 #include "core/query/terms/answer.h"
 #include "core/query/terms/pair_cache.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/placed/placement_table.h"
+#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// The answer for two placements, or its error, and the deciding pair of pieces if one is a body.
+// The answer for two placements, or its error, and the deciding pair of pieces if one is a body. An
+// error of a limit names its flag.
 struct PlacedAnswer {
   absl::StatusOr<Answer> answer;
   PiecesAnswer of_body = {};
@@ -25,25 +35,76 @@ struct PlacedAnswer {
   std::optional<FirstContact> contact = {};
 };
 
-// Queries a pair of placements. A pair with a body gets an error for queries restricted to hulls,
-// or if it needs more certificates than a reply holds. cache: of a pair of hulls; may be null.
-// Requires that both are answerable.
+// The query of a pair of placements: of hulls or bodies, at rest or in motion, by any method. It is
+// computed in slices, so that other calls get their turn. A query of two hulls takes one slice, of
+// some milliseconds at most; the textbook's test and searches of bodies take as many as they need.
+class PairSearch {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // options: valid; for a table with motions, `motion` applies. All arguments must outlive this.
+  // Requires that both placements are answerable, and placed in advance for the textbook.
+  PairSearch(const PlacementTable& table, uint32_t a, uint32_t b, const QueryOptions& options,
+             const MotionOptions& motion)
+      : table_(table), a_(a), b_(b), options_(options), motion_(motion) {}
+  PairSearch(const PairSearch&) = delete;
+  PairSearch& operator=(const PairSearch&) = delete;
+
+  // RESOURCE_EXHAUSTED: the search holds much memory between slices, and readers exceed their share
+  // of --memory-limit. Call before the first Advance.
+  absl::Status CheckMemory(Registry& registry) const;
+
+  // Works until the answer is known, then returns true, or until `end`, but makes some progress.
+  bool Advance(Clock::time_point end);
+
+  // Requires that Advance returned true. CANCELLED: options.should_stop returned true. A pair with
+  // a body gets an error for queries restricted to hulls, or if it needs more certificates than a
+  // reply holds.
+  PlacedAnswer& answer() { return answer_; }
+
+  // Memory held between slices.
+  size_t MemoryBytes() const;
+
+ private:
+  struct MovingBodies {
+    MovingBodies(const PlacementTable& table, uint32_t i, uint32_t j, const MotionOptions& options)
+        : a(table.MovingBodyAt(i)), b(table.MovingBodyAt(j)), search(a, b, options) {}
+
+    const MovingBody a;
+    const MovingBody b;
+    MovingBodySearch search;
+  };
+
+  // Return true if the answer is known.
+  absl::StatusOr<bool> Begin();
+  absl::StatusOr<bool> Continue(Clock::time_point end);
+  void Take(FirstContact contact, PiecesAnswer of_body);
+
+  const PlacementTable& table_;
+  const uint32_t a_;
+  const uint32_t b_;
+  const QueryOptions& options_;
+  const MotionOptions& motion_;
+  std::variant<std::monostate, TextbookCheck, BodySearch, MovingBodies> search_;
+  PlacedAnswer answer_;
+};
+
+// Runs a whole search.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const QueryOptions& options, const MotionOptions& motion);
+
+// As AskPlaced for a call without motions. cache: of a pair of hulls; may be null.
+PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
-
-// As AskPlaced for a call with motions.
-PlacedAnswer AskMoving(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const MotionOptions& options);
-
-// True if the query takes about as long as many pairs of hulls, so that the clock must be checked
-// after it.
-inline bool IsLongToAsk(const PlacementTable& table, uint32_t a, uint32_t b) {
-  return table.is_body(a) || table.is_body(b);
-}
 
 // Returns the error of a query, with the limit that it hit.
 absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
                        const absl::Status& status, const QueryOptions& options);
+
+// Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns their bytes.
+size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const std::vector<PieceCertificate>& certificates, size_t most,
+                       google::protobuf::RepeatedPtrField<v1::PieceCertificate>* messages);
 
 // Adds the row of such an answer as AddAnswer does, or a row without an answer if the pieces'
 // certificates exceed Config::kMaxRowProofBytes.

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <string_view>
@@ -101,6 +102,18 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   return absl::OkStatus();
 }
 
+// Checks the ID of a placement, or adds its inline shape. INVALID_ARGUMENT: it names a hull and
+// carries points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
+absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
+                          InlineShapes* shapes) {
+  if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
+  if (placement.hull_id().empty()) return DecodeShape(placement.points(), shapes);
+  return absl::InvalidArgumentError("hull_id and points are both set; set one of them");
+}
+
+std::string FieldInList(size_t i) { return absl::StrCat("placements[", i, "]."); }
+std::string FieldInPair(size_t i) { return i == 0 ? "a." : "b."; }
+
 // Decodes the points of all inline shapes. INVALID_ARGUMENT: their number is not the sum of the
 // sizes.
 absl::StatusOr<std::vector<Vector>> DecodeShapePoints(const v1::PackedPlacements& packed) {
@@ -130,7 +143,10 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
   const absl::Status few = CheckCount(is_packed ? packed.hulls_size() : placements.size(),
                                       " placements", max_placements, what);
   if (!few.ok()) return few;
-  if (!is_packed) return PlacementTable(placements, caller);
+  if (!is_packed) {
+    return PlacementTable({placements.data(), static_cast<size_t>(placements.size())}, FieldInList,
+                          caller);
+  }
   for (const auto& [count, of] : {std::pair<int, const char*>{packed.hull_ids_size(), " hull_ids"},
                                   {packed.shape_sizes_size(), " shape_sizes"}}) {
     if (absl::Status s = CheckCount(count, of, max_placements, what); !s.ok()) return s;
@@ -139,6 +155,17 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
   const absl::StatusOr<std::vector<Vector>> shape_points = DecodeShapePoints(packed);
   if (!shape_points.ok()) return shape_points.status();
   return PlacementTable(packed, *shape_points, caller);
+}
+
+absl::StatusOr<PlacementTable> PlacementTable::MakePair(const v1::Placement& a,
+                                                        const v1::Placement& b,
+                                                        const Caller& caller) {
+  const std::array<const v1::Placement*, 2> pair = {&a, &b};
+  PlacementTable table(pair, FieldInPair, caller);
+  for (size_t i = 0; i < pair.size(); ++i) {
+    if (table.IsMalformed(i)) return table.problem(i);
+  }
+  return table;
 }
 
 PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vector> shape_points,
@@ -184,8 +211,8 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
     if (!HasHull(i)) {
       malformed_.emplace(i, malformed[named]);
     } else if (IsValidRadius(RadiusAt(i))) {
-      CheckPose(i, "packed_placements.poses[", "].");
-      if (has_motions()) CheckEnd(i, "packed_placements.end_poses[", "].");
+      CheckPoses(
+          i, [i](const char* of) { return absl::StrCat("packed_placements.", of, "s[", i, "]."); });
     } else {
       hull_of_[i] = kNoHull;
       malformed_.emplace(i, Prefixed(absl::StrCat("packed_placements.radii[", i, "]"),
@@ -194,8 +221,9 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
   }
 }
 
-PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-                               const Caller& caller)
+// field: returns the text of errors before a field of a placement.
+PlacementTable::PlacementTable(std::span<const v1::Placement* const> placements,
+                               std::string (*field)(size_t i), const Caller& caller)
     : prefix_(caller.prefix) {
   std::unordered_map<std::string_view, uint32_t> index_of;
   // Placements with inline shapes, which follow all IDs in hulls_.
@@ -203,17 +231,17 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   const size_t count = placements.size();
   hull_of_.resize(count, kNoHull);
   poses_.Resize(static_cast<int>(count) * kPoseNumbers, 0);
-  if (std::ranges::any_of(placements, &v1::Placement::has_end_pose)) {
+  if (std::ranges::any_of(placements, [](const auto* each) { return each->has_end_pose(); })) {
     end_poses_.Resize(poses_.size(), 0);
   }
   for (size_t i = 0; i < count; ++i) {
-    const v1::Placement& placement = placements[static_cast<int>(i)];
+    const v1::Placement& placement = *placements[i];
     const auto known = index_of.find(placement.hull_id());
     const bool is_known = known != index_of.end() && !placement.has_points();
     absl::Status status = Prefixed("radius", ValidateRadius(placement.radius()));
     if (status.ok() && !is_known) status = CheckSubject(caller, placement, &shapes_);
     if (!status.ok()) {
-      malformed_.emplace(i, Prefixed(absl::StrCat("placements[", i, "]."), status));
+      malformed_.emplace(i, Prefixed(field(i), status));
       continue;
     }
     if (placement.has_points()) {
@@ -230,11 +258,11 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
       radii_[static_cast<int>(i)] = placement.radius();
     }
     WritePose(ReadPose(placement.pose()), i, &poses_);
-    CheckPose(i, "placements[", "].pose.");
-    if (!has_motions()) continue;
-    WritePose(placement.has_end_pose() ? ReadPose(placement.end_pose()) : PoseAt(i), i,
-              &end_poses_);
-    CheckEnd(i, "placements[", "].end_pose.");
+    if (has_motions()) {
+      WritePose(placement.has_end_pose() ? ReadPose(placement.end_pose()) : PoseAt(i), i,
+                &end_poses_);
+    }
+    CheckPoses(i, [&](const char* of) { return absl::StrCat(field(i), of, "."); });
   }
   shape_count_ = shaped.size();
   for (size_t k = 0; k < shape_count_; ++k) {
@@ -242,17 +270,15 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   }
 }
 
-// of, after: text of the error before and after the index.
-void PlacementTable::CheckPose(size_t i, const char* of, const char* after) {
-  const Pose pose = PoseAt(i);
-  if (IsValidPose(pose)) return;
-  malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), ValidatePose(pose)));
-}
-
-void PlacementTable::CheckEnd(size_t i, const char* of, const char* after) {
-  if (IsMalformed(i)) return;
-  const absl::Status valid = ValidateEnd(MotionAt(i));
-  if (!valid.ok()) malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), valid));
+// field: returns the text of errors before a coordinate of "pose" or "end_pose".
+template <typename Field>
+void PlacementTable::CheckPoses(size_t i, const Field& field) {
+  if (const Pose pose = PoseAt(i); !IsValidPose(pose)) {
+    malformed_.emplace(i, Prefixed(field("pose"), ValidatePose(pose)));
+  } else if (has_motions()) {
+    const absl::Status valid = ValidateEnd(MotionAt(i));
+    if (!valid.ok()) malformed_.emplace(i, Prefixed(field("end_pose"), valid));
+  }
 }
 
 MovingBox PlacementTable::MovingBoxAt(size_t i) const {
@@ -535,6 +561,13 @@ void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {
   EncodeVersion(*store_, hulls_[k]->record, version);
 }
 
+void PlacementTable::EncodeDecidingPiece(size_t i, uint32_t piece,
+                                         v1::DecidingPiece* message) const {
+  const HullView& body = *hulls_[hull_of_[i]];
+  message->set_index(piece);
+  EncodeVersion(*store_, body.body->hull_of(piece).record, message->mutable_hull());
+}
+
 void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) const {
   const absl::Status& status = problem(i);
   HULLD_CHECK(!status.ok());
@@ -542,13 +575,6 @@ void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) cons
   message->set_code(ToGrpc(status.code()));
   message->set_message(std::string(status.message()));
   message->set_reason(ReasonOf(status));
-}
-
-absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
-                          InlineShapes* shapes) {
-  if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
-  if (placement.hull_id().empty()) return DecodeShape(placement.points(), shapes);
-  return absl::InvalidArgumentError("hull_id and points are both set; set one of them");
 }
 
 absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,

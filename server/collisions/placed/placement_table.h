@@ -50,6 +50,10 @@ class PlacementTable {
       v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
+  // As Make, for the placements "a" and "b" of a pair. The first malformed one is the error.
+  static absl::StatusOr<PlacementTable> MakePair(const v1::Placement& a, const v1::Placement& b,
+                                                 const Caller& caller);
+
   // Places placements at each use instead of in advance: for a call that uses each about once. Call
   // before Resolve.
   void PlaceOnDemand() { places_on_demand_ = true; }
@@ -168,6 +172,8 @@ class PlacementTable {
   }
   size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
+  // Encodes the piece of a body that decided. Requires that the placement is a body.
+  void EncodeDecidingPiece(size_t i, uint32_t piece, v1::DecidingPiece* message) const;
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
 
@@ -182,16 +188,15 @@ class PlacementTable {
     google::protobuf::RepeatedPtrField<v1::HullVersion>* piece_hulls;
   };
 
-  PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+  PlacementTable(std::span<const v1::Placement* const> placements, std::string (*field)(size_t i),
                  const Caller& caller);
   PlacementTable(v1::PackedPlacements& packed, std::span<const Vector> shape_points,
                  const Caller& caller);
 
   bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
-  void CheckPose(size_t i, const char* of, const char* after);
-  // As CheckPose, for the end pose.
-  void CheckEnd(size_t i, const char* of, const char* after);
+  template <typename Field>
+  void CheckPoses(size_t i, const Field& field);
   Motion MotionAt(size_t i) const { return {PoseAt(i), ReadPose(end_poses_, i)}; }
   double RadiusAt(size_t i) const { return radii_.empty() ? 0 : radii_[static_cast<int>(i)]; }
   Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
@@ -258,11 +263,6 @@ class PlacementTable {
   // If certificates are wanted: the hulls of all pieces, without duplicates; owned by hulls_.
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
-
-// Checks the ID of a placement, or adds its inline shape. INVALID_ARGUMENT: it names a
-// hull and carries points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
-absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
-                          InlineShapes* shapes);
 
 // INVALID_ARGUMENT, naming the first field with an end pose: the call takes no motions. `what`: its
 // subject, as in "a stream".

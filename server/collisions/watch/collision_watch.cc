@@ -49,13 +49,6 @@ v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, 
 
 }  // namespace
 
-BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                   Registry& registry, WorkerPool& readers,
-                                   WorkerPool& long_readers, TaskPool& pool) {
-  return Launch(std::shared_ptr<CollisionWatch>(
-      new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
-}
-
 void CollisionWatch::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
@@ -72,14 +65,14 @@ void CollisionWatch::StartWork() {
   if (is_sending_) return work(lane_, &CollisionWatch::SendRound);
   if (has_message_) {
     // The first message resolves all hulls.
-    if (!is_open_) return work(long_readers_, &CollisionWatch::TakeMessage);
+    if (!is_open_) return work(parts_.long_readers, &CollisionWatch::TakeMessage);
     const bool is_short = request().update().placements_size() <= kMostShortUpdate;
-    if (is_short) return work(pool_, &CollisionWatch::TakeMessage);
+    if (is_short) return work(parts_.pool, &CollisionWatch::TakeMessage);
     return work(lane_, &CollisionWatch::TakeMessage);
   }
   if (has_half_closed_) return End(absl::OkStatus());
   if (!std::exchange(has_changes_, false)) return;
-  work(readers_, &CollisionWatch::TakeChanges);
+  work(parts_.readers, &CollisionWatch::TakeChanges);
 }
 
 void CollisionWatch::OnMessage() {
@@ -134,7 +127,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   }
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
-  const Limits& limits = registry_.limits();
+  const Limits& limits = parts_.registry.limits();
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
   if (!options.ok()) return options.status();
@@ -172,10 +165,10 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
       hulls_.Open(table_.hull_ids(), on_ready,
                   table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
   if (!round.ok()) return round.status();
-  absl::Status built = table_.AddShapes(registry_, should_stop, &round->resolved);
+  absl::Status built = table_.AddShapes(parts_.registry, should_stop, &round->resolved);
   if (!built.ok()) return built;
   Locked([this] { has_changes_ = true; });
-  table_.SetHulls(registry_.store(), std::move(round->resolved), options_);
+  table_.SetHulls(parts_.registry.store(), std::move(round->resolved), options_);
   revision_ = round->revision;
   new_piece_hulls_ = std::move(round->piece_hulls);
   for (const size_t k : round->places) {
@@ -249,7 +242,7 @@ absl::Status CollisionWatch::HandleChanges(WatchedHulls::Round round) {
 absl::Status CollisionWatch::BeginRound(const std::vector<uint32_t>& changed) {
   if (absl::Status s = pairs_.Select(changed, table_); !s.ok()) return s;
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + hulls_.MemoryBytes());
-  if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  if (absl::Status s = parts_.registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   call().AddPairs(pairs_.selected().size());
   next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
   is_sending_ = true;
@@ -279,7 +272,7 @@ void CollisionWatch::SendRound() {
     new_problems_.clear();
     if (answers_message_) call().EndMessage();
   }
-  EncodeHeader(registry_.store(), revision_, reply_.mutable_header());
+  EncodeHeader(parts_.registry.store(), revision_, reply_.mutable_header());
   reply_.set_update(messages_);
   reply_.set_synced(is_complete);
   Locked([&] {
@@ -303,7 +296,7 @@ bool CollisionWatch::AddHulls() {
     } else if (next_piece_hull_ < new_piece_hulls_.size()) {
       v1::HullVersion* const version = reply_.add_piece_hulls();
       const HullRecord& hull = new_piece_hulls_[next_piece_hull_++];
-      EncodeVersion(registry_.store(), hull, version);
+      EncodeVersion(parts_.registry.store(), hull, version);
       reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
@@ -321,7 +314,7 @@ absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
     pair.is_within_clearance = false;
     return absl::OkStatus();
   }
-  const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
+  const PlacedAnswer found = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
   const absl::StatusOr<Answer>& answer = found.answer;
   if (!answer.ok()) return answer.status();
   rungs_.Add(answer->rung);
@@ -341,19 +334,15 @@ void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pa
   event->set_placement_a(pair.a);
   event->set_placement_b(pair.b);
   if (kind != v1::COLLISION_EVENT_KIND_LOST) {
-    const HullView& a = *table_.hull(*table_.hull_of(pair.a));
-    const HullView& b = *table_.hull(*table_.hull_of(pair.b));
     event->set_relation(pair.relation);
-    event->set_revision_a(a.record.revision);
-    event->set_revision_b(b.record.revision);
-    const auto encode_piece = [this](const HullView& view, uint32_t piece,
-                                     v1::DecidingPiece* message) {
-      message->set_index(piece);
-      const HullRecord& hull = view.body->hull_of(piece).record;
-      EncodeVersion(registry_.store(), hull, message->mutable_hull());
-    };
-    if (pieces && a.body != nullptr) encode_piece(a, pieces->a, event->mutable_piece_a());
-    if (pieces && b.body != nullptr) encode_piece(b, pieces->b, event->mutable_piece_b());
+    event->set_revision_a(table_.hull(*table_.hull_of(pair.a))->record.revision);
+    event->set_revision_b(table_.hull(*table_.hull_of(pair.b))->record.revision);
+    if (pieces && table_.is_body(pair.a)) {
+      table_.EncodeDecidingPiece(pair.a, pieces->a, event->mutable_piece_a());
+    }
+    if (pieces && table_.is_body(pair.b)) {
+      table_.EncodeDecidingPiece(pair.b, pieces->b, event->mutable_piece_b());
+    }
     if (options_.clearance.has_value()) event->set_within_clearance(pair.is_within_clearance);
   }
   reply_bytes_ += kEntryHeaderBytes + event->ByteSizeLong();

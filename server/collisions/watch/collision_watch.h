@@ -13,12 +13,11 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
+#include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/watch/watched_hulls.h"
 #include "server/collisions/watch/watched_pairs.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
@@ -32,22 +31,14 @@ namespace hulld::server {
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
                                             v1::WatchCollisionsRequest> {
  public:
-  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                            TaskPool& pool);
+  CollisionWatch(CallContext& context, const CollisionParts& parts)
+      : ReadingStream(context, parts.admission, Rpc::kWatchCollisions),
+        parts_(parts),
+        lane_(parts.pool),
+        hulls_(parts.registry),
+        charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
  private:
-  CollisionWatch(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                 WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
-      : ReadingStream(context, admission, Rpc::kWatchCollisions),
-        registry_(registry),
-        readers_(readers),
-        long_readers_(long_readers),
-        pool_(pool),
-        lane_(pool),
-        hulls_(registry),
-        charge_(registry.memory(), MemoryUse::kReading) {}
-
   void Open() override {
     Locked([] {});
   }
@@ -75,10 +66,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   // Ends the task, and the call if `error` is not OK.
   void EndWork(const absl::Status& error);
 
-  Registry& registry_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
-  TaskPool& pool_;
+  const CollisionParts& parts_;
   TaskPool::Lane lane_;
 
   // Guarded by the mutex.

@@ -1,0 +1,26 @@
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_COLLISION_PARTS_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_COLLISION_PARTS_H_
+
+#include "server/call/admission.h"
+#include "server/process/task_pool.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/registry/waiting_calls.h"
+
+namespace hulld::server {
+
+// The parts of the server that collision calls use.
+struct CollisionParts {
+  Registry& registry;
+  Admission& admission;
+  // For steps that may block: about the hulls of a pair, and about the hulls of many.
+  WorkerPool& readers;
+  WorkerPool& long_readers;
+  TaskPool& pool;
+  // Waits for freshness without a thread.
+  WaitingCalls& waiting;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_COLLISION_PARTS_H_
