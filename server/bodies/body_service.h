@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-
 #include "hulld/v1/body.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"

@@ -3,7 +3,6 @@
 
 #include <grpcpp/grpcpp.h>
 
-
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
