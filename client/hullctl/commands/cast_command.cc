@@ -60,7 +60,8 @@ Triple NumbersOf(const v1::SeparatedInterval& interval) {
   return {Leading(n.x(), dropped), Leading(n.y(), dropped), Leading(n.z(), dropped)};
 }
 
-// The plane that separates the ray from the hull until they meet is that of the facet.
+// The plane that separates the ray from the hull until they meet is that of the facet, except within
+// rounding of an edge or vertex.
 std::optional<Triple> NormalOf(const v1::FirstContact& contact) {
   if (contact.intervals().empty()) return std::nullopt;
   Triple n = NumbersOf(*contact.intervals().rbegin());
@@ -228,8 +229,9 @@ void AddCastCommand(Command program, Invocation* invocation) {
       "The ray ends at ORIGIN + DIRECTION: the length of DIRECTION is that of the ray. Hits are\n"
       "sorted by time, from 0 at the start to 1 at the end, and are exact: a ray that grazes a\n"
       "corner hits the hull. A time that is not a double is rounded up to the next one. Hulls are\n"
-      "not moved. NORMAL is the outward normal of the facet that the ray hits, or - if the ray\n"
-      "starts in the hull. Bodies are not searched.");
+      "not moved. NORMAL is the outward normal of the facet that the ray hits or, within rounding of\n"
+      "an edge or a vertex, of some plane that has the hull on one side; - if the ray starts in the\n"
+      "hull. Bodies are not searched.");
   command.SetExamples({{"What is below the origin?", "hullctl cast 0,0,0 0,0,-100"},
                        {"", "hullctl cast 0,0,0 100,0,0 robot/ --output name"}});
   command.OnGiven([=] { invocation->action = [=] { return CastRay(*invocation, *arguments); }; });

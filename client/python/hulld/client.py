@@ -579,8 +579,9 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hits:
-        """The hits of rays: exact, grazes included. A ray is a point that moves from its origin to
-        origin + direction, so a direction has the length of its ray.
+        """The hits of rays: exact, grazes included, unless a placement has a radius or rotates. A
+        ray is a point that moves from its origin to origin + direction, rounded, so a direction has
+        the length of its ray.
 
         origins, directions: n x 3, or one of them 3 for all rays. placements: as in
         check_collisions; the pieces of a body must have its frame. Pairs far apart are skipped in

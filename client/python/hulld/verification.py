@@ -16,7 +16,7 @@ from typing import Protocol, Union
 import numpy as np
 import numpy.typing as npt
 
-from hulld.answers.bodies import Body
+from hulld.answers.bodies import Body, BodyInfo
 from hulld.answers.collisions import (
     Batch,
     Certificate,
@@ -29,7 +29,7 @@ from hulld.answers.collisions import (
     SeparatedInterval,
     StreamAnswer,
 )
-from hulld.answers.hulls import HullMesh
+from hulld.answers.hulls import Header, HullInfo, HullMesh
 from hulld.errors import NotFoundError
 from hulld.geometry.placements import (
     Placement,
@@ -158,6 +158,8 @@ class _Piece:
             index = int(places[0])
         if index >= len(self.points):
             raise VerificationError("a vertex pair names a vertex that does not exist")
+        if not (self._vertices[index] == vertex).all():
+            raise VerificationError(f"a vertex pair gives other coordinates of vertex {index}")
         return self.points[index]
 
     def box(self) -> list[tuple[Fraction, Fraction]]:
@@ -259,7 +261,10 @@ def _check_nearness(relation: Relation, differences: Sequence[_Point], radius: F
 def _direction(given: Sequence[float] | Sequence[int] | None) -> _Point:
     if given is None:
         raise VerificationError("the certificate has no direction")
-    return (Fraction(given[0]), Fraction(given[1]), Fraction(given[2]))
+    try:
+        return (Fraction(given[0]), Fraction(given[1]), Fraction(given[2]))
+    except (ValueError, OverflowError):
+        raise VerificationError("the direction holds a number that is not finite") from None
 
 
 def _differences(certificate: Certificate, a: _Piece, b: _Piece) -> list[_Point]:
@@ -625,8 +630,9 @@ class Verifier:
 
     def __init__(self, client: _Source) -> None:
         self._client = client
-        self._meshes: dict[str, HullMesh] = {}
-        self._bodies: dict[str, Body | None] = {}
+        # The latest ones, each with its version; for the ID of a hull, no body.
+        self._meshes: dict[str, tuple[HullVersion, npt.NDArray[np.float64]]] = {}
+        self._bodies: dict[str, tuple[HullVersion, Body | None]] = {}
 
     def check(
         self,
@@ -779,38 +785,36 @@ class Verifier:
             yield piece, self._vertices(piece_hulls[piece.id])
 
     def _vertices(self, version: HullVersion) -> npt.NDArray[np.float64]:
-        if version.hull_id not in self._meshes:
+        known = self._meshes.get(version.hull_id)
+        if known is None or known[0] != version:
             try:
-                self._meshes[version.hull_id] = self._client.get_hull_mesh(version.hull_id)
+                mesh = self._client.get_hull_mesh(version.hull_id)
             except NotFoundError:
                 raise VerificationError(f"hull {version.hull_id} is gone", moved=True) from None
-        mesh = self._meshes[version.hull_id]
-        self._expect(version, mesh.info.create_revision, mesh.info.revision, mesh.header.store_id)
-        return mesh.vertices
+            _expect(version, mesh.info, mesh.header)
+            known = self._meshes[version.hull_id] = (version, mesh.vertices)
+        return known[1]
 
     def _body(self, version: HullVersion) -> Body | None:
-        if version.hull_id not in self._bodies:
+        """None: a hull has the ID."""
+        known = self._bodies.get(version.hull_id)
+        if known is None or known[0] != version:
             try:
-                self._bodies[version.hull_id] = self._client.get_body(version.hull_id)
+                body = self._client.get_body(version.hull_id)
+                _expect(version, body.info, body.header)
             except NotFoundError:
-                self._bodies[version.hull_id] = None
-        body = self._bodies[version.hull_id]
-        if body is not None:
-            self._expect(
-                version, body.info.create_revision, body.info.revision, body.header.store_id
-            )
-        return body
+                body = None
+            known = self._bodies[version.hull_id] = (version, body)
+        return known[1]
 
-    def _expect(self, version: HullVersion, created: int, revision: int, store_id: str) -> None:
-        if store_id != version.store_id:
-            raise VerificationError("the server's store differs from the answer's")
-        if (created, revision) == (version.create_revision, version.revision):
-            return
-        # A newer answer may be about the current body.
-        self._meshes.pop(version.hull_id, None)
-        self._bodies.pop(version.hull_id, None)
+
+def _expect(version: HullVersion, info: HullInfo | BodyInfo, header: Header) -> None:
+    """Checks that a hull or body is still at the version of an answer."""
+    if header.store_id != version.store_id:
+        raise VerificationError("the server's store differs from the answer's")
+    if (info.create_revision, info.revision) != (version.create_revision, version.revision):
         raise VerificationError(
-            f"{version.hull_id} is at revision {revision}; the answer is from revision "
+            f"{version.hull_id} is at revision {info.revision}; the answer is from revision "
             f"{version.revision}",
             moved=True,
         )

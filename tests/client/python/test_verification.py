@@ -121,3 +121,35 @@ def test_what_changed_since_is_said(client: hulld.Client, row: str, cube: str) -
     assert raised.value.moved
     again = client.check_collision(row, cube, certificate=True)
     verifier.check(row, cube, again)
+
+
+def test_an_answer_about_a_new_version_is_proven(
+    client: hulld.Client, row: str, cube: str
+) -> None:
+    verifier = hulld.Verifier(client)
+    for scale in (1, 2):
+        client.replace_hull(cube, np.multiply(CUBE, scale))
+        client.put_body(row, [cube] * scale)
+        verifier.check(cube, cube, client.check_collision(cube, cube, certificate=True))
+        verifier.check(row, cube, client.check_collision(row, cube, certificate=True))
+    client.delete_hull(cube)
+    client.put_body(cube, [row + "/piece"])
+    client.append_points(row + "/piece", CUBE, create=True)
+    verifier.check(cube, cube, client.check_collision(cube, cube, certificate=True))
+
+
+def test_numbers_of_a_proof_are_checked(client: hulld.Client, cube: str) -> None:
+    verifier = hulld.Verifier(client)
+    b = (cube, (1, 0, 0))
+    answer = client.check_collision(cube, b, certificate=True)
+    assert answer.certificate is not None
+    for x in (np.inf, -np.inf, np.nan):
+        forged = dataclasses.replace(answer.certificate, direction=(x, 0.0, 0.0))
+        with pytest.raises(hulld.VerificationError, match="not finite"):
+            verifier.check(cube, b, dataclasses.replace(answer, certificate=forged))
+    first, *rest = answer.certificate.pairs
+    for changes in ({"vertex_a": first.vertex_a + 1}, {"vertex_b": first.vertex_b + np.nan}):
+        pairs = (dataclasses.replace(first, **changes), *rest)  # type: ignore[arg-type]
+        forged = dataclasses.replace(answer.certificate, pairs=pairs)
+        with pytest.raises(hulld.VerificationError, match="other coordinates"):
+            verifier.check(cube, b, dataclasses.replace(answer, certificate=forged))

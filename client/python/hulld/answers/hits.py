@@ -16,8 +16,11 @@ class Hits:
     """The placements that rays meet: k rows, ascending by ray, then by time.
 
     rays, placements: k indices. times: k, from 0 at the origin of the ray to 1 at its end; a time
-    that no double represents becomes the next one. points: k x 3, on the ray at that time. normals:
-    k x 3, of unit length, out of the facet that is met; NaN if the ray starts in contact.
+    that no double represents becomes the next one. Of a placement with a radius or a rotation, a
+    time is at most 2^-30 late, and NaN where Relation.WITHIN_TOLERANCE leaves open if the ray meets
+    it. points: k x 3, on the ray at that time. normals: k x 3, of unit length, out of the facet
+    that is met; within rounding of an edge or vertex, normal to some plane that has the placement
+    on one side; NaN if the ray starts in contact.
     """
 
     rays: npt.NDArray[np.uint32]
@@ -48,7 +51,8 @@ class Hits:
 
 
 def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
-    """The plane that separates a ray from a hull until they meet is that of the facet."""
+    """The plane that separates a ray from a hull until they meet is that of the facet, except within
+    rounding of an edge or vertex."""
     if not proof or proof[-1].direction is None:
         return np.full(3, np.nan)
     direction = proof[-1].end_direction or proof[-1].direction

@@ -39,8 +39,9 @@ class Placement:
     stored. radius: grows the shape, or each piece of the body, by a closed ball: a point becomes a
     sphere, a segment a capsule. end_pose: of a motion, at time 1; None: the placement is at rest.
     At time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1, exactly;
-    of q1 and -q1, the same rotation, the one with the shorter path is taken. ValueError: a
-    malformed ID, shape, or radius, or not exactly one of ID and points.
+    of q1 and -q1, the same rotation, the one with the shorter path is taken. A translation alone
+    ends with the identity rotation, as any pose of this form. ValueError: a malformed ID, shape, or
+    radius, or not exactly one of ID and points.
     """
 
     id: str | None = None

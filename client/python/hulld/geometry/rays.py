@@ -5,27 +5,24 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hulld import arguments
 from hulld.geometry.placements import Placements
+from hulld.geometry.points import as_points
 
 Vectors = npt.NDArray[np.float64]
 
 
-def _vectors(values: npt.ArrayLike, name: str) -> Vectors:
-    array = arguments.as_floats(arguments.as_array(values, name), name).astype(np.float64)
-    if array.ndim not in (1, 2) or array.shape[-1] != 3:
-        raise ValueError(f"{name} has the shape {array.shape}; it takes (n, 3), or (3,)")
-    return np.atleast_2d(array)
-
-
 def ray_ends(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Vectors, Vectors]:
     """The origins and ends of rays, n x 3 each; one origin or direction serves all rays.
-    ValueError: other shapes."""
-    starts, along = _vectors(origins, "origins"), _vectors(directions, "directions")
+    ValueError: other shapes; an origin, direction, or end that is not finite."""
+    starts = as_points(origins, "origins").astype(np.float64)
+    along = as_points(directions, "directions").astype(np.float64)
     if len(starts) != len(along) and 1 not in (len(starts), len(along)):
         raise ValueError(f"there are {len(starts)} origins and {len(along)} directions")
     starts, along = np.broadcast_arrays(starts, along)
-    return starts, starts + along
+    with np.errstate(over="ignore"):
+        ends = starts + along
+    as_points(ends, "(origins + directions)")
+    return starts, ends
 
 
 def with_rays(targets: Placements, starts: Vectors, ends: Vectors) -> Placements:

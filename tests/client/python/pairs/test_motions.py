@@ -83,6 +83,8 @@ def test_each_part_of_a_proof_is_checked(client: hulld.Client, cube: str) -> Non
     expect("offsets at both ends", intervals=(dataclasses.replace(first, end_offset=None), *rest))
     zero = dataclasses.replace(first, end_direction=(0.0, 0.0, 0.0))
     expect("direction is zero", intervals=(zero, *rest))
+    infinite = dataclasses.replace(first, end_direction=(np.inf, 0.0, 0.0))
+    expect("not finite", intervals=(infinite, *rest))
     expect("not finite", intervals=(dataclasses.replace(first, end_offset=np.inf), *rest))
     expect("not finite", intervals=(dataclasses.replace(first, offset=np.inf), *rest))
     expect("direction is zero", intervals=(dataclasses.replace(first, direction=(0, 0, 0)), *rest))
@@ -232,6 +234,13 @@ def test_rays_hit_in_order(client: hulld.Client, cube: str) -> None:
         client.cast(np.zeros((3, 3)), np.zeros((2, 3)), row)
     with pytest.raises(ValueError, match="origins has the shape"):
         client.cast([1, 2], (1, 0, 0), row)
+    for origin, direction, message in [
+        ((0, np.nan, 0), (1, 0, 0), r"origins\[0\].y is nan"),
+        ((0, 0, 0), (1, 0, np.inf), r"directions\[0\].z is inf"),
+        ((1e308, 0, 0), (1e308, 0, 0), r"\(origins \+ directions\)\[0\].x is inf"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            client.cast(origin, direction, row)
     with pytest.raises(hulld.NotFoundError, match="nothing"):
         client.cast((0, 0, 0), (1, 0, 0), [cube, "nothing"])
 
