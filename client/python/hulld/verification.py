@@ -352,6 +352,18 @@ def _check_pieces(
                 )
 
 
+def _check_deciding(
+    relation: Relation, shown: Sequence[PieceCertificate], deciding: tuple[int, ...]
+) -> None:
+    """Checks that the pieces which the answer names are among those shown to be in contact."""
+    if relation == Relation.SEPARATED or deciding in ((one.piece_a, one.piece_b) for one in shown):
+        return
+    raise VerificationError(
+        f"the answer says that pieces {deciding[0]} of A and {deciding[1]} of B decided, but no "
+        "certificate shows that"
+    )
+
+
 # Directions and offsets at both ends of an interval, linear in between.
 _Plane = tuple[tuple[_Point, Fraction], tuple[_Point, Fraction]]
 
@@ -662,6 +674,10 @@ class Verifier:
             answer.piece_hulls,
             answer.first_contact,
             max_time_error,
+            (
+                0 if answer.piece_a is None else answer.piece_a.index,
+                0 if answer.piece_b is None else answer.piece_b.index,
+            ),
         )
 
     def check_row(
@@ -697,6 +713,8 @@ class Verifier:
             found.piece_hulls,
             answers[row].first_contact,
             max_time_error,
+            # -1 for a hull.
+            (0, 0) if answers.pieces is None else tuple(answers.pieces[row].clip(0).tolist()),
         )
 
     def _check(
@@ -710,6 +728,7 @@ class Verifier:
         piece_hulls: Mapping[str, HullVersion],
         contact: FirstContact | None,
         max_time_error: float,
+        deciding: tuple[int, ...],
     ) -> None:
         if relation not in _STRENGTH:
             raise VerificationError(f"{relation.name} has no certificate")
@@ -720,6 +739,8 @@ class Verifier:
                 of_a = self._moving_pieces(a, versions[0], piece_hulls)
                 of_b = self._moving_pieces(b, versions[1], piece_hulls)
                 _check_moving_pieces(relation, contact, proof, of_a, of_b, max_time_error)
+                shown = [one for one in proof if one.relation != Relation.SEPARATED]
+                _check_deciding(relation, shown, deciding)
                 return
             moving = (self._moving(a, versions[0]), self._moving(b, versions[1]))
             _check_first_contact(relation, contact, certificate, *moving, max_time_error)
@@ -735,6 +756,7 @@ class Verifier:
             self._pieces(a, versions[0], piece_hulls),
             self._pieces(b, versions[1], piece_hulls),
         )
+        _check_deciding(relation, [one for one in proof if one.relation == relation], deciding)
 
     def _points(self, placement: Placement, version: HullVersion) -> npt.NDArray[np.float64]:
         if placement.shape is None:

@@ -277,6 +277,9 @@ def test_bodies_in_motion_are_proven(client: hulld.Client, cube: str, name: str)
     assert hits.times.tolist() == [0.25] and hits.normals.tolist() == [[-1, 0, 0]]
     answer = client.check_collision(body, start, to_b=(3, 0, 0), certificate=True)
     assert answer.piece_a is not None and answer.piece_a.index == 1
+    other = dataclasses.replace(answer, piece_a=dataclasses.replace(answer.piece_a, index=0))
+    with pytest.raises(hulld.VerificationError, match="pieces 0 of A and 0 of B decided"):
+        verifier.check(body, start, other, to_b=(3, 0, 0))
     for number in range(2):
         short = [*answer.piece_certificates]
         short.pop(number)
