@@ -1,3 +1,4 @@
+#include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
@@ -60,8 +61,8 @@ Triple NumbersOf(const v1::SeparatedInterval& interval) {
   return {Leading(n.x(), dropped), Leading(n.y(), dropped), Leading(n.z(), dropped)};
 }
 
-// The plane that separates the ray from the hull until they meet is that of the facet, except within
-// rounding of an edge or vertex.
+// The plane that separates the ray from the hull until they meet is that of the facet, except
+// within rounding of an edge or vertex.
 std::optional<Triple> NormalOf(const v1::FirstContact& contact) {
   if (contact.intervals().empty()) return std::nullopt;
   Triple n = NumbersOf(*contact.intervals().rbegin());
@@ -78,6 +79,10 @@ class Ray {
  public:
   explicit Ray(const CastArguments& arguments) : origin_(arguments.origin) {
     for (int i = 0; i < 3; ++i) end_[i] = origin_[i] + arguments.direction[i];
+  }
+
+  bool HasFiniteEnd() const {
+    return std::ranges::all_of(end_, [](double number) { return std::isfinite(number); });
   }
 
   Triple PointAt(double time) const {
@@ -189,10 +194,15 @@ void Print(const Invocation& run, const Hits& found) {
 }
 
 ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
+  const Ray ray(arguments);
+  if (!ray.HasFiniteEnd()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "ORIGIN + DIRECTION is beyond the largest double; shorten the ray"));
+  }
   const Client client = run.MakeClient();
   const auto list = client.ListAllHulls(arguments.prefix);
   if (!list.ok()) return run.Fail(list.status());
-  const auto found = Cast(client, Ray(arguments), *list);
+  const auto found = Cast(client, ray, *list);
   if (!found.ok()) return run.Fail(found.status());
   Print(run, *found);
   if (found->failed == 0) return ExitCode::kDone;
@@ -229,8 +239,10 @@ void AddCastCommand(Command program, Invocation* invocation) {
       "The ray ends at ORIGIN + DIRECTION: the length of DIRECTION is that of the ray. Hits are\n"
       "sorted by time, from 0 at the start to 1 at the end, and are exact: a ray that grazes a\n"
       "corner hits the hull. A time that is not a double is rounded up to the next one. Hulls are\n"
-      "not moved. NORMAL is the outward normal of the facet that the ray hits or, within rounding of\n"
-      "an edge or a vertex, of some plane that has the hull on one side; - if the ray starts in the\n"
+      "not moved. NORMAL is the outward normal of the facet that the ray hits or, within rounding "
+      "of\n"
+      "an edge or a vertex, of some plane that has the hull on one side; - if the ray starts in "
+      "the\n"
       "hull. Bodies are not searched.");
   command.SetExamples({{"What is below the origin?", "hullctl cast 0,0,0 0,0,-100"},
                        {"", "hullctl cast 0,0,0 100,0,0 robot/ --output name"}});

@@ -7,10 +7,13 @@
 #include <array>
 #include <cstdint>
 #include <utility>
+#include <variant>
 
 #include "core/numeric/exponent_limits.h"
+#include "core/query/motion/pair_at.h"
 #include "core/query/motion/translation_search.h"
 #include "core/query/motion/turning_search.h"
+#include "core/query/terms/answer.h"
 
 namespace hulld {
 namespace {
@@ -68,6 +71,31 @@ absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
   return absl::OkStatus();
 }
 
+bool KeepsItsPose(const Motion& motion) {
+  return motion.start.t == motion.end.t && IsTranslation(motion);
+}
+
+// Finds the contact of two hulls at rest, in their relation at all times.
+absl::StatusOr<FirstContact> FindAtRest(const MovingHull& a, const MovingHull& b,
+                                        const MotionOptions& options) {
+  absl::StatusOr<Answer> answer =
+      PairAt(a, b, 0).Check(options.want_certificate, options.should_stop);
+  if (!answer.ok()) return answer.status();
+  FirstContact contact;
+  contact.relation = answer->relation;
+  if (answer->relation != Relation::kSeparated) {
+    contact.separated_until = 0;
+    contact.contact_time = 0;
+    contact.certificate = std::move(answer->certificate);
+  } else if (options.want_certificate) {
+    SeparatedInterval& interval = contact.intervals.emplace_back();
+    const ExactDirection& direction = answer->certificate->direction;
+    if (const Vector* n = std::get_if<Vector>(&direction)) interval.direction = *n;
+    if (const IntegerVector* n = std::get_if<IntegerVector>(&direction)) interval.direction = *n;
+  }
+  return contact;
+}
+
 // Requires: valid arguments, neither hull empty, and IsInOrder(a, b).
 absl::StatusOr<FirstContact> FindInOrder(const MovingHull& a, const MovingHull& b,
                                          const MotionOptions& options) {
@@ -76,6 +104,7 @@ absl::StatusOr<FirstContact> FindInOrder(const MovingHull& a, const MovingHull& 
   if (!rounded && IsTranslation(a.X_WB) && IsTranslation(b.X_WB)) {
     return TranslationSearch(a, b, options).Run();
   }
+  if (KeepsItsPose(a.X_WB) && KeepsItsPose(b.X_WB)) return FindAtRest(a, b, options);
   return TurningSearch(a, b, options).Run();
 }
 

@@ -94,9 +94,9 @@ struct FirstContact {
 
 // Finds the first contact of two hulls in motion. Exact if both motions are translations
 // (IsTranslation) and both radii 0, grazes included: the time is rational, and the bracket has no
-// double inside. Otherwise never a miss and never a false contact; the bracket is as narrow as
-// requested, and the relation is kWithinTolerance only within the resolution. Swapping A and B
-// mirrors the answer. Empty hulls are separated from everything.
+// double inside. Exact, too, if both are at rest. Otherwise never a miss and never a false contact;
+// the bracket is as narrow as requested, and the relation is kWithinTolerance only within the
+// resolution. Swapping A and B mirrors the answer. Empty hulls are separated from everything.
 //
 // INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; no
 // plane can be proven because a rotation nearly vanishes, or sizes are out of the range of

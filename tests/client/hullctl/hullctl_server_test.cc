@@ -177,6 +177,9 @@ TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
   EXPECT_EQ(Ask({"cast", "-1,1,1.0000000000000002", "8,0,0", "near/c", "--output", "name"}).out,
             "");
   EXPECT_EQ(Ask({"cast", "1,2", "8,0,0"}).code, 2);
+  ran = Ask({"cast", "1e308,0,0", "1e308,0,0"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION is beyond the largest double"));
   EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 

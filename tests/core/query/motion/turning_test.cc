@@ -316,6 +316,24 @@ TEST(Turning, RadiiBringTheContactForward) {
   EXPECT_EQ(relation_at(std::sqrt(2.0) + 0.2501), Relation::kSeparated);
 }
 
+TEST(Turning, RoundedPairsAtRestHaveTheRelationOfTheirPoses) {
+  for (const double scale : {1.0, 0x1p-1000, 0x1p1000}) {
+    SCOPED_TRACE(scale);
+    const OwnMoving a(Scaled(Box(1, 1, 1), scale), AtRest());
+    // Its rotation is the same at all times. The corner of A is 5 away.
+    const Vector t = scale * Vector(4, 5, 0);
+    const Motion at_rest = {{{1, 0, 0, 0}, t}, {{3, 0, 0, 0}, t}};
+    for (const double radius : {std::nextafter(5.0, 0.0), 5.0, std::nextafter(5.0, 6.0)}) {
+      const FirstContact contact = Find(a, OwnMoving({{0, 0, 0}}, at_rest, radius * scale));
+      EXPECT_EQ(contact.relation, radius < 5    ? Relation::kSeparated
+                                  : radius == 5 ? Relation::kTouching
+                                                : Relation::kOverlapping);
+      EXPECT_EQ(contact.separated_until, radius < 5 ? 1 : 0);
+      EXPECT_EQ(contact.contact_time, radius < 5 ? std::nullopt : std::optional(0.0));
+    }
+  }
+}
+
 TEST(Turning, ExtremeScalesKeepTheRelation) {
   for (const double scale : {1e-150, 1e-60, 1e60, 1e150}) {
     SCOPED_TRACE(scale);
