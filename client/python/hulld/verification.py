@@ -330,8 +330,8 @@ def _check_pieces(
     proven: dict[tuple[int, int], Relation] = {}
     for one in certificates:
         name = f"pieces {one.piece_a} of A and {one.piece_b} of B"
-        if one.piece_a >= len(a) or one.piece_b >= len(b):
-            raise VerificationError(f"{name} do not exist")
+        if one.piece_a >= len(a) or one.piece_b >= len(b) or (one.piece_a, one.piece_b) in proven:
+            raise VerificationError(f"{name} do not exist, or have two certificates")
         if one.relation not in _STRENGTH or _STRENGTH[one.relation] > _STRENGTH[relation]:
             raise VerificationError(f"{name} are {one.relation.name}, the bodies {relation.name}")
         try:
@@ -356,7 +356,7 @@ def _check_deciding(
     relation: Relation, shown: Sequence[PieceCertificate], deciding: tuple[int, ...]
 ) -> None:
     """Checks that the pieces which the answer names are among those shown to be in contact."""
-    if relation == Relation.SEPARATED or deciding in ((one.piece_a, one.piece_b) for one in shown):
+    if relation == Relation.SEPARATED or deciding in [(one.piece_a, one.piece_b) for one in shown]:
         return
     raise VerificationError(
         f"the answer says that pieces {deciding[0]} of A and {deciding[1]} of B decided, but no "

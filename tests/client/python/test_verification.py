@@ -87,6 +87,10 @@ def test_bodies_are_proven(client: hulld.Client, row: str, cube: str) -> None:
     short = dataclasses.replace(touching, piece_certificates=touching.piece_certificates[:-1])
     with pytest.raises(hulld.VerificationError, match="pieces 4 of A and 4 of B have no"):
         verifier.check(row, (row, (0, 1, 0)), short)
+    twice = (*touching.piece_certificates, touching.piece_certificates[0])
+    with pytest.raises(hulld.VerificationError, match="have two certificates"):
+        forged = dataclasses.replace(touching, piece_certificates=twice)
+        verifier.check(row, (row, (0, 1, 0)), forged)
     assert touching.piece_a is not None
     other = dataclasses.replace(touching, piece_a=dataclasses.replace(touching.piece_a, index=9))
     with pytest.raises(hulld.VerificationError, match="pieces 9 of A .* no certificate shows"):
