@@ -241,6 +241,14 @@ int ExactOrient2d(const Vector& a, const Vector& b, const Vector& c, CoordinateP
 }  // namespace
 
 int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
+  // Points in a plane across an axis, as on many facets of drawings. Usually one comparison for
+  // each.
+  for (int k = 0; k < 3; ++k) {
+    if (a[k] == b[k] && a[k] == c[k] && a[k] == d[k]) {
+      ++counts.filter;
+      return 0;
+    }
+  }
   if (const std::optional<int> sign = FilteredOrient3d(b - a, c - a, d - a)) {
     ++counts.filter;
     return *sign;

@@ -11,14 +11,15 @@ namespace hulld {
 // Returns the sign of det[b-a, c-a, d-a]: +1 if d lies on the side that the normal (b-a) x (c-a)
 // points to, 0 if the four points are coplanar, -1 otherwise. Exact for all finite input.
 //
-// Stages: a floating-point filter with a proven bound almost always decides. Next, the same filter
-// runs relative to one of the points; this decides if points lie close together and, after scaling
-// by a power of two, at extreme magnitudes. Integers of fixed size decide if all coordinates, on
-// one scale, fit into 60 bits. Expansions decide if the exponents, after scaling by a power of two,
-// lie within the range of kExpansionMin and kExpansionMax. Integers of arbitrary size decide the
-// rest. Cost: ~10 ns by the filter; ~30 ns from the nearest point or in fixed size; ~1 us by
-// expansions; several us by integers of arbitrary size, growing with the spread of exponents.
-// Source: Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic.
+// Stages: points that share a coordinate are coplanar. A floating-point filter with a proven bound
+// decides almost all others. Next, the same filter runs relative to one of the points; this decides
+// if points lie close together and, after scaling by a power of two, at extreme magnitudes.
+// Integers of fixed size decide if all coordinates, on one scale, fit into 60 bits. Expansions
+// decide if the exponents, after scaling by a power of two, lie within the range of kExpansionMin
+// and kExpansionMax. Integers of arbitrary size decide the rest. Cost: ~10 ns by the filter; ~30 ns
+// from the nearest point or in fixed size; ~1 us by expansions; several us by integers of arbitrary
+// size, growing with the spread of exponents. Source: Shewchuk 1997, Adaptive Precision
+// Floating-Point Arithmetic.
 //
 // Laws, for all finite points:
 // (1) Antisymmetry: exchanging two of the points negates the sign.

@@ -226,6 +226,28 @@ TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
   EXPECT_EQ(after.integer, before.integer);
 }
 
+// Points in a plane across an axis are coplanar at any magnitude, and no later stage is needed.
+TEST(Orient3d, PlanesAcrossAxesTakeNoExactArithmetic) {
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const OrientationCounts before = ThreadOrientationCounts();
+  for (const int scale : {-1070, -320, 0, 320, 1000}) {
+    for (int i = 0; i < 300; ++i) {
+      Points p;
+      for (Vector& v : p) {
+        v = Vector(unit(random), unit(random), unit(random)) * std::ldexp(1.0, scale);
+      }
+      for (Vector& v : p) v[i % 3] = p[0][i % 3];
+      ExpectExact(p);
+      ASSERT_EQ(Sign(p), 0);
+    }
+  }
+  const OrientationCounts after = ThreadOrientationCounts();
+  EXPECT_EQ(after.fixed_point, before.fixed_point);
+  EXPECT_EQ(after.expansion, before.expansion);
+  EXPECT_EQ(after.integer, before.integer);
+}
+
 // Rounding terms far below the rest to zero neither loses a certain sign nor makes an uncertain one
 // certain.
 TEST(Orient3d, MagnitudesFarApartTakeNoIntegersUnlessTheyCount) {
