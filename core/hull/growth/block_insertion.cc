@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <optional>
 #include <vector>
 
 #include "core/hull/growth/conflict_lists.h"
@@ -143,13 +142,13 @@ class BlockInsertion {
         seen.push_back(seen.back());
         continue;
       }
-      const std::optional<Surface::Location> location = surface_.Locate(vertices_, p);
-      if (!location) {
+      const Surface::Location location = surface_.Locate(vertices_, p);
+      if (location.side == Surface::Side::kUnknown) {
         astray_.push_back(p);
-      } else if (location->side == Surface::Side::kOutside) {
+      } else if (location.side == Surface::Side::kOutside) {
         outside.push_back(p);
-        seen.push_back(location->triangle);
-      } else if (const auto corner = surface_.CornerAt(vertices_, location->triangle, p)) {
+        seen.push_back(location.triangle);
+      } else if (const auto corner = surface_.CornerAt(vertices_, location.triangle, p)) {
         vertices_.CountDuplicate(*corner);
         ++duplicates;
       }
@@ -166,7 +165,8 @@ class BlockInsertion {
   // Returns the points of a sample that neither the map of directions nor, if many remain, a finer
   // map can reject.
   std::vector<Vector> SurvivorsOf(size_t stride) {
-    surface_.MeasureBefore(vertices_, points_.size() / stride, kBlockMapFineness,
+    surface_.MeasureBefore(vertices_, points_.size() / stride,
+                           needs_fine_map_ ? kFineMapFineness : kBlockMapFineness,
                            kBlockWalksPerPoint, poll_);
     std::vector<Vector> survivors;
     asked_ = 0;
@@ -181,9 +181,9 @@ class BlockInsertion {
       asked_ += points.size();
     }
     surface_.CountRejected(asked_, asked_ - survivors.size());
-    if (survivors.size() > kManyPerTriangle * surface_.triangle_count() &&
-        surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor,
-                               poll_)) {
+    needs_fine_map_ = survivors.size() > kManyPerTriangle * surface_.triangle_count();
+    if (needs_fine_map_ && surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness,
+                                                  kWalksPerSurvivor, poll_)) {
       indices_.clear();
       surface_.directions()->AppendSurvivors(survivors, indices_, poll_);
       for (size_t k = 0; k < indices_.size(); ++k) survivors[k] = survivors[indices_[k]];
@@ -214,6 +214,8 @@ class BlockInsertion {
   std::vector<Vector> rest_;
   // Number of points of the sample that were looked up in the map.
   size_t asked_ = 0;
+  // True if the last sample left many points for each triangle.
+  bool needs_fine_map_ = false;
   // Surviving indices among the points being looked up in the map.
   std::vector<uint32_t> indices_;
 };

@@ -69,22 +69,22 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
 void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
   const uint64_t work_before = work_;
-  std::optional<Location> location;
+  Location location = {Side::kUnknown, last_};
   if (directions_) {
     location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
   }
-  if (!location) {
+  if (location.side == Side::kUnknown) {
     location = Scan(vertices, point, size);
     work_ += triangles_.size();
   }
   steps_ += (work_ - work_before) / kTrianglesPerStep;
-  last_ = location->triangle;
-  if (location->side == Side::kInside) {
+  last_ = location.triangle;
+  if (location.side == Side::kInside) {
     // A point equal to a vertex lies only in the cones of that vertex's triangles.
-    const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
+    const std::optional<VertexId> corner = CornerAt(vertices, location.triangle, point);
     if (corner) vertices.CountDuplicate(*corner);
   } else {
-    RemoveVisible(vertices, point, location->triangle);
+    RemoveVisible(vertices, point, location.triangle);
     JoinToBoundary(vertices, point);
   }
   if (directions_) directions_->SetHint(cell, last_);

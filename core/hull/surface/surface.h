@@ -85,23 +85,23 @@ class Surface {
   }
 
   // The location of a point, and a triangle that it sees strictly (outside) or with a cone that
-  // contains it (inside).
-  enum class Side { kInside, kOutside };
+  // contains it (inside). Unknown: no triangle was found.
+  enum class Side { kInside, kOutside, kUnknown };
   struct Location {
     Side side;
     TriangleId triangle;
   };
-  // Locates a point; fast if the last point in its cell of the map was near it. Returns nothing if
-  // the walk exceeds the length expected for the surface. Requires: a known interior point.
-  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point) {
+  // Locates a point; fast if the last point in its cell of the map was near it. Unknown if the walk
+  // exceeds the length expected for the surface. Requires: a known interior point.
+  Location Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
     const size_t cell = directions_->PlaceOf(point).cell;
     const double size = SizeWith(vertices, point);
     const TriangleId start = Alive(directions_->hint(cell));
     ++work_;
-    std::optional<Location> location = SeenNear(start, point, size);
-    if (!location) location = Walk(vertices, point, size, start, work_);
-    if (location) directions_->SetHint(cell, location->triangle);
+    Location location = SeenNear(start, point, size);
+    if (location.side == Side::kUnknown) location = Walk(vertices, point, size, start, work_);
+    if (location.side != Side::kUnknown) directions_->SetHint(cell, location.triangle);
     return location;
   }
   // Returns true if the point lies strictly outside the triangle's plane, exactly.
@@ -266,9 +266,9 @@ class Surface {
   void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
   // Returns, among a triangle and the triangles beyond its edges, the one that the point is
-  // farthest outside; none if doubles are not certain that it is outside any. Faster than the walk
-  // steps that it saves.
-  std::optional<Location> SeenNear(TriangleId id, const Vector& point, double size) const {
+  // farthest outside; unknown if doubles are not certain that it is outside any. Faster than the
+  // walk steps that it saves.
+  Location SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
     double most = HeightAbove(t, point, size);
@@ -277,8 +277,7 @@ class Surface {
       best = height > most ? next : best;
       most = std::max(most, height);
     }
-    if (!(most > 0)) return std::nullopt;
-    return Location{Side::kOutside, best};
+    return {most > 0 ? Side::kOutside : Side::kUnknown, best};
   }
   // Returns the point's height above the triangle's plane, times the length of its normal, if that
   // is certainly above zero; otherwise zero.
@@ -286,8 +285,8 @@ class Surface {
     const double height = t.normal.dot(point) - t.offset;
     return height > static_cast<double>(t.slope) * size ? height : 0;
   }
-  std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start, uint64_t& steps) const;
+  Location Walk(const VertexTable& vertices, const Vector& point, double size, TriangleId start,
+                uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
   size_t EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
                     const Ray& ray, std::optional<uint32_t> first) const;

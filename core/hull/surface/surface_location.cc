@@ -89,12 +89,11 @@ double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
 // Crosses edges that have the point on their far side. The ray from the interior point through the
 // point meets the plane of the next triangle no later, and sooner unless both are coplanar. A walk
 // can therefore cycle only among coplanar triangles, and leaves the cycle after it starts to choose
-// at random. Returns nothing if the walk exceeds the length expected for the surface.
-std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start,
-                                               uint64_t& steps) const {
+// at random. Unknown if the walk exceeds the length expected for the surface.
+Surface::Location Surface::Walk(const VertexTable& vertices, const Vector& point, double size,
+                                TriangleId start, uint64_t& steps) const {
   ++steps;
-  if (SideOf(vertices, start, point, size) > 0) return Location{Side::kOutside, start};
+  if (SideOf(vertices, start, point, size) > 0) return {Side::kOutside, start};
   const Ray ray = RayTo(point);
   TriangleId at = start;
   uint32_t random = 1;
@@ -107,12 +106,12 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
     }
     const SurfaceTriangle& t = triangles_[at];
     const size_t edge = EdgeToward(vertices, t, point, ray, first);
-    if (edge == 3) return Location{Side::kInside, at};
+    if (edge == 3) return {Side::kInside, at};
     at = t.neighbors[edge];
     ++steps;
-    if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
+    if (SideOf(vertices, at, point, size) > 0) return {Side::kOutside, at};
   }
-  return std::nullopt;
+  return {Side::kUnknown, at};
 }
 
 Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
@@ -281,11 +280,10 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
     m *= 1 - step_back;
     if (round % 2 == 1) step_back *= 2;
     const Vector point = center + m * direction;
-    const std::optional<Location> location =
-        Walk(vertices, point, SizeWith(vertices, point), near, work_);
-    if (!location) return 0;
-    near = location->triangle;
-    if (location->side == Side::kInside) return m;
+    const Location location = Walk(vertices, point, SizeWith(vertices, point), near, work_);
+    if (location.side == Side::kUnknown) return 0;
+    near = location.triangle;
+    if (location.side == Side::kInside) return m;
   }
   return 0;
 }
