@@ -278,7 +278,7 @@ TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
   const double values[] = {0x1p60 - 0x1p8, -(0x1p60 - 0x1p8), 0x1p60, 1, -1, 0.5};
   const OrientationCounts before = ThreadOrientationCounts();
   for (const int scale : {-1070, -60, 0, 900}) {
-    for (int i = 0; i < 8000; ++i) {
+    for (int i = 0; i < 10000; ++i) {
       Points p;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(values[pick(random)], scale);
