@@ -14,8 +14,9 @@ namespace hulld {
 // coordinates of the two hulls, each about its center.
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
-// The largest bound of the angle of a normal, in radians. Floating point meets it inside facets, and
-// if the hulls are about as far apart as they are large; otherwise exact arithmetic finds the normal.
+// The largest bound of the angle of a normal, in radians. Floating point meets it inside facets,
+// and if the hulls are about as far apart as they are large; otherwise exact arithmetic finds the
+// normal.
 inline constexpr double kMaxNormalAngle = 1e-6;
 
 enum class Method : uint8_t { kCertifiedSearch, kTextbookSat };
