@@ -43,7 +43,7 @@ class YamlReader {
                                                  const std::string& key) const;
 
  private:
-  YamlReader(YAML::Node root, std::string name) : root_(std::move(root)), name_(std::move(name)) {}
+  YamlReader(const YAML::Node& root, std::string name) : root_(root), name_(std::move(name)) {}
 
   YAML::Node root_;
   std::string name_;

@@ -395,6 +395,7 @@ class SceneParser {
     const auto found = among.find(name);
     if (found != among.end()) return found->second;
     std::vector<std::string> known;
+    known.reserve(among.size());
     for (const auto& [key, index] : among) known.push_back(key);
     return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not defined under ",
                                             where, Suggestion(name, known)));

@@ -420,7 +420,7 @@ void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
   const size_t new_count = horizon_.size();
   while (region_.size() < new_count) region_.push_back(NewId());
   const TriangleId* const region = region_.data();
-  const Vector top = vertices[apex];
+  const Vector& top = vertices[apex];
   for (size_t k = 0; k < new_count; ++k) {
     const HorizonEdge edge = horizon_[k];
     const TriangleId id = region[k];
