@@ -8,6 +8,7 @@
 #include "hulld/v1/status.grpc.pb.h"
 #include "server/access/caller.h"
 #include "server/call/admission.h"
+#include "server/call/message_bytes.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
