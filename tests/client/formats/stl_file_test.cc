@@ -1,3 +1,4 @@
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +53,7 @@ TEST(StlText, ErrorsCountFacets) {
 TEST(StlText, LetterCaseNamesAndWhiteSpaceDoNotMatter) {
   for (const char* name : {"", " s", " two words", " facet", " \xc3\xa4"}) {
     const std::string solid = std::string("solid") + name + "\n";
-    const std::string text = solid + Facet() + Facet() + "end" + solid;
+    const std::string text = absl::StrCat(solid, Facet(), Facet(), "end", solid);
     ExpectFacets(text, 2);
     ExpectFacets(Upper(text), 2);
     ExpectFacets(solid + Upper(Facet()) + "endsolid", 1);

@@ -296,8 +296,8 @@ std::vector<Extreme> MakeExtremes() {
 }  // namespace
 
 std::span<const Extreme> Extremes() {
-  static const std::vector<Extreme> all = MakeExtremes();
-  return all;
+  static const std::vector<Extreme> kAll = MakeExtremes();
+  return kAll;
 }
 
 void PrintTo(const Extreme& extreme, std::ostream* out) { *out << extreme.name; }
