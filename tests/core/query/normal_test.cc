@@ -32,7 +32,6 @@ QueryOptions WantNormal() {
 // Returns true if the direction has unit length and is within its bound of n.
 testing::AssertionResult Shows(const Normal& normal, const Exact& n) {
   long double dot = 0;
-  long double squared = 0;
   long double crossed = 0;
   long double length = 0;
   for (int i = 0; i < 3; ++i) {
@@ -41,7 +40,6 @@ testing::AssertionResult Shows(const Normal& normal, const Exact& n) {
     const long double d_j = normal.direction[j];
     dot += d_i * n[i];
     length += d_i * d_i;
-    squared += static_cast<long double>(n[i]) * n[i];
     crossed += (d_i * n[j] - d_j * n[i]) * (d_i * n[j] - d_j * n[i]);
   }
   const long double angle = std::atan2(std::sqrt(crossed), dot);
