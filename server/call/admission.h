@@ -98,7 +98,7 @@ class Admission {
       std::list<Revocable>* list = nullptr;
     };
     Ticket(Admission* admission, Rpc rpc);
-    // Of the move.
+    // For the move constructor only: a copy would end the call twice.
     Ticket(const Ticket&) = default;
 
     Admission* admission_;

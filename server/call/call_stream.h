@@ -18,10 +18,10 @@
 
 namespace hulld::server {
 
-// Base of all streaming calls: owns itself until gRPC is done with it, is admitted before anything
-// else, and finishes exactly once. Reactor: one of those of message_bytes.h.
+// Base class of streaming calls. A call owns itself until gRPC releases it. It is admitted before
+// it does anything else, and finishes exactly once. Reactor: a reactor of message_bytes.h.
 //
-// PulledStream and QueuedStream derive from this: replies made one by one, or queued.
+// Derived classes: PulledStream makes replies one by one; QueuedStream queues them.
 template <typename Reactor>
 class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
  public:

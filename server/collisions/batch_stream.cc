@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "core/base/check.h"
 #include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
@@ -137,8 +136,6 @@ absl::Status BatchStream::AnswerRelation(const PlacedPair& pair, PairsPiece& pie
   std::optional<PlacedHull> made_b;
   const absl::StatusOr<hulld::Answer> answer =
       CheckCollision(table_.PlacedAt(pair.a, &made_a), table_.PlacedAt(pair.b, &made_b), query_);
-  // No other error is possible for the relation of valid hulls at valid poses.
-  HULLD_CHECK(answer.ok() || absl::IsCancelled(answer.status()));
   if (!answer.ok()) return answer.status();
   piece.rungs.Add(answer->rung);
   Add(piece, [&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });

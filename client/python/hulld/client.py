@@ -539,14 +539,15 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Containment:
-        """Tells for each point whether it is inside a hull or body, on its boundary, or outside:
-        exactly, for the doubles given.
+        """Returns whether each point is inside a hull or body, on its boundary, or outside. The
+        answer is exact for the doubles given.
 
-        points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: its
-        pose in the world. separation, max_error: as in check_collision; the distance, or the
-        negative depth. A point where two pieces of a body meet counts as on its boundary. The
-        points are sent in as few calls as the server's limits allow; each call answers for the
-        current version of the hull and has its own `timeout`.
+        points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: the
+        pose of the hull in the world. separation, max_error: as in check_collision; the separation
+        is the distance of a point outside, and minus the depth of a point inside. A point where two
+        pieces of a body meet is on the boundary. The points are sent in as few calls as the
+        server's limits allow. Each call uses the current version of the hull, and has its own
+        `timeout`.
 
         NotFoundError: no such hull.
         """

@@ -12,12 +12,12 @@
 
 namespace hulld {
 
-// Returns the direction from A to B in which they are nearest, of unit length up to rounding. No
-// claim depends on its accuracy: it is that of floating point if pair.usable(), and exact but for
-// its rounding otherwise. Zero if the pair meets, or floating point finds no direction. `first`: an
-// initial direction, not zero. `nearest`: pairs where the search begins, if any, such as those that
-// were nearest shortly before; those that are nearest at the end. CANCELLED: should_stop, which may
-// be empty, returned true.
+// Returns the direction from A to B along which they are nearest, with unit length up to rounding;
+// zero if the pair meets, or if floating point finds none. If pair.usable(), it is computed in
+// floating point; otherwise it is exact except for the final rounding. Proofs do not depend on its
+// accuracy. `first`: an initial direction, not zero. `nearest`, in and out: the vertex pairs of the
+// nearest points; the search begins with them, so pass the result of a similar pose, or none.
+// CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
                                         FloatCombination& nearest,
                                         const std::function<bool()>& should_stop);

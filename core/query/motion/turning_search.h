@@ -17,9 +17,10 @@
 namespace hulld {
 
 // Finds the first contact of two hulls, at least one of which rotates, by conservative advancement
-// (Mirtich 1996). While the hulls are separated, the direction of their least distance gives a
-// plane. MovingPlane proves it for an interval, as long as possible, whose end is the next time. If
-// the plane fails within max_time_error, an exact query at a double may prove contact.
+// (Mirtich 1996). Each step finds the direction in which the hulls are nearest, and the longest
+// interval for which MovingPlane proves that a plane across it separates them. The next step starts
+// at the end of that interval. If the interval would be shorter than max_time_error, an exact query
+// at a double checks for contact.
 //
 // A plane of constant direction takes most of the gap along it, so a transversal contact needs few
 // steps. Past a graze, the nearest direction turns before the gap closes; there the plane turns,
@@ -27,9 +28,9 @@ namespace hulld {
 // the interval's length, so a graze needs a number of steps proportional to the logarithm of its
 // gap.
 //
-// Toward a contact, a parabola through the gap, its rate, and the last gap predicts the time. A
-// plane that turns leads to shortly before it, so the steps converge faster than by a constant
-// factor, and few exact queries prove the contact. Failed predictions end these leaps.
+// Near a contact, a step first tries to leap to just before the contact that a parabola predicts,
+// from the present gap, its rate, and the previous gap. Leaps converge superlinearly, and leave few
+// exact queries. After kMostFailedLeaps wrong predictions, the search leaps no more.
 //
 // Once the gap is within the resolution, planes that the hulls may cross by the resolution decide
 // if the least separation of the remaining motion is within it, too.

@@ -259,7 +259,7 @@ absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows) {
   if (!rows.ok()) return rows.status();
   uint64_t number = 0;
   if (rows->count() == 1 && absl::SimpleAtoi(std::string(rows->at(0, 0)), &number)) return number;
-  return absl::DataLossError("the row of hulld.store is missing");
+  return absl::DataLossError("the row of hulld.store is missing or damaged");
 }
 
 absl::StatusOr<bool> HasTable(Session& session, const std::string& name) {

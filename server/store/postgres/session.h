@@ -74,7 +74,7 @@ class Session {
   // As Ask for statements that commit. A warning counts as a loss: for example, the wait for a
   // standby was interrupted, so the transaction is committed, but not replicated as required.
   absl::StatusOr<std::vector<Rows>> AskToCommit(std::span<const Statement> statements);
-  // As in 150018.
+  // Returns the version of the server: 150018 for 15.18.
   int server_version() const { return PQserverVersion(connection_.get()); }
   // Describes the location without secrets: "database hulld at db.example".
   std::string Describe() const;

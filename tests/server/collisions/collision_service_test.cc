@@ -200,7 +200,7 @@ TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
   EXPECT_LE(std::abs(deep.separation().value() + 0.5), deep.separation().bound());
   EXPECT_TRUE(deep.within_clearance());
   EXPECT_EQ(deep.normal().direction().x(), 1);
-  EXPECT_LE(deep.normal().angle_bound(), 1e-6);
+  EXPECT_LE(deep.normal().angle_bound(), 1e-10);
   const v1::CheckCollisionResponse nothing = check(PlacementOf("empty"), 5);
   EXPECT_EQ(nothing.separation().value(), std::numeric_limits<double>::infinity());
   EXPECT_FALSE(nothing.has_normal());

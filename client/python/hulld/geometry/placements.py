@@ -106,15 +106,16 @@ def as_moving(placement: PlacementLike, end_pose: PoseLike) -> Placement:
 
 
 class Placements:
-    """Many placements of few hulls, bodies, or inline shapes: each once, the poses as one array.
+    """Placements of hulls, bodies, and inline shapes, stored compactly: each ID or shape once, and
+    the poses in one array.
 
-    ids: the distinct IDs. poses: for each placement, as in pack_poses; None: the identity.
-    indices: for each placement, the index of its ID or, from the number of IDs on, of its shape;
-    None: each is placed once, or a single one as often as there are poses. shapes: inline shapes,
-    the points of each as in Placement. radii: of each placement, or one for all, as in Placement;
-    None: 0. end_poses: of motions, for each placement, as in Placement.end_pose; one that is at
-    rest has its pose again. None: all are at rest. orthogonality_tolerance, quaternion_order: as
-    in pack_poses.
+    ids: the distinct IDs. shapes: inline shapes, each given by its points as in Placement. poses:
+    the pose of each placement, as in pack_poses; None: the identity. indices: for each placement,
+    the index of its subject in the list of ids followed by shapes; None: one placement for each
+    subject, or, of a single subject, one for each pose. radii: the radius of each placement, or one
+    for all, as in Placement; None: 0. end_poses: the end pose of each placement, as in
+    Placement.end_pose; a placement at rest repeats its pose. None: all are at rest.
+    orthogonality_tolerance, quaternion_order: as in pack_poses.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses

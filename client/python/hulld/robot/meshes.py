@@ -272,7 +272,7 @@ def _read_text_stl(
 
     text = words()
 
-    def read() -> str:
+    def facets_read() -> str:
         """The number of facets, as in "1 facet"."""
         return f"{len(parts)} facet" + "s" * (len(parts) != 1)
 
@@ -281,18 +281,18 @@ def _read_text_stl(
         place, word, name = next(text, ("", "", ""))
         if not place:
             raise ValueError(
-                f"{end}: the file ends after {read()}, before {expected}; is it complete?"
+                f"{end}: the file ends after {facets_read()}, before {expected}; is it complete?"
             )
         if expected and word.lower() not in expected.split(" or "):
             raise ValueError(
-                f'{place}: {word!r} after {read()} where "{expected}" is expected'
+                f'{place}: {word!r} after {facets_read()} where "{expected}" is expected'
             )
         return word.lower(), name
 
     for place, word, name in text:
         if word != "solid":
             raise ValueError(
-                f'{place}: {word!r} after {read()} where "solid" is expected'
+                f'{place}: {word!r} after {facets_read()} where "solid" is expected'
             )
         part = number_of.setdefault(name, len(number_of))
         while take("facet or endsolid")[0] == "facet":
