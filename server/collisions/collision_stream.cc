@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <span>
-#include <thread>
 #include <utility>
 
 #include "core/base/check.h"
@@ -85,7 +84,7 @@ bool CollisionStream::IsQuick() const {
 
 void CollisionStream::Handle() {
   asked_.clear();
-  moved_.clear();
+  decided_.clear();
   next_asked_ = 0;
   refresh_.reset();
   const absl::Status status = HandleMessage();
@@ -111,12 +110,6 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   table_.EncodeHeader(parts_.registry.store(), reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
-  is_decided_ = false;
-  // Places a few placements, or all of a single-threaded answer, on this thread.
-  if (!IsPlain() || moved_.size() < kPairsPerHelper) {
-    for (const uint32_t placement : moved_) table_.PlaceAgain(placement);
-    moved_.clear();
-  }
   AnswerSlice();
 }
 
@@ -210,15 +203,15 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
     return s;
   }
   for (int i = 0; i < update.placements_size(); ++i) {
-    table_.SetPose(update.placements(i), ReadPose(update.poses(), static_cast<size_t>(i)));
-    AskAboutPairsOf(update.placements(i));
+    const uint32_t placement = update.placements(i);
+    const Pose pose = ReadPose(update.poses(), static_cast<size_t>(i));
+    // Refreshing places all placements.
+    update.refresh_hulls() ? table_.SetPose(placement, pose) : table_.Move(placement, pose);
+    AskAboutPairsOf(placement);
   }
   if (update.refresh_hulls()) {
-    // Refreshing places all placements.
     refresh_ = ReadPlan{.freshness = freshness_};
     refresh_->freshness.began = call().message_arrival();
-  } else {
-    moved_.assign(update.placements().begin(), update.placements().end());
   }
   return absl::OkStatus();
 }
@@ -274,16 +267,11 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
-// Places moved placements, then decides the requested pairs, together with any helper threads that
-// arrive in time. Helpers run slices in this call's turns, so they yield to other calls.
+// Decides the requested pairs, together with any helper threads that arrive in time. Helpers run
+// slices in this call's turns, so they yield to other calls.
 void CollisionStream::DecideTogether() {
   decided_.resize(asked_.size());
-  is_placing_ = !moved_.empty();
-  if (is_placing_) {
-    unclaimed_.Begin(static_cast<uint32_t>(moved_.size()));
-  } else if (!BeginDeciding()) {
-    return EncodeDecided();
-  }
+  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
   const size_t wanted =
       std::min<size_t>(parts_.pool.threads() - 1, asked_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
@@ -297,43 +285,19 @@ void CollisionStream::DecideTogether() {
   TakePart();
 }
 
-// Requires that all placements are placed. Returns false if there is nothing to decide.
-bool CollisionStream::BeginDeciding() {
-  is_placing_ = false;
-  if (asked_.empty()) return false;
-  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
-  return true;
-}
-
-// Claims the next block. While other threads place the last placements, a short wait is worth it:
-// the pairs would otherwise require waking another thread.
-ClaimedRange::Block CollisionStream::Claim() {
-  constexpr int kMostYields = 64;
-  ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
-  for (int i = 0; block.empty() && is_placing_ && i < kMostYields; ++i) {
-    std::this_thread::yield();
-    block = unclaimed_.Claim(kPairsPerClaim);
-  }
-  return block;
-}
-
 // Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
 // several concurrently; the thread that returns the last block continues. Nothing of this stream
 // may be used after returning the last block, or if no block was available.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
-    const ClaimedRange::Block block = Claim();
+    const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
     if (block.empty()) return;
-    // The next step cannot start before this block is returned.
-    const bool is_placing = is_placing_;
     // If the call must stop, blocks are returned undone, so that exactly one thread is the last.
     if (!call().ShouldStop()) {
-      for (uint32_t i = block.begin; i < block.end; ++i) {
-        is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);
-      }
+      for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
     }
-    if (unclaimed_.GiveBack(block) && !(is_placing && BeginDeciding())) return EncodeDecided();
+    if (unclaimed_.GiveBack(block)) return AnswerSlice();
     if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
   }
 }
@@ -356,30 +320,17 @@ void CollisionStream::Decide(uint32_t i) {
   decided_[i] = {static_cast<uint8_t>(relation), rung, is_changed};
 }
 
-// Encodes the decided pairs, until the message is full or other calls are due.
-void CollisionStream::EncodeDecided() {
-  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-  is_decided_ = true;
+void CollisionStream::AddDecided(size_t i) {
+  const auto [number, rung, is_changed] = decided_[i];
+  const auto relation = static_cast<v1::Relation>(number);
+  const bool is_answered = relation != v1::RELATION_UNSPECIFIED;
+  if (is_answered) rungs_.Add(rung);
+  if (only_changes_ && messages_ > 0 && !is_changed) return;
   v1::AnswerColumns* const columns = reply().mutable_columns();
-  while (next_asked_ < asked_.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
-    if (next_asked_ % kPairsPerClockRead == 0) {
-      if (call().ShouldStop()) break;
-      if (std::chrono::steady_clock::now() >= end) {
-        return RunOn(lane_, [this] { EncodeDecided(); });
-      }
-    }
-    const auto [number, rung, is_changed] = decided_[next_asked_];
-    const uint32_t index = asked_[next_asked_++];
-    const auto relation = static_cast<v1::Relation>(number);
-    const bool is_answered = relation != v1::RELATION_UNSPECIFIED;
-    if (is_answered) rungs_.Add(rung);
-    if (only_changes_ && messages_ > 0 && !is_changed) continue;
-    reply().add_pairs(index);
-    columns->add_relations(relation);
-    columns->add_rungs(is_answered ? EncodeRung(rung) : v1::RUNG_UNSPECIFIED);
-    reply_bytes_ += kIndexBytes + kRelationBytes;
-  }
-  SendAnswered();
+  reply().add_pairs(asked_[i]);
+  columns->add_relations(relation);
+  columns->add_rungs(is_answered ? EncodeRung(rung) : v1::RUNG_UNSPECIFIED);
+  reply_bytes_ += kIndexBytes + kRelationBytes;
 }
 
 void CollisionStream::SendPart(bool last) {
@@ -388,20 +339,22 @@ void CollisionStream::SendPart(bool last) {
   Send();
 }
 
-// Computes until the answer is complete, the message is full, or other calls are due.
+// Computes until the answer is complete, the message is full, or other calls are due. A plain answer
+// is decided as a whole first.
 void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
     next_row_ = table_.EncodeHulls(next_row_, &reply());
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
-  if (IsPlain()) return is_decided_ ? EncodeDecided() : DecideTogether();
+  const bool is_plain = IsPlain();
+  if (is_plain && decided_.size() < asked_.size()) return DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-  const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerClaim;
-  while (next_asked_ < asked_.size()) {
-    if (reply_bytes_ >= FullMessageBytes(wanted_)) break;
-    AddAnswer(asked_[next_asked_++]);
-    if (next_asked_ % pairs_per_look != 0) continue;
+  const size_t pairs_per_look =
+      is_plain ? kPairsPerClockRead : (table_.has_bodies() ? 1 : kPairsPerClaim);
+  while (next_asked_ < asked_.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
+    is_plain ? AddDecided(next_asked_) : AddAnswer(asked_[next_asked_]);
+    if (++next_asked_ % pairs_per_look != 0) continue;
     if (call().ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
       return RunOn(lane_, [this] { AnswerSlice(); });

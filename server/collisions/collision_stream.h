@@ -77,11 +77,9 @@ class CollisionStream
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
   void DecideTogether();
-  bool BeginDeciding();
-  ClaimedRange::Block Claim();
   void TakePart();
   void Decide(uint32_t i);
-  void EncodeDecided();
+  void AddDecided(size_t i);
   void AnswerSlice();
   void SendAnswered();
   void SendPart(bool last);
@@ -118,16 +116,10 @@ class CollisionStream
   size_t next_asked_ = 0;
   RungCounts rungs_;
 
-  // Placements moved by the current message and not placed yet.
-  std::vector<uint32_t> moved_;
-
-  // A plain answer is decided as a whole, by several threads, and then encoded.
-  bool is_decided_ = false;
-  // Parallel to asked_.
+  // Of a plain answer, parallel to asked_ once it is decided, by several threads.
   std::vector<Decided> decided_;
-  // Unclaimed work: entries of moved_ during placing, then entries of asked_.
+  // Entries of asked_ that no thread decides yet.
   ClaimedRange unclaimed_;
-  std::atomic<bool> is_placing_ = false;
   // Queued slices of helpers.
   std::atomic<size_t> helpers_waiting_ = 0;
 };

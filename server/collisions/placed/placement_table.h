@@ -132,9 +132,8 @@ class PlacementTable {
 
   // Requires a valid pose (ValidatePose).
   void Move(size_t i, const Pose& X_WH);
-  // Move in two steps. Several threads may call PlaceAgain concurrently for different placements.
+  // As Move, to be followed by Refresh.
   void SetPose(size_t i, const Pose& X_WH);
-  void PlaceAgain(size_t i);
 
   // IDs of the hulls, without duplicates unless packed placements name it several times; none for
   // inline shapes.
@@ -211,6 +210,7 @@ class PlacementTable {
   size_t BodyBytes() const;
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;
+  void PlaceAgain(size_t i);
 
   // For each placement: its hull as an index into hulls_, or kNoHull if hull_of() is nullopt; and
   // its pose, packed.
