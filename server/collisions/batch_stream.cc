@@ -1,9 +1,5 @@
 #include "server/collisions/batch_stream.h"
 
-#include <algorithm>
-#include <memory>
-#include <utility>
-
 #include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
@@ -22,19 +18,14 @@ constexpr int kMostPlacementsPerSlice = 4096;
 // Pairs between two reads of the clock.
 constexpr uint64_t kPairsPerPoll = 64;
 
-// Appends answers of pairs that follow the pairs of `message`.
-void Append(const v1::BatchCheckCollisionsResponse& next,
-            v1::BatchCheckCollisionsResponse* message) {
-  const uint64_t first_pair = message->first_pair();
-  message->MergeFrom(next);
-  message->set_first_pair(first_pair);
-}
-
 }  // namespace
 
 BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kBatchCheckCollisions, parts,
-                    {kFirstPairs, kMostPairs, kMostPlacementsPerSlice}) {}
+                    {.first_units = kFirstPairs,
+                     .most_units = kMostPairs,
+                     .most_short_placements = kMostPlacementsPerSlice,
+                     .joins_head = true}) {}
 
 absl::Status BatchStream::Validate() {
   if (absl::Status s = DecodePlacements(request().method(), "the batch"); !s.ok()) return s;
@@ -51,18 +42,6 @@ absl::Status BatchStream::Validate() {
 absl::Status BatchStream::Prepare() {
   is_plain_ = AsksRelationsOfHulls(query_, table_);
   return absl::OkStatus();
-}
-
-bool BatchStream::QueueHead() {
-  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
-  next_row_ = table_.EncodeHulls(next_row_, &head_);
-  if (next_row_ == table_.table_rows()) {
-    has_head_ = true;
-    return false;
-  }
-  const size_t bytes = head_.ByteSizeLong();
-  Queue(std::exchange(head_, {}), bytes);
-  return true;
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {
@@ -85,9 +64,6 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
     ++pairs;
   } while (piece.next < piece.end &&
            ((!looks_each_time && pairs % kPairsPerPoll != 0) || Clock::now() < end));
-  call().metrics().CountPairs(std::exchange(piece.rungs, {}));
-  piece.is_done = piece.next == piece.end;
-  piece.EndReply();
   return absl::OkStatus();
 }
 
@@ -142,33 +118,14 @@ absl::Status BatchStream::AnswerRelation(const PlacedPair& pair, PairsPiece& pie
   return absl::OkStatus();
 }
 
-void BatchStream::Deliver(PairsPiece& piece) {
-  if (has_head_ && !piece.replies.empty()) {
-    const size_t bytes = head_.ByteSizeLong();
-    if (bytes + piece.reply_bytes.front() > Config::kReplyMessageBytes) {
-      Queue(std::move(head_), bytes);
-    } else {
-      Append(piece.replies.front(), &head_);
-      piece.replies.front() = std::move(head_);
-      piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
-    }
-    has_head_ = false;
-  }
-  DeliverReplies(piece);
-}
-
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
-  if (NamesRows(reply.columns())) return false;
-  Append(reply, waiting);
+  const bool is_head = waiting->columns().relations().empty();
+  if (!is_head && NamesRows(reply.columns())) return false;
+  const uint64_t first_pair = waiting->first_pair();
+  waiting->MergeFrom(reply);
+  waiting->set_first_pair(first_pair);
   return true;
-}
-
-// A batch without pairs consists of its head.
-void BatchStream::OnAllDelivered() {
-  if (!std::exchange(has_head_, false)) return;
-  const size_t bytes = head_.ByteSizeLong();
-  Queue(std::move(head_), bytes);
 }
 
 }  // namespace hulld::server

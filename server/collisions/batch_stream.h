@@ -37,13 +37,10 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status Prepare() override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
   // The functions below require the mutex.
-  bool QueueHead() override;
   uint64_t CountUnits() override { return static_cast<uint64_t>(request().pairs_size()) / 2; }
   bool MayRunAhead() const override;
-  void Deliver(PairsPiece& piece) override;
   bool Join(const v1::BatchCheckCollisionsResponse& reply,
             v1::BatchCheckCollisionsResponse* waiting) override;
-  void OnAllDelivered() override;
 
   // Without the mutex.
   PlacedPair PairAt(uint64_t i) const;
@@ -60,12 +57,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // Written before the first piece: all pairs are of hulls at rest, and only relations are wanted
   // (AnswerRelation).
   bool is_plain_ = false;
-
-  // Guarded by the mutex. The next row of the table of hulls to send, and the last part of the
-  // table, which the first answers join.
-  size_t next_row_ = 0;
-  v1::BatchCheckCollisionsResponse head_;
-  bool has_head_ = false;
 };
 
 }  // namespace hulld::server

@@ -44,7 +44,6 @@ struct Piece {
   // Size of each reply, and their total.
   std::vector<size_t> reply_bytes = {};
   size_t bytes = 0;
-  bool is_done = false;
   // Rows of the next reply, and an upper estimate of their bytes.
   Reply rows = {};
   size_t row_bytes = 0;
@@ -57,6 +56,8 @@ struct Piece {
   size_t noted_bytes = 0;
   uint64_t units = 0;
   std::chrono::steady_clock::duration elapsed{0};
+
+  bool is_done() const { return next == end; }
 
   // Ends the reply of the current rows, if any.
   void EndReply() {
@@ -103,6 +104,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     uint64_t most_units;
     // Preparing this many placements takes about a slice, waits excluded.
     int most_short_placements;
+    // The first answers may join the last message of the head.
+    bool joins_head;
   };
 
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
@@ -115,6 +118,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         most_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
         shape_(shape),
         charge_(parts.registry.memory(), MemoryUse::kReading),
+        holds_head_(shape.joins_head),
         piece_units_(shape.first_units) {}
 
   // The call is prepared step by step, without the mutex, on one thread; the hulls are resolved
@@ -156,22 +160,27 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
   }
 
-  // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
-  // without the mutex, on any thread, but never concurrently for the same piece.
+  // Works on the piece until `end`, or until it is done: adds rows and replies, counts rungs, and
+  // advances `next`. Called without the mutex, on any thread, but never concurrently for the same
+  // piece.
   virtual absl::Status Advance(Work& piece, Clock::time_point end) = 0;
 
   // The functions below require the mutex.
 
-  // Queues a message of the head, which precedes all answers, or keeps it to join the first of
-  // them. Returns true if more of the head follows. Called as the client reads, after the hulls are
-  // resolved.
-  virtual bool QueueHead() = 0;
   // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
   // True if a slice of a piece may start while earlier pieces are in flight.
   virtual bool MayRunAhead() const { return true; }
-  // Queues replies of the front piece; called one last time with is_done.
-  virtual void Deliver(Work& piece) = 0;
+  // Queues the replies of the front piece, in order; called one last time when it is done.
+  virtual void Deliver(Work& piece) {
+    for (size_t i = 0; i < piece.replies.size(); ++i) {
+      QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
+      holds_head_ = false;
+    }
+    piece.replies.clear();
+    piece.reply_bytes.clear();
+    piece.bytes = 0;
+  }
   // Merges a small reply into the queued one; returns false if they do not fit.
   virtual bool Join(const Reply& reply, Reply* waiting) = 0;
   // Called after every piece was delivered. Returns the number of further units that only then
@@ -179,16 +188,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual uint64_t CountFollowingUnits() { return 0; }
   // Called after that, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
-
-  // Queues the replies of the piece in order.
-  void DeliverReplies(Work& piece) {
-    for (size_t i = 0; i < piece.replies.size(); ++i) {
-      QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
-    }
-    piece.replies.clear();
-    piece.reply_bytes.clear();
-    piece.bytes = 0;
-  }
 
   void QueueOrJoin(Reply reply, size_t bytes) {
     const bool is_small =
@@ -285,22 +284,36 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     absl::Status status = this->call().ShouldStop() ? this->call().StopStatus()
                                                     : Advance(piece, start + TaskPool::kSliceTime);
     if (this->call().ShouldStop()) status = this->call().StopStatus();
+    piece.EndReply();
+    this->call().metrics().CountPairs(std::exchange(piece.rungs, {}));
     piece.elapsed += Clock::now() - start;
     piece.units += piece.next - before;
     this->Locked([this, &piece, &status] {
       HULLD_CHECK(std::exchange(piece.is_running, false));
       --running_;
       if (!status.ok()) return this->End(status);
-      if (piece.is_done) AdaptUnits(piece);
+      if (piece.is_done()) AdaptUnits(piece);
     });
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
-  // A running slice ends in a Locked step.
+  // The end of the preparation and of each slice is a Locked step.
   bool KeepsWaiting() const final {
+    if (holds_head_) return opening_ || running_ > 0;
     return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
            this->LastWaitingTime() < kMostWait;
+  }
+
+  // Queues a message of the table of hulls, which precedes all answers, as the client reads. Returns
+  // true if more of it follows.
+  bool QueueHead() {
+    Reply head;
+    if (next_row_ == 0) table_.EncodeHeader(registry_.store(), head.mutable_header());
+    next_row_ = table_.EncodeHulls(next_row_, &head);
+    const size_t bytes = head.ByteSizeLong();
+    this->Queue(std::move(head), bytes);
+    return next_row_ < table_.table_rows();
   }
 
   void StartWork() final {
@@ -309,7 +322,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     while (!pieces_.empty() && !pieces_.front()->is_running) {
       Work& front = *pieces_.front();
       Deliver(front);
-      if (!front.is_done) break;
+      if (!front.is_done()) break;
       pieces_.pop_front();
     }
     NoteHeldBytes();
@@ -339,7 +352,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       pieces_.push_back(std::move(piece));
     }
     for (const std::unique_ptr<Work>& piece : pieces_) {
-      if (piece->is_running || piece->is_done) continue;
+      if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
       if (!is_front && (piece->bytes >= kMostHeldBytes || !MayRunAhead())) continue;
       piece->is_running = true;
@@ -372,8 +385,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // The mutex guards the members below; a running piece belongs to its slice.
   bool opening_ = true;
-  // Part of the head is still to be queued.
+  // Part of the head is still to be queued, from this row of the table of hulls on.
   bool is_head_left_ = false;
+  size_t next_row_ = 0;
+  // The last message of the head waits for the first answers.
+  bool holds_head_;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;
   // Size of the next piece.

@@ -70,7 +70,10 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 
 SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kFindCollisions, parts,
-                    {kFirstPlacements, kMostPlacements, kMostBoxesPerSlice}) {}
+                    {.first_units = kFirstPlacements,
+                     .most_units = kMostPlacements,
+                     .most_short_placements = kMostBoxesPerSlice,
+                     .joins_head = false}) {}
 
 absl::Status SceneStream::Validate() {
   if (absl::Status s = DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"); !s.ok()) return s;
@@ -161,15 +164,6 @@ size_t SceneStream::HeldBytes() const {
                                                      : 0);
 }
 
-bool SceneStream::QueueHead() {
-  v1::FindCollisionsResponse head;
-  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
-  next_row_ = table_.EncodeHulls(next_row_, &head);
-  const size_t bytes = head.ByteSizeLong();
-  Queue(std::move(head), bytes);
-  return next_row_ < table_.table_rows();
-}
-
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   if (piece.next >= search_->size()) return AdvanceRanked(piece, end);
   const uint64_t steps_per_look = table_.has_bodies() || table_.has_motions() ? 1 : kStepsPerPoll;
@@ -206,8 +200,6 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
                                                   : Rank(a, *b, std::move(found->answer), piece);
     if (!ranked.ok()) return ranked;
   }
-  piece.EndReply();
-  piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
 
@@ -222,8 +214,6 @@ absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end
     Count(relation, 1, &piece.totals);
     ++piece.next;
   } while (piece.next < piece.end && Clock::now() < end);
-  piece.EndReply();
-  piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
 
@@ -341,8 +331,7 @@ v1::Relation SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& a
 
 void SceneStream::Deliver(ScenePiece& piece) {
   AddTo(&totals_, std::exchange(piece.totals, {}));
-  call().metrics().CountPairs(std::exchange(piece.rungs, {}));
-  DeliverReplies(piece);
+  PiecedReplies::Deliver(piece);
 }
 
 // Messages of the head hold no answers.

@@ -62,7 +62,6 @@ class SceneStream
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
   size_t HeldBytes() const override;
   // The functions below require the mutex.
-  bool QueueHead() override;
   uint64_t CountUnits() override { return search_->size(); }
   uint64_t CountFollowingUnits() override;
   void Deliver(ScenePiece& piece) override;
@@ -102,8 +101,7 @@ class SceneStream
   // Written before the first piece of ranked pairs.
   std::vector<RankedPair> ranked_;
 
-  // Guarded by the mutex. The next row of the table of hulls to send.
-  size_t next_row_ = 0;
+  // Guarded by the mutex.
   v1::SceneTotals totals_;
 };
 
