@@ -145,8 +145,6 @@ absl::Status SceneStream::Prepare() {
     ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
   }
-  piece_query_ = query_;
-  piece_query_.threads = 1;
   options_.query = query_;
   absl::StatusOr<SceneSearch> search =
       moves ? SceneSearch::Make(table_.placed(), options_, std::move(moving))
@@ -271,7 +269,7 @@ void SceneStream::OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const {
   piece.totals.set_candidates(piece.totals.candidates() + 1);
   const PlacedBody& body_a = table_.bodies()[a];
   const PlacedBody& body_b = table_.bodies()[b];
-  const double reach = piece_query_.clearance.value_or(0);
+  const double reach = query_.clearance.value_or(0);
   piece.bodies.emplace(ScenePiece::Bodies{
       b, MeetingPieces(
              body_a.body(), body_b.body(),
@@ -290,7 +288,7 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
   }
   const PlacedPiece piece_a(table_.bodies()[a], pieces->a);
   const PlacedPiece piece_b(table_.bodies()[b], pieces->b);
-  PlacedAnswer found = {CheckCollision(piece_a.placed(), piece_b.placed(), piece_query_)};
+  PlacedAnswer found = {CheckCollision(piece_a.placed(), piece_b.placed(), query_)};
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   if (found.answer.ok()) {
     Answer& answer = *found.answer;
@@ -303,7 +301,7 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
       answer.certificate = {};
     }
   } else {
-    found.answer = NameQueryLimit(found.answer.status(), piece_query_);
+    found.answer = NameQueryLimit(found.answer.status(), query_);
   }
   Count(AddFound(a, b, found, piece), 1, &piece.totals);
   return absl::OkStatus();

@@ -90,8 +90,6 @@ class SceneStream
   SceneOptions options_;
   std::vector<GroupPair> ignored_groups_;
   std::optional<SceneSearch> search_;
-  // With every_piece: the query of a pair of pieces.
-  QueryOptions piece_query_;
   // With a limit or first_only: the query of the pairs that are answered at the end, and the pairs
   // ranked so far.
   QueryOptions ranked_query_;
