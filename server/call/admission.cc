@@ -147,38 +147,35 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
           ? &*known
           : &*clients_.emplace(arrival.client, Ticket::Client{.number = ++last_client_}).first;
   ticket.admission_ = this;
-  running_.fetch_add(1, std::memory_order_relaxed);
+  Count(ticket, 1);
   running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
-  Ticket::Client& client = ticket.client_->second;
-  ++client.running;
-  switch (ticket.share_) {
-    case Ticket::Share::kCalls:
-      ++client.calls;
-      ++calls_;
-      if (connections_ != nullptr) ticket.connection_ = connections_->BeginCall(arrival.peer);
-      break;
-    case Ticket::Share::kAnonymous:
-      ++client.anonymous;
-      ++anonymous_;
-      break;
-    case Ticket::Share::kFree:
-      if (ticket.connection_ != 0) watching_health_.insert(ticket.connection_);
-      break;
+  if (ticket.share_ == Ticket::Share::kCalls && connections_ != nullptr) {
+    ticket.connection_ = connections_->BeginCall(arrival.peer);
   }
-  if (ticket.kind_ == CallKind::kUnary) ++single_calls_;
-  if (ticket.kind_ == CallKind::kBatch) {
-    ++client.batches;
-    ++batches_;
+  if (ticket.share_ == Ticket::Share::kFree && ticket.connection_ != 0) {
+    watching_health_.insert(ticket.connection_);
   }
-  if (ticket.kind_ == CallKind::kStream && !IsAnonymous(arrival.rpc)) ++client.streams;
-  if (!arrival.caller.name.empty() && arrival.lifetime != nullptr) {
-    const auto call = revocable_.insert(
-        revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime, arrival.on_revoked});
-    call->list = &revocable_;
-    ticket.revocable_ = call;
-  }
-  Watch(arrival.call, &ticket);
+  Watch(arrival, &ticket);
   return ticket;
+}
+
+void Admission::Count(const Ticket& ticket, uint64_t by) {
+  Ticket::Client& client = ticket.client_->second;
+  client.running += by;
+  running_.fetch_add(by, std::memory_order_relaxed);
+  if (ticket.share_ == Ticket::Share::kCalls) {
+    client.calls += by;
+    calls_ += by;
+  } else if (ticket.share_ == Ticket::Share::kAnonymous) {
+    client.anonymous += by;
+    anonymous_ += by;
+  }
+  if (ticket.kind_ == CallKind::kUnary) single_calls_ += by;
+  if (ticket.kind_ == CallKind::kBatch) {
+    client.batches += by;
+    batches_ += by;
+  }
+  if (ticket.kind_ == CallKind::kStream && !IsAnonymous(ticket.rpc_)) client.streams += by;
 }
 
 size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid) {
@@ -187,13 +184,11 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
   size_t count = 0;
   {
     const std::lock_guard lock(mutex_);
-    for (auto next = revocable_.begin(); next != revocable_.end();) {
-      const auto call = next++;
-      if (is_valid(call->caller)) continue;
-      call->lifetime->Revoke();
-      call->end = end;
-      if (call->on_revoked) waiting.push_back(std::move(call->on_revoked));
-      MoveTo(revoked_, call);
+    for (Ticket::Watched& call : watched_) {
+      if (call.caller.name.empty() || call.lifetime->is_revoked() || is_valid(call.caller)) continue;
+      call.lifetime->Revoke();
+      call.end = std::min(call.end, end);
+      if (call.on_revoked) waiting.push_back(std::move(call.on_revoked));
       ++count;
     }
     watched_changed_.notify_all();
@@ -203,44 +198,40 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
   return count;
 }
 
-void Admission::MoveTo(std::list<Ticket::Revocable>& list,
-                       std::list<Ticket::Revocable>::iterator call) {
-  list.splice(list.end(), *call->list, call);
-  call->list = &list;
-}
-
-void Admission::Watch(grpc_call* call, Ticket* ticket) {
+void Admission::Watch(const Arrival& arrival, Ticket* ticket) {
+  const bool has_token = !arrival.caller.name.empty();
   const bool sends_much = ticket->kind_ == CallKind::kBatch || ticket->kind_ == CallKind::kDownload;
-  const bool is_limited = limits_.max_request_time > std::chrono::milliseconds::zero();
-  if (!is_limited || call == nullptr || !sends_much) return;
-  const auto end = std::chrono::steady_clock::now() + limits_.max_request_time + kGrace;
-  grpc_call_ref(call);
-  ticket->watched_ = watched_.insert(watched_.end(), {end, call});
-  if (watched_.size() == 1) watched_changed_.notify_all();
+  const bool is_limited = sends_much && arrival.call != nullptr &&
+                          limits_.max_request_time > std::chrono::milliseconds::zero();
+  if (!has_token && !is_limited) return;
+  const auto end =
+      is_limited ? std::chrono::steady_clock::now() + limits_.max_request_time + kGrace : kNever;
+  if (arrival.call != nullptr) grpc_call_ref(arrival.call);
+  ticket->watched_ = watched_.insert(watched_.end(), {arrival.caller, arrival.lifetime,
+                                                     arrival.on_revoked, arrival.call, end});
+  if (end < next_look_) watched_changed_.notify_all();
 }
 
+// Searches all watched calls at each look. Looks are rare: most calls end before they are overdue.
 void Admission::CancelOverdue() {
   std::unique_lock lock(mutex_);
   while (!ending_) {
-    if (watched_.empty() && revoked_.empty()) {
+    const auto first = std::ranges::min_element(watched_, {}, &Ticket::Watched::end);
+    next_look_ = first == watched_.end() ? kNever : first->end;
+    if (next_look_ == kNever) {
       watched_changed_.wait(lock);
       continue;
     }
-    const bool is_revoked =
-        watched_.empty() || (!revoked_.empty() && revoked_.front().end < watched_.front().end);
-    const auto end = is_revoked ? revoked_.front().end : watched_.front().end;
-    if (std::chrono::steady_clock::now() < end) {
-      watched_changed_.wait_until(lock, end);
+    if (std::chrono::steady_clock::now() < next_look_) {
+      watched_changed_.wait_until(lock, next_look_);
       continue;
     }
-    grpc_call* const call = is_revoked ? revoked_.front().call : watched_.front().call;
+    // Cancelled once.
+    first->end = kNever;
+    if (first->call == nullptr) continue;
+    grpc_call* const call = first->call;
+    const bool is_revoked = !first->caller.name.empty() && first->lifetime->is_revoked();
     grpc_call_ref(call);
-    if (is_revoked) {
-      MoveTo(cut_off_, revoked_.begin());
-    } else {
-      watched_.front().is_cancelled = true;
-      cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
-    }
     // gRPC may call back, and the calls may end, before this returns.
     lock.unlock();
     if (is_revoked) {
@@ -270,36 +261,18 @@ void Admission::Leave(Ticket& ticket) {
     // Notifies under the lock, because the waiting thread may destroy this after its release.
     const std::lock_guard lock(mutex_);
     if (ticket.watched_.has_value()) {
-      const auto call = *ticket.watched_;
-      watched = call->call;
-      (call->is_cancelled ? cancelled_ : watched_).erase(call);
+      watched = (*ticket.watched_)->call;
+      watched_.erase(*ticket.watched_);
     }
-    if (ticket.revocable_.has_value()) (*ticket.revocable_)->list->erase(*ticket.revocable_);
-    Ticket::Client& client = ticket.client_->second;
-    HULLD_CHECK(client.running > 0);
-    if (ticket.kind_ == CallKind::kBatch) {
-      --client.batches;
-      --batches_;
+    HULLD_CHECK(ticket.client_->second.running > 0);
+    Count(ticket, uint64_t{0} - 1);
+    if (ticket.share_ == Ticket::Share::kCalls && ticket.connection_ != 0) {
+      connections_->EndCall(ticket.connection_);
     }
-    if (ticket.kind_ == CallKind::kStream && !IsAnonymous(ticket.rpc_)) --client.streams;
-    if (ticket.kind_ == CallKind::kUnary) --single_calls_;
-    switch (ticket.share_) {
-      case Ticket::Share::kCalls:
-        --client.calls;
-        --calls_;
-        if (ticket.connection_ != 0) connections_->EndCall(ticket.connection_);
-        break;
-      case Ticket::Share::kAnonymous:
-        --client.anonymous;
-        --anonymous_;
-        break;
-      case Ticket::Share::kFree:
-        watching_health_.erase(ticket.connection_);
-        break;
-    }
-    if (--client.running == 0) clients_.erase(clients_.find(ticket.client_->first));
+    if (ticket.share_ == Ticket::Share::kFree) watching_health_.erase(ticket.connection_);
+    if (ticket.client_->second.running == 0) clients_.erase(clients_.find(ticket.client_->first));
     running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
-    if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();
+    if (running_ == 0) idle_.notify_all();
   }
   if (watched != nullptr) grpc_call_unref(watched);
 }

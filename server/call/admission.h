@@ -82,20 +82,16 @@ class Admission {
     };
     // Nodes of an unordered_map have stable addresses.
     using Clients = std::unordered_map<std::string, Client>;
+    // A call that is ended when its token is revoked, or when it is overdue.
     struct Watched {
-      std::chrono::steady_clock::time_point end;
-      grpc_call* call;
-      bool is_cancelled = false;
-    };
-    struct Revocable {
+      // As in Arrival.
       Caller caller;
-      grpc_call* call;
       CallLifetime* lifetime;
       std::function<void()> on_revoked;
-      // Time of cancellation of a revoked call that does not end by itself.
-      std::chrono::steady_clock::time_point end = {};
-      // List that contains this.
-      std::list<Revocable>* list = nullptr;
+      // May be null; otherwise holds a reference.
+      grpc_call* call;
+      // Time of its cancellation.
+      std::chrono::steady_clock::time_point end;
     };
     Ticket(Admission* admission, Rpc rpc);
     // For the move constructor only: a copy would end the call twice.
@@ -109,9 +105,7 @@ class Admission {
     bool is_one_of_many_ = false;
     // The caller's connection in the ConnectionTable; 0: unknown.
     uint64_t connection_ = 0;
-    // Set for calls with a token.
-    std::optional<std::list<Revocable>::iterator> revocable_;
-    // Set for downloads and batches while --max-request-time limits them.
+    // Set for calls with a token, and for downloads and batches while --max-request-time limits them.
     std::optional<std::list<Watched>::iterator> watched_;
   };
 
@@ -145,8 +139,8 @@ class Admission {
     std::optional<PeerAddress> peer = {};
     // gRPC's object of the call.
     grpc_call* call = nullptr;
-    // Owner of the call's token, if any, and the lifetime that ends when the token is revoked; it
-    // must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after the
+    // Owner of the call's token, if any, and then the lifetime that ends when the token is revoked;
+    // it must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after the
     // ticket is destroyed. It ends a call that waits without polling.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
@@ -176,13 +170,15 @@ class Admission {
   absl::Status CheckAnonymousRoom(const Ticket::Client& client) const;
   // Returns the share of a call, given its connection.
   Ticket::Share ShareOf(const Arrival& arrival, uint64_t connection) const;
-  void Watch(grpc_call* call, Ticket* ticket);
-  static void MoveTo(std::list<Ticket::Revocable>& list,
-                     std::list<Ticket::Revocable>::iterator call);
+  // Counts a call, or with `by` = -1 (modulo 2^64) its end.
+  void Count(const Ticket& ticket, uint64_t by);
+  void Watch(const Arrival& arrival, Ticket* ticket);
 
   void Leave(Ticket& ticket);
   // Body of the watchdog thread.
   void CancelOverdue();
+
+  static constexpr auto kNever = std::chrono::steady_clock::time_point::max();
 
   const Limits limits_;
   Metrics& metrics_;
@@ -210,16 +206,9 @@ class Admission {
   // Only clients with running calls.
   Ticket::Clients clients_;
   uint64_t last_client_ = 0;
-  // Calls with a valid token; revoked calls in the order of their cancellation; and cancelled
-  // revoked calls.
-  std::list<Ticket::Revocable> revocable_;
-  std::list<Ticket::Revocable> revoked_;
-  std::list<Ticket::Revocable> cut_off_;
-  // In the order of their deadlines, because all have the same time limit.
   std::list<Ticket::Watched> watched_;
-  // Overdue calls, already cancelled.
-  std::list<Ticket::Watched> cancelled_;
-  // Notified when watched_ or revoked_ changes.
+  // Time of the watchdog's next look, unless notified.
+  std::chrono::steady_clock::time_point next_look_ = kNever;
   std::condition_variable watched_changed_;
   bool ending_ = false;
   std::thread watchman_;
