@@ -4,12 +4,10 @@
 #include <grpcpp/grpcpp.h>
 
 #include <cstddef>
-#include <memory>
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call_stream.h"
-#include "server/collisions/pair_question.h"
 #include "server/collisions/placed/collision_parts.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
@@ -49,9 +47,6 @@ class CollisionService : public CollisionServiceOfBytes {
   BidiReactor* WatchCollisions(CallContext* context) override;
 
  private:
-  void Check(CheckCall* call);
-  void AnswerLater(std::shared_ptr<PairQuestion> question, ClientId client);
-
   WaitingCalls waiting_;
   const CollisionParts parts_;
 };

@@ -2,9 +2,7 @@
 #define HULLD_SERVER_COLLISIONS_PAIR_QUESTION_H_
 
 #include <absl/status/status.h>
-#include <absl/status/statusor.h>
 
-#include <functional>
 #include <memory>
 #include <optional>
 
@@ -25,25 +23,23 @@ using CheckCall = UnaryCall<v1::CheckCollisionRequest, v1::CheckCollisionRespons
 // at any time.
 class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
  public:
-  // Reads everything except the hulls. `call` must not end before the question is answered.
-  static absl::StatusOr<std::shared_ptr<PairQuestion>> Read(const CollisionParts& parts,
-                                                            CheckCall* call);
-
-  const Freshness& freshness() const { return plan_.freshness; }
-  const std::function<bool()>& should_stop() const { return options_.should_stop; }
-
-  // Resolves the hulls, answers, and ends the call. An answer that takes some microseconds is
-  // computed immediately; any other on the pool, with its first slice before those of batches.
-  // Waits for the store, and builds canonical snapshots and boxes of pieces.
-  void Answer();
-  // As Answer, but returns false without blocking if it would have to wait or to build.
-  bool TryAnswer();
+  // Answers the call, which must be admitted.
+  static void Start(const CollisionParts& parts, CheckCall* call);
 
  private:
   PairQuestion(const CollisionParts& parts, CheckCall* call)
       : parts_(parts), call_(call), charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
+  // Reads everything except the hulls.
   absl::Status ReadRequest();
+  // Resolves the hulls on a reader's thread, which may wait for the store and build canonical
+  // snapshots and boxes of pieces, then answers.
+  void AnswerLater();
+  // As AnswerLater on this thread, but returns false without blocking if it would have to wait or to
+  // build.
+  bool TryAnswer();
+  // Ends the call. An answer that takes some microseconds is computed immediately; any other on the
+  // pool, with its first slice before those of batches.
   void AnswerResolved();
   absl::Status Begin();
   bool IsQuick() const;
