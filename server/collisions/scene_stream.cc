@@ -1,7 +1,6 @@
 #include "server/collisions/scene_stream.h"
 
 #include <algorithm>
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -135,12 +134,13 @@ absl::Status SceneStream::Prepare() {
   });
   if (call().ShouldStop()) return call().StopStatus();
   if (request().has_limit()) {
-    nearest_ =
-        std::make_unique<NearestPairs>(request().limit(), boxes, query_.max_error.value_or(0));
+    ranking_ =
+        std::make_unique<RankedPairs>(request().limit(), boxes, query_.max_error.value_or(0));
     ranked_query_ = std::exchange(query_, WithoutDetails(query_));
   }
   if (request().first_only()) {
-    first_ = std::make_unique<FirstPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
+    ranking_ =
+        std::make_unique<RankedPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
     ranked_query_ = query_;
     ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
@@ -156,10 +156,10 @@ absl::Status SceneStream::Prepare() {
 }
 
 size_t SceneStream::HeldBytes() const {
-  return table_.MemoryBytes() + ignored_groups_.capacity() * sizeof(GroupPair) +
-         (search_.has_value() ? search_->MemoryBytes() : 0) +
-         (nearest_ != nullptr && search_.has_value() ? nearest_->MaxMemoryBytes(search_->pairs())
-                                                     : 0);
+  size_t bytes = table_.MemoryBytes() + ignored_groups_.capacity() * sizeof(GroupPair);
+  if (!search_.has_value()) return bytes;
+  if (request().has_limit()) bytes += ranking_->MaxMemoryBytes(search_->pairs());
+  return bytes + search_->MemoryBytes();
 }
 
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
@@ -190,13 +190,11 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
     absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
     if (!found.ok()) return found.status();
     if (found->answer.ok() && !search_->IsFound(*found->answer)) continue;
-    if (nearest_ == nullptr && first_ == nullptr) {
+    if (ranking_ == nullptr) {
       Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
-      continue;
+    } else if (absl::Status s = Rank(a, *b, *std::move(found), piece); !s.ok()) {
+      return s;
     }
-    const absl::Status ranked = first_ != nullptr ? RankFirst(a, *b, *found, piece)
-                                                  : Rank(a, *b, std::move(found->answer), piece);
-    if (!ranked.ok()) return ranked;
   }
   return absl::OkStatus();
 }
@@ -231,37 +229,29 @@ absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, S
   return found;
 }
 
-absl::Status SceneStream::Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer,
-                               ScenePiece& piece) {
+absl::Status SceneStream::Rank(uint32_t a, uint32_t b, PlacedAnswer found, ScenePiece& piece) {
+  const absl::StatusOr<Answer>& answer = found.answer;
   const bool may_be_near =
-      answer.ok() && (answer->relation == Relation::kOverlapping || nearest_->MayBeNear(a, b));
+      request().has_limit() && answer.ok() &&
+      (answer->relation == Relation::kOverlapping || ranking_->MayBeNear(a, b));
   if (may_be_near) {
     QueryOptions query = query_;
     query.want_separation = true;
-    answer = AskAtRest(table_, a, b, query, nullptr).answer;
+    found = AskAtRest(table_, a, b, query, nullptr);
   }
   if (absl::IsCancelled(answer.status())) return answer.status();
   const v1::Relation relation =
       answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
   Count(relation, 1, &piece.totals);
+  bool grew = false;
   if (!answer.ok()) {
-    nearest_->AddUnanswered(a, b);
+    grew = ranking_->AddUnanswered(a, b);
+  } else if (found.contact.has_value()) {
+    grew = ranking_->Add({found.contact->separated_until, a, b, relation},
+                         found.contact->contact_time.value_or(RankedPairs::kNever));
   } else if (may_be_near) {
-    nearest_->Add({answer->separation->value, a, b, relation});
+    grew = ranking_->Add({answer->separation->value, a, b, relation});
   }
-  return absl::OkStatus();
-}
-
-absl::Status SceneStream::RankFirst(uint32_t a, uint32_t b, const PlacedAnswer& answer,
-                                    ScenePiece& piece) {
-  const v1::Relation relation =
-      answer.answer.ok() ? EncodeRelation(answer.answer->relation) : v1::RELATION_UNSPECIFIED;
-  Count(relation, 1, &piece.totals);
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  const bool grew = answer.answer.ok()
-                        ? first_->Add({answer.contact->separated_until, a, b, relation},
-                                      answer.contact->contact_time.value_or(kNever))
-                        : first_->AddUnanswered(a, b);
   return grew ? registry().CheckMemory(MemoryUse::kReading) : absl::OkStatus();
 }
 
@@ -308,8 +298,8 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
 }
 
 uint64_t SceneStream::CountFollowingUnits() {
-  if (nearest_ == nullptr && first_ == nullptr) return 0;
-  std::vector<RankedPair> ranked = first_ != nullptr ? first_->Take() : nearest_->Take();
+  if (ranking_ == nullptr) return 0;
+  std::vector<RankedPair> ranked = ranking_->Take();
   if (ranked.empty()) return 0;
   ranked_ = std::move(ranked);
   return ranked_.size();

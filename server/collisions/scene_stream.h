@@ -15,11 +15,10 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/collisions/first_pairs.h"
-#include "server/collisions/nearest_pairs.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
+#include "server/collisions/ranked_pairs.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
@@ -79,10 +78,9 @@ class SceneStream
   // Answers a candidate, in a scene with a limit by its relation and clearance alone, and counts
   // it. CANCELLED.
   absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece);
-  // Ranks a found pair by its separation. CANCELLED.
-  absl::Status Rank(uint32_t a, uint32_t b, absl::StatusOr<Answer> answer, ScenePiece& piece);
-  // Ranks a found pair by its first contact. RESOURCE_EXHAUSTED: --memory-limit.
-  absl::Status RankFirst(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece);
+  // Ranks a found pair by its separation or, in motion, its first contact. CANCELLED.
+  // RESOURCE_EXHAUSTED: --memory-limit.
+  absl::Status Rank(uint32_t a, uint32_t b, PlacedAnswer found, ScenePiece& piece);
   // Adds a row; returns its relation.
   v1::Relation AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece);
 
@@ -94,8 +92,7 @@ class SceneStream
   // ranked so far.
   QueryOptions ranked_query_;
   MotionOptions ranked_motion_;
-  std::unique_ptr<NearestPairs> nearest_;
-  std::unique_ptr<FirstPairs> first_;
+  std::unique_ptr<RankedPairs> ranking_;
   // Written before the first piece of ranked pairs.
   std::vector<RankedPair> ranked_;
 

@@ -1,4 +1,4 @@
-#include "server/collisions/nearest_pairs.h"
+#include "server/collisions/ranked_pairs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Separation, then placements.
 using Ranked = std::tuple<double, uint32_t, uint32_t>;
 
-TEST(NearestPairs, OrderOfAdditionsDoesNotMatter) {
+TEST(RankedPairs, OrderOfAdditionsDoesNotMatter) {
   std::vector<RankedPair> pairs;
   for (uint32_t a = 0; a < 20; ++a) {
     for (uint32_t b = a + 1; b < 20; ++b) {
@@ -38,7 +38,7 @@ TEST(NearestPairs, OrderOfAdditionsDoesNotMatter) {
   std::mt19937 random(31);
   for (int round = 0; round < 10; ++round) {
     std::shuffle(pairs.begin(), pairs.end(), random);
-    NearestPairs nearest(25, {}, 0);
+    RankedPairs nearest(25, {}, 0);
     for (const RankedPair& pair : pairs) {
       const bool may_be_skipped = pair.rank > nearest.bound();
       if (!may_be_skipped) nearest.Add(pair);
@@ -54,9 +54,9 @@ TEST(NearestPairs, OrderOfAdditionsDoesNotMatter) {
   }
 }
 
-TEST(NearestPairs, BoundCoversTheErrorOfSeparations) {
+TEST(RankedPairs, BoundCoversTheErrorOfSeparations) {
   const Box box = {Vector(0, 0, 0), Vector(3, 4, 0)};
-  NearestPairs nearest(1, {box}, 0.25);
+  RankedPairs nearest(1, {box}, 0.25);
   EXPECT_EQ(nearest.bound(), kInfinity);
   nearest.AddUnanswered(0, 1);
   EXPECT_EQ(nearest.bound(), kInfinity);
@@ -64,14 +64,14 @@ TEST(NearestPairs, BoundCoversTheErrorOfSeparations) {
   EXPECT_GT(nearest.bound(), 2.25 + 1e-10);
   EXPECT_LT(nearest.bound(), 2.25 + 1e-9);
   const Box far = {Vector(3, 4, 3), Vector(4, 5, 3)};
-  NearestPairs apart(1, {box, far, box}, 0);
+  RankedPairs apart(1, {box, far, box}, 0);
   EXPECT_TRUE(apart.MayBeNear(0, 1));
   apart.Add({3, 0, 1, v1::RELATION_SEPARATED});
   EXPECT_TRUE(apart.MayBeNear(0, 1));
   apart.Add({2.9, 0, 1, v1::RELATION_SEPARATED});
   EXPECT_FALSE(apart.MayBeNear(1, 0));
   EXPECT_TRUE(apart.MayBeNear(0, 2));
-  NearestPairs points(1, {}, 0);
+  RankedPairs points(1, {}, 0);
   points.Add({0, 0, 1, v1::RELATION_TOUCHING});
   EXPECT_GT(points.bound(), 0);
 }

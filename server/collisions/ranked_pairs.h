@@ -1,0 +1,83 @@
+#ifndef HULLD_SERVER_COLLISIONS_RANKED_PAIRS_H_
+#define HULLD_SERVER_COLLISIONS_RANKED_PAIRS_H_
+
+#include <atomic>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/query/box_tree.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/registry/memory/memory_budget.h"
+
+namespace hulld::server {
+
+// Two placements, in the order of a scene that ranks its pairs. A pair without an answer is the
+// last: its rank is infinite, which those of found pairs are not.
+struct RankedPair {
+  // As reported: the separation or, in motion, separated_until.
+  double rank;
+  uint32_t a;
+  uint32_t b;
+  v1::Relation relation;
+
+  auto operator<=>(const RankedPair&) const = default;
+};
+
+// The pairs that a scene with a limit or first_only answers at the end, and the pairs without an
+// answer. The result does not depend on the order of additions. Thread-safe.
+class RankedPairs {
+ public:
+  // Keeps the `limit` pairs of least separation, and the first `limit` pairs without an answer.
+  // boxes: one for each placement. max_error: the requested one, or 0.
+  RankedPairs(size_t limit, std::vector<Box> boxes, double max_error);
+  // Keeps the pairs in motion that may be the first to touch: those whose rank does not exceed the
+  // least contact time; none if no contact is proven. Charges its memory to `charge`.
+  explicit RankedPairs(MemoryCharge charge);
+
+  // With a limit: any pair whose exact separation exceeds this has `limit` nearer ones. Never
+  // increases.
+  double bound() const { return bound_.load(std::memory_order_relaxed); }
+  // With a limit: false if the boxes prove that `limit` pairs are nearer than these placements,
+  // which do not overlap. Cost: some ten operations.
+  bool MayBeNear(uint32_t a, uint32_t b) const;
+
+  // contact_time: infinite if no contact is proven, and with a limit. Return true if the charge
+  // grew.
+  bool Add(const RankedPair& pair, double contact_time = kNever);
+  bool AddUnanswered(uint32_t a, uint32_t b);
+
+  // Removes and returns the kept pairs in ascending order, then those without an answer.
+  std::vector<RankedPair> Take();
+
+  // With a limit: upper bound of the memory, in a scene with this many pairs.
+  size_t MaxMemoryBytes(uint64_t pairs) const;
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+ private:
+  // Updates the charge. Returns true if it changed. Requires the mutex.
+  bool Charge();
+
+  const size_t limit_;
+  const std::vector<Box> boxes_;
+  // Upper bound of the error of a reported separation near 0.
+  double max_error_ = 0;
+  std::atomic<double> bound_ = kNever;
+  std::mutex mutex_;
+  // The mutex guards the members below.
+  double earliest_ = kNever;
+  // Heaps, the greatest pair first.
+  std::vector<RankedPair> kept_;
+  std::vector<RankedPair> unanswered_;
+  // Without a limit.
+  std::optional<MemoryCharge> charge_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_RANKED_PAIRS_H_
