@@ -219,9 +219,7 @@ absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, S
     found = AskPlaced(table_, a, b, query_, motion_options_);
   } else {
     found.answer = search_->Ask(a, b, &found.of_body);
-    if (!found.answer.ok()) {
-      found.answer = NameLimit(table_, a, b, found.answer.status(), query_);
-    }
+    if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), query_);
   }
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   piece.totals.set_candidates(piece.totals.candidates() + 1);
@@ -291,7 +289,7 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
       answer.certificate = {};
     }
   } else {
-    found.answer = NameQueryLimit(found.answer.status(), query_);
+    found.answer = NameLimit(found.answer.status(), query_);
   }
   Count(AddFound(a, b, found, piece), 1, &piece.totals);
   return absl::OkStatus();

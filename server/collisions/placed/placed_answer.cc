@@ -96,9 +96,7 @@ bool PairSearch::Advance(Clock::time_point end) {
   if (is_known.ok() && !*is_known) is_known = Continue(end);
   if (is_known.ok() && !*is_known) return false;
   if (!is_known.ok()) answer_.answer = is_known.status();
-  if (!answer_.answer.ok()) {
-    answer_.answer = NameLimit(table_, a_, b_, answer_.answer.status(), options_);
-  }
+  if (!answer_.answer.ok()) answer_.answer = NameLimit(answer_.answer.status(), options_);
   return true;
 }
 
@@ -178,16 +176,8 @@ PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
   static const auto* const kNoMotion = new MotionOptions();
   if (HasBody(table, a, b)) return AskPlaced(table, a, b, options, *kNoMotion);
   PlacedAnswer found = {AskHulls(table, a, b, options, cache)};
-  if (!found.answer.ok()) {
-    found.answer = NameLimit(table, a, b, found.answer.status(), options);
-  }
+  if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), options);
   return found;
-}
-
-absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const absl::Status& status, const QueryOptions& options) {
-  return HasBody(table, a, b) ? NameProofLimit(status, options.max_depth_bytes)
-                              : NameQueryLimit(status, options);
 }
 
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,

@@ -97,10 +97,6 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
 PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// Returns the error of a query, with the limit that it hit.
-absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const absl::Status& status, const QueryOptions& options);
-
 // Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns their bytes.
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
                        const std::vector<PieceCertificate>& certificates, size_t most,

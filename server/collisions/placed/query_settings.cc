@@ -106,15 +106,12 @@ bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b) {
   return a.hull().vertices().size() + b.hull().vertices().size() > kMostVertices;
 }
 
-absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {
+absl::Status NameLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   if (IsDepthTooLarge(status)) return AtLimit(status, options.max_depth_bytes, "request-memory");
-  return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
-}
-
-absl::Status NameProofLimit(const absl::Status& status, uint64_t max_depth_bytes) {
-  if (status.code() != absl::StatusCode::kResourceExhausted) return status;
-  if (IsDepthTooLarge(status)) return AtLimit(status, max_depth_bytes, "request-memory");
+  if (options.method == Method::kTextbookSat) {
+    return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
+  }
   return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
                     {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
 }

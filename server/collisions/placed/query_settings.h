@@ -43,12 +43,8 @@ bool IsQuickToRelate(const QueryHull& hull);
 bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b);
 
 // Returns the server's error for an error of a query with these options: RESOURCE_EXHAUSTED names
-// the limit and its flag.
-absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
-
-// Returns the server's error for an error of a query with bodies. RESOURCE_EXHAUSTED: it needs too
-// many certificates, or more memory than max_depth_bytes.
-absl::Status NameProofLimit(const absl::Status& status, uint64_t max_depth_bytes);
+// the limit, and its flag or, if bodies need too many certificates, its reason.
+absl::Status NameLimit(const absl::Status& status, const QueryOptions& options);
 
 // RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces take more than `limit` bytes.
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
