@@ -152,17 +152,11 @@ absl::Status PairQuestion::Encode() {
   if (!found.answer.ok()) return found.answer.status();
   v1::CheckCollisionResponse& response = call_->response();
   response.set_relation(EncodeRelation(found.answer->relation));
-  const PiecePair pieces = found.of_body.pieces.value_or(PiecePair{0, 0});
-  if (found.of_body.pieces.has_value()) {
-    if (table_.is_body(kA)) {
-      table_.EncodeDecidingPiece(kA, pieces.a, response.mutable_piece_a());
-    }
-    if (table_.is_body(kB)) {
-      table_.EncodeDecidingPiece(kB, pieces.b, response.mutable_piece_b());
-    }
-  }
-  const QueryHull& a = table_.has_bodies() ? table_.HullOfPiece(kA, pieces.a) : table_.HullAt(kA);
-  const QueryHull& b = table_.has_bodies() ? table_.HullOfPiece(kB, pieces.b) : table_.HullAt(kB);
+  const std::optional<PiecePair>& deciding = found.of_body.pieces;
+  if (deciding) table_.EncodeDecidingPieces(kA, kB, *deciding, &response);
+  const PiecePair pieces = deciding.value_or(PiecePair{0, 0});
+  const QueryHull& a = table_.HullOfPiece(kA, pieces.a);
+  const QueryHull& b = table_.HullOfPiece(kB, pieces.b);
   if (found.contact.has_value()) {
     EncodeFirstContact(*found.contact, response.mutable_first_contact());
     if (found.contact->certificate.has_value()) {

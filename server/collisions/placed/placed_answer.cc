@@ -31,8 +31,10 @@ absl::StatusOr<Answer> AskHulls(const PlacementTable& table, uint32_t a, uint32_
   return CheckCollision(table.PlacedAt(a, &made_a), table.PlacedAt(b, &made_b), options, cache);
 }
 
+// Adds the deciding pieces of a row in a call with bodies.
 size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
                  const std::optional<PiecePair>& pieces, v1::AnswerColumns* columns) {
+  if (!table.has_bodies()) return 0;
   const auto index = [&](uint32_t placement, uint32_t piece) {
     return table.is_body(placement) ? static_cast<int32_t>(piece) : -1;
   };
@@ -42,10 +44,15 @@ size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
 }
 
 // Adds the row of an answer, without its pieces and their certificates.
-size_t AddRow(const PlacementTable& table, const QueryHull& a, const QueryHull& b,
-              const PlacedAnswer& answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
-  if (answer.contact.has_value()) return AddFirstContact(*answer.contact, a, b, wanted, columns);
-  const size_t bytes = AddAnswer(answer.answer, a, b, wanted, columns);
+size_t AddRow(const PlacementTable& table, uint32_t a, uint32_t b, const PlacedAnswer& answer,
+              const v1::Wanted& wanted, v1::AnswerColumns* columns) {
+  const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
+  const QueryHull& hull_a = table.HullOfPiece(a, pieces.a);
+  const QueryHull& hull_b = table.HullOfPiece(b, pieces.b);
+  if (answer.contact.has_value()) {
+    return AddFirstContact(*answer.contact, hull_a, hull_b, wanted, columns);
+  }
+  const size_t bytes = AddAnswer(answer.answer, hull_a, hull_b, wanted, columns);
   return table.has_motions() ? bytes + AddNoTimes(columns) : bytes;
 }
 
@@ -54,11 +61,8 @@ size_t AddRow(const PlacementTable& table, const QueryHull& a, const QueryHull& 
 size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
-  const QueryHull& nothing = table.HullOfPiece(a, 0);
-  const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   v1::AnswerColumns row;
-  size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),
-                        answer, wanted, &row);
+  size_t bytes = AddRow(table, a, b, answer, wanted, &row);
   v1::PieceProof* const proof = row.add_piece_proofs();
   bytes += kProofBytes + AddCertificates(table, a, b, answer.of_body.certificates,
                                          Config::kMaxRowProofBytes, proof->mutable_certificates());
@@ -67,7 +71,7 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
     row.Clear();
     const absl::Status too_large =
         ProofTooLarge(answer.of_body.certificates.size(), Config::kMaxRowProofBytes);
-    bytes = AddRow(table, nothing, nothing, {too_large}, wanted, &row);
+    bytes = AddRow(table, a, b, {too_large}, wanted, &row);
     is_answered = false;
   }
   const auto number = static_cast<uint64_t>(columns->relations_size());
@@ -199,14 +203,9 @@ size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
-  if (!table.has_bodies()) {
-    return AddRow(table, table.HullAt(a), table.HullAt(b), answer, wanted, columns);
-  }
   const bool is_proven = wanted.certificate() && answer.answer.ok() && HasBody(table, a, b);
   if (is_proven) return AddProvenAnswer(table, a, b, answer, wanted, columns);
-  const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
-  const size_t bytes = AddRow(table, table.HullOfPiece(a, pieces.a), table.HullOfPiece(b, pieces.b),
-                              answer, wanted, columns);
+  const size_t bytes = AddRow(table, a, b, answer, wanted, columns);
   // Without an answer no pieces decided, although the relation alone may have been found.
   return bytes +
          AddPieces(table, a, b, answer.answer.ok() ? answer.of_body.pieces : std::nullopt, columns);
@@ -216,7 +215,6 @@ size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
                          v1::AnswerColumns* columns) {
   size_t bytes = AddUnanswered(wanted, columns);
   if (table.has_motions()) bytes += AddNoTimes(columns);
-  if (!table.has_bodies()) return bytes;
   return bytes + AddPieces(table, 0, 0, std::nullopt, columns);
 }
 

@@ -103,6 +103,7 @@ class PlacementTable {
   const QueryHull& HullAt(size_t i) const;
   // As HullAt, but for a body the hull of a piece.
   const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
+    if (!has_bodies()) return HullAt(i);
     const auto pieces = bodies_[i].body().pieces();
     return piece < pieces.size() ? *pieces[piece].hull : HullAt(i);
   }
@@ -171,8 +172,13 @@ class PlacementTable {
   }
   size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
-  // Encodes the piece of a body that decided. Requires that the placement is a body.
-  void EncodeDecidingPiece(size_t i, uint32_t piece, v1::DecidingPiece* message) const;
+  // Encodes the pieces that decided a pair of placements, of those that are bodies, into piece_a and
+  // piece_b of the message.
+  template <typename Message>
+  void EncodeDecidingPieces(size_t a, size_t b, const PiecePair& pieces, Message* message) const {
+    if (is_body(a)) EncodeDecidingPiece(a, pieces.a, message->mutable_piece_a());
+    if (is_body(b)) EncodeDecidingPiece(b, pieces.b, message->mutable_piece_b());
+  }
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
 
@@ -207,6 +213,7 @@ class PlacementTable {
   void NoteProblems();
   size_t EncodeRows(size_t first, const RowFields& to) const;
   size_t EncodePlacement(size_t row, const RowFields& to) const;
+  void EncodeDecidingPiece(size_t i, uint32_t piece, v1::DecidingPiece* message) const;
   size_t BodyBytes() const;
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;

@@ -337,12 +337,7 @@ void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pa
     event->set_relation(pair.relation);
     event->set_revision_a(table_.hull(*table_.hull_of(pair.a))->record.revision);
     event->set_revision_b(table_.hull(*table_.hull_of(pair.b))->record.revision);
-    if (pieces && table_.is_body(pair.a)) {
-      table_.EncodeDecidingPiece(pair.a, pieces->a, event->mutable_piece_a());
-    }
-    if (pieces && table_.is_body(pair.b)) {
-      table_.EncodeDecidingPiece(pair.b, pieces->b, event->mutable_piece_b());
-    }
+    if (pieces) table_.EncodeDecidingPieces(pair.a, pair.b, *pieces, event);
     if (options_.clearance.has_value()) event->set_within_clearance(pair.is_within_clearance);
   }
   reply_bytes_ += kEntryHeaderBytes + event->ByteSizeLong();
