@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <optional>
+#include <chrono>
 #include <unordered_map>
 #include <utility>
 
@@ -85,11 +85,6 @@ void EncodePose(const Pose& pose, v1::Pose* message) {
   EncodeVector(pose.t, message->mutable_translation());
 }
 
-template <typename Request>
-std::optional<uint64_t> IfRevision(const Request& request) {
-  return request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-}
-
 }  // namespace
 
 UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, Bytes* response) {
@@ -102,8 +97,10 @@ UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, B
 UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
-        call->EndOn(readers_,
-                    [this, call] { return Get(call->request(), call->call(), &call->response()); });
+        const auto get = [this, call](std::chrono::nanoseconds staleness) {
+          return Get(call->request(), call->call(), staleness, &call->response());
+        };
+        EndFresh(registry_, readers_, call, get, false);
       });
 }
 
@@ -116,7 +113,10 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(*context, admission_, Rpc::kDeleteBody, {request, response},
-                           [this](DeleteCall* call) { Delete(call); });
+                           [this](DeleteCall* call) {
+                             EndDeleted(registry_, call, registry_.bodies(), "body",
+                                        call->request().body_id());
+                           });
 }
 
 void BodyService::Put(PutCall* call) {
@@ -145,15 +145,9 @@ void BodyService::Put(PutCall* call) {
 }
 
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
-                              v1::GetBodyResponse* response) {
+                              std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
-  if (!freshness.ok()) return freshness.status();
-  const auto staleness =
-      registry_.barrier().AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
-  if (!staleness.ok()) return staleness.status();
   const FoundBodies found =
       registry_.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
@@ -161,7 +155,7 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
-  EncodeHeader(registry_.store(), AsOf{found.store_revision, *staleness},
+  EncodeHeader(registry_.store(), AsOf{found.store_revision, staleness},
                response->mutable_header());
   EncodeBody(body->Describe(), response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
@@ -172,20 +166,6 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
     placement->set_radius(piece.radius);
   }
   return absl::OkStatus();
-}
-
-void BodyService::Delete(DeleteCall* call) {
-  const std::string& id = call->request().body_id();
-  if (absl::Status s = CheckHullId(call->call().caller(), id, "body_id"); !s.ok()) {
-    return call->End(s);
-  }
-  registry_.bodies().Delete(
-      id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
-        if (!revision.ok()) return call->End(revision.status());
-        call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);
-        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
-        call->End(absl::OkStatus());
-      });
 }
 
 }  // namespace hulld::server

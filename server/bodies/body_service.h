@@ -4,6 +4,8 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
+
 #include "hulld/v1/body.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
@@ -37,11 +39,10 @@ class BodyService : public BodyServiceOfBytes {
   using ListCall = UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>;
   using DeleteCall = UnaryCall<v1::DeleteBodyRequest, v1::DeleteBodyResponse>;
 
-  // Put and Delete end the call after the change is committed.
+  // Ends the call after the change is committed.
   void Put(PutCall* call);
   absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
-                   v1::GetBodyResponse* response);
-  void Delete(DeleteCall* call);
+                   std::chrono::nanoseconds staleness, v1::GetBodyResponse* response);
 
   Registry& registry_;
   Admission& admission_;

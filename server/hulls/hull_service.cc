@@ -73,7 +73,10 @@ UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request,
 
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(*context, admission_, Rpc::kDeleteHull, {request, response},
-                           [this](DeleteCall* call) { Delete(call); });
+                           [this](DeleteCall* call) {
+                             EndDeleted(registry_, call, registry_.hulls(), "hull",
+                                        call->request().hull_id());
+                           });
 }
 
 WriteReactor* HullService::WatchHulls(CallContext* context, const Bytes* request) {
@@ -137,22 +140,6 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   response->mutable_audit()->set_ok(finding.ok());
   if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
   return absl::OkStatus();
-}
-
-void HullService::Delete(DeleteCall* call) {
-  const v1::DeleteHullRequest& request = call->request();
-  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
-    return call->End(s);
-  }
-  const auto if_revision =
-      request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  registry_.hulls().Delete(
-      request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
-        if (!revision.ok()) return call->End(revision.status());
-        call->call().LogChange("hull deleted", {"hull", call->request().hull_id()}, *revision);
-        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
-        call->End(absl::OkStatus());
-      });
 }
 
 }  // namespace hulld::server

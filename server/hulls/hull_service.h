@@ -53,11 +53,10 @@ class HullService : public HullServiceOfBytes {
   using ListCall = UnaryCall<v1::ListHullsRequest, v1::ListHullsResponse>;
   using DeleteCall = UnaryCall<v1::DeleteHullRequest, v1::DeleteHullResponse>;
 
-  // Create and Delete end the call after the change is committed.
+  // Ends the call after the change is committed.
   void Create(CreateCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
-  void Delete(DeleteCall* call);
 
   Registry& registry_;
   Admission& admission_;

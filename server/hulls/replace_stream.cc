@@ -61,7 +61,7 @@ absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
     return s;
   }
   replacement_.hull_id = open.hull_id();
-  if (open.has_if_revision()) replacement_.if_revision = open.if_revision();
+  replacement_.if_revision = IfRevision(open);
   replacement_.create_if_absent = open.create_if_absent();
   replacement_.builder = std::make_shared<HullBuilder>();
   return absl::OkStatus();

@@ -126,7 +126,7 @@ absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_p
   Chunk chunk;
   chunk.sequence = message.sequence();
   chunk.points = *std::move(points);
-  if (message.has_if_revision()) chunk.if_revision = message.if_revision();
+  chunk.if_revision = IfRevision(message);
   return chunk;
 }
 

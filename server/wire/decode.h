@@ -5,6 +5,7 @@
 #include <google/protobuf/repeated_field.h>
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -32,6 +33,12 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, ui
 absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes);
 // INVALID_ARGUMENT: no point, more than Config::kMaxShapePoints, or one that is not finite.
 absl::Status CheckShape(std::span<const Vector> points);
+
+// Returns the revision that a change depends on, if any.
+template <typename Request>
+std::optional<uint64_t> IfRevision(const Request& request) {
+  return request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
+}
 
 // Decodes a chunk. Its points may be NaN or infinite, which the builder checks. INVALID_ARGUMENT:
 // sequence 0, both point fields are set, or the number of coordinates is not a multiple of three.

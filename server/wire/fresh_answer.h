@@ -3,6 +3,7 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
@@ -69,6 +70,22 @@ void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, L
     return absl::OkStatus();
   };
   EndFresh(registry, pool, call, answer, !registry.store().finds_records());
+}
+
+// Ends a unary call that deletes a hull or a body after the deletion is committed. records: the
+// HullChanges or the BodyRegistry. kind: "hull" or "body".
+template <typename UnaryCall, typename Records>
+void EndDeleted(Registry& registry, UnaryCall* call, Records& records, const char* kind,
+                const std::string& id) {
+  const absl::Status valid = CheckHullId(call->call().caller(), id, absl::StrCat(kind, "_id"));
+  if (!valid.ok()) return call->End(valid);
+  const auto done = [&registry, call, kind, &id](const absl::StatusOr<uint64_t>& revision) {
+    if (!revision.ok()) return call->End(revision.status());
+    call->call().LogChange(absl::StrCat(kind, " deleted"), {kind, id}, *revision);
+    EncodeHeader(registry.store(), *revision, call->response().mutable_header());
+    call->End(absl::OkStatus());
+  };
+  records.Delete(id, IfRevision(call->request()), done);
 }
 
 }  // namespace hulld::server
