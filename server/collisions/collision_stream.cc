@@ -120,21 +120,12 @@ absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
 }
 
 absl::Status CollisionStream::HandleMessage() {
-  switch (request().message_case()) {
-    case v1::StreamCollisionsRequest::kOpen:
-      if (open_) {
-        return absl::InvalidArgumentError(
-            "open was sent twice; start a new stream for other placements or pairs");
-      }
-      return Prefixed("open: ", HandleOpen());
-    case v1::StreamCollisionsRequest::kUpdate:
-      if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
-      ++messages_;
-      return OfMessage(HandleUpdate(request().update()));
-    case v1::StreamCollisionsRequest::MESSAGE_NOT_SET:
-      break;
-  }
-  return absl::InvalidArgumentError("the message is empty; set open or update");
+  const absl::Status in_order = CheckOrder(
+      request(), open_, "open was sent twice; start a new stream for other placements or pairs");
+  if (!in_order.ok()) return in_order;
+  if (request().has_open()) return Prefixed("open: ", HandleOpen());
+  ++messages_;
+  return OfMessage(HandleUpdate(request().update()));
 }
 
 absl::Status CollisionStream::HandleOpen() {

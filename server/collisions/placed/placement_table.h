@@ -276,6 +276,18 @@ class PlacementTable {
 absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                            const v1::PackedPlacements& packed, const char* what);
 
+// Checks that `open` is the first message of a stream, and only the first. INVALID_ARGUMENT; `twice`:
+// the error of a second one.
+template <typename Request>
+absl::Status CheckOrder(const Request& request, bool is_open, const char* twice) {
+  if (!request.has_open() && !request.has_update()) {
+    return absl::InvalidArgumentError("the message is empty; set open or update");
+  }
+  if (request.has_open() && is_open) return absl::InvalidArgumentError(twice);
+  if (request.has_open() || is_open) return absl::OkStatus();
+  return absl::InvalidArgumentError("the first message must be open, not update");
+}
+
 // Validates an update of a stream with `count` placements: the new pose of each of `placements`, as
 // read by ReadPose. INVALID_ARGUMENT: the lists do not match, an index is out of range or repeated,
 // or a pose is malformed.

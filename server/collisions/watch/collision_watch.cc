@@ -101,22 +101,12 @@ void CollisionWatch::TakeMessage() {
 }
 
 absl::Status CollisionWatch::HandleMessage() {
-  switch (request().message_case()) {
-    case v1::WatchCollisionsRequest::kOpen:
-      if (is_open_) {
-        return absl::InvalidArgumentError(
-            "open came twice; other placements or pairs need another watch");
-      }
-      return Prefixed("open: ", HandleOpen(*request().mutable_open()));
-    case v1::WatchCollisionsRequest::kUpdate:
-      if (!is_open_)
-        return absl::InvalidArgumentError("the first message must be open, not update");
-      ++messages_;
-      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
-    case v1::WatchCollisionsRequest::MESSAGE_NOT_SET:
-      break;
-  }
-  return absl::InvalidArgumentError("the message is empty; set open or update");
+  const absl::Status in_order = CheckOrder(
+      request(), is_open_, "open came twice; other placements or pairs need another watch");
+  if (!in_order.ok()) return in_order;
+  if (request().has_open()) return Prefixed("open: ", HandleOpen(*request().mutable_open()));
+  ++messages_;
+  return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
 }
 
 absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
