@@ -31,7 +31,7 @@ bool IsContact(v1::Relation relation) {
 }
 
 // Returns the kind of the pair's event; UNSPECIFIED if the pair is unchanged.
-v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, bool is_within) {
+v1::CollisionEventKind KindOf(const LivePair& before, v1::Relation relation, bool is_within) {
   switch (relation) {
     case v1::RELATION_OVERLAPPING:
       if (before.relation == relation) break;
@@ -142,7 +142,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   options_ = *std::move(options);
   table_ = *std::move(table);
   table_.SortByHull();
-  pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
+  pairs_ = LivePairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
 
   // Preparation pays off, because each hull is queried repeatedly.
@@ -297,7 +297,7 @@ bool CollisionWatch::AddHulls() {
   return true;
 }
 
-absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
+absl::Status CollisionWatch::AnswerPair(LivePair& pair) {
   if (!table_.is_answerable(pair.a) || !table_.is_answerable(pair.b)) {
     if (pair.is_reported()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair, std::nullopt);
     pair.relation = v1::RELATION_SEPARATED;
@@ -317,7 +317,7 @@ absl::Status CollisionWatch::AnswerPair(WatchedPair& pair) {
   return absl::OkStatus();
 }
 
-void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
+void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const LivePair& pair,
                               const std::optional<PiecePair>& pieces) {
   v1::CollisionEvent* const event = reply_.add_events();
   event->set_kind(kind);

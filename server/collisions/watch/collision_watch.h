@@ -16,7 +16,7 @@
 #include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/watch/watched_hulls.h"
-#include "server/collisions/watch/watched_pairs.h"
+#include "server/collisions/placed/live_pairs.h"
 #include "server/process/task_pool.h"
 
 namespace hulld::server {
@@ -60,8 +60,8 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status BeginRound(const std::vector<uint32_t>& changed);
   void SendRound();
   bool AddHulls();
-  absl::Status AnswerPair(WatchedPair& pair);
-  void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
+  absl::Status AnswerPair(LivePair& pair);
+  void AddEvent(v1::CollisionEventKind kind, const LivePair& pair,
                 const std::optional<PiecePair>& pieces);
   // Ends the task, and the call if `error` is not OK.
   void EndWork(const absl::Status& error);
@@ -84,7 +84,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   bool is_open_ = false;
   QueryOptions options_;
   PlacementTable table_;
-  WatchedPairs pairs_;
+  LivePairs pairs_;
   uint64_t messages_ = 0;
   // Every change of a hull up to this revision is included.
   uint64_t revision_ = 0;

@@ -1,4 +1,4 @@
-#include "server/collisions/watch/watched_pairs.h"
+#include "server/collisions/placed/live_pairs.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -17,7 +17,7 @@ uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 
 }  // namespace
 
-WatchedPairs::WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements,
+LivePairs::LivePairs(const v1::CollisionWatchOpen& open, size_t placements,
                            uint64_t max_pairs)
     : pairs_of_(placements),
       is_scene_(open.pairs().empty()),
@@ -33,7 +33,7 @@ WatchedPairs::WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements
   for (int i = 0; i < open.pairs_size(); i += 2) Add(open.pairs(i), open.pairs(i + 1));
 }
 
-uint32_t WatchedPairs::Add(uint32_t a, uint32_t b) {
+uint32_t LivePairs::Add(uint32_t a, uint32_t b) {
   auto number = static_cast<uint32_t>(pairs_.size());
   if (free_.empty()) {
     pairs_.emplace_back();
@@ -49,26 +49,26 @@ uint32_t WatchedPairs::Add(uint32_t a, uint32_t b) {
   return number;
 }
 
-void WatchedPairs::Drop(uint32_t number) {
-  const WatchedPair& pair = pairs_[number];
+void LivePairs::Drop(uint32_t number) {
+  const LivePair& pair = pairs_[number];
   numbers_.erase(KeyOf(pair.a, pair.b));
   std::erase(pairs_of_[pair.a], number);
   std::erase(pairs_of_[pair.b], number);
   free_.push_back(number);
 }
 
-bool WatchedPairs::MayCollide(uint32_t a, uint32_t b) const {
+bool LivePairs::MayCollide(uint32_t a, uint32_t b) const {
   if (a == b || std::min(a, b) >= movers_) return false;
   if (groups_.empty() || ignored_.empty()) return true;
   return !ignored_.contains(std::minmax(groups_[a], groups_[b]));
 }
 
-void WatchedPairs::SelectOne(uint32_t number) {
+void LivePairs::SelectOne(uint32_t number) {
   if (std::exchange(pairs_[number].is_selected, true)) return;
   selected_.push_back(number);
 }
 
-absl::Status WatchedPairs::Select(std::span<const uint32_t> changed, const PlacementTable& table) {
+absl::Status LivePairs::Select(std::span<const uint32_t> changed, const PlacementTable& table) {
   for (const uint32_t placement : changed) {
     for (const uint32_t number : pairs_of_[placement]) SelectOne(number);
     if (is_scene_) boxes_[placement] = table.BoxOf(placement);
@@ -76,7 +76,7 @@ absl::Status WatchedPairs::Select(std::span<const uint32_t> changed, const Place
   return is_scene_ ? SelectNeighbors(changed) : absl::OkStatus();
 }
 
-absl::Status WatchedPairs::SelectNeighbors(std::span<const uint32_t> changed) {
+absl::Status LivePairs::SelectNeighbors(std::span<const uint32_t> changed) {
   if (changed.size() <= kMostCompared) {
     for (const uint32_t a : changed) {
       const Box box = GrownBy(boxes_[a], clearance_);
@@ -99,7 +99,7 @@ absl::Status WatchedPairs::SelectNeighbors(std::span<const uint32_t> changed) {
   return absl::OkStatus();
 }
 
-absl::Status WatchedPairs::SelectPair(uint32_t a, uint32_t b) {
+absl::Status LivePairs::SelectPair(uint32_t a, uint32_t b) {
   if (!MayCollide(a, b)) return absl::OkStatus();
   const auto [low, high] = std::minmax(a, b);
   const auto [place, is_new] = numbers_.emplace(KeyOf(low, high), 0);
@@ -114,13 +114,13 @@ absl::Status WatchedPairs::SelectPair(uint32_t a, uint32_t b) {
   return absl::OkStatus();
 }
 
-void WatchedPairs::ForgetPoints(uint32_t placement) {
+void LivePairs::ForgetPoints(uint32_t placement) {
   for (const uint32_t number : pairs_of_[placement]) pairs_[number].cache.ForgetHulls();
 }
 
-void WatchedPairs::EndRound() {
+void LivePairs::EndRound() {
   for (const uint32_t number : selected_) {
-    WatchedPair& pair = pairs_[number];
+    LivePair& pair = pairs_[number];
     pair.is_selected = false;
     if (!is_scene_ || pair.is_reported()) continue;
     if (!GrownBy(boxes_[pair.a], clearance_).Meets(boxes_[pair.b])) Drop(number);
@@ -128,9 +128,9 @@ void WatchedPairs::EndRound() {
   selected_.clear();
 }
 
-size_t WatchedPairs::MemoryBytes() const {
+size_t LivePairs::MemoryBytes() const {
   // Entries in the lists of two placements, in the selection, and in the map by key.
-  constexpr size_t kPerPair = sizeof(WatchedPair) + 3 * sizeof(uint32_t) + 48;
+  constexpr size_t kPerPair = sizeof(LivePair) + 3 * sizeof(uint32_t) + 48;
   return pairs_.size() * kPerPair +
          pairs_of_.size() * (sizeof(std::vector<uint32_t>) + sizeof(uint32_t)) +
          boxes_.size() * sizeof(Box);

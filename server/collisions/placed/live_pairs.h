@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_
-#define HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_LIVE_PAIRS_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_LIVE_PAIRS_H_
 
 #include <absl/status/status.h>
 
@@ -19,7 +19,7 @@
 namespace hulld::server {
 
 // State of a pair between answers.
-struct WatchedPair {
+struct LivePair {
   uint32_t a = 0;
   uint32_t b = 0;
   PairCache cache;
@@ -35,12 +35,12 @@ struct WatchedPair {
 // The pairs of a watch, indexed by placement, and those selected for the current round. Holds all
 // named pairs; of a scene, only reported pairs and pairs whose bounding boxes, grown by the
 // clearance, meet: all other pairs are farther apart than the clearance. Not thread-safe.
-class WatchedPairs {
+class LivePairs {
  public:
-  WatchedPairs() = default;
+  LivePairs() = default;
   // Requires valid pairs, groups and movers for this many placements. max_pairs: maximum number of
   // held pairs of a scene (--max-pairs-per-batch).
-  WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
+  LivePairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
   // Selects all pairs of the moved or changed placements, including new ones; each placement once.
   // RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n) in total,
@@ -51,7 +51,7 @@ class WatchedPairs {
 
   // Numbers of the selected pairs.
   std::span<const uint32_t> selected() const { return selected_; }
-  WatchedPair& pair(uint32_t number) { return pairs_[number]; }
+  LivePair& pair(uint32_t number) { return pairs_[number]; }
   // Clears the selection and drops pairs that need not be held.
   void EndRound();
 
@@ -65,7 +65,7 @@ class WatchedPairs {
   absl::Status SelectNeighbors(std::span<const uint32_t> changed);
   absl::Status SelectPair(uint32_t a, uint32_t b);
 
-  std::vector<WatchedPair> pairs_;
+  std::vector<LivePair> pairs_;
   // Pair numbers by placement.
   std::vector<std::vector<uint32_t>> pairs_of_;
   std::vector<uint32_t> selected_;
@@ -85,4 +85,4 @@ class WatchedPairs {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_LIVE_PAIRS_H_
