@@ -70,9 +70,9 @@ bool CollisionStream::IsQuick() const {
   int pairs = 0;
   for (const uint32_t placement : update.placements()) {
     if (placement >= table_.size()) return true;  // an error
-    for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
+    for (const uint32_t number : pairs_.pairs_of(placement)) {
       if (++pairs > kMostQuickPairs) return false;
-      const PairState& pair = pairs_[pairs_of_[k]];
+      const LivePair& pair = pairs_.pair(number);
       for (const uint32_t part : {pair.a, pair.b}) {
         if (table_.is_body(part)) return false;
         if (!IsQuickToRelate(table_.placed()[part].query_hull())) return false;
@@ -83,7 +83,7 @@ bool CollisionStream::IsQuick() const {
 }
 
 void CollisionStream::Handle() {
-  asked_.clear();
+  pairs_.EndRound();
   decided_.clear();
   next_asked_ = 0;
   refresh_.reset();
@@ -105,11 +105,10 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
-  if (!std::is_sorted(asked_.begin(), asked_.end())) std::sort(asked_.begin(), asked_.end());
-  for (const uint32_t pair : asked_) is_asked_[pair] = false;
+  pairs_.SortSelected();
   table_.EncodeHeader(parts_.registry.store(), reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
-  call().AddPairs(asked_.size());
+  call().AddPairs(pairs_.selected().size());
   AnswerSlice();
 }
 
@@ -154,24 +153,9 @@ absl::Status CollisionStream::HandleOpen() {
   table_ = *std::move(table);
 
   if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) return s;
-
-  pairs_.reserve(static_cast<size_t>(open.pairs_size()) / 2);
-  pairs_begin_.assign(table_.size() + 1, 0);
-  for (int i = 0; i < open.pairs_size(); i += 2) {
-    pairs_.push_back({open.pairs(i), open.pairs(i + 1), {}, v1::RELATION_UNSPECIFIED});
-    ++pairs_begin_[pairs_.back().a];
-    ++pairs_begin_[pairs_.back().b];
-  }
-  size_t sum = 0;
-  for (size_t& begin : pairs_begin_) begin = sum += begin;
-  pairs_of_.resize(sum);
-  for (size_t i = pairs_.size(); i-- > 0;) {
-    pairs_of_[--pairs_begin_[pairs_[i].a]] = static_cast<uint32_t>(i);
-    pairs_of_[--pairs_begin_[pairs_[i].b]] = static_cast<uint32_t>(i);
-  }
+  pairs_ = LivePairs(open.pairs(), table_.size(), v1::RELATION_UNSPECIFIED);
   open_ = true;
-  is_asked_.assign(pairs_.size(), false);
-  for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
+  pairs_.SelectAll();
   // Preparation is worth the wait: the hulls are used until the client refreshes them.
   const uint64_t pairs_per_hull = 2 * pairs_.size() / std::max<size_t>(1, table_.hull_count());
   refresh_ = {kExpectedUpdates * pairs_per_hull, true, freshness_};
@@ -181,10 +165,8 @@ absl::Status CollisionStream::HandleOpen() {
 // Charges the stream's memory to --memory-limit before allocating it. RESOURCE_EXHAUSTED: there is
 // no room.
 absl::Status CollisionStream::ChargeFor(size_t pairs) {
-  // A pair has entries in the pairs of two placements, and in the pairs to query and decided.
-  constexpr size_t kPerPair =
-      sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char) + sizeof(Decided);
-  charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
+  charge_.Set(table_.MemoryBytes() + LivePairs::BytesOf(pairs, table_.size()) +
+              pairs * sizeof(Decided));
   return parts_.registry.CheckMemory(MemoryUse::kReading);
 }
 
@@ -198,7 +180,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
     const Pose pose = ReadPose(update.poses(), static_cast<size_t>(i));
     // Refreshing places all placements.
     update.refresh_hulls() ? table_.SetPose(placement, pose) : table_.Move(placement, pose);
-    AskAboutPairsOf(placement);
+    pairs_.SelectPairsOf(placement);
   }
   if (update.refresh_hulls()) {
     refresh_ = ReadPlan{.freshness = freshness_};
@@ -212,32 +194,16 @@ absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
   }
-  for (size_t i = 0; i < table_.size(); ++i) {
-    if (table_.hull_changed(i)) AskAboutPairsOf(i);
-    if (!table_.query_hull_changed(i)) continue;
-    // The cached points are of the former QueryHull. The cached axis remains a good guess.
-    for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) {
-      pairs_[pairs_of_[k]].cache.ForgetHulls();
-    }
+  for (uint32_t i = 0; i < table_.size(); ++i) {
+    if (table_.hull_changed(i)) pairs_.SelectPairsOf(i);
+    if (table_.query_hull_changed(i)) pairs_.ForgetPoints(i);
   }
   next_row_ = 0;
   return absl::OkStatus();
 }
 
-void CollisionStream::AskAbout(uint32_t pair) {
-  if (is_asked_[pair]) return;
-  is_asked_[pair] = true;
-  asked_.push_back(pair);
-}
-
-void CollisionStream::AskAboutPairsOf(size_t placement) {
-  for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
-    AskAbout(pairs_of_[k]);
-  }
-}
-
 void CollisionStream::AddAnswer(uint32_t index) {
-  PairState& pair = pairs_[index];
+  LivePair& pair = pairs_.pair(index);
   const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
   PlacedAnswer answer;
   if (answerable) answer = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
@@ -261,10 +227,10 @@ void CollisionStream::AddAnswer(uint32_t index) {
 // Decides the requested pairs, together with any helper threads that arrive in time. Helpers run
 // slices in this call's turns, so they yield to other calls.
 void CollisionStream::DecideTogether() {
-  decided_.resize(asked_.size());
-  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
+  decided_.resize(pairs_.selected().size());
+  unclaimed_.Begin(static_cast<uint32_t>(decided_.size()));
   const size_t wanted =
-      std::min<size_t>(parts_.pool.threads() - 1, asked_.size() / kPairsPerHelper);
+      std::min<size_t>(parts_.pool.threads() - 1, decided_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
   for (size_t helpers = helpers_waiting_.load(); helpers < wanted; ++helpers) {
     ++helpers_waiting_;
@@ -294,7 +260,7 @@ void CollisionStream::TakePart() {
 }
 
 void CollisionStream::Decide(uint32_t i) {
-  PairState& pair = pairs_[asked_[i]];
+  LivePair& pair = pairs_.pair(pairs_.selected()[i]);
   v1::Relation relation = v1::RELATION_UNSPECIFIED;
   Rung rung = Rung::kBounds;
   if (table_.is_answerable(pair.a) && table_.is_answerable(pair.b)) {
@@ -318,7 +284,7 @@ void CollisionStream::AddDecided(size_t i) {
   if (is_answered) rungs_.Add(rung);
   if (only_changes_ && messages_ > 0 && !is_changed) return;
   v1::AnswerColumns* const columns = reply().mutable_columns();
-  reply().add_pairs(asked_[i]);
+  reply().add_pairs(pairs_.selected()[i]);
   columns->add_relations(relation);
   columns->add_rungs(is_answered ? EncodeRung(rung) : v1::RUNG_UNSPECIFIED);
   reply_bytes_ += kIndexBytes + kRelationBytes;
@@ -339,12 +305,13 @@ void CollisionStream::AnswerSlice() {
     reply_bytes_ = reply().ByteSizeLong();
   }
   const bool is_plain = IsPlain();
-  if (is_plain && decided_.size() < asked_.size()) return DecideTogether();
+  const std::span<const uint32_t> asked = pairs_.selected();
+  if (is_plain && decided_.size() < asked.size()) return DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   const size_t pairs_per_look =
       is_plain ? kPairsPerClockRead : (table_.has_bodies() ? 1 : kPairsPerClaim);
-  while (next_asked_ < asked_.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
-    is_plain ? AddDecided(next_asked_) : AddAnswer(asked_[next_asked_]);
+  while (next_asked_ < asked.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
+    is_plain ? AddDecided(next_asked_) : AddAnswer(asked[next_asked_]);
     if (++next_asked_ % pairs_per_look != 0) continue;
     if (call().ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
@@ -357,8 +324,9 @@ void CollisionStream::AnswerSlice() {
 void CollisionStream::SendAnswered() {
   call().metrics().CountPairs(std::exchange(rungs_, {}));
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
-  if (next_asked_ == asked_.size()) call().EndMessage();
-  SendPart(next_asked_ == asked_.size());
+  const bool is_last = next_asked_ == pairs_.selected().size();
+  if (is_last) call().EndMessage();
+  SendPart(is_last);
 }
 
 }  // namespace hulld::server

@@ -17,6 +17,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/collisions/claimed_range.h"
 #include "server/collisions/placed/collision_parts.h"
+#include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/task_pool.h"
@@ -40,15 +41,6 @@ class CollisionStream
         charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
  private:
-  // State of a pair kept between answers.
-  struct PairState {
-    uint32_t a;
-    uint32_t b;
-    PairCache cache;
-    // The last answer.
-    v1::Relation relation = v1::RELATION_UNSPECIFIED;
-  };
-
   // Result of a pair.
   struct Decided {
     // A v1::Relation; unspecified if a placement has a problem, which is reported elsewhere.
@@ -73,8 +65,6 @@ class CollisionStream
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
   absl::Status Refresh(const ReadPlan& plan);
   void AnswerMessage(absl::Status status);
-  void AskAbout(uint32_t pair);
-  void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
   void DecideTogether();
   void TakePart();
@@ -105,20 +95,15 @@ class CollisionStream
   PlacementTable table_;
   // Next row of the table to send; table_rows() if none is left.
   size_t next_row_ = 0;
-  std::vector<PairState> pairs_;
-  // Pairs of placement i: pairs_of_[pairs_begin_[i]] up to pairs_begin_[i + 1].
-  std::vector<uint32_t> pairs_of_;
-  std::vector<size_t> pairs_begin_;
-
-  // Pairs queried by the current message, ascending, and the next one to answer.
-  std::vector<uint32_t> asked_;
-  std::vector<char> is_asked_;
+  // The selected pairs are queried by the current message, in ascending order.
+  LivePairs pairs_;
+  // Index of the next selected pair to answer.
   size_t next_asked_ = 0;
   RungCounts rungs_;
 
-  // Of a plain answer, parallel to asked_ once it is decided, by several threads.
+  // Of a plain answer, parallel to the selected pairs once it is decided, by several threads.
   std::vector<Decided> decided_;
-  // Entries of asked_ that no thread decides yet.
+  // Selected pairs that no thread decides yet.
   ClaimedRange unclaimed_;
   // Queued slices of helpers.
   std::atomic<size_t> helpers_waiting_ = 0;

@@ -17,20 +17,24 @@ uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 
 }  // namespace
 
-LivePairs::LivePairs(const v1::CollisionWatchOpen& open, size_t placements,
-                           uint64_t max_pairs)
-    : pairs_of_(placements),
-      is_scene_(open.pairs().empty()),
-      max_pairs_(max_pairs),
-      groups_(open.groups().begin(), open.groups().end()),
-      movers_(open.has_movers() ? open.movers() : static_cast<uint32_t>(placements)),
-      clearance_(open.clearance()) {
+LivePairs::LivePairs(const google::protobuf::RepeatedField<uint32_t>& pairs, size_t placements,
+                     v1::Relation relation)
+    : first_relation_(relation), pairs_of_(placements) {
+  pairs_.reserve(static_cast<size_t>(pairs.size()) / 2);
+  for (int i = 0; i < pairs.size(); i += 2) Add(pairs[i], pairs[i + 1]);
+}
+
+LivePairs::LivePairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs)
+    : LivePairs(open.pairs(), placements, v1::RELATION_SEPARATED) {
+  is_scene_ = open.pairs().empty();
+  max_pairs_ = max_pairs;
+  groups_.assign(open.groups().begin(), open.groups().end());
+  movers_ = open.has_movers() ? open.movers() : static_cast<uint32_t>(placements);
+  clearance_ = open.clearance();
   for (const GroupPair& pair : IgnoredGroups(open)) {
     ignored_.insert(std::minmax(pair.first, pair.second));
   }
   if (is_scene_) boxes_.resize(placements);
-  pairs_.reserve(static_cast<size_t>(open.pairs_size()) / 2);
-  for (int i = 0; i < open.pairs_size(); i += 2) Add(open.pairs(i), open.pairs(i + 1));
 }
 
 uint32_t LivePairs::Add(uint32_t a, uint32_t b) {
@@ -40,10 +44,8 @@ uint32_t LivePairs::Add(uint32_t a, uint32_t b) {
   } else {
     number = free_.back();
     free_.pop_back();
-    pairs_[number] = {};
   }
-  pairs_[number].a = a;
-  pairs_[number].b = b;
+  pairs_[number] = {.a = a, .b = b, .relation = first_relation_};
   pairs_of_[a].push_back(number);
   if (a != b) pairs_of_[b].push_back(number);
   return number;
@@ -68,9 +70,21 @@ void LivePairs::SelectOne(uint32_t number) {
   selected_.push_back(number);
 }
 
+void LivePairs::SelectAll() {
+  for (uint32_t number = 0; number < pairs_.size(); ++number) SelectOne(number);
+}
+
+void LivePairs::SelectPairsOf(uint32_t placement) {
+  for (const uint32_t number : pairs_of_[placement]) SelectOne(number);
+}
+
+void LivePairs::SortSelected() {
+  if (!std::ranges::is_sorted(selected_)) std::ranges::sort(selected_);
+}
+
 absl::Status LivePairs::Select(std::span<const uint32_t> changed, const PlacementTable& table) {
   for (const uint32_t placement : changed) {
-    for (const uint32_t number : pairs_of_[placement]) SelectOne(number);
+    SelectPairsOf(placement);
     if (is_scene_) boxes_[placement] = table.BoxOf(placement);
   }
   return is_scene_ ? SelectNeighbors(changed) : absl::OkStatus();
@@ -128,11 +142,16 @@ void LivePairs::EndRound() {
   selected_.clear();
 }
 
+size_t LivePairs::BytesOf(size_t pairs, size_t placements) {
+  // Entries in the lists of two placements, and in the selection.
+  return pairs * (sizeof(LivePair) + 3 * sizeof(uint32_t)) +
+         placements * (sizeof(std::vector<uint32_t>) + sizeof(uint32_t));
+}
+
 size_t LivePairs::MemoryBytes() const {
-  // Entries in the lists of two placements, in the selection, and in the map by key.
-  constexpr size_t kPerPair = sizeof(LivePair) + 3 * sizeof(uint32_t) + 48;
-  return pairs_.size() * kPerPair +
-         pairs_of_.size() * (sizeof(std::vector<uint32_t>) + sizeof(uint32_t)) +
+  // A node of the map by key.
+  constexpr size_t kNodeBytes = 48;
+  return BytesOf(pairs_.size(), pairs_of_.size()) + pairs_.size() * kNodeBytes +
          boxes_.size() * sizeof(Box);
 }
 

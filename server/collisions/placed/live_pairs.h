@@ -2,6 +2,7 @@
 #define HULLD_SERVER_COLLISIONS_PLACED_LIVE_PAIRS_H_
 
 #include <absl/status/status.h>
+#include <google/protobuf/repeated_field.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -22,9 +23,9 @@ namespace hulld::server {
 struct LivePair {
   uint32_t a = 0;
   uint32_t b = 0;
-  PairCache cache;
-  // As reported last; SEPARATED if never reported.
-  v1::Relation relation = v1::RELATION_SEPARATED;
+  PairCache cache = {};
+  // As reported last.
+  v1::Relation relation = v1::RELATION_UNSPECIFIED;
   bool is_within_clearance = false;
   bool is_selected = false;
 
@@ -32,16 +33,23 @@ struct LivePair {
   bool is_reported() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
-// The pairs of a watch, indexed by placement, and those selected for the current round. Holds all
-// named pairs; of a scene, only reported pairs and pairs whose bounding boxes, grown by the
-// clearance, meet: all other pairs are farther apart than the clearance. Not thread-safe.
+// The pairs of a collision stream or watch, indexed by placement, and those selected for the current
+// round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding boxes, grown
+// by the clearance, meet: all other pairs are farther apart than the clearance. Not thread-safe.
 class LivePairs {
  public:
   LivePairs() = default;
+  // Named pairs. Requires valid pairs for this many placements. relation: of a pair that was never
+  // reported.
+  LivePairs(const google::protobuf::RepeatedField<uint32_t>& pairs, size_t placements,
+            v1::Relation relation);
   // Requires valid pairs, groups and movers for this many placements. max_pairs: maximum number of
   // held pairs of a scene (--max-pairs-per-batch).
   LivePairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
+  // Select all held pairs, or those of a placement.
+  void SelectAll();
+  void SelectPairsOf(uint32_t placement);
   // Selects all pairs of the moved or changed placements, including new ones; each placement once.
   // RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n) in total,
   // plus the number of selected pairs.
@@ -51,10 +59,16 @@ class LivePairs {
 
   // Numbers of the selected pairs.
   std::span<const uint32_t> selected() const { return selected_; }
+  void SortSelected();
+  size_t size() const { return pairs_.size(); }
   LivePair& pair(uint32_t number) { return pairs_[number]; }
+  const LivePair& pair(uint32_t number) const { return pairs_[number]; }
+  std::span<const uint32_t> pairs_of(uint32_t placement) const { return pairs_of_[placement]; }
   // Clears the selection and drops pairs that need not be held.
   void EndRound();
 
+  // Memory of this many named pairs and placements.
+  static size_t BytesOf(size_t pairs, size_t placements);
   size_t MemoryBytes() const;
 
  private:
@@ -65,6 +79,7 @@ class LivePairs {
   absl::Status SelectNeighbors(std::span<const uint32_t> changed);
   absl::Status SelectPair(uint32_t a, uint32_t b);
 
+  v1::Relation first_relation_ = v1::RELATION_UNSPECIFIED;
   std::vector<LivePair> pairs_;
   // Pair numbers by placement.
   std::vector<std::vector<uint32_t>> pairs_of_;

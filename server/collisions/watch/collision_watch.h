@@ -14,9 +14,9 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/collisions/placed/collision_parts.h"
+#include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/watch/watched_hulls.h"
-#include "server/collisions/placed/live_pairs.h"
 #include "server/process/task_pool.h"
 
 namespace hulld::server {
