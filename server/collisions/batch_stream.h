@@ -9,7 +9,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/query/batch.h"
 #include "core/query/motion/first_contact.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
@@ -34,8 +33,10 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
 
  private:
   absl::Status Validate() override;
-  absl::Status Prepare() override;
-  absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
+  // Answers the next pair of the piece, or works on it until `end`. CANCELLED. RESOURCE_EXHAUSTED:
+  // PairSearch::CheckMemory.
+  absl::Status Step(PairsPiece& piece, Clock::time_point end) override;
+  uint64_t StepsPerLook() const override;
   // The functions below require the mutex.
   uint64_t CountUnits() override { return static_cast<uint64_t>(request().pairs_size()) / 2; }
   bool MayRunAhead() const override;
@@ -43,20 +44,9 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
             v1::BatchCheckCollisionsResponse* waiting) override;
 
   // Without the mutex.
-  PlacedPair PairAt(uint64_t i) const;
-  bool IsAnswerable(const PlacedPair& pair) const;
-  // Answers the next pair of the piece, or works on it until `end`. CANCELLED. RESOURCE_EXHAUSTED:
-  // PairSearch::CheckMemory.
-  absl::Status Answer(PairsPiece& piece, Clock::time_point end);
-  absl::Status AnswerRelation(const PlacedPair& pair, PairsPiece& piece);
-  // Adds the row of the next pair: `add_row` adds it to the columns and returns its size, as
-  // AddAnswer does.
-  template <typename AddRow>
-  void Add(PairsPiece& piece, const AddRow& add_row);
-
-  // Written before the first piece: all pairs are of hulls at rest, and only relations are wanted
-  // (AnswerRelation).
-  bool is_plain_ = false;
+  absl::Status AnswerRelation(uint32_t a, uint32_t b, PairsPiece& piece);
+  // Ends the row of the next pair.
+  void EndPair(PairsPiece& piece, size_t bytes);
 };
 
 }  // namespace hulld::server

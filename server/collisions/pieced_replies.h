@@ -29,6 +29,7 @@
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
 #include "server/settings/config.h"
+#include "server/wire/answer_columns.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {
@@ -160,10 +161,18 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
   }
 
-  // Works on the piece until `end`, or until it is done: adds rows and replies, counts rungs, and
-  // advances `next`. Called without the mutex, on any thread, but never concurrently for the same
-  // piece.
-  virtual absl::Status Advance(Work& piece, Clock::time_point end) = 0;
+  // Makes a step with the next unit of the piece, which takes some microseconds, or until `end` at
+  // most: adds rows, counts rungs, and advances `next` after the unit. Called without the mutex, on
+  // any thread, but never concurrently for the same piece.
+  virtual absl::Status Step(Work& piece, Clock::time_point end) = 0;
+  // Steps between two reads of the clock.
+  virtual uint64_t StepsPerLook() const = 0;
+
+  // Ends a row of the piece. bytes: as AddAnswer returns.
+  void EndRow(Work& piece, size_t bytes) {
+    piece.row_bytes += bytes;
+    if (piece.row_bytes >= FullMessageBytes(this->request().wanted())) piece.EndReply();
+  }
 
   // The functions below require the mutex.
 
@@ -276,6 +285,17 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     charge_.Set(fixed_bytes_);
     if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
     return registry_.CheckMemory(MemoryUse::kReading);
+  }
+
+  // Works on the piece until `end`, or until it is done.
+  absl::Status Advance(Work& piece, Clock::time_point end) {
+    absl::Status status;
+    do {
+      for (uint64_t left = StepsPerLook(); left > 0 && !piece.is_done() && status.ok(); --left) {
+        status = Step(piece, end);
+      }
+    } while (status.ok() && !piece.is_done() && Clock::now() < end);
+    return status;
   }
 
   void RunSlice(Work& piece) {

@@ -162,54 +162,47 @@ size_t SceneStream::HeldBytes() const {
   return bytes + search_->MemoryBytes();
 }
 
-absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
-  if (piece.next >= search_->size()) return AdvanceRanked(piece, end);
-  const uint64_t steps_per_look = table_.has_bodies() || table_.has_motions() ? 1 : kStepsPerPoll;
-  for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
-    if (piece.next == piece.end) break;
-    const auto a = static_cast<uint32_t>(piece.next);
-    if (piece.bodies.has_value()) {
-      if (absl::Status s = AdvanceBodies(a, piece); !s.ok()) return s;
-      continue;
-    }
-    if (!piece.has_candidates) {
-      piece.candidates.Start(*search_, a);
-      piece.has_candidates = true;
-    }
-    if (!piece.candidates.Gather(kNodesPerStep)) continue;
-    const std::optional<uint32_t> b = piece.candidates.Next();
-    if (!b.has_value()) {
-      piece.has_candidates = false;
-      ++piece.next;
-      continue;
-    }
-    if (request().every_piece() && (table_.is_body(a) || table_.is_body(*b))) {
-      OpenBodies(a, *b, piece);
-      continue;
-    }
-    absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
-    if (!found.ok()) return found.status();
-    if (found->answer.ok() && !search_->IsFound(*found->answer)) continue;
-    if (ranking_ == nullptr) {
-      Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
-    } else if (absl::Status s = Rank(a, *b, *std::move(found), piece); !s.ok()) {
-      return s;
-    }
+uint64_t SceneStream::StepsPerLook() const {
+  const bool is_quick = ranked_.empty() && !table_.has_bodies() && !table_.has_motions();
+  return is_quick ? kStepsPerPoll : 1;
+}
+
+absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
+  if (!ranked_.empty()) return AnswerRanked(piece);
+  const auto a = static_cast<uint32_t>(piece.next);
+  if (piece.bodies.has_value()) return AdvanceBodies(a, piece);
+  if (!piece.has_candidates) {
+    piece.candidates.Start(*search_, a);
+    piece.has_candidates = true;
   }
+  if (!piece.candidates.Gather(kNodesPerStep)) return absl::OkStatus();
+  const std::optional<uint32_t> b = piece.candidates.Next();
+  if (!b.has_value()) {
+    piece.has_candidates = false;
+    ++piece.next;
+    return absl::OkStatus();
+  }
+  if (request().every_piece() && (table_.is_body(a) || table_.is_body(*b))) {
+    OpenBodies(a, *b, piece);
+    return absl::OkStatus();
+  }
+  absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
+  if (!found.ok()) return found.status();
+  if (found->answer.ok() && !search_->IsFound(*found->answer)) return absl::OkStatus();
+  if (ranking_ != nullptr) return Rank(a, *b, *std::move(found), piece);
+  Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
   return absl::OkStatus();
 }
 
-absl::Status SceneStream::AdvanceRanked(ScenePiece& piece, Clock::time_point end) {
-  do {
-    const RankedPair& pair = ranked_[piece.next - search_->size()];
-    const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
-    if (absl::IsCancelled(found.answer.status())) return found.answer.status();
-    const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
-    // Details such as a certificate may be refused.
-    Count(pair.relation, uint64_t{0} - 1, &piece.totals);
-    Count(relation, 1, &piece.totals);
-    ++piece.next;
-  } while (piece.next < piece.end && Clock::now() < end);
+absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
+  const RankedPair& pair = ranked_[piece.next - search_->size()];
+  const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
+  if (absl::IsCancelled(found.answer.status())) return found.answer.status();
+  const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
+  // Details such as a certificate may be refused.
+  Count(pair.relation, uint64_t{0} - 1, &piece.totals);
+  Count(relation, 1, &piece.totals);
+  ++piece.next;
   return absl::OkStatus();
 }
 
@@ -308,10 +301,10 @@ v1::Relation SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& a
   v1::FindCollisionsResponse& rows = piece.rows;
   rows.add_pairs(a);
   rows.add_pairs(b);
-  piece.row_bytes += kPairBytes + AddPlacedAnswer(table_, a, b, answer, request().wanted(),
-                                                  rows.mutable_columns());
+  const size_t bytes =
+      AddPlacedAnswer(table_, a, b, answer, request().wanted(), rows.mutable_columns());
   const v1::Relation relation = rows.columns().relations(rows.pairs_size() / 2 - 1);
-  if (piece.row_bytes >= FullMessageBytes(request().wanted())) piece.EndReply();
+  EndRow(piece, kPairBytes + bytes);
   return relation;
 }
 

@@ -58,7 +58,8 @@ class SceneStream
  private:
   absl::Status Validate() override;
   absl::Status Prepare() override;
-  absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
+  absl::Status Step(ScenePiece& piece, Clock::time_point end) override;
+  uint64_t StepsPerLook() const override;
   size_t HeldBytes() const override;
   // The functions below require the mutex.
   uint64_t CountUnits() override { return search_->size(); }
@@ -70,7 +71,8 @@ class SceneStream
   // Without the mutex.
   absl::Status ValidateChoice() const;
   absl::Status ValidateLimit() const;
-  absl::Status AdvanceRanked(ScenePiece& piece, Clock::time_point end);
+  // Answers the next of the ranked pairs. CANCELLED.
+  absl::Status AnswerRanked(ScenePiece& piece);
   // Starts on the pairs of pieces of a candidate.
   void OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const;
   // Answers one of them. CANCELLED.
