@@ -305,7 +305,8 @@ size_t PlacementTable::MemoryBytes() const {
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() * (sizeof(std::string) + KnownHulls::kBytesEach) +
          hull_count() * (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) +
-                         sizeof(size_t) + 2 * sizeof(char)) +
+                         2 * sizeof(char)) +
+         placements_of_.size() * sizeof(std::vector<uint32_t>) +
          shapes_.MemoryBytes() + of_ids + of_errors + BodyBytes();
 }
 
@@ -357,7 +358,7 @@ absl::Status PlacementTable::AddShapes(Registry& registry, const std::function<b
 
 void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolved,
                                   const QueryOptions& options) {
-  HULLD_CHECK(by_hull_begin_.size() == hull_count() + 1 && resolved.hulls.size() == hulls.size());
+  HULLD_CHECK(placements_of_.size() == hull_count() && resolved.hulls.size() == hulls.size());
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
   is_all_answerable_ = false;
@@ -465,15 +466,9 @@ PlacedBody PlacementTable::PlaceBody(size_t i) const {
 }
 
 void PlacementTable::SortByHull() {
-  by_hull_begin_.assign(hull_count() + 1, 0);
-  for (const uint32_t k : hull_of_) {
-    if (k != kNoHull) ++by_hull_begin_[k];
-  }
-  size_t sum = 0;
-  for (size_t& begin : by_hull_begin_) begin = sum += begin;
-  by_hull_.resize(sum);
-  for (size_t i = size(); i-- > 0;) {
-    if (HasHull(i)) by_hull_[--by_hull_begin_[hull_of_[i]]] = static_cast<uint32_t>(i);
+  placements_of_.resize(hull_count());
+  for (uint32_t i = 0; i < size(); ++i) {
+    if (HasHull(i)) placements_of_[hull_of_[i]].push_back(i);
   }
 }
 

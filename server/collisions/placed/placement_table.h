@@ -148,9 +148,8 @@ class PlacementTable {
   void SortByHull();
   // Placements of hull k. Requires SortByHull.
   std::span<const uint32_t> placements_of(size_t k) const {
-    HULLD_DCHECK(k + 1 < by_hull_begin_.size());
-    return std::span(by_hull_).subspan(by_hull_begin_[k],
-                                       by_hull_begin_[k + 1] - by_hull_begin_[k]);
+    HULLD_DCHECK(k < placements_of_.size());
+    return placements_of_[k];
   }
   // Hull of a placement; nullopt if the ID, the inline shape, or the radius is malformed, or the ID
   // is outside the caller's prefix.
@@ -244,10 +243,8 @@ class PlacementTable {
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
   std::vector<char> query_hull_changed_;
-  // After SortByHull, the placements of hull k: by_hull_[by_hull_begin_[k]] up to by_hull_begin_[k
-  // + 1].
-  std::vector<uint32_t> by_hull_;
-  std::vector<size_t> by_hull_begin_;
+  // After SortByHull, the placements of each hull.
+  std::vector<std::vector<uint32_t>> placements_of_;
   // Store and revision of the last Resolve.
   const Store* store_ = nullptr;
   AsOf as_of_;
