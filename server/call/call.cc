@@ -144,7 +144,8 @@ void Call::LogSlow(Clock::duration duration, const absl::Status& status, const c
        {"points", points_.load(std::memory_order_relaxed)}});
 }
 
-grpc::Status Call::End(const absl::Status& status) {
+grpc::Status Call::End(absl::Status status) {
+  if (absl::IsCancelled(status) && ShouldStop()) status = StopStatus();
   const Clock::duration duration = Clock::now() - arrival_;
   metrics().CountCall(rpc_, status.code(), duration);
   if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");

@@ -93,8 +93,9 @@ class Call {
   void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 
-  // Returns the status with which the reactor must finish.
-  grpc::Status End(const absl::Status& status);
+  // Returns the status with which the reactor must finish. The reason why the call stopped takes the
+  // place of CANCELLED from the work.
+  grpc::Status End(absl::Status status);
 
  private:
   using Clock = std::chrono::steady_clock;

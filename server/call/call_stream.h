@@ -84,8 +84,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   // Ends the call. Must be called exactly once, with no gRPC operation in flight except a read.
   void FinishCall(const absl::Status& status) {
     HULLD_CHECK(!std::exchange(finished_, true));
-    // The reason why the call stopped is more precise than CANCELLED from the work.
-    this->Finish(call_.End(absl::IsCancelled(status) ? OrStopped(status) : status));
+    this->Finish(call_.End(status));
   }
   bool finished() const { return finished_; }
 

@@ -53,10 +53,8 @@ class UnaryCall : public UnaryReactor {
 
   // Sends the response or the error; the call must not be used afterwards.
   void End(const absl::Status& status) {
-    // The reason why the call stopped is more precise than CANCELLED from the work.
-    const bool stopped = status.code() == absl::StatusCode::kCancelled && call_.ShouldStop();
     if (status.ok()) *response_bytes_ = SerializeReply(response_);
-    Finish(call_.End(stopped ? call_.StopStatus() : status));
+    Finish(call_.End(status));
   }
 
   const Call& call() const { return call_; }
