@@ -89,9 +89,12 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 }  // namespace
 
 absl::Status PairSearch::CheckMemory(Registry& registry) const {
-  const bool holds_much = options_.method == Method::kTextbookSat && !HasBody(table_, a_, b_) &&
-                          HoldsMuchForTextbook(table_.placed()[a_], table_.placed()[b_]);
-  return holds_much ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
+  // Some 400 bytes each.
+  constexpr size_t kMostVertices = 4096;
+  if (options_.method != Method::kTextbookSat || HasBody(table_, a_, b_)) return absl::OkStatus();
+  const size_t vertices = table_.placed()[a_].hull().vertices().size() +
+                          table_.placed()[b_].hull().vertices().size();
+  return vertices > kMostVertices ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
 }
 
 bool PairSearch::Advance(Clock::time_point end) {

@@ -100,12 +100,6 @@ bool IsQuickToRelate(const QueryHull& hull) {
   return hull.point_count() <= kMostPoints;
 }
 
-bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b) {
-  // Some 400 bytes each.
-  constexpr size_t kMostVertices = 4096;
-  return a.hull().vertices().size() + b.hull().vertices().size() > kMostVertices;
-}
-
 absl::Status NameLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   if (IsDepthTooLarge(status)) return AtLimit(status, options.max_depth_bytes, "request-memory");

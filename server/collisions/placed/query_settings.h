@@ -38,10 +38,6 @@ inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTab
 // response, so that a gRPC thread may compute it.
 bool IsQuickToRelate(const QueryHull& hull);
 
-// True if the textbook's state between slices is so large that the readers' share of --memory-limit
-// must be checked first. Requires canonical hulls.
-bool HoldsMuchForTextbook(const PlacedHull& a, const PlacedHull& b);
-
 // Returns the server's error for an error of a query with these options: RESOURCE_EXHAUSTED names
 // the limit, and its flag or, if bodies need too many certificates, its reason.
 absl::Status NameLimit(const absl::Status& status, const QueryOptions& options);
