@@ -95,13 +95,13 @@ UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, B
 }
 
 UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return GetCall::Start(
-      *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
-        const auto get = [this, call](std::chrono::nanoseconds staleness) {
-          return Get(call->request(), call->call(), staleness, &call->response());
-        };
-        EndFresh(registry_, readers_, call, get, false);
-      });
+  return GetCall::Start(*context, admission_, Rpc::kGetBody, {request, response},
+                        [this](GetCall* call) {
+                          const auto get = [this, call](std::chrono::nanoseconds staleness) {
+                            return Get(call->request(), call->call(), staleness, &call->response());
+                          };
+                          EndFresh(registry_, readers_, call, get, false);
+                        });
 }
 
 UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
@@ -112,11 +112,10 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 }
 
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(*context, admission_, Rpc::kDeleteBody, {request, response},
-                           [this](DeleteCall* call) {
-                             EndDeleted(registry_, call, registry_.bodies(), "body",
-                                        call->request().body_id());
-                           });
+  return DeleteCall::Start(
+      *context, admission_, Rpc::kDeleteBody, {request, response}, [this](DeleteCall* call) {
+        EndDeleted(registry_, call, registry_.bodies(), "body", call->request().body_id());
+      });
 }
 
 void BodyService::Put(PutCall* call) {

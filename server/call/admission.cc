@@ -185,7 +185,8 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
   {
     const std::lock_guard lock(mutex_);
     for (Ticket::Watched& call : watched_) {
-      if (call.caller.name.empty() || call.lifetime->is_revoked() || is_valid(call.caller)) continue;
+      const bool is_revocable = !call.caller.name.empty() && !call.lifetime->is_revoked();
+      if (!is_revocable || is_valid(call.caller)) continue;
       call.lifetime->Revoke();
       call.end = std::min(call.end, end);
       if (call.on_revoked) waiting.push_back(std::move(call.on_revoked));
@@ -207,8 +208,8 @@ void Admission::Watch(const Arrival& arrival, Ticket* ticket) {
   const auto end =
       is_limited ? std::chrono::steady_clock::now() + limits_.max_request_time + kGrace : kNever;
   if (arrival.call != nullptr) grpc_call_ref(arrival.call);
-  ticket->watched_ = watched_.insert(watched_.end(), {arrival.caller, arrival.lifetime,
-                                                     arrival.on_revoked, arrival.call, end});
+  ticket->watched_ = watched_.insert(
+      watched_.end(), {arrival.caller, arrival.lifetime, arrival.on_revoked, arrival.call, end});
   if (end < next_look_) watched_changed_.notify_all();
 }
 

@@ -105,7 +105,8 @@ class Admission {
     bool is_one_of_many_ = false;
     // The caller's connection in the ConnectionTable; 0: unknown.
     uint64_t connection_ = 0;
-    // Set for calls with a token, and for downloads and batches while --max-request-time limits them.
+    // Set for calls with a token, and for downloads and batches while --max-request-time limits
+    // them.
     std::optional<std::list<Watched>::iterator> watched_;
   };
 
@@ -140,8 +141,8 @@ class Admission {
     // gRPC's object of the call.
     grpc_call* call = nullptr;
     // Owner of the call's token, if any, and then the lifetime that ends when the token is revoked;
-    // it must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after the
-    // ticket is destroyed. It ends a call that waits without polling.
+    // it must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after
+    // the ticket is destroyed. It ends a call that waits without polling.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
     std::function<void()> on_revoked = {};

@@ -93,8 +93,8 @@ class Call {
   void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 
-  // Returns the status with which the reactor must finish. The reason why the call stopped takes the
-  // place of CANCELLED from the work.
+  // Returns the status with which the reactor must finish. The reason why the call stopped takes
+  // the place of CANCELLED from the work.
   grpc::Status End(absl::Status status);
 
  private:

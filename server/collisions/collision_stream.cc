@@ -296,8 +296,8 @@ void CollisionStream::SendPart(bool last) {
   Send();
 }
 
-// Computes until the answer is complete, the message is full, or other calls are due. A plain answer
-// is decided as a whole first.
+// Computes until the answer is complete, the message is full, or other calls are due. A plain
+// answer is decided as a whole first.
 void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
     next_row_ = table_.EncodeHulls(next_row_, &reply());

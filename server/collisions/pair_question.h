@@ -35,8 +35,8 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   // Resolves the hulls on a reader's thread, which may wait for the store and build canonical
   // snapshots and boxes of pieces, then answers.
   void AnswerLater();
-  // As AnswerLater on this thread, but returns false without blocking if it would have to wait or to
-  // build.
+  // As AnswerLater on this thread, but returns false without blocking if it would have to wait or
+  // to build.
   bool TryAnswer();
   // Ends the call. An answer that takes some microseconds is computed immediately; any other on the
   // pool, with its first slice before those of batches.

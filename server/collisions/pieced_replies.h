@@ -325,8 +325,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
            this->LastWaitingTime() < kMostWait;
   }
 
-  // Queues a message of the table of hulls, which precedes all answers, as the client reads. Returns
-  // true if more of it follows.
+  // Queues a message of the table of hulls, which precedes all answers, as the client reads.
+  // Returns true if more of it follows.
   bool QueueHead() {
     Reply head;
     if (next_row_ == 0) table_.EncodeHeader(registry_.store(), head.mutable_header());

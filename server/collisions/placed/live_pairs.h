@@ -33,9 +33,10 @@ struct LivePair {
   bool is_reported() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
-// The pairs of a collision stream or watch, indexed by placement, and those selected for the current
-// round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding boxes, grown
-// by the clearance, meet: all other pairs are farther apart than the clearance. Not thread-safe.
+// The pairs of a collision stream or watch, indexed by placement, and those selected for the
+// current round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding
+// boxes, grown by the clearance, meet: all other pairs are farther apart than the clearance. Not
+// thread-safe.
 class LivePairs {
  public:
   LivePairs() = default;

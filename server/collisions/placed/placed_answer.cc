@@ -92,8 +92,8 @@ absl::Status PairSearch::CheckMemory(Registry& registry) const {
   // Some 400 bytes each.
   constexpr size_t kMostVertices = 4096;
   if (options_.method != Method::kTextbookSat || HasBody(table_, a_, b_)) return absl::OkStatus();
-  const size_t vertices = table_.placed()[a_].hull().vertices().size() +
-                          table_.placed()[b_].hull().vertices().size();
+  const size_t vertices =
+      table_.placed()[a_].hull().vertices().size() + table_.placed()[b_].hull().vertices().size();
   return vertices > kMostVertices ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
 }
 

@@ -304,10 +304,10 @@ size_t PlacementTable::MemoryBytes() const {
       sizeof(double);
   return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() * (sizeof(std::string) + KnownHulls::kBytesEach) +
-         hull_count() * (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) +
-                         2 * sizeof(char)) +
-         placements_of_.size() * sizeof(std::vector<uint32_t>) +
-         shapes_.MemoryBytes() + of_ids + of_errors + BodyBytes();
+         hull_count() *
+             (sizeof(absl::StatusOr<HullView>) + sizeof(const QueryHull*) + 2 * sizeof(char)) +
+         placements_of_.size() * sizeof(std::vector<uint32_t>) + shapes_.MemoryBytes() + of_ids +
+         of_errors + BodyBytes();
 }
 
 // Valid after resolution.

@@ -171,8 +171,8 @@ class PlacementTable {
   }
   size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
-  // Encodes the pieces that decided a pair of placements, of those that are bodies, into piece_a and
-  // piece_b of the message.
+  // Encodes the pieces that decided a pair of placements, of those that are bodies, into piece_a
+  // and piece_b of the message.
   template <typename Message>
   void EncodeDecidingPieces(size_t a, size_t b, const PiecePair& pieces, Message* message) const {
     if (is_body(a)) EncodeDecidingPiece(a, pieces.a, message->mutable_piece_a());
@@ -273,8 +273,8 @@ class PlacementTable {
 absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                            const v1::PackedPlacements& packed, const char* what);
 
-// Checks that `open` is the first message of a stream, and only the first. INVALID_ARGUMENT; `twice`:
-// the error of a second one.
+// Checks that `open` is the first message of a stream, and only the first. INVALID_ARGUMENT;
+// `twice`: the error of a second one.
 template <typename Request>
 absl::Status CheckOrder(const Request& request, bool is_open, const char* twice) {
   if (!request.has_open() && !request.has_update()) {

@@ -1,5 +1,3 @@
-#include "server/collisions/ranked_pairs.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "server/collisions/ranked_pairs.h"
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
