@@ -1,6 +1,5 @@
 #include "server/collisions/scene_stream.h"
 
-#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -29,22 +28,6 @@ constexpr size_t kBoxesPerStep = 256;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
-// Adds `by` pairs of a relation, or without an answer. -1: modulo 2^64, as in the sums of AddTo.
-void Count(v1::Relation relation, uint64_t by, v1::SceneTotals* totals) {
-  switch (relation) {
-    case v1::RELATION_SEPARATED:
-      return totals->set_separated(totals->separated() + by);
-    case v1::RELATION_TOUCHING:
-      return totals->set_touching(totals->touching() + by);
-    case v1::RELATION_OVERLAPPING:
-      return totals->set_overlapping(totals->overlapping() + by);
-    case v1::RELATION_WITHIN_TOLERANCE:
-      return totals->set_within_tolerance(totals->within_tolerance() + by);
-    default:
-      return totals->set_failed(totals->failed() + by);
-  }
-}
-
 // Returns the query for relation and clearance alone.
 QueryOptions WithoutDetails(QueryOptions options) {
   options.want_axis = false;
@@ -54,15 +37,6 @@ QueryOptions WithoutDetails(QueryOptions options) {
   options.want_witness = false;
   options.want_normal = false;
   return options;
-}
-
-void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
-  sums->set_candidates(sums->candidates() + totals.candidates());
-  sums->set_separated(sums->separated() + totals.separated());
-  sums->set_touching(sums->touching() + totals.touching());
-  sums->set_overlapping(sums->overlapping() + totals.overlapping());
-  sums->set_within_tolerance(sums->within_tolerance() + totals.within_tolerance());
-  sums->set_failed(sums->failed() + totals.failed());
 }
 
 }  // namespace
@@ -190,7 +164,7 @@ absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
   if (!found.ok()) return found.status();
   if (found->answer.ok() && !search_->IsFound(*found->answer)) return absl::OkStatus();
   if (ranking_ != nullptr) return Rank(a, *b, *std::move(found), piece);
-  Count(AddFound(a, *b, *found, piece), 1, &piece.totals);
+  ++piece.counts.found[AddFound(a, *b, *found, piece)];
   return absl::OkStatus();
 }
 
@@ -199,9 +173,9 @@ absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
   const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
-  // Details such as a certificate may be refused.
-  Count(pair.relation, uint64_t{0} - 1, &piece.totals);
-  Count(relation, 1, &piece.totals);
+  // Details such as a certificate may be refused. Counts are modulo 2^64, like their sums.
+  --piece.counts.found[pair.relation];
+  ++piece.counts.found[relation];
   ++piece.next;
   return absl::OkStatus();
 }
@@ -215,7 +189,7 @@ absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, S
     if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), query_);
   }
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
-  piece.totals.set_candidates(piece.totals.candidates() + 1);
+  ++piece.counts.candidates;
   if (found.answer.ok() && !found.contact.has_value()) piece.rungs.Add(found.answer->rung);
   return found;
 }
@@ -233,7 +207,7 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, PlacedAnswer found, Scene
   if (absl::IsCancelled(answer.status())) return answer.status();
   const v1::Relation relation =
       answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
-  Count(relation, 1, &piece.totals);
+  ++piece.counts.found[relation];
   bool grew = false;
   if (!answer.ok()) {
     grew = ranking_->AddUnanswered(a, b);
@@ -247,7 +221,7 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, PlacedAnswer found, Scene
 }
 
 void SceneStream::OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const {
-  piece.totals.set_candidates(piece.totals.candidates() + 1);
+  ++piece.counts.candidates;
   const PlacedBody& body_a = table_.bodies()[a];
   const PlacedBody& body_b = table_.bodies()[b];
   const double reach = query_.clearance.value_or(0);
@@ -284,7 +258,7 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
   } else {
     found.answer = NameLimit(found.answer.status(), query_);
   }
-  Count(AddFound(a, b, found, piece), 1, &piece.totals);
+  ++piece.counts.found[AddFound(a, b, found, piece)];
   return absl::OkStatus();
 }
 
@@ -309,7 +283,9 @@ v1::Relation SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& a
 }
 
 void SceneStream::Deliver(ScenePiece& piece) {
-  AddTo(&totals_, std::exchange(piece.totals, {}));
+  const PairCounts counts = std::exchange(piece.counts, {});
+  counts_.candidates += counts.candidates;
+  for (size_t i = 0; i < counts.found.size(); ++i) counts_.found[i] += counts.found[i];
   PiecedReplies::Deliver(piece);
 }
 
@@ -323,9 +299,16 @@ bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
 
 void SceneStream::OnAllDelivered() {
   v1::FindCollisionsResponse last;
-  totals_.set_pairs(search_->pairs());
-  *last.mutable_totals() = totals_;
-  QueueOrJoin(std::move(last), totals_.ByteSizeLong());
+  v1::SceneTotals& totals = *last.mutable_totals();
+  totals.set_pairs(search_->pairs());
+  totals.set_candidates(counts_.candidates);
+  totals.set_separated(counts_.found[v1::RELATION_SEPARATED]);
+  totals.set_touching(counts_.found[v1::RELATION_TOUCHING]);
+  totals.set_overlapping(counts_.found[v1::RELATION_OVERLAPPING]);
+  totals.set_within_tolerance(counts_.found[v1::RELATION_WITHIN_TOLERANCE]);
+  totals.set_failed(counts_.found[v1::RELATION_UNSPECIFIED]);
+  const size_t bytes = totals.ByteSizeLong();
+  QueueOrJoin(std::move(last), bytes);
 }
 
 }  // namespace hulld::server

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -25,6 +26,12 @@
 
 namespace hulld::server {
 
+// Counts of candidates, and of found pairs by relation; UNSPECIFIED: without an answer.
+struct PairCounts {
+  uint64_t candidates = 0;
+  std::array<uint64_t, v1::Relation_ARRAYSIZE> found = {};
+};
+
 // A range of placements, each to be queried against its successors, or of ranked pairs.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   // Remaining candidates of placement `next`, if it was started.
@@ -37,7 +44,7 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   };
   std::optional<Bodies> bodies;
   // Counts since the last delivery of the piece.
-  v1::SceneTotals totals;
+  PairCounts counts;
 
   size_t held_bytes() const {
     return candidates.MemoryBytes() + row_bytes +
@@ -99,7 +106,7 @@ class SceneStream
   std::vector<RankedPair> ranked_;
 
   // Guarded by the mutex.
-  v1::SceneTotals totals_;
+  PairCounts counts_;
 };
 
 }  // namespace hulld::server

@@ -156,7 +156,6 @@ class PlacementTable {
   std::optional<size_t> hull_of(size_t i) const {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
-  uint64_t revision() const { return as_of_.revision; }
 
   // Encodes the revision and staleness of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
