@@ -227,7 +227,7 @@ void Admission::CancelOverdue() {
       watched_changed_.wait_until(lock, next_look_);
       continue;
     }
-    // Cancelled once.
+    // No second cancellation.
     first->end = kNever;
     if (first->call == nullptr) continue;
     grpc_call* const call = first->call;

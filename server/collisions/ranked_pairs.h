@@ -35,7 +35,7 @@ class RankedPairs {
   // Keeps the `limit` pairs of least separation, and the first `limit` pairs without an answer.
   // boxes: one for each placement. max_error: the requested one, or 0.
   RankedPairs(size_t limit, std::vector<Box> boxes, double max_error);
-  // Keeps the pairs in motion that may be the first to touch: those whose rank does not exceed the
+  // Keeps the pairs in motion that may be the first to touch: all with a rank of at most the
   // least contact time; none if no contact is proven. Charges its memory to `charge`.
   explicit RankedPairs(MemoryCharge charge);
 

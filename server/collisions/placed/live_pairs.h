@@ -33,8 +33,8 @@ struct LivePair {
   bool is_reported() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
-// The pairs of a collision stream or watch, indexed by placement, and those selected for the
-// current round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding
+// The pairs of a collision stream or watch, indexed by placement, and the selection of the current
+// round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding
 // boxes, grown by the clearance, meet: all other pairs are farther apart than the clearance. Not
 // thread-safe.
 class LivePairs {
@@ -48,7 +48,7 @@ class LivePairs {
   // held pairs of a scene (--max-pairs-per-batch).
   LivePairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
-  // Select all held pairs, or those of a placement.
+  // Select all held pairs, or the held pairs of a placement.
   void SelectAll();
   void SelectPairsOf(uint32_t placement);
   // Selects all pairs of the moved or changed placements, including new ones; each placement once.

@@ -170,8 +170,8 @@ class PlacementTable {
   }
   size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
-  // Encodes the pieces that decided a pair of placements, of those that are bodies, into piece_a
-  // and piece_b of the message.
+  // Encodes the deciding pieces of a pair of placements into piece_a and piece_b of the message; a
+  // hull has none.
   template <typename Message>
   void EncodeDecidingPieces(size_t a, size_t b, const PiecePair& pieces, Message* message) const {
     if (is_body(a)) EncodeDecidingPiece(a, pieces.a, message->mutable_piece_a());
