@@ -39,6 +39,11 @@ absl::Status BatchStream::Validate() {
                        "the batch");
 }
 
+absl::Status BatchStream::Prepare() {
+  is_plain_ = AsksRelationsOfHulls(query_, table_);
+  return absl::OkStatus();
+}
+
 // A started textbook pair holds memory, so a batch starts only one.
 bool BatchStream::MayRunAhead() const { return query_.method != Method::kTextbookSat; }
 
@@ -62,7 +67,7 @@ absl::Status BatchStream::Step(PairsPiece& piece, Clock::time_point end) {
     EndPair(piece, AddUnansweredPair(table_, wanted, columns));
     return absl::OkStatus();
   }
-  if (AsksRelationsOfHulls(query_, table_)) return AnswerRelation(a, b, piece);
+  if (is_plain_) return AnswerRelation(a, b, piece);
   if (!piece.search.has_value()) {
     piece.search.emplace(table_, a, b, query_, motion_options_);
     if (absl::Status s = piece.search->CheckMemory(registry()); !s.ok()) return s;

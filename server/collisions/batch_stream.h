@@ -33,6 +33,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
 
  private:
   absl::Status Validate() override;
+  absl::Status Prepare() override;
   // Answers the next pair of the piece, or works on it until `end`. CANCELLED. RESOURCE_EXHAUSTED:
   // PairSearch::CheckMemory.
   absl::Status Step(PairsPiece& piece, Clock::time_point end) override;
@@ -47,6 +48,10 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status AnswerRelation(uint32_t a, uint32_t b, PairsPiece& piece);
   // Ends the row of the next pair.
   void EndPair(PairsPiece& piece, size_t bytes);
+
+  // Written before the first piece: all pairs are of hulls at rest, and only relations are wanted
+  // (AnswerRelation).
+  bool is_plain_ = false;
 };
 
 }  // namespace hulld::server

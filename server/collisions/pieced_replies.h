@@ -289,13 +289,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
-    absl::Status status;
+    const uint64_t steps = StepsPerLook();
     do {
-      for (uint64_t left = StepsPerLook(); left > 0 && !piece.is_done() && status.ok(); --left) {
-        status = Step(piece, end);
+      for (uint64_t left = steps; left > 0 && !piece.is_done(); --left) {
+        if (absl::Status s = Step(piece, end); !s.ok()) return s;
       }
-    } while (status.ok() && !piece.is_done() && Clock::now() < end);
-    return status;
+    } while (!piece.is_done() && Clock::now() < end);
+    return absl::OkStatus();
   }
 
   void RunSlice(Work& piece) {
