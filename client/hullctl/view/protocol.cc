@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <span>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
@@ -294,8 +295,8 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
   const auto values_json = [](const std::vector<double>& values) {
     return NumbersJson(values.data(), values.size());
   };
-  std::vector<uint32_t> named = scene.pairs.value_or(std::vector<uint32_t>());
-  named.resize(std::min<size_t>(named.size(), 2));
+  std::span<const uint32_t> named;
+  if (scene.pairs) named = std::span(*scene.pairs).first(std::min<size_t>(scene.pairs->size(), 2));
   return TextMessage("scene", {{"number", std::to_string(number)},
                                {"key", QuoteJson(scene.key)},
                                {"title", QuoteJson(scene.title)},
