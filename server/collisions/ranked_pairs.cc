@@ -51,9 +51,9 @@ bool RankedPairs::MayBeNear(uint32_t a, uint32_t b) const {
 
 bool RankedPairs::Add(const RankedPair& pair, double contact_time) {
   const std::lock_guard lock(mutex_);
-  earliest_ = std::min(earliest_, contact_time);
+  earliest_.store(std::min(earliest(), contact_time), std::memory_order_relaxed);
   AddBounded(pair, limit_, &kept_);
-  while (!kept_.empty() && kept_.front().rank > earliest_) DropGreatest(&kept_);
+  while (!kept_.empty() && kept_.front().rank > earliest()) DropGreatest(&kept_);
   if (kept_.size() == limit_) {
     const double farthest = kept_.front().rank;
     bound_.store(farthest + max_error_ + kRelativeError * std::abs(farthest),
@@ -78,7 +78,7 @@ bool RankedPairs::Charge() {
 std::vector<RankedPair> RankedPairs::Take() {
   const std::lock_guard lock(mutex_);
   const bool is_limited = !charge_.has_value();
-  if (!is_limited && earliest_ == kNever) kept_.clear();
+  if (!is_limited && earliest() == kNever) kept_.clear();
   std::sort_heap(kept_.begin(), kept_.end());
   std::sort_heap(unanswered_.begin(), unanswered_.end());
   kept_.insert(kept_.end(), unanswered_.begin(), unanswered_.end());

@@ -29,7 +29,8 @@ struct RankedPair {
 };
 
 // The pairs that a scene with a limit or first_only answers at the end, and the pairs without an
-// answer. The result does not depend on the order of additions. Thread-safe.
+// answer. The result does not depend on the order of additions. Pairs that are separated up to a
+// time after earliest() need not be added. Thread-safe.
 class RankedPairs {
  public:
   // Keeps the `limit` pairs of least separation, and the first `limit` pairs without an answer.
@@ -39,6 +40,8 @@ class RankedPairs {
   // least contact time; none if no contact is proven. Charges its memory to `charge`.
   explicit RankedPairs(MemoryCharge charge);
 
+  // Without a limit: the least contact time so far.
+  double earliest() const { return earliest_.load(std::memory_order_relaxed); }
   // With a limit: any pair whose exact separation exceeds this has `limit` nearer ones. Never
   // increases.
   double bound() const { return bound_.load(std::memory_order_relaxed); }
@@ -67,10 +70,11 @@ class RankedPairs {
   const std::vector<Box> boxes_;
   // Upper bound of the error of a reported separation near 0.
   double max_error_ = 0;
+  // Written with the mutex.
   std::atomic<double> bound_ = kNever;
+  std::atomic<double> earliest_ = kNever;
   std::mutex mutex_;
   // The mutex guards the members below.
-  double earliest_ = kNever;
   // Heaps, the greatest pair first.
   std::vector<RankedPair> kept_;
   std::vector<RankedPair> unanswered_;

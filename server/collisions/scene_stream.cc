@@ -1,5 +1,6 @@
 #include "server/collisions/scene_stream.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -115,7 +116,6 @@ absl::Status SceneStream::Prepare() {
   if (request().first_only()) {
     ranking_ =
         std::make_unique<RankedPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
-    ranked_query_ = query_;
     ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
   }
@@ -170,19 +170,24 @@ absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
 
 absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
   const RankedPair& pair = ranked_[piece.next - search_->size()];
-  const PlacedAnswer found = AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
+  const PlacedAnswer found = request().first_only()
+                                 ? AskFirst(pair.a, pair.b, ranked_motion_)
+                                 : AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
-  const v1::Relation relation = AddFound(pair.a, pair.b, found, piece);
-  // Details such as a certificate may be refused. Counts are modulo 2^64, like their sums.
-  --piece.counts.found[pair.relation];
-  ++piece.counts.found[relation];
   ++piece.next;
+  // It was ranked, or failed, before the first contact was known.
+  if (found.answer.ok() && !search_->IsFound(*found.answer)) return absl::OkStatus();
+  // Details such as a certificate may be refused. Counts are modulo 2^64, like their sums.
+  if (request().has_limit()) --piece.counts.found[pair.relation];
+  ++piece.counts.found[AddFound(pair.a, pair.b, found, piece)];
   return absl::OkStatus();
 }
 
 absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece) {
   PlacedAnswer found;
-  if (table_.has_motions()) {
+  if (request().first_only()) {
+    found = AskFirst(a, b, motion_options_);
+  } else if (table_.has_motions()) {
     found = AskPlaced(table_, a, b, query_, motion_options_);
   } else {
     found.answer = search_->Ask(a, b, &found.of_body);
@@ -192,6 +197,12 @@ absl::StatusOr<PlacedAnswer> SceneStream::AskCandidate(uint32_t a, uint32_t b, S
   ++piece.counts.candidates;
   if (found.answer.ok() && !found.contact.has_value()) piece.rungs.Add(found.answer->rung);
   return found;
+}
+
+PlacedAnswer SceneStream::AskFirst(uint32_t a, uint32_t b, MotionOptions motion) const {
+  motion.latest = std::min(1.0, ranking_->earliest());
+  if (!search_->MayMeet(a, b, motion.latest)) return {Answer()};
+  return AskPlaced(table_, a, b, query_, motion);
 }
 
 absl::Status SceneStream::Rank(uint32_t a, uint32_t b, PlacedAnswer found, ScenePiece& piece) {
@@ -207,7 +218,7 @@ absl::Status SceneStream::Rank(uint32_t a, uint32_t b, PlacedAnswer found, Scene
   if (absl::IsCancelled(answer.status())) return answer.status();
   const v1::Relation relation =
       answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
-  ++piece.counts.found[relation];
+  if (request().has_limit()) ++piece.counts.found[relation];
   bool grew = false;
   if (!answer.ok()) {
     grew = ranking_->AddUnanswered(a, b);

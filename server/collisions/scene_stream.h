@@ -87,6 +87,9 @@ class SceneStream
   // Answers a candidate, in a scene with a limit by its relation and clearance alone, and counts
   // it. CANCELLED.
   absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece);
+  // Answers a pair of a scene with first_only. It counts as separated if it is so up to the
+  // earliest contact that is known.
+  PlacedAnswer AskFirst(uint32_t a, uint32_t b, MotionOptions motion) const;
   // Ranks a found pair by its separation or, in motion, its first contact. CANCELLED.
   // RESOURCE_EXHAUSTED: --memory-limit.
   absl::Status Rank(uint32_t a, uint32_t b, PlacedAnswer found, ScenePiece& piece);

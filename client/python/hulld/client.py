@@ -638,8 +638,8 @@ class Client(ClientBase):
         the least separation, in ascending order, with their separations; without a clearance,
         among all pairs. The totals still count every pair within the clearance. Pairs without an
         answer follow, at most as many. first_only: only the pairs in motion that may be the first
-        to touch, in ascending order of separated_until; none if no pair touches. The totals count
-        every pair that meets. every_piece: a row for each pair of pieces that is found; the column
+        to touch, in ascending order of separated_until; none if no pair touches. The totals then
+        count these pairs only. every_piece: a row for each pair of pieces that is found; the column
         `pieces` distinguishes the rows of two bodies.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)

@@ -53,6 +53,7 @@ MovingBodySearch::MovingBodySearch(const MovingBody& a, const MovingBody& b,
       options_(&options),
       is_plain_translation_(!a.is_rounded() && !b.is_rounded() && IsTranslation(a.X_WB) &&
                             IsTranslation(b.X_WB)),
+      latest_(is_plain_translation_ ? 1 : options.latest),
       meeting_(
           a.body, b.body, [&a](uint32_t piece) { return SweptBox(a.Piece(piece)); },
           [&b](uint32_t piece) { return SweptBox(b.Piece(piece)); }) {
@@ -85,9 +86,11 @@ absl::StatusOr<FirstContact> MovingBodySearch::Find(PiecePair pieces, double lat
 absl::Status MovingBodySearch::Search() {
   const std::optional<PiecePair> pieces = overlaps_at_start_ ? std::nullopt : meeting_.Next();
   if (!pieces) return Decide();
-  const absl::StatusOr<FirstContact> found = Find(*pieces, std::min(earliest_, 1.0), false);
+  const absl::StatusOr<FirstContact> found = Find(*pieces, std::min(earliest_, latest_), false);
   if (!found.ok()) return found.status();
-  if (found->relation != Relation::kSeparated) {
+  if (found->relation == Relation::kSeparated || found->separated_until > latest_) {
+    others_until_ = std::min(others_until_, found->separated_until);
+  } else {
     TakeUp({*pieces, found->relation, found->separated_until,
             found->contact_time.value_or(kInfinity)});
   }
@@ -113,6 +116,7 @@ void MovingBodySearch::DropLater() {
 absl::Status MovingBodySearch::Decide() {
   DropLater();
   FirstContact& contact = result_.contact;
+  contact.separated_until = others_until_;
   const Met* first = nullptr;
   for (const Met& met : met_) {
     if (first == nullptr || met.separated_until < contact.separated_until) {

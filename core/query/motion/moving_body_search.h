@@ -84,12 +84,16 @@ class MovingBodySearch {
   const MotionOptions* options_;
   // The relation is the strongest over all times.
   bool is_plain_translation_;
+  // MotionOptions::latest, unless the relation depends on later times, too.
+  double latest_;
   MeetingPieces meeting_;
   Stage stage_ = Stage::kPairs;
   // In the order of the search, those that may be the first.
   std::vector<Met> met_;
   size_t kept_ = 0;
   double earliest_ = std::numeric_limits<double>::infinity();
+  // All pairs without a contact up to latest_ are separated up to this time.
+  double others_until_ = 1;
   bool overlaps_ = false;
   // No contact is earlier, and no relation stronger.
   bool overlaps_at_start_ = false;

@@ -87,8 +87,8 @@ MovingBox MovingBoxOf(const MovingBody& moving) {
 // Relative to B, the boxes meet along an axis while both gaps between opposite bounds are not
 // negative. These are linear in time, so they meet at some time if and only if the intervals of all
 // six gaps have a common point.
-bool MayMeet(const MovingBox& a, const MovingBox& b) {
-  TimeSpan times;
+bool MayMeet(const MovingBox& a, const MovingBox& b, double until) {
+  TimeSpan times{.end = until};
   for (int axis = 0; axis < 3; ++axis) {
     if (!times.KeepNonNegative(a.start.high[axis] - b.start.low[axis],
                                a.end.high[axis] - b.end.low[axis]) ||

@@ -28,9 +28,9 @@ MovingBox MovingBoxOf(const MovingBody& moving);
 inline Box SweptBox(const MovingHull& moving) { return MovingBoxOf(moving).Around(); }
 inline Box SweptBox(const MovingBody& moving) { return MovingBoxOf(moving).Around(); }
 
-// Returns false only if the boxes are disjoint at each time. True for some pairs that come within
-// rounding of each other.
-bool MayMeet(const MovingBox& a, const MovingBox& b);
+// Returns false only if the boxes are disjoint at each time up to `until`. True for some pairs that
+// come within rounding of each other.
+bool MayMeet(const MovingBox& a, const MovingBox& b, double until = 1);
 
 }  // namespace hulld
 

@@ -93,6 +93,11 @@ class SceneSearch {
   absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body = nullptr) const;
   // Returns true if the pair is not SEPARATED or is within the clearance.
   bool IsFound(const Answer& answer) const;
+  // In a scene with motions: returns false only if the boxes of the pair are disjoint at each time
+  // up to `until`.
+  bool MayMeet(uint32_t a, uint32_t b, double until) const {
+    return hulld::MayMeet(moving_[a], moving_[b], until);
+  }
 
   // Memory of the boxes and their tree.
   size_t MemoryBytes() const {

@@ -362,9 +362,8 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     }
   }
   const v1::SceneTotals& totals = parts.back().totals();
-  if (request.has_limit()) return CheckLimitedTotals(request.limit(), totals, counted);
-  if (!request.first_only()) return CheckSceneTotals(totals, counted);
-  return CheckLimitedTotals(std::numeric_limits<uint32_t>::max(), totals, counted);
+  return request.has_limit() ? CheckLimitedTotals(request.limit(), totals, counted)
+                             : CheckSceneTotals(totals, counted);
 }
 
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts) {

@@ -69,6 +69,9 @@ TEST_F(FirstPairsTest, FirstOnlyFindsWhatMayTouchFirst) {
       EXPECT_GT(scene->columns().certificates(i).pairs_size(), 0);
     }
     EXPECT_EQ(found, expected);
+    const v1::SceneTotals& totals = scene->totals();
+    EXPECT_EQ(totals.touching() + totals.overlapping() + totals.within_tolerance(), found.size());
+    EXPECT_GT(totals.candidates(), found.size());
     contacts += static_cast<int>(found.size());
   }
   EXPECT_GT(contacts, 12);

@@ -88,6 +88,7 @@ std::string FaultOf(const OwnMovingBody& a, const OwnMovingBody& b, const BodyCo
 TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
   Random random(TestSeed(1));
   std::array<int, 4> relations = {};
+  int ended_early = 0;
   for (int round = 0; round < 60; ++round) {
     SCOPED_TRACE(round);
     const bool turns = round % 2 == 1;
@@ -132,6 +133,18 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
     EXPECT_EQ(FaultOf(a, b, *found), "");
     ++relations[static_cast<size_t>(found->contact.relation)];
 
+    // A search that ends early.
+    options.latest = 0.25;
+    const absl::StatusOr<BodyContact> early = FindFirstContact(a.moving(), b.moving(), options);
+    ASSERT_TRUE(early.ok()) << early.status();
+    EXPECT_EQ(FaultOf(a, b, *early), "");
+    if (until <= options.latest) {
+      EXPECT_EQ(early->contact.separated_until, until);
+    } else {
+      EXPECT_GT(early->contact.separated_until, options.latest);
+      ended_early += early->contact.separated_until < until;
+    }
+
     const absl::StatusOr<BodyContact> swapped = FindFirstContact(b.moving(), a.moving());
     ASSERT_TRUE(swapped.ok()) << swapped.status();
     EXPECT_EQ(swapped->contact.relation, found->contact.relation);
@@ -140,6 +153,7 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
   }
   EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 5);
   EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
+  EXPECT_GT(ended_early, 5);
 }
 
 // The point meets a triangle and a cube at half time, and only overlaps the cube.

@@ -16,11 +16,11 @@ namespace swept_box_test {
 
 using oracle::Rational;
 
-// Returns -1 if the boxes are disjoint at each time, 0 if they meet at one time only, and otherwise
-// 1; in rationals.
-int BruteForceMeeting(const MovingBox& a, const MovingBox& b) {
+// Returns -1 if the boxes are disjoint at each time up to `until`, 0 if they meet at one time only,
+// and otherwise 1; in rationals.
+int BruteForceMeeting(const MovingBox& a, const MovingBox& b, double until = 1) {
   Rational begin = 0;
-  Rational end = 1;
+  Rational end(until);
   for (int axis = 0; axis < 3; ++axis) {
     for (const auto& [upper, lower] : {std::pair(&a, &b), std::pair(&b, &a)}) {
       const Rational first = Rational(upper->start.high[axis]) - Rational(lower->start.low[axis]);
@@ -39,6 +39,8 @@ struct Counts {
   int apart = 0;
   int touching = 0;
   int needless = 0;
+  // Times before the boxes meet.
+  int later = 0;
 };
 
 void Check(const MovingBox& a, const MovingBox& b, Counts& counts) {
@@ -46,6 +48,13 @@ void Check(const MovingBox& a, const MovingBox& b, Counts& counts) {
   EXPECT_EQ(MayMeet(a, b), MayMeet(b, a));
   if (expected >= 0) {
     EXPECT_TRUE(MayMeet(a, b));
+  }
+  for (const double until : {0.0, 0.25, 0.5, 0.75}) {
+    const int early = BruteForceMeeting(a, b, until);
+    if (early >= 0) {
+      EXPECT_TRUE(MayMeet(a, b, until)) << until;
+    }
+    counts.later += expected >= 0 && early < 0 && !MayMeet(a, b, until);
   }
   counts.touching += expected == 0;
   counts.apart += expected < 0;
@@ -84,6 +93,7 @@ TEST(SweptBox, NoPairThatMeetsIsDropped) {
     }
     EXPECT_GT(counts.apart, 100);
     EXPECT_GT(counts.touching, 50);
+    EXPECT_GT(counts.later, 100);
     EXPECT_LT(counts.needless, counts.apart / 2);
   }
 }
