@@ -19,8 +19,7 @@
 #include "server/process/log.h"
 #include "server/server.h"
 #include "server/settings/config.h"
-#include "server/settings/cpu_limit.h"
-#include "server/settings/variables.h"
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 namespace {

@@ -21,7 +21,7 @@
 #include "server/network/guarded_sockets.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
-#include "server/settings/cpu_limit.h"
+#include "server/settings/resource_limits.h"
 #include "server/store/memory_store.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "server/settings/cpu_limit.h"
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 namespace {

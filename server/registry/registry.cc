@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "server/registry/catalog/registered_hull.h"
-#include "server/settings/cpu_limit.h"
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 

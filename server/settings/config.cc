@@ -17,8 +17,6 @@
 #include <sstream>
 #include <utility>
 
-#include "server/settings/variables.h"
-
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
@@ -256,9 +254,6 @@ class Parser {
     } catch (const CLI::Error& error) {
       return absl::InvalidArgumentError(error.what());
     }
-    config_.drain_timeout = ToMilliseconds(drain_timeout_seconds_);
-    config_.limits.max_request_time = ToMilliseconds(max_request_seconds_);
-    config_.limits.slow_request = ToMilliseconds(slow_request_seconds_);
     result->config = config_;
     result->check = check_;
     result->settings = app_.config_to_str(/*default_also=*/true, /*write_description=*/false);
@@ -291,30 +286,30 @@ class Parser {
         Hint(flag.substr(dashes), NamesOf([](const CLI::Option&) { return true; }), "--")));
   }
 
-  template <typename T>
-  CLI::Option* Add(const std::string& name, T& value, const std::string& description) {
-    return app_.add_option("--" + name, value, description)
-        ->envname(EnvironmentName(name))
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
-        ->capture_default_str();
-  }
-
-  void AddFlag(const std::string& name, bool& value, const std::string& description) {
-    app_.add_flag("--" + name, value, description)
-        ->envname(EnvironmentName(name))
+  // The variable of an option has its name, and its last value wins.
+  static CLI::Option* WithVariable(CLI::Option* option) {
+    return option->envname(EnvironmentName(option->get_single_name()))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
   }
 
-  void AddSeconds(const std::string& name, double& value, const std::string& description) {
-    Add(name, value, description)->check(CLI::Validator(CheckSeconds, ""))->type_name("SECONDS");
+  template <typename T>
+  CLI::Option* Add(const std::string& name, T& value, const std::string& description) {
+    return WithVariable(app_.add_option("--" + name, value, description))->capture_default_str();
   }
 
-  static std::chrono::milliseconds ToMilliseconds(double seconds) {
-    return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+  void AddFlag(const std::string& name, bool& value, const std::string& description) {
+    WithVariable(app_.add_flag("--" + name, value, description));
   }
 
-  static double ToSeconds(std::chrono::milliseconds time) {
-    return static_cast<double>(time.count()) / 1000;
+  void AddSeconds(const std::string& name, std::chrono::milliseconds& value,
+                  const std::string& description) {
+    const std::function<void(const double&)> set = [&value](double seconds) {
+      value = std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+    };
+    WithVariable(app_.add_option_function("--" + name, set, description))
+        ->default_str(absl::StrCat(static_cast<double>(value.count()) / 1000))
+        ->check(CLI::Validator(CheckSeconds, ""))
+        ->type_name("SECONDS");
   }
 
   void AddServing() {
@@ -326,7 +321,7 @@ class Parser {
     Add("threads", config_.threads, "Threads that compute answers; 0: one per usable processor")
         ->check(CLI::Range(0, 1024));
     AddStore();
-    AddSeconds("drain-timeout", drain_timeout_seconds_,
+    AddSeconds("drain-timeout", config_.drain_timeout,
                "Time that running calls may take after SIGTERM or SIGINT");
     AddObservation();
     Add("log-level", config_.log_level, "Minimum level of logged messages")
@@ -365,7 +360,8 @@ class Parser {
     AddFlag("metrics-insecure", config_.metrics_insecure,
             "Allow --metrics-address on addresses that other machines can reach; metrics are "
             "neither encrypted nor authenticated");
-    AddSeconds("slow-request", slow_request_seconds_, "Log requests that take longer; 0: none");
+    AddSeconds("slow-request", config_.limits.slow_request,
+               "Log requests that take longer; 0: none");
   }
 
   void AddGuard() {
@@ -441,7 +437,7 @@ class Parser {
              "Concurrent batches and scenes");
     AddLimit("max-batches-per-client", limits.max_batches_per_client,
              "Concurrent batches and scenes of one client");
-    AddSeconds("max-request-time", max_request_seconds_,
+    AddSeconds("max-request-time", limits.max_request_time,
                "Time that one request may take; for streams of poses, per message; streams of "
                "points are exempt; 0: unlimited");
   }
@@ -480,9 +476,6 @@ class Parser {
   Config config_;
   std::string config_file_;
   bool check_ = false;
-  double drain_timeout_seconds_ = ToSeconds(Config().drain_timeout);
-  double max_request_seconds_ = ToSeconds(Limits().max_request_time);
-  double slow_request_seconds_ = ToSeconds(Limits().slow_request);
 };
 
 std::string DefaultDataDir(const Environment& environment) {

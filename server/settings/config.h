@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_SETTINGS_CONFIG_H_
 #define HULLD_SERVER_SETTINGS_CONFIG_H_
 
+#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <chrono>
@@ -88,7 +89,7 @@ struct Config {
   // File of the tokens that may call (server/access/token_table.h); empty: everyone who can connect
   // may call.
   std::string tokens_file;
-  // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
+  // Threads that compute answers; 0: DefaultThreads() of resource_limits.h.
   int threads = 0;
   // Kind of store: "rocksdb", "postgres", or "memory".
   std::string store = "rocksdb";
@@ -167,6 +168,13 @@ using Environment = std::function<std::optional<std::string>(const std::string&)
 
 // The variables of this process.
 std::optional<std::string> ProcessEnvironment(const std::string& name);
+
+// Returns the names of this process's environment variables that start with "HULLD_".
+std::vector<std::string> ProcessVariables();
+
+// INVALID_ARGUMENT: one of the variables is likely a misspelled setting. Other unknown names are
+// accepted, such as those that Kubernetes sets for a service named hulld.
+absl::Status CheckVariables(const std::vector<std::string>& names);
 
 // Reads the settings: a flag beats its environment variable (HULLD_MAX_HULLS for --max-hulls),
 // which beats the TOML file named by --config, which beats the default. arguments: without the

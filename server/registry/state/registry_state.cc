@@ -4,7 +4,7 @@
 
 #include "core/base/check.h"
 #include "server/registry/catalog/registered_hull.h"
-#include "server/settings/memory_limit.h"
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 namespace {

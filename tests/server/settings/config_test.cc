@@ -9,8 +9,6 @@
 #include <map>
 #include <sstream>
 
-#include "server/settings/variables.h"
-
 namespace hulld::server {
 namespace config_test {
 

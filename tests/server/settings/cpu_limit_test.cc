@@ -1,12 +1,12 @@
 // Processor quotas of control groups, read from a tree of files made for each test.
 
-#include "server/settings/cpu_limit.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>
 #include <string>
+
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 namespace cpu_limit_test {

@@ -1,12 +1,12 @@
 // Memory limits of control groups, read from a tree of files made for each test.
 
-#include "server/settings/memory_limit.h"
-
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <limits>
 #include <string>
+
+#include "server/settings/resource_limits.h"
 
 namespace hulld::server {
 namespace memory_limit_test {

@@ -1,6 +1,7 @@
-#ifndef HULLD_SERVER_SETTINGS_CPU_LIMIT_H_
-#define HULLD_SERVER_SETTINGS_CPU_LIMIT_H_
+#ifndef HULLD_SERVER_SETTINGS_RESOURCE_LIMITS_H_
+#define HULLD_SERVER_SETTINGS_RESOURCE_LIMITS_H_
 
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -29,6 +30,14 @@ CpuLimit ReadCpuLimit(const std::filesystem::path& root = "/");
 // Returns ReadCpuLimit().threads() as of the first call.
 int DefaultThreads();
 
+// Returns the least memory limit of the control group of this process and its ancestors, in bytes,
+// of versions 1 and 2. UINT64_MAX: no limit. root: as above.
+uint64_t ControlGroupMemory(const std::filesystem::path& root = "/");
+
+// Returns half of the memory that this process may use, in bytes: that of the machine, or
+// ControlGroupMemory() if it is less.
+uint64_t DefaultMemoryLimit();
+
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_SETTINGS_CPU_LIMIT_H_
+#endif  // HULLD_SERVER_SETTINGS_RESOURCE_LIMITS_H_
