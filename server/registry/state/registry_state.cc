@@ -36,7 +36,7 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& hull,
   catalog.NoteVertices(0, stored.record.vertex_count);
   catalog.Publish(stored.record.revision);
   catalog.NoteChange(*hull);
-  feed.NoteHull(locked, ChangeKind::kCreated, hull);
+  feed.NoteHull(locked, std::nullopt, hull);
 }
 
 void RegistryState::ApplyReplacement(Locked& locked, const HullPointer& former,
@@ -48,7 +48,7 @@ void RegistryState::ApplyReplacement(Locked& locked, const HullPointer& former,
   catalog.hulls().Insert(hull);
   catalog.Publish(stored.record.revision);
   catalog.NoteChange(*hull);
-  feed.NoteHull(locked, ChangeKind::kReplaced, hull);
+  feed.NoteHull(locked, Incarnation::Of(former->committed().record), hull);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
@@ -57,7 +57,7 @@ void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint6
   catalog.NoteVertices(record.vertex_count, 0);
   catalog.NoteHullEnded();
   catalog.NoteChange(*hull);
-  feed.NoteDeleted(locked, record, revision);
+  feed.NoteDeleted(locked, record.hull_id, Incarnation::Of(record), revision);
   catalog.Forget(locked, hull, Gone(record.hull_id, "deleted"));
 }
 
@@ -70,41 +70,32 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
   if (after.revision != before.revision) {
     catalog.Publish(after.revision);
     catalog.NoteVertices(before.vertex_count, after.vertex_count);
-    feed.NoteHull(locked, ChangeKind::kChanged, hull);
+    feed.NoteHull(locked, Incarnation::Of(before), hull);
   }
   preparer.ScheduleIfWorn(hull);
 }
 
 void RegistryState::ApplyBody(Locked& locked, const std::string& id,
                               const std::shared_ptr<const Body>& body, uint64_t revision) {
-  const std::shared_ptr<const Body> former = catalog.FindBody(id);
+  std::optional<Incarnation> former;
+  if (const auto known = catalog.FindBody(id)) former = Incarnation::Of(known->record());
   catalog.Publish(revision);
   // For readers that look for a hull with this ID.
   catalog.recent_changes().Note(id);
   catalog.bodies().Set(locked, id, body);
   if (body != nullptr) {
-    feed.NoteBodyPut(locked, former == nullptr ? nullptr : &former->record(), body);
+    feed.NoteBody(locked, former, body);
   } else {
     catalog.NoteBodyEnded();
-    feed.NoteBodyDeleted(locked, former->record(), revision);
+    feed.NoteDeleted(locked, id, *former, revision);
   }
 }
-
-// State of an ID after all changes up to `since` were applied.
-struct RegistryState::Former {
-  // True if the state was known. If not, the peer change supplies the rest.
-  bool was_known = false;
-  // Null also if unknown.
-  HullPointer hull;
-  std::optional<BodyRecord> body;
-  // create_revision of an unknown hull or body that has ended; otherwise 0.
-  uint64_t ended_began = 0;
-};
 
 RegistryState::HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
                                                           const PeerChange& change,
                                                           uint64_t since) {
-  const Former former = FindFormer(id, change, since);
+  const std::optional<Incarnation> former = FindFormer(id, change, since);
+  HullPointer hull = catalog.hulls().Find(id);
   // False for changes that were part of the initial load.
   const bool is_new = change.revision > catalog.revision();
   if (is_new) {
@@ -112,42 +103,38 @@ RegistryState::HullPointer RegistryState::ApplyPeerChange(Locked& locked, const 
     // Includes hulls that were created and deleted in between: a reader must learn of the interval.
     catalog.recent_changes().Note(id);
   }
-  if (former.hull != nullptr) {
-    if (ApplyPeerVersion(locked, former.hull, change, is_new)) return former.hull;
-    EndFormer(locked, former.hull, change);
+  if (hull != nullptr) {
+    if (ApplyPeerVersion(locked, hull, change, is_new)) return hull;
+    EndFormer(locked, hull, change);
   }
   ApplyPeerBody(locked, id, change);
   if (change.hull.has_value()) {
     catalog.AddStored(id, *change.hull);
     catalog.NoteChange(*catalog.hulls().Find(id));
   }
-  if (is_new) Note(locked, id, change, former, since);
-  return former.hull;
+  if (is_new) Note(locked, id, change, former);
+  return hull;
 }
 
-RegistryState::Former RegistryState::FindFormer(const std::string& id, const PeerChange& change,
-                                                uint64_t since) {
-  Former former;
-  former.was_known = catalog.IsKnown(id);
-  former.body = FindFormerBody(id, change, since);
-  former.hull = catalog.hulls().Find(id);
-  const bool has_ended = !former.was_known && change.former_began <= since;
-  if (has_ended) former.ended_began = change.former_began;
-  return former;
-}
-
-std::optional<BodyRecord> RegistryState::FindFormerBody(const std::string& id,
-                                                        const PeerChange& change, uint64_t since) {
+// Returns the incarnation that had the ID after all changes up to `since`. If it is not known here,
+// the peer change supplies it.
+std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
+                                                     const PeerChange& change, uint64_t since) {
   if (catalog.IsKnown(id)) {
-    const std::shared_ptr<const Body> body = catalog.FindBody(id);
-    return body == nullptr ? std::nullopt : std::optional(body->record());
+    if (const auto body = catalog.FindBody(id)) return Incarnation::Of(body->record());
+    const HullPointer hull = catalog.hulls().Find(id);
+    if (hull == nullptr) return std::nullopt;
+    return Incarnation::Of(hull->committed().record);
   }
-  if (change.former_was_body && change.former_began <= since) {
-    return BodyRecord{id, change.former_began, 0};
+  std::optional<Incarnation> former;
+  if (change.former_began != 0) {
+    former = {change.former_began, change.former_was_body};
+  } else if (change.hull.has_value() && change.hull->ok()) {
+    former = Incarnation::Of((*change.hull)->record);
+  } else if (change.body.has_value() && change.body->ok()) {
+    former = Incarnation::Of((*change.body)->record);
   }
-  const bool was_there = change.former_began == 0 && change.body.has_value() && change.body->ok() &&
-                         (*change.body)->record.create_revision <= since;
-  return was_there ? std::optional((*change.body)->record) : std::nullopt;
+  return former.has_value() && former->create_revision <= since ? former : std::nullopt;
 }
 
 // Returns true if `change` is another version of the known hull, and applies it.
@@ -166,7 +153,7 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
   catalog.statistics().grown += grew;
   if (grew) preparer.ScheduleIfWorn(hull);
   catalog.NoteChange(*hull);
-  if (is_new) feed.NoteHull(locked, ChangeKind::kChanged, hull);
+  if (is_new) feed.NoteHull(locked, Incarnation::Of(stored.record), hull);
   return true;
 }
 
@@ -194,66 +181,19 @@ void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const P
 
 // Notes the change in the feed. Requires: the catalog holds it.
 void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange& change,
-                         const Former& former, uint64_t since) {
+                         const std::optional<Incarnation>& former) {
   const std::shared_ptr<const Body> body = catalog.FindBody(id);
   const HullPointer hull = change.hull.has_value() ? catalog.hulls().Find(id) : nullptr;
-  if (body != nullptr && body->damage().ok()) {
-    NoteBody(locked, id, change, former, body);
-  } else if (hull != nullptr && !hull->state.damaged()) {
-    NoteHull(locked, hull, former, since);
-  } else if (hull == nullptr) {
-    NoteEnd(locked, id, change, former, body != nullptr);
+  if (body != nullptr && body->damage().ok()) return feed.NoteBody(locked, former, body);
+  if (hull != nullptr && !hull->state.damaged()) return feed.NoteHull(locked, former, hull);
+  const bool has_ended =
+      hull == nullptr && (body == nullptr || (former.has_value() && !former->is_body));
+  if (has_ended && (former.has_value() || change.ended_at == change.revision)) {
+    // A resumed watch may know a hull that was never known here.
+    const Incarnation ended = former.value_or(Incarnation{.create_revision = change.revision});
+    feed.NoteDeleted(locked, id, ended, change.revision);
   } else {
     // A damaged record cannot be described.
-    feed.NoteOther(locked, change.revision);
-  }
-}
-
-void RegistryState::NoteBody(Locked& locked, const std::string& id, const PeerChange& change,
-                             const Former& former, const std::shared_ptr<const Body>& body) {
-  if (former.hull != nullptr) {
-    feed.NoteBecameBody(locked, former.hull->committed().record, body);
-  } else if (former.ended_began != 0 && !change.former_was_body) {
-    HullRecord ended;
-    ended.hull_id = id;
-    ended.create_revision = former.ended_began;
-    feed.NoteBecameBody(locked, ended, body);
-  } else {
-    feed.NoteBodyPut(locked, former.body.has_value() ? &*former.body : nullptr, body);
-  }
-}
-
-void RegistryState::NoteHull(Locked& locked, const HullPointer& hull, const Former& former,
-                             uint64_t since) {
-  if (former.body.has_value()) {
-    feed.NoteBecameHull(locked, *former.body, hull);
-  } else if (!former.was_known && hull->committed().record.create_revision <= since) {
-    feed.NoteHull(locked, ChangeKind::kChanged, hull);
-  } else if (former.hull != nullptr || former.ended_began != 0) {
-    feed.NoteHull(locked, ChangeKind::kReplaced, hull);
-  } else {
-    feed.NoteHull(locked, ChangeKind::kCreated, hull);
-  }
-}
-
-// has_body: a damaged body has the ID now.
-void RegistryState::NoteEnd(Locked& locked, const std::string& id, const PeerChange& change,
-                            const Former& former, bool has_body) {
-  const bool is_deletion = !change.body.has_value() && change.ended_at == change.revision;
-  if (former.body.has_value() && !has_body) {
-    feed.NoteBodyDeleted(locked, *former.body, change.revision);
-  } else if (former.hull != nullptr || is_deletion) {
-    // A resumed watch may know a hull that was never known here.
-    HullRecord record;
-    record.hull_id = id;
-    record.create_revision = change.revision;
-    if (former.hull != nullptr) {
-      record.create_revision = former.hull->committed().record.create_revision;
-    } else if (former.ended_began != 0) {
-      record.create_revision = former.ended_began;
-    }
-    feed.NoteDeleted(locked, record, change.revision);
-  } else {
     feed.NoteOther(locked, change.revision);
   }
 }

@@ -70,22 +70,14 @@ struct RegistryState {
   Preparer preparer;
 
  private:
-  struct Former;
-
-  Former FindFormer(const std::string& id, const PeerChange& change, uint64_t since);
-  std::optional<BodyRecord> FindFormerBody(const std::string& id, const PeerChange& change,
-                                           uint64_t since);
+  std::optional<Incarnation> FindFormer(const std::string& id, const PeerChange& change,
+                                        uint64_t since);
   bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change,
                         bool is_new);
   void EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change);
   void ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change);
-  void Note(Locked& locked, const std::string& id, const PeerChange& change, const Former& former,
-            uint64_t since);
-  void NoteBody(Locked& locked, const std::string& id, const PeerChange& change,
-                const Former& former, const std::shared_ptr<const Body>& body);
-  void NoteHull(Locked& locked, const HullPointer& hull, const Former& former, uint64_t since);
-  void NoteEnd(Locked& locked, const std::string& id, const PeerChange& change,
-               const Former& former, bool has_body);
+  void Note(Locked& locked, const std::string& id, const PeerChange& change,
+            const std::optional<Incarnation>& former);
 };
 
 }  // namespace hulld::server

@@ -82,61 +82,44 @@ void ChangeFeed::Begin(uint64_t revision, PageSource& pages) {
   deletions_.Begin(revision);
 }
 
-ChangeFeed::Change ChangeFeed::ChangeOf(ChangeKind kind,
-                                        const std::shared_ptr<RegisteredHull>& hull) {
-  const HullRecord& record = hull->committed().record;
-  return {kind, false, record.revision, record.create_revision, hull};
-}
-
-ChangeFeed::Change ChangeFeed::ChangeOf(ChangeKind kind, const std::shared_ptr<const Body>& body) {
-  const BodyRecord& record = body->record();
-  return {kind, true, record.revision, record.create_revision, nullptr, body};
-}
-
-void ChangeFeed::NoteHull(Locked& locked, ChangeKind kind,
+void ChangeFeed::NoteHull(Locked& locked, const std::optional<Incarnation>& former,
                           const std::shared_ptr<RegisteredHull>& hull) {
-  Note(locked, hull->committed().record.hull_id, ChangeOf(kind, hull));
+  const HullRecord& record = hull->committed().record;
+  NotePresent(locked, record.hull_id, former,
+              {.is_body = false,
+               .revision = record.revision,
+               .create_revision = record.create_revision,
+               .hull = hull});
 }
 
-void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision) {
-  NoteDeletion(locked, record.hull_id,
-               {ChangeKind::kDeleted, false, revision, record.create_revision});
-}
-
-void ChangeFeed::NoteBodyPut(Locked& locked, const BodyRecord* former,
-                             const std::shared_ptr<const Body>& body) {
+void ChangeFeed::NoteBody(Locked& locked, const std::optional<Incarnation>& former,
+                          const std::shared_ptr<const Body>& body) {
   const BodyRecord& record = body->record();
-  const ChangeKind kind = former == nullptr ? ChangeKind::kCreated
-                          : record.create_revision != former->create_revision
-                              ? ChangeKind::kReplaced
-                              : ChangeKind::kChanged;
-  Note(locked, record.body_id, ChangeOf(kind, body));
+  NotePresent(locked, record.body_id, former,
+              {.is_body = true,
+               .revision = record.revision,
+               .create_revision = record.create_revision,
+               .body = body});
 }
 
-void ChangeFeed::NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision) {
-  NoteDeletion(locked, record.body_id,
-               {ChangeKind::kDeleted, true, revision, record.create_revision});
-}
-
-void ChangeFeed::NoteDeletion(Locked& locked, const std::string& id, const Change& change) {
-  deletions_.Add(id, change.revision, change.is_body);
+// Notes a change after which a hull or body has the ID.
+void ChangeFeed::NotePresent(Locked& locked, const std::string& id,
+                             const std::optional<Incarnation>& former, Change change) {
+  const Incarnation now = {change.create_revision, change.is_body};
+  change.kind = !former.has_value() ? ChangeKind::kCreated
+                : *former == now    ? ChangeKind::kChanged
+                                    : ChangeKind::kReplaced;
+  if (former.has_value() && former->is_body != now.is_body) {
+    change.other_kind_began = former->create_revision;
+    deletions_.Add(id, change.revision, former->is_body);
+  }
   Note(locked, id, change);
 }
 
-void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
-                                const std::shared_ptr<const Body>& body) {
-  Change change = ChangeOf(ChangeKind::kReplaced, body);
-  change.other_kind_began = former.create_revision;
-  deletions_.Add(former.hull_id, change.revision, false);
-  Note(locked, former.hull_id, change);
-}
-
-void ChangeFeed::NoteBecameHull(Locked& locked, const BodyRecord& former,
-                                const std::shared_ptr<RegisteredHull>& hull) {
-  Change change = ChangeOf(ChangeKind::kReplaced, hull);
-  change.other_kind_began = former.create_revision;
-  deletions_.Add(former.body_id, change.revision, true);
-  Note(locked, former.body_id, change);
+void ChangeFeed::NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
+                             uint64_t revision) {
+  deletions_.Add(id, revision, former.is_body);
+  Note(locked, id, {ChangeKind::kDeleted, former.is_body, revision, former.create_revision});
 }
 
 void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {

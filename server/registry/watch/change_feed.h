@@ -27,6 +27,17 @@
 
 namespace hulld::server {
 
+// A hull or body from its creation or replacement to its end.
+struct Incarnation {
+  static Incarnation Of(const HullRecord& record) { return {record.create_revision, false}; }
+  static Incarnation Of(const BodyRecord& record) { return {record.create_revision, true}; }
+
+  uint64_t create_revision = 0;
+  bool is_body = false;
+
+  bool operator==(const Incarnation&) const = default;
+};
+
 // Sends the initial state and then every change of hulls and bodies to watches. A watch first
 // catches up: it reports deletions, if it resumes, and lists the existing hulls. Then it reports
 // the changes noted since, and is synced whenever none is left.
@@ -61,20 +72,16 @@ class ChangeFeed {
   // all other functions.
   void Begin(uint64_t revision, PageSource& pages);
 
-  // Note a committed change at the revision of its record, or at `revision`. Cost: O(log n) per
-  // group that includes the ID, and one hash per length of a watched prefix.
-  void NoteHull(Locked& locked, ChangeKind kind, const std::shared_ptr<RegisteredHull>& hull);
-  void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
-  // former: the body that this one replaces, or null.
-  void NoteBodyPut(Locked& locked, const BodyRecord* former,
-                   const std::shared_ptr<const Body>& body);
-  void NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision);
-  // Peer servers turned a hull into a body, or a body into a hull, by several changes; reported as
-  // one.
-  void NoteBecameBody(Locked& locked, const HullRecord& former,
-                      const std::shared_ptr<const Body>& body);
-  void NoteBecameHull(Locked& locked, const BodyRecord& former,
-                      const std::shared_ptr<RegisteredHull>& hull);
+  // Note a committed change at the revision of its record, or at `revision`. former: the
+  // incarnation that had the ID before, possibly the same one; nullopt: none. It is of the other
+  // kind if peer servers turned a hull into a body, or a body into a hull, by several changes.
+  // Cost: O(log n) per group that includes the ID, and one hash per length of a watched prefix.
+  void NoteHull(Locked& locked, const std::optional<Incarnation>& former,
+                const std::shared_ptr<RegisteredHull>& hull);
+  void NoteBody(Locked& locked, const std::optional<Incarnation>& former,
+                const std::shared_ptr<const Body>& body);
+  void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
+                   uint64_t revision);
   // Notes a revision whose change cannot be described; only the revision is reported.
   void NoteOther(const Locked& locked, uint64_t revision);
 
@@ -122,11 +129,10 @@ class ChangeFeed {
   };
   friend struct WatchGroup;
 
-  static Change ChangeOf(ChangeKind kind, const std::shared_ptr<RegisteredHull>& hull);
-  static Change ChangeOf(ChangeKind kind, const std::shared_ptr<const Body>& body);
   static std::optional<Change> AsReportedTo(const WatchTarget& target, const Change& change);
   void Note(Locked& locked, const std::string& id, const Change& change);
-  void NoteDeletion(Locked& locked, const std::string& id, const Change& change);
+  void NotePresent(Locked& locked, const std::string& id, const std::optional<Incarnation>& former,
+                   Change change);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& group, const std::string& id,
                const Change& change);
 
