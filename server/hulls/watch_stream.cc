@@ -11,7 +11,7 @@ namespace {
 
 // Returns true if the box must be read from the store. Bodies have no box.
 bool WantsBox(const HullChange& change) {
-  return change.record.vertex_count > 0 && !change.has_box && !change.damaged;
+  return change.record.vertex_count > 0 && change.box.IsEmpty() && !change.damaged;
 }
 
 v1::HullEventKind EncodeKind(ChangeKind kind) {
@@ -47,9 +47,9 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
     EncodeRecord(change.record, event->mutable_hull());
   }
   event->mutable_hull()->set_damaged(change.damaged);
-  if (!change.has_box) return;
-  EncodeVector(change.low, event->mutable_box_min());
-  EncodeVector(change.high, event->mutable_box_max());
+  if (change.box.IsEmpty()) return;
+  EncodeVector(change.box.low, event->mutable_box_min());
+  EncodeVector(change.box.high, event->mutable_box_max());
 }
 
 }  // namespace
@@ -137,9 +137,7 @@ absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
       if (resolved.ok()) {
         const HullView& view = resolved->second;
         change.record = view.record;
-        change.has_box = !view.served->empty();
-        change.low = view.served->low();
-        change.high = view.served->high();
+        change.box = view.served->box();
       }
     }
     loaded.push_back(std::move(change));

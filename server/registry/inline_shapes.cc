@@ -27,15 +27,13 @@ std::shared_ptr<const InlineHull> BuildInlineHull(std::span<const Vector> points
   HULLD_CHECK(builder.Add(points).ok());
   const auto canonical = std::make_shared<CanonicalHull>(builder.Snapshot());
   const std::shared_ptr<const QueryHull> version(canonical, &canonical->query_hull());
-  Vector low = points.front();
-  Vector high = points.front();
+  Box box = {points.front(), points.front()};
   for (const Vector& vertex : canonical->hull()->vertices()) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
+    box = {box.low.cwiseMin(vertex), box.high.cwiseMax(vertex)};
   }
   const size_t bytes = sizeof(InlineHull) + sizeof(CanonicalHull) + canonical->MemoryBytes();
   return std::make_shared<const InlineHull>(InlineHull{
-      ServedHull(version, low, high, canonical), MemoryCharge(memory, MemoryUse::kReading, bytes)});
+      ServedHull(version, box, canonical), MemoryCharge(memory, MemoryUse::kReading, bytes)});
 }
 
 }  // namespace

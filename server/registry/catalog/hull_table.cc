@@ -40,9 +40,7 @@ HullChange HullTable::Entry::Describe(const std::string& id) const {
   if (awake_ != nullptr) return awake_->Describe();
   HullChange change;
   change.record = resting_.RecordWith(id);
-  change.has_box = resting_.has_box;
-  change.low = resting_.low;
-  change.high = resting_.high;
+  change.box = resting_.box;
   return change;
 }
 
@@ -95,7 +93,7 @@ void HullTable::Wake(const std::string& id, Entry& entry) {
   const RestingHull& resting = entry.resting_;
   const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
   entry.awake_ = std::make_shared<RegisteredHull>(stored, HullState::Present(), readable_, budget_);
-  if (resting.has_box) entry.awake_->SetBox(resting.low, resting.high);
+  entry.awake_->SetBox(resting.box);
   if (resting.compact != nullptr) entry.awake_->Restore(*resting.compact);
 }
 
@@ -178,10 +176,7 @@ bool HullTable::IsUnused(const HullPointer& hull) const {
 
 HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
   RestingHull resting(hull.committed());
-  const HullChange described = hull.Describe();
-  resting.has_box = described.has_box;
-  resting.low = described.low;
-  resting.high = described.high;
+  resting.box = hull.Describe().box;
   return resting;
 }
 

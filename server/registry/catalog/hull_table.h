@@ -69,10 +69,9 @@ class HullTable {
     PointCounts counts;
     uint64_t writer_count = 0;
     VertexLayout layout;
-    Vector low = Vector::Zero();
-    Vector high = Vector::Zero();
+    // Empty if it is not known.
+    Box box = Box::Empty();
     int8_t dimension = -1;
-    bool has_box = false;
     // Null if the store holds the points, or there are none.
     std::unique_ptr<CompactHull> compact;
   };

@@ -9,6 +9,11 @@
 #include "server/contract/error_info.h"
 
 namespace hulld::server {
+namespace {
+
+Box BoxAt(const LiveHull::Mark& mark) { return {mark.low(), mark.high()}; }
+
+}  // namespace
 
 RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                                MemoryBudget& budget)
@@ -22,9 +27,7 @@ HullChange RegisteredHull::Describe() const {
   HullChange change;
   change.record = committed().record;
   change.damaged = state.damaged();
-  change.has_box = committed_.has_box && !change.damaged;
-  change.low = committed_.low;
-  change.high = committed_.high;
+  if (!change.damaged) change.box = committed_.box;
   return change;
 }
 
@@ -33,22 +36,10 @@ void RegisteredHull::SetStored(const StoredHull& stored) {
   committed_.stored = in_flight_.head = stored;
 }
 
-void RegisteredHull::SetBox(const Vector& low, const Vector& high) {
-  committed_.has_box = true;
-  committed_.low = low;
-  committed_.high = high;
-}
-
-// Records the bounding box at the mark, if it has one.
-void RegisteredHull::KeepBox() {
-  const LiveHull::Mark& mark = committed_.mark;
-  if (mark.low()[0] <= mark.high()[0]) SetBox(mark.low(), mark.high());
-}
-
 // The old mark may hold the last reference to a previous preparation.
 void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
   locked.Afterwards([before = std::exchange(committed_.mark, mark)] {});
-  KeepBox();
+  if (const Box box = BoxAt(mark); !box.IsEmpty()) committed_.box = box;
 }
 
 void RegisteredHull::Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
@@ -93,7 +84,7 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
     Grow(locked, *growth, stored.record.dimension);
   } else if (!is_same) {
     DiscardAll(locked);
-    committed_.has_box = false;
+    committed_.box = Box::Empty();
   }
   committed_.stored = in_flight_.head = stored;
   in_flight_.writers.clear();
@@ -225,8 +216,8 @@ void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
   served_.live = std::move(points);
   committed_.mark = live()->Now();
   in_flight_.live_is_ahead = false;
+  if (const Box box = BoxAt(committed_.mark); !box.IsEmpty()) committed_.box = box;
   ResetWear();
-  KeepBox();
 }
 
 std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
@@ -239,8 +230,8 @@ std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
           std::make_shared<CanonicalHull>(std::make_shared<MemoryPart>(account.budget(), nullptr));
     }
     const LiveHull::Mark& mark = committed_.mark;
-    served_.version = std::make_shared<const ServedHull>(live()->VersionAt(mark), mark.low(),
-                                                         mark.high(), served_.canonical);
+    served_.version =
+        std::make_shared<const ServedHull>(live()->VersionAt(mark), BoxAt(mark), served_.canonical);
   }
   std::shared_ptr<const Reading> reading = served_.readers.lock();
   if (is_new) CountParts();
@@ -393,10 +384,9 @@ void RegisteredHull::Requeue(PendingChunk chunk) {
 const std::shared_ptr<const ServedHull>& EmptyServedHull() {
   static const auto* const kServed = [] {
     const auto canonical = std::make_shared<CanonicalHull>(Hull());
-    const LiveHull::Mark nothing;
     return new std::shared_ptr<const ServedHull>(std::make_shared<const ServedHull>(
-        std::shared_ptr<const QueryHull>(canonical, &canonical->query_hull()), nothing.low(),
-        nothing.high(), canonical));
+        std::shared_ptr<const QueryHull>(canonical, &canonical->query_hull()), Box::Empty(),
+        canonical));
   }();
   return *kServed;
 }

@@ -86,7 +86,7 @@ class RegisteredHull {
   // Sets the stored state after the hull's first change. Requires: none was set before.
   void SetStored(const StoredHull& stored);
   // Restores the bounding box of a hull that was at rest.
-  void SetBox(const Vector& low, const Vector& high);
+  void SetBox(const Box& box) { committed_.box = box; }
   // Commits the oldest chunk in flight, of `points` new vertices. mark: the prefix of live() with
   // it.
   void Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
@@ -224,9 +224,8 @@ class RegisteredHull {
   struct Committed {
     StoredHull stored;
     LiveHull::Mark mark;
-    bool has_box = false;
-    Vector low;
-    Vector high;
+    // Empty if it is not known.
+    Box box = Box::Empty();
     uint64_t supersessions = 0;
   };
   struct InFlight {
@@ -264,7 +263,6 @@ class RegisteredHull {
     std::weak_ptr<const Reading> readers;
   };
 
-  void KeepBox();
   void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
   // Drop the served version, and the canonical snapshot; the next reader rebuilds them.
   void DiscardServed(Locked& locked);

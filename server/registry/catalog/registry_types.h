@@ -13,6 +13,7 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/numeric/vector.h"
+#include "core/query/box_tree.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/fair_queue.h"
 #include "server/process/synchronization.h"
@@ -206,11 +207,8 @@ struct HullChange {
   uint64_t piece_count = 0;
   // The store cannot read it.
   bool damaged = false;
-  // True if `low` and `high` are the corners of the bounding box. False for a hull without
-  // vertices, or not in memory since the server started.
-  bool has_box = false;
-  Vector low;
-  Vector high;
+  // The bounding box. Empty for a hull without vertices, or not in memory since the server started.
+  Box box = Box::Empty();
 };
 
 // Called exactly once with the result.

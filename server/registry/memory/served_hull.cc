@@ -92,9 +92,9 @@ const QueryHull& CanonicalHull::query_hull() {
   return *query_hull_;
 }
 
-ServedHull::ServedHull(std::shared_ptr<const QueryHull> version, const Vector& low,
-                       const Vector& high, std::shared_ptr<CanonicalHull> canonical)
-    : version_(std::move(version)), low_(low), high_(high), canonical_(std::move(canonical)) {
+ServedHull::ServedHull(std::shared_ptr<const QueryHull> version, const Box& box,
+                       std::shared_ptr<CanonicalHull> canonical)
+    : version_(std::move(version)), box_(box), canonical_(std::move(canonical)) {
   HULLD_CHECK(version_ != nullptr && canonical_ != nullptr);
 }
 

@@ -13,6 +13,7 @@
 
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
+#include "core/query/box_tree.h"
 #include "core/query/placed/query_hull.h"
 #include "server/process/synchronization.h"
 #include "server/registry/memory/memory_budget.h"
@@ -81,9 +82,9 @@ class CanonicalHull {
 // snapshot, which the first request that needs it builds. Thread-safe.
 class ServedHull {
  public:
-  // low, high: corners of the bounding box; low exceeds high for the empty hull. canonical: of the
-  // same version, shared by all served forms of that version.
-  ServedHull(std::shared_ptr<const QueryHull> version, const Vector& low, const Vector& high,
+  // box: the bounding box; empty for the empty hull. canonical: of the same version, shared by all
+  // served forms of that version.
+  ServedHull(std::shared_ptr<const QueryHull> version, const Box& box,
              std::shared_ptr<CanonicalHull> canonical);
 
   // For queries that name no vertex: relation, tolerance and clearance. The result lives as long as
@@ -91,9 +92,10 @@ class ServedHull {
   const QueryHull& query_hull() const {
     return canonical_->has_query_hull() ? canonical_->query_hull() : *version_;
   }
-  bool empty() const { return low_[0] > high_[0]; }
-  const Vector& low() const { return low_; }
-  const Vector& high() const { return high_; }
+  bool empty() const { return box_.IsEmpty(); }
+  const Box& box() const { return box_; }
+  const Vector& low() const { return box_.low; }
+  const Vector& high() const { return box_.high; }
 
   // The canonical snapshot; null until built.
   const Hull* canonical() const { return canonical_->hull(); }
@@ -112,8 +114,7 @@ class ServedHull {
 
  private:
   const std::shared_ptr<const QueryHull> version_;
-  const Vector low_;
-  const Vector high_;
+  const Box box_;
   const std::shared_ptr<CanonicalHull> canonical_;
 };
 

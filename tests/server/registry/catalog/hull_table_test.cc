@@ -74,19 +74,17 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
     EXPECT_EQ(hull->committed(), stored);
     EXPECT_EQ(hull->head(), stored);
     EXPECT_EQ(table_.Find("a"), hull);
-    hull->SetBox({1, 2, 3}, {4, 5, 6});
+    hull->SetBox({{1, 2, 3}, {4, 5, 6}});
     GoRound();
     EXPECT_TRUE(IsAwake("a")) << "while someone holds it";
   }
   GoRound();
   EXPECT_FALSE(IsAwake("a"));
   const HullChange told = table_.entries().find("a")->second.Describe("a");
-  EXPECT_TRUE(told.has_box);
-  EXPECT_EQ(told.high, Vector(4, 5, 6));
+  EXPECT_EQ(told.box.high, Vector(4, 5, 6));
   const auto again = table_.Find("a");
   EXPECT_EQ(again->committed(), stored);
-  EXPECT_TRUE(again->Describe().has_box);
-  EXPECT_EQ(again->Describe().low, Vector(1, 2, 3));
+  EXPECT_EQ(again->Describe().box.low, Vector(1, 2, 3));
 }
 
 // Putting it to rest would lose each of these.
@@ -150,7 +148,7 @@ TEST_F(HullTableTest, AnIdleSmallHullTakesItsPointsAlone) {
   EXPECT_EQ(table_.entries().find("a")->second.compact()->points.size(), 8);
   EXPECT_EQ(budget_.Statistics().bytes, table_.compact_bytes());
   EXPECT_GE(table_.compact_bytes(), 8 * sizeof(Vector));
-  EXPECT_TRUE(table_.entries().find("a")->second.Describe("a").has_box);
+  EXPECT_FALSE(table_.entries().find("a")->second.Describe("a").box.IsEmpty());
   const auto hull = table_.Find("a");
   EXPECT_EQ(hull->committed(), Stored("a", 3));
   EXPECT_EQ(hull->builder(), nullptr);

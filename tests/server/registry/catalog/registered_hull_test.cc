@@ -82,7 +82,7 @@ TEST_F(SupersededHull, GrowthIsAddedAndReadersKeepTheirSnapshots) {
   EXPECT_EQ(before->high(), Vector(1, 1, 1));
   EXPECT_EQ(ServedPoints(), 9);
   EXPECT_EQ(hull_.Serve()->high(), Vector(2, 2, 2));
-  EXPECT_EQ(hull_.Describe().high, Vector(2, 2, 2));
+  EXPECT_EQ(hull_.Describe().box.high, Vector(2, 2, 2));
   EXPECT_EQ(hull_.points_since_prepared(), 1);
 }
 
@@ -90,7 +90,7 @@ TEST_F(SupersededHull, WithoutGrowthItGoes) {
   EXPECT_FALSE(Supersede(Grown(), nullptr));
   EXPECT_EQ(hull_.committed(), Grown());
   EXPECT_FALSE(hull_.IsReady());
-  EXPECT_FALSE(hull_.Describe().has_box);
+  EXPECT_TRUE(hull_.Describe().box.IsEmpty());
   // The hull was deleted before its growth arrived.
   EXPECT_FALSE(Supersede(Grown(2), &growth_));
   EXPECT_FALSE(hull_.IsReady());

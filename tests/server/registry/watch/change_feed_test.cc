@@ -212,8 +212,7 @@ TEST_F(ChangeFeedTest, ReportsInteriorPointsWithTheNextChange) {
   const WatchBatch batch = watcher.Next();
   ASSERT_EQ(batch.changes.size(), 1);
   EXPECT_EQ(batch.changes[0].record.counts.received, 10);
-  EXPECT_TRUE(batch.changes[0].has_box);
-  EXPECT_EQ(batch.changes[0].high, Vector(2, 2, 2));
+  EXPECT_EQ(batch.changes[0].box.high, Vector(2, 2, 2));
 }
 
 TEST_F(ChangeFeedTest, ReportsOnlyItsTarget) {
