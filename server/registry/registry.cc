@@ -103,13 +103,8 @@ RegistrySizes Registry::Sizes() const {
 
 CacheStatistics Registry::Cache() const {
   const std::lock_guard lock(state_.mutex);
-  const MemoryStatistics memory = state_.memory.Statistics();
   CacheStatistics cache = state_.catalog.statistics();
-  cache.bytes = memory.bytes;
-  cache.reading_bytes = memory.reading;
-  cache.writing_bytes = memory.writing;
-  cache.limit_bytes = memory.limit_bytes;
-  cache.evictions = memory.evictions;
+  static_cast<MemoryStatistics&>(cache) = state_.memory.Statistics();
   return cache;
 }
 

@@ -17,6 +17,7 @@
 #include "core/query/placed/live_hull.h"
 #include "server/process/fair_queue.h"
 #include "server/process/synchronization.h"
+#include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
@@ -134,15 +135,10 @@ struct RegistrySizes {
   uint64_t body_count = 0;
 };
 
-// Memory held for hulls, and its effect on reads so far.
-struct CacheStatistics {
-  // Builders, points and their prepared form, canonical snapshots, points pending to be built,
-  // vertices pending to be stored, and memory that calls hold for long (MemoryCharge).
-  uint64_t bytes = 0;
-  // Parts of `bytes` held for readers and for writers (MemoryUse).
-  uint64_t reading_bytes = 0;
-  uint64_t writing_bytes = 0;
-  uint64_t limit_bytes = 0;
+// Memory held for hulls, and its effect on reads so far. Memory: builders, points and their
+// prepared form, canonical snapshots, points pending to be built, vertices pending to be stored,
+// and memory that calls hold for long (MemoryCharge).
+struct CacheStatistics : MemoryStatistics {
   // Requested hulls found in memory.
   uint64_t hits = 0;
   // Requested hulls that had to be read from the store.
@@ -151,8 +147,6 @@ struct CacheStatistics {
   uint64_t loads = 0;
   // Number of times that a peer server's points were added to a hull in memory.
   uint64_t grown = 0;
-  // Number of times that a hull's builder or served version was evicted to stay within the limit.
-  uint64_t evictions = 0;
   // Hulls found damaged in the store.
   uint64_t damaged = 0;
 };

@@ -30,8 +30,8 @@ enum class MemoryUse {
 struct MemoryStatistics {
   // All memory counted now, and its parts held for readers and writers; the rest can be evicted.
   uint64_t bytes = 0;
-  uint64_t reading = 0;
-  uint64_t writing = 0;
+  uint64_t reading_bytes = 0;
+  uint64_t writing_bytes = 0;
   uint64_t limit_bytes = 0;
   // Number of evictions from an account.
   uint64_t evictions = 0;

@@ -265,7 +265,7 @@ TEST_F(HullTableTest, WithoutAStoreIdleHullsKeepPointsAndSequences) {
   insert("x");
   for (int i = 0; i < 2; ++i) RestIdle(locked_, table);
   ASSERT_NE(table.entries().find("x")->second.compact(), nullptr);
-  EXPECT_EQ(budget_.Statistics().writing, table.compact_bytes());
+  EXPECT_EQ(budget_.Statistics().writing_bytes, table.compact_bytes());
   MemoryCharge charge(budget_, MemoryUse::kReading, 1 << 30);
   budget_.Evict(locked_);
   const auto hull = table.Find("x");

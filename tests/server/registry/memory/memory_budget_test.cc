@@ -39,8 +39,8 @@ class MemoryBudgetTest : public ::testing::Test {
     return budget_.Check(locked, use);
   }
   uint64_t bytes() const { return budget_.Statistics().bytes; }
-  uint64_t reading() const { return budget_.Statistics().reading; }
-  uint64_t writing() const { return budget_.Statistics().writing; }
+  uint64_t reading() const { return budget_.Statistics().reading_bytes; }
+  uint64_t writing() const { return budget_.Statistics().writing_bytes; }
 
   FairMutex owners_;
   MemoryBudget budget_{100, 40, owners_};
