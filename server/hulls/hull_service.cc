@@ -90,7 +90,7 @@ void HullService::Create(CreateCall* call) {
   }
   registry_.hulls().Create(
       request.hull_id(), request.if_absent(),
-      [this, call](const absl::StatusOr<CreateResult>& created) {
+      [this, call](const absl::StatusOr<PutHullResult>& created) {
         if (!created.ok()) return call->End(created.status());
         const HullRecord& hull = created->hull;
         if (created->created) {

@@ -97,7 +97,7 @@ absl::Status ReplaceStream::Build() {
 void ReplaceStream::Commit() {
   // The registry answers on another thread after the commit.
   const Store& store = registry_.store();
-  const auto done = [this, &store](const absl::StatusOr<ReplaceResult>& result) {
+  const auto done = [this, &store](const absl::StatusOr<PutHullResult>& result) {
     // The memory was counted twice after the registry took it; at worst, that evicted a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());

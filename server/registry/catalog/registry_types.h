@@ -81,13 +81,8 @@ struct Resolved {
   std::vector<absl::StatusOr<HullView>> hulls;
 };
 
-struct CreateResult {
-  uint64_t store_revision = 0;
-  HullRecord hull;
-  bool created = false;
-};
-
-struct ReplaceResult {
+// Result of creating or replacing a hull.
+struct PutHullResult {
   uint64_t store_revision = 0;
   HullRecord hull;
   // True if no hull existed before.

@@ -66,7 +66,7 @@ class HullChanges : public PeerChangeListener {
   // refused. Requires: a valid ID (not checked here; CheckHullId runs on arrival of the call).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
-  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done);
+  void Create(const std::string& id, bool if_absent, Reply<PutHullResult> done);
   // Removes a hull and notifies its sessions. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
@@ -74,7 +74,7 @@ class HullChanges : public PeerChangeListener {
   // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
   // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
   // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
-  void Replace(Replacement replacement, Reply<ReplaceResult> done);
+  void Replace(Replacement replacement, Reply<PutHullResult> done);
 
   // Opens a session; `done` runs on this or another thread. `on_gone` is called at most once, on
   // any thread, with the reason if the hull is deleted or replaced before the session is closed.
@@ -108,17 +108,17 @@ class HullChanges : public PeerChangeListener {
   void Advance(Locked& locked, const HullPointer& hull);
 
   void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
-                    const Reply<CreateResult>& done);
+                    const Reply<PutHullResult>& done);
   void CreateNew(Locked& locked, const std::string& id, const Creation& done);
   void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
                     const Reply<uint64_t>& done);
   void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
-                     const Reply<ReplaceResult>& done);
+                     const Reply<PutHullResult>& done);
   absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
   void CommitReplacement(Locked& locked, const HullPointer& former,
                          const std::shared_ptr<Replacement>& replacement,
-                         const Reply<ReplaceResult>& done);
-  absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
+                         const Reply<PutHullResult>& done);
+  absl::StatusOr<PutHullResult> FinishReplacement(Locked& locked, const HullPointer& former,
                                                   const HullPointer& hull,
                                                   const absl::Status& status, const Change& change);
 

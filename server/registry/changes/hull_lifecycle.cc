@@ -41,34 +41,35 @@ void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement) {
 
 }  // namespace
 
-void HullChanges::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
+void HullChanges::Create(const std::string& id, bool if_absent, Reply<PutHullResult> done) {
   barrier_.WhenFresh(done,
                      [=, this](Locked& locked) { CreateLocked(locked, id, if_absent, done); });
 }
 
 void HullChanges::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
-                               const Reply<CreateResult>& done) {
+                               const Reply<PutHullResult>& done) {
   LockedTask again = [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); };
   if (records_.MustWait(locked, id, RecordReader::For::kLife, done, again)) return;
   const HullPointer existing = state_.catalog.Find(id);
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
       if (Committer::IsSuperseded(hull.status())) return later.AfterwardsLocked(again);
-      if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
-      Answer<CreateResult>(
-          later, done, CreateResult{state_.catalog.revision(), (*hull)->committed().record, true});
+      if (!hull.ok()) return Answer<PutHullResult>(later, done, hull.status());
+      Answer<PutHullResult>(
+          later, done, PutHullResult{state_.catalog.revision(), (*hull)->committed().record, true});
     });
   }
   if (!if_absent) {
-    Answer<CreateResult>(
+    Answer<PutHullResult>(
         locked, done,
         WithReason(absl::AlreadyExistsError(absl::StrCat(QuotedHull(id), " already exists")),
                    v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
   } else if (existing->state.damaged()) {
-    Answer<CreateResult>(locked, done, existing->state.damage());
+    Answer<PutHullResult>(locked, done, existing->state.damage());
   } else {
-    Answer<CreateResult>(
-        locked, done, CreateResult{state_.catalog.revision(), existing->committed().record, false});
+    Answer<PutHullResult>(
+        locked, done,
+        PutHullResult{state_.catalog.revision(), existing->committed().record, false});
   }
 }
 
@@ -126,7 +127,7 @@ void HullChanges::DeleteLocked(Locked& locked, const std::string& id,
          });
 }
 
-void HullChanges::Replace(Replacement replacement, Reply<ReplaceResult> done) {
+void HullChanges::Replace(Replacement replacement, Reply<PutHullResult> done) {
   HULLD_CHECK(replacement.builder != nullptr);
   std::vector<Vector> vertices = replacement.builder->Vertices();
   if (state_.store.keeps_hulls()) replacement.vertices = vertices;
@@ -137,13 +138,13 @@ void HullChanges::Replace(Replacement replacement, Reply<ReplaceResult> done) {
 }
 
 void HullChanges::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
-                                const Reply<ReplaceResult>& done) {
+                                const Reply<PutHullResult>& done) {
   const std::string& id = replacement->hull_id;
   LockedTask again = [=, this](Locked& later) { ReplaceLocked(later, replacement, done); };
   if (records_.MustWait(locked, id, RecordReader::For::kQuiet, done, std::move(again))) return;
   const HullPointer former = state_.catalog.Find(id);
   if (absl::Status s = CheckReplacement(former.get(), *replacement); !s.ok()) {
-    return Answer<ReplaceResult>(locked, done, s);
+    return Answer<PutHullResult>(locked, done, s);
   }
   CommitReplacement(locked, former, replacement, done);
 }
@@ -175,7 +176,7 @@ absl::Status HullChanges::CheckReplacement(const RegisteredHull* former,
 // quiet.
 void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
                                     const std::shared_ptr<Replacement>& replacement,
-                                    const Reply<ReplaceResult>& done) {
+                                    const Reply<PutHullResult>& done) {
   Change change = MakeChange(former.get(), *replacement);
   HullPointer hull;
   if (former == nullptr) {
@@ -193,7 +194,7 @@ void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
          [=, this](Locked& later, const absl::Status& status, Change& replaced) {
            const bool again = Committer::IsSuperseded(status);
            if (again) TakeBack(*hull, replaced, *replacement);
-           absl::StatusOr<ReplaceResult> result =
+           absl::StatusOr<PutHullResult> result =
                FinishReplacement(later, former, hull, status, replaced);
            if (!again) return Answer(later, done, std::move(result));
            later.AfterwardsLocked(
@@ -202,7 +203,7 @@ void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
 }
 
 // hull: replaces `former`, which may be null, if `status` is OK.
-absl::StatusOr<ReplaceResult> HullChanges::FinishReplacement(Locked& locked,
+absl::StatusOr<PutHullResult> HullChanges::FinishReplacement(Locked& locked,
                                                              const HullPointer& former,
                                                              const HullPointer& hull,
                                                              const absl::Status& status,
@@ -221,7 +222,7 @@ absl::StatusOr<ReplaceResult> HullChanges::FinishReplacement(Locked& locked,
   hull->NoteUse();
   state_.catalog.hulls().RestSoon(locked, *hull);
   state_.memory.Evict(locked);
-  return ReplaceResult{state_.catalog.revision(), change.hull.record, former == nullptr};
+  return PutHullResult{state_.catalog.revision(), change.hull.record, former == nullptr};
 }
 
 }  // namespace hulld::server

@@ -77,7 +77,7 @@ class ManyHulls {
       std::promise<bool> created;
       registry_.hulls().Replace(
           std::move(replacement),
-          [&](const absl::StatusOr<ReplaceResult>& result) { created.set_value(result.ok()); });
+          [&](const absl::StatusOr<PutHullResult>& result) { created.set_value(result.ok()); });
       if (!created.get_future().get()) std::abort();
     }
     Print("create", start);

@@ -40,8 +40,8 @@ class TestRegistry {
     return promise.get_future().get();
   }
 
-  absl::StatusOr<CreateResult> Create(const std::string& id, bool if_absent = false) {
-    return Wait<CreateResult>([&](Reply<CreateResult> done) {
+  absl::StatusOr<PutHullResult> Create(const std::string& id, bool if_absent = false) {
+    return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
       registry_.hulls().Create(id, if_absent, std::move(done));
     });
   }
@@ -73,8 +73,8 @@ class TestRegistry {
     registry_.hulls().CloseAppend(opened->session);
     return result;
   }
-  absl::StatusOr<ReplaceResult> Replace(Replacement replacement) {
-    return Wait<ReplaceResult>([&](Reply<ReplaceResult> done) {
+  absl::StatusOr<PutHullResult> Replace(Replacement replacement) {
+    return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
       registry_.hulls().Replace(std::move(replacement), std::move(done));
     });
   }

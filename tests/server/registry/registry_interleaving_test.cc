@@ -285,7 +285,7 @@ TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
   replacement.hull_id = "h";
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
-  ASSERT_TRUE(DurableRegistry::Wait<ReplaceResult>([&](Reply<ReplaceResult> done) {
+  ASSERT_TRUE(DurableRegistry::Wait<PutHullResult>([&](Reply<PutHullResult> done) {
                 registry_.hulls().Replace(std::move(replacement), std::move(done));
               }).ok());
   gate.Open();

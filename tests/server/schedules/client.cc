@@ -133,7 +133,7 @@ void Client::Create() {
   const bool if_absent = random().OneIn(2);
   const Call call = Begin(AnyHull());
   Scheduler::Current().Note("creates hull", call.hull, if_absent ? 1 : 0);
-  const auto check = [&](const absl::StatusOr<CreateResult>& result) {
+  const auto check = [&](const absl::StatusOr<PutHullResult>& result) {
     if (!result.ok()) {
       const auto exists = [](const State& state) { return state.exists; };
       const bool may_exist = absl::IsAlreadyExists(result.status()) && !if_absent &&
@@ -150,8 +150,8 @@ void Client::Create() {
     if (!state.has_value()) Fail(call, absl::StrCat("there is no ", Text(result->hull)));
     ledger().Report(call.hull, *state);
   };
-  Await<CreateResult>(
-      [&](Reply<CreateResult> done) {
+  Await<PutHullResult>(
+      [&](Reply<PutHullResult> done) {
         simulation_.registry.hulls().Create(HullName(call.hull), if_absent, std::move(done));
       },
       check);
@@ -192,7 +192,7 @@ void Client::Replace() {
   replacement.counts = *replacement.builder->Add(PointsOf(points));
   const bool creates = replacement.create_if_absent;
   Scheduler::Current().Note("replaces hull", call.hull, points, call.if_revision.value_or(0));
-  const auto check = [&](const absl::StatusOr<ReplaceResult>& result) {
+  const auto check = [&](const absl::StatusOr<PutHullResult>& result) {
     if (absl::IsNotFound(result.status()) && !creates) return CheckNotFound(call);
     if (absl::IsAborted(result.status())) return CheckAborted(call);
     if (creates && MayBeOther(call, result.status(), true)) return;
@@ -209,8 +209,8 @@ void Client::Replace() {
       Fail(call, "a replacement says the wrong of whether there was a hull");
     }
   };
-  Await<ReplaceResult>(
-      [&](Reply<ReplaceResult> done) {
+  Await<PutHullResult>(
+      [&](Reply<PutHullResult> done) {
         simulation_.registry.hulls().Replace(std::move(replacement), std::move(done));
       },
       check);

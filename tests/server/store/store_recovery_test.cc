@@ -212,11 +212,11 @@ TEST_P(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
 TEST_P(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   KeptRegistry& hulls = Start();
   constexpr int kHulls = 200;
-  std::vector<std::promise<absl::StatusOr<CreateResult>>> replies(kHulls);
+  std::vector<std::promise<absl::StatusOr<PutHullResult>>> replies(kHulls);
   for (int i = 0; i < kHulls; ++i) {
     hulls.registry().hulls().Create(
         absl::StrCat("h", i), false,
-        [&replies, i](absl::StatusOr<CreateResult> r) { replies[i].set_value(std::move(r)); });
+        [&replies, i](absl::StatusOr<PutHullResult> r) { replies[i].set_value(std::move(r)); });
   }
   std::vector<uint64_t> revisions;
   for (auto& reply : replies) revisions.push_back(reply.get_future().get()->hull.revision);

@@ -43,7 +43,7 @@ class PostgresShared : public PostgresTest {
     const auto view = server.View(id);
     return view.ok() ? view->record.counts.received : 0;
   }
-  static absl::StatusOr<ReplaceResult> Replace(PostgresRegistry& server, const std::string& id,
+  static absl::StatusOr<PutHullResult> Replace(PostgresRegistry& server, const std::string& id,
                                                const std::vector<Vector>& points,
                                                std::optional<uint64_t> if_revision = {}) {
     auto builder = std::make_shared<HullBuilder>();
