@@ -201,9 +201,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
     return hulls->hulls[known.index_of_.at(id)];
   };
-  Resolved resolved;
-  resolved.store_revision = hulls->store_revision;
-  resolved.staleness = hulls->staleness;
+  Resolved resolved = {.as_of = hulls->as_of};
   resolved.hulls.reserve(ids.size());
   for (size_t i = 0; i < ids.size(); ++i) {
     resolved.hulls.push_back(known.bodies_[i] == nullptr

@@ -80,7 +80,7 @@ absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
   if (!resolved.ok()) return resolved.status();
   absl::StatusOr<HullView>& hull = resolved->hulls.front();
   if (!hull.ok()) return hull.status();
-  return std::pair(resolved->as_of(), *std::move(hull));
+  return std::pair(resolved->as_of, *std::move(hull));
 }
 
 HoldStatistics Registry::Holds() const {

@@ -373,7 +373,7 @@ void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolv
     for (const uint32_t i : placements_of(k)) PlaceAgain(i);
   }
   if (!has_bodies()) TakeBodies();
-  as_of_ = resolved.as_of();
+  as_of_ = resolved.as_of;
   NoteProblems();
 }
 
@@ -405,7 +405,7 @@ void PlacementTable::SetHulls(const Store& store, Resolved resolved, const Query
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
   store_ = &store;
-  as_of_ = resolved.as_of();
+  as_of_ = resolved.as_of;
   NoteProblems();
   placed_.clear();
   if (!places_on_demand_) {

@@ -55,7 +55,7 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
   if (absl::Status s = Resolve(std::move(all), should_stop, &round); !s.ok()) return s;
   // Changes are applied here before the watch reports them.
   lookup_.plan = {.freshness = Freshness::AnyStaleness()};
-  round.revision = revision_ = round.resolved.store_revision;
+  round.revision = revision_ = round.resolved.as_of.revision;
   return round;
 }
 

@@ -72,13 +72,9 @@ struct ReadPlan {
 
 // Hulls at one revision of the store.
 struct Resolved {
-  AsOf as_of() const { return {store_revision, staleness}; }
-
-  uint64_t store_revision = 0;
-  // As AsOf::staleness.
-  std::chrono::nanoseconds staleness{0};
+  AsOf as_of = {};
   // In the order of the request; NOT_FOUND if absent, DATA_LOSS if the store is damaged.
-  std::vector<absl::StatusOr<HullView>> hulls;
+  std::vector<absl::StatusOr<HullView>> hulls = {};
 };
 
 // Result of creating or replacing a hull.

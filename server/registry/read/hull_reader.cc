@@ -341,11 +341,11 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
     Locked locked(state_.mutex);
     const auto staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
-    resolved.staleness = *staleness;
+    resolved.as_of.staleness = *staleness;
     const auto end = LookUpDue(locked, {ids, known, should_stop, plan});
     if (!end.ok()) return end.status();
     HULLD_CHECK(*end == LookUpEnd::kDone);
-    resolved.store_revision = state_.catalog.revision();
+    resolved.as_of.revision = state_.catalog.revision();
     state_.memory.Evict(locked);
   }
   resolved.hulls = known.Views(ids);
@@ -362,12 +362,12 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
     Locked locked(state_.mutex);
     const auto staleness = barrier_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
-    resolved.staleness = *staleness;
+    resolved.as_of.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
     const auto end = LookUpDue(locked, read);
     // Refresh reports an error, which may be gone later.
     if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
-    resolved.store_revision = state_.catalog.revision();
+    resolved.as_of.revision = state_.catalog.revision();
   }
   resolved.hulls = known.Views(ids);
   return resolved;

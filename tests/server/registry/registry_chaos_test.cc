@@ -59,8 +59,8 @@ class RegistryChaos : public RegistryInterleaving {
       const auto resolved = registry_.Resolve(ids, {}, plan);
       EXPECT_TRUE(resolved.ok());
       if (!resolved.ok()) break;
-      EXPECT_GE(resolved->store_revision, store_revision);
-      store_revision = resolved->store_revision;
+      EXPECT_GE(resolved->as_of.revision, store_revision);
+      store_revision = resolved->as_of.revision;
       for (const auto& hull : resolved->hulls) {
         if (!hull.ok()) {
           EXPECT_TRUE(absl::IsNotFound(hull.status())) << hull.status();

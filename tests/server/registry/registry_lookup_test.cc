@@ -88,7 +88,7 @@ TEST_F(RegistryLookup, ChangesBetweenTwoSlicesAreLookedUpAgain) {
   for (size_t i = 0; i < ids.size(); i += 100) EXPECT_EQ(Received(*resolved, i), 5);
   EXPECT_TRUE(absl::IsNotFound(resolved->hulls[250].status()));
   EXPECT_TRUE(resolved->hulls[1000].ok());
-  EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
+  EXPECT_EQ(resolved->as_of.revision, registry_.Sizes().store_revision);
   EXPECT_EQ(registry_.Holds().most_lookups, kMost);
 }
 
@@ -115,7 +115,7 @@ TEST_F(RegistryLookup, ResultsBelongToOneRevision) {
     EXPECT_GE(second + 1, last);
     last = first;
     const HullRecord& record = resolved->hulls[0]->record;
-    EXPECT_LE(record.revision, resolved->store_revision);
+    EXPECT_LE(record.revision, resolved->as_of.revision);
   }
   ending = true;
   writer.join();
@@ -131,7 +131,7 @@ TEST_F(RegistryLookup, ARefreshLooksUpOnlyChangedHulls) {
   absl::StatusOr<Resolved> resolved = registry_.reader().Refresh(ids, known, {});
   EXPECT_EQ(Lookups(), 1001);
   EXPECT_EQ(resolved->hulls[3]->record.vertex_count, 8);
-  EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
+  EXPECT_EQ(resolved->as_of.revision, registry_.Sizes().store_revision);
 
   ASSERT_TRUE(hulls_.Delete(ids[3]).ok());
   Replacement replacement;

@@ -92,12 +92,12 @@ TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
     const auto tried = registry_.reader().TryResolve(ids);
     ASSERT_TRUE(tried.has_value());
     ASSERT_EQ(tried->hulls.size(), 2);
-    EXPECT_EQ(tried->store_revision, registry_.Sizes().store_revision);
+    EXPECT_EQ(tried->as_of.revision, registry_.Sizes().store_revision);
     EXPECT_EQ(tried->hulls[0]->record.counts.received, i);
     EXPECT_EQ(tried->hulls[0]->served->high(), Vector(static_cast<double>(i), 0, 0));
     EXPECT_EQ(tried->hulls[1].status().code(), absl::StatusCode::kNotFound);
     const auto waited = registry_.Resolve(ids, {});
-    EXPECT_EQ(tried->store_revision, waited->store_revision);
+    EXPECT_EQ(tried->as_of.revision, waited->as_of.revision);
     EXPECT_EQ(tried->hulls[0]->served, waited->hulls[0]->served);
     EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
   }
@@ -376,7 +376,7 @@ TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {
   const std::vector<std::string> ids = {"b", "none", "a", "b"};
   const auto resolved = registry_.Resolve(ids, {});
   ASSERT_TRUE(resolved.ok());
-  EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
+  EXPECT_EQ(resolved->as_of.revision, registry_.Sizes().store_revision);
   EXPECT_EQ(resolved->hulls[0]->record.hull_id, "b");
   EXPECT_EQ(resolved->hulls[1].status().code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(resolved->hulls[2]->served->low(), Vector(0, 0, 0));

@@ -295,9 +295,9 @@ void Client::Read() {
   }
   for (size_t i = 0; i < ids.size(); ++i) {
     call.hull = static_cast<size_t>(ids[i][0] - 'a');
-    CheckView(call, resolved->store_revision, resolved->hulls[i]);
+    CheckView(call, resolved->as_of.revision, resolved->hulls[i]);
   }
-  ledger().ReportRevision(resolved->store_revision);
+  ledger().ReportRevision(resolved->as_of.revision);
   const absl::StatusOr<HullView>& view = resolved->hulls.back();
   if (view.ok() && random().OneIn(2)) MakeCanonical(call, *view);
 }
@@ -380,7 +380,7 @@ void Client::CheckAll() {
     const absl::StatusOr<Resolved> resolved = simulation_.registry.Resolve(ids, {});
     // Memory may be too small for the hull, and points may be damaged.
     if (resolved.ok()) {
-      CheckView(call, resolved->store_revision, resolved->hulls[0]);
+      CheckView(call, resolved->as_of.revision, resolved->hulls[0]);
     } else if (!MayFail(call, resolved.status(), false)) {
       Fail(call, absl::StrCat("wrong: ", resolved.status().ToString()));
     }
