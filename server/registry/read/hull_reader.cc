@@ -7,13 +7,20 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/check.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
+
+namespace {
+
+// Status of a lookup that would have to wait, but may not. Without a message, which would cost an
+// allocation.
+absl::Status WouldWait() { return absl::Status(absl::StatusCode::kUnavailable, ""); }
+
+}  // namespace
 
 // A read of several hulls.
 struct HullReader::HullsRead {
@@ -27,16 +34,16 @@ struct HullReader::HullsRead {
 
 // Updates the views of all due hulls. Releases the mutex after a number of lookups, and, if
 // allowed, to read from the store and to prepare. CANCELLED: should_stop returned true.
-absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
-  const absl::StatusOr<LookUpEnd> end = LookUpAll(locked, read);
-  // After kDone no load is left, so the mutex stays held.
-  if (!end.ok() || *end != LookUpEnd::kDone) {
+absl::Status HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
+  absl::Status status = LookUpAll(locked, read);
+  // After a success no load is left, so the mutex stays held.
+  if (!status.ok()) {
     KnownHulls& known = read.known;
     const std::function<bool()> stop = [] { return true; };
     EndAllLoading(locked, {read.ids, known, stop, read.plan});
     for (const uint32_t k : known.due_) known.hulls_[k].found = nullptr;
   }
-  return end;
+  return status;
 }
 
 // Finds the hulls due next and loads them into the processor's caches, so that their cache misses
@@ -64,7 +71,7 @@ size_t HullReader::FindAhead(const HullsRead& read) {
   return known.due_.size() - count;
 }
 
-absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
+absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
   if (!known.next_change_.has_value()) known.next_change_ = state_.catalog.recent_changes().end();
   size_t left_to_find = known.due_.size();
@@ -80,14 +87,13 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, cons
     } else if (!known.due_.empty()) {
       if (known.due_.size() <= left_to_find) left_to_find = FindAhead(read);
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      const absl::StatusOr<LookUpEnd> end = LookUp(locked, read, known.due_.back());
-      if (!end.ok() || *end != LookUpEnd::kDone) return end;
+      if (absl::Status s = LookUp(locked, read, known.due_.back()); !s.ok()) return s;
       due.is_due = false;
       known.due_.pop_back();
     } else if (!known.ahead_.empty()) {
       EndAllLoading(locked, read);
     } else {
-      return LookUpEnd::kDone;
+      return absl::OkStatus();
     }
     locked.NoteLookup();
     if (locked.lookups() < kMostLookupsPerHold) continue;
@@ -113,9 +119,8 @@ absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   return state_.memory.Check(locked, MemoryUse::kReading);
 }
 
-// Looks up the view of a hull, or its error.
-absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const HullsRead& read,
-                                                         uint32_t k) {
+// Looks up the view of a hull, or its error. UNAVAILABLE: WouldWait.
+absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls::Known& known = read.known.hulls_[k];
   const std::string& id = read.ids[known.first];
   const ReadPlan& plan = read.plan;
@@ -124,37 +129,37 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
     if (*found == nullptr || (*found)->state.gone()) found = state_.catalog.hulls().Ask(id);
     if (!found.has_value() && !state_.catalog.bodies().contains(id)) {
-      if (!read.may_wait) return LookUpEnd::kWouldWait;
+      if (!read.may_wait) return WouldWait();
       const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
       if (!is_over.ok()) return is_over.status();
-      if (*is_over) return LookUpEnd::kDone;
+      if (*is_over) return absl::OkStatus();
       continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
       known.view = state_.catalog.NoSuchHull(id);
-      return LookUpEnd::kDone;
+      return absl::OkStatus();
     }
     if (hull->state.damaged()) {
       known.view = hull->state.damage();
-      return LookUpEnd::kDone;
+      return absl::OkStatus();
     }
     if (!hull->IsReady()) {
       // The hull was looked up, prepared, and evicted since. Loading and preparing it again could
       // evict another hull of the same read, and so on without end.
       if (IsHeld(known, *hull)) {
         ++state_.catalog.statistics().hits;
-        return LookUpEnd::kDone;
+        return absl::OkStatus();
       }
-      if (!read.may_wait) return LookUpEnd::kWouldWait;
+      if (!read.may_wait) return WouldWait();
       const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
       if (!is_over.ok()) return is_over.status();
-      if (*is_over) return LookUpEnd::kDone;
+      if (*is_over) return absl::OkStatus();
       continue;
     }
     const bool prepare = Preparer::IsWanted(*hull, plan.expected_questions);
     if (prepare && plan.prepare_first) {
-      if (!read.may_wait) return LookUpEnd::kWouldWait;
+      if (!read.may_wait) return WouldWait();
       if (!std::exchange(known.is_prepared, true)) {
         if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
         continue;
@@ -162,7 +167,7 @@ absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const H
     }
     if (prepare) state_.preparer.Schedule(hull);
     NoteView(locked, hull, read.known, k, was_missing);
-    return LookUpEnd::kDone;
+    return absl::OkStatus();
   }
 }
 
@@ -342,9 +347,7 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
     const auto staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.as_of.staleness = *staleness;
-    const auto end = LookUpDue(locked, {ids, known, should_stop, plan});
-    if (!end.ok()) return end.status();
-    HULLD_CHECK(*end == LookUpEnd::kDone);
+    if (absl::Status s = LookUpDue(locked, {ids, known, should_stop, plan}); !s.ok()) return s;
     resolved.as_of.revision = state_.catalog.revision();
     state_.memory.Evict(locked);
   }
@@ -363,10 +366,8 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
     const auto staleness = barrier_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.as_of.staleness = *staleness;
-    const HullsRead read = {ids, known, should_stop, plan, false};
-    const auto end = LookUpDue(locked, read);
     // Refresh reports an error, which may be gone later.
-    if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
+    if (!LookUpDue(locked, {ids, known, should_stop, plan, false}).ok()) return std::nullopt;
     resolved.as_of.revision = state_.catalog.revision();
   }
   resolved.hulls = known.Views(ids);

@@ -68,17 +68,11 @@ class HullReader {
 
  private:
   struct HullsRead;
-  // Outcome of a lookup without an error.
-  enum class LookUpEnd {
-    kDone,
-    // The lookup would have to wait, but may not.
-    kWouldWait,
-  };
 
-  absl::StatusOr<LookUpEnd> LookUpDue(Locked& locked, const HullsRead& read);
-  absl::StatusOr<LookUpEnd> LookUpAll(Locked& locked, const HullsRead& read);
+  absl::Status LookUpDue(Locked& locked, const HullsRead& read);
+  absl::Status LookUpAll(Locked& locked, const HullsRead& read);
   size_t FindAhead(const HullsRead& read);
-  absl::StatusOr<LookUpEnd> LookUp(Locked& locked, const HullsRead& read, uint32_t k);
+  absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
   absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
   absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
                                    RegisteredHull& hull, bool& was_missing);
