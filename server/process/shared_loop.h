@@ -18,48 +18,59 @@ namespace hulld::server {
 // A loop over [0, count) shared by several threads: each takes the next `step` indices.
 class SharedLoop {
  public:
-  // Runs `work` on disjoint ranges that cover [0, count), on this thread and on up to
-  // `most_helpers` free threads of a pool. Waits for started helpers, and not for queued ones, so
-  // it may be called on any thread that may block. Several threads call `work` concurrently.
+  // Called by several threads concurrently.
+  using Work = std::function<void(size_t begin, size_t end)>;
+
+  // Starts to run `work` on disjoint ranges that cover [0, count), on up to `most_helpers` free
+  // threads of a pool, without blocking. Finish must follow; `work` is not called after it.
   // Requires step > 0.
-  static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step,
-                  std::function<void(size_t begin, size_t end)> work) {
+  static std::shared_ptr<SharedLoop> Start(WorkerPool& helpers, size_t most_helpers, size_t count,
+                                           size_t step, Work work) {
     HULLD_CHECK(step > 0);
     const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
     const size_t steps = (count + step - 1) / step;
     for (size_t i = 1; i < steps && i <= most_helpers; ++i) {
-      helpers.Submit([loop] { loop->TakePart(); });
+      helpers.Submit([loop] { loop->TakePart({}); });
     }
-    loop->TakePart();
-    loop->AwaitAll();
+    return loop;
   }
 
-  // For Run.
-  SharedLoop(size_t count, size_t step, std::function<void(size_t begin, size_t end)> work)
+  // Works on the rest on this thread, too. Waits for started helpers, and not for queued ones, so
+  // it may be called on any thread that may block. After should_stop, which may be empty and is
+  // called only on this thread, returns true, the remaining indices are skipped.
+  void Finish(const std::function<bool()>& should_stop) {
+    TakePart(should_stop);
+    std::unique_lock lock(mutex_);
+    while (done_ < count_) all_done_.wait(lock);
+  }
+
+  static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step, Work work) {
+    Start(helpers, most_helpers, count, step, std::move(work))->Finish({});
+  }
+
+  // For Start.
+  SharedLoop(size_t count, size_t step, Work work)
       : count_(count), step_(step), work_(std::move(work)) {}
 
  private:
   // Works until no step is left.
-  void TakePart() {
+  void TakePart(const std::function<bool()>& should_stop) {
     for (size_t begin = next_.fetch_add(step_); begin < count_; begin = next_.fetch_add(step_)) {
       const size_t end = std::min(count_, begin + step_);
-      work_(begin, end);
+      if (!is_stopped_) work_(begin, end);
+      if (should_stop && should_stop()) is_stopped_ = true;
       const std::lock_guard lock(mutex_);
       done_ += end - begin;
       if (done_ == count_) all_done_.notify_all();
     }
   }
 
-  void AwaitAll() {
-    std::unique_lock lock(mutex_);
-    while (done_ < count_) all_done_.wait(lock);
-  }
-
   const size_t count_;
   const size_t step_;
   // Not called after the loop is done, although late helpers still hold it.
-  const std::function<void(size_t begin, size_t end)> work_;
+  const Work work_;
   std::atomic<size_t> next_ = 0;
+  std::atomic<bool> is_stopped_ = false;
   Mutex mutex_;
   ConditionVariable all_done_;
   size_t done_ = 0;

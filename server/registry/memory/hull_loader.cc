@@ -4,7 +4,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <mutex>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -62,7 +61,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHul
   return MakeLive(stored, store.LoadVertices(stored));
 }
 
-LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
+LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helpers)
     : store_(store),
       hulls_(std::move(hulls)),
       order_(hulls_.size()),
@@ -81,31 +80,15 @@ LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
     points = 0;
     begin = n + 1;
   }
-}
-
-std::shared_ptr<LoadJob> LoadJob::Start(Store& store, std::vector<StoredHull> hulls,
-                                        WorkerPool& helpers) {
   // Loading this many small hulls takes longer than waking a thread.
   constexpr size_t kWorthAThread = 8;
-  const auto job = std::make_shared<LoadJob>(store, std::move(hulls));
-  const size_t shares = std::min<size_t>(helpers.threads(), job->hulls_.size() / kWorthAThread);
-  for (size_t i = 0; i < shares; ++i) helpers.Submit([job] { job->Work({}); });
-  return job;
+  loop_ = SharedLoop::Start(helpers, std::min(helpers.threads(), hulls_.size() / kWorthAThread),
+                            ends_.size(), 1, [this](size_t part, size_t) { LoadPart(part); });
 }
 
-// Loads parts until none is left. Skips the rest after should_stop, which may be empty, returns
-// true.
-void LoadJob::Work(const std::function<bool()>& should_stop) {
-  for (size_t part = next_++; part < ends_.size(); part = next_++) {
-    const uint32_t begin = part == 0 ? 0 : ends_[part - 1];
-    if (!is_stopped_) LoadSome(std::span(order_).subspan(begin, ends_[part] - begin));
-    if (Stopped(should_stop)) is_stopped_ = true;
-    const std::lock_guard lock(mutex_);
-    if (++ended_ == ends_.size()) all_ended_.notify_all();
-  }
-}
-
-void LoadJob::LoadSome(std::span<const uint32_t> some) {
+void LoadJob::LoadPart(size_t part) {
+  const uint32_t begin = part == 0 ? 0 : ends_[part - 1];
+  const std::span some = std::span(order_).subspan(begin, ends_[part] - begin);
   std::vector<const StoredHull*> stored;
   stored.reserve(some.size());
   for (const uint32_t i : some) stored.push_back(&hulls_[i]);
@@ -116,9 +99,7 @@ void LoadJob::LoadSome(std::span<const uint32_t> some) {
 }
 
 std::vector<LoadJob::Loaded> LoadJob::Finish(const std::function<bool()>& should_stop) {
-  Work(should_stop);
-  std::unique_lock lock(mutex_);
-  while (ended_ < ends_.size()) all_ended_.wait(lock);
+  loop_->Finish(should_stop);
   return std::move(loaded_);
 }
 

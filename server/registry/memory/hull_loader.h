@@ -3,7 +3,6 @@
 
 #include <absl/status/statusor.h>
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -13,7 +12,7 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
-#include "server/process/synchronization.h"
+#include "server/process/shared_loop.h"
 #include "server/process/worker_pool.h"
 #include "server/store/store.h"
 
@@ -27,26 +26,24 @@ namespace hulld::server {
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored);
 
 // A batch of hulls loaded together, by free threads of a pool and by the thread that asks for the
-// results; each takes a few hulls per step. Thread-safe except for Finish.
+// results; each takes a few hulls per step.
 class LoadJob {
  public:
   using Loaded = absl::StatusOr<std::shared_ptr<LiveHull>>;
 
-  // Store and pool must outlive the tasks that Start submits, which end soon after Finish.
-  LoadJob(Store& store, std::vector<StoredHull> hulls);
-  // Starts loading on the threads of the pool, without blocking.
-  static std::shared_ptr<LoadJob> Start(Store& store, std::vector<StoredHull> hulls,
-                                        WorkerPool& helpers);
+  // Starts loading on the threads of the pool, without blocking. Requires that Finish is called.
+  LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helpers);
+  LoadJob(const LoadJob&) = delete;
+  LoadJob& operator=(const LoadJob&) = delete;
 
   const std::vector<StoredHull>& hulls() const { return hulls_; }
   // Returns LoadLive of each hull, in order: loads the hulls that no thread has taken and waits for
   // the rest. Remaining hulls get CANCELLED after should_stop, which may be empty and is called
-  // only on this thread, returns true. Call at most once.
+  // only on this thread, returns true. Call once.
   std::vector<Loaded> Finish(const std::function<bool()>& should_stop);
 
  private:
-  void Work(const std::function<bool()>& should_stop);
-  void LoadSome(std::span<const uint32_t> some);
+  void LoadPart(size_t part);
 
   Store& store_;
   const std::vector<StoredHull> hulls_;
@@ -55,12 +52,7 @@ class LoadJob {
   std::vector<uint32_t> ends_;
   // Each element is written by the thread that took it, and read after all threads have ended.
   std::vector<Loaded> loaded_;
-  std::atomic<size_t> next_ = 0;
-  std::atomic<bool> is_stopped_ = false;
-  Mutex mutex_;
-  ConditionVariable all_ended_;
-  // Number of finished parts.
-  size_t ended_ = 0;
+  std::shared_ptr<SharedLoop> loop_;
 };
 
 // Returns a builder with the hull of these points; never null. DATA_LOSS naming the hull: the

@@ -303,7 +303,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
     next.found[i]->StartLoading();
     hulls.hulls_[next.hulls[i]].is_ahead = true;
   }
-  next.job = LoadJob::Start(state_.store, std::move(stored), loaders_);
+  next.job = std::make_shared<LoadJob>(state_.store, std::move(stored), loaders_);
   hulls.ahead_.push_back(std::move(next));
   return true;
 }
