@@ -12,29 +12,6 @@
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
-namespace {
-
-absl::Status BodyMismatch(const std::string& id, uint64_t revision, uint64_t if_revision) {
-  const std::string found =
-      revision == 0 ? absl::StrCat(" does not exist, so it is not at revision ", if_revision)
-                    : absl::StrCat(" is at revision ", revision, ", not ", if_revision);
-  return WithReason(
-      absl::AbortedError(
-          absl::StrCat(QuotedBody(id), found, " (if_revision); read it again, then retry")),
-      v1::ERROR_REASON_REVISION_MISMATCH,
-      {{"body_id", id}, {"if_revision", if_revision}, {"current_revision", revision}});
-}
-
-absl::Status HullHasTheId(const std::string& id) {
-  return WithReason(absl::AlreadyExistsError(absl::StrCat(
-                        "\"", id,
-                        "\" is a hull, and hulls and bodies share their IDs; choose another ID, or "
-                        "delete the hull first")),
-                    v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}});
-}
-
-}  // namespace
-
 absl::Status BodyRegistry::Load(Locked& locked) {
   return state_.store.ForEachBody(
       [&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
@@ -59,11 +36,11 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
 
 // OK if the body may be put, also as a replacement.
 absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
-  if (state_.catalog.hulls().contains(id)) return HullHasTheId(id);
+  if (state_.catalog.hulls().contains(id)) return IdTaken("hull", id);
   const std::shared_ptr<const Body> body = state_.catalog.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;
   if (if_revision.has_value() && *if_revision != revision) {
-    return BodyMismatch(id, revision, *if_revision);
+    return RevisionMismatch("body", id, revision, *if_revision);
   }
   return body == nullptr ? state_.catalog.CheckHullCount() : absl::OkStatus();
 }
@@ -122,7 +99,8 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
   }
   const std::shared_ptr<const Body> body = entry->committed();
   if (if_revision.has_value() && *if_revision != body->record().revision) {
-    return Answer<uint64_t>(locked, done, BodyMismatch(id, body->record().revision, *if_revision));
+    return Answer<uint64_t>(locked, done,
+                            RevisionMismatch("body", id, body->record().revision, *if_revision));
   }
   Change change;
   change.deleted = true;

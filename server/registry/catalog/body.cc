@@ -36,12 +36,14 @@ HullChange Body::Describe(const StoredBody& stored, const absl::Status& damage) 
 
 std::string QuotedBody(const std::string& id) { return absl::StrCat("body \"", id, "\""); }
 
-absl::Status BodyExists(const std::string& id) {
-  return WithReason(absl::AlreadyExistsError(absl::StrCat(
-                        "\"", id,
-                        "\" is a body, and hulls and bodies share their IDs; choose another ID, or "
-                        "delete the body first")),
-                    v1::ERROR_REASON_BODY_EXISTS, {{"body_id", id}});
+absl::Status IdTaken(const std::string& kind, const std::string& id) {
+  return WithReason(absl::AlreadyExistsError(
+                        absl::StrCat("\"", id, "\" is a ", kind,
+                                     ", and hulls and bodies share their IDs; choose another "
+                                     "ID, or delete the ",
+                                     kind, " first")),
+                    kind == "body" ? v1::ERROR_REASON_BODY_EXISTS : v1::ERROR_REASON_HULL_EXISTS,
+                    {{kind + "_id", id}});
 }
 
 absl::Status BodyNotFound(const std::string& id) {

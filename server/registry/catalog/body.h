@@ -64,8 +64,9 @@ class Body {
   mutable std::shared_ptr<const PieceBoxes> boxes_;
 };
 
-// ALREADY_EXISTS: a body has the ID that a hull requests.
-absl::Status BodyExists(const std::string& id);
+// ALREADY_EXISTS: a body has the ID that a hull requests, or a hull the ID that a body requests.
+// kind: of the present one, "hull" or "body".
+absl::Status IdTaken(const std::string& kind, const std::string& id);
 absl::Status BodyNotFound(const std::string& id);
 std::string QuotedBody(const std::string& id);
 

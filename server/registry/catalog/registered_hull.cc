@@ -413,14 +413,17 @@ absl::Status HullNotFound(const std::string& id) {
                     v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
-absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {
-  return WithReason(absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
-                                                    record.revision, ", not ", if_revision,
-                                                    " (if_revision); read it again, then retry")),
-                    v1::ERROR_REASON_REVISION_MISMATCH,
-                    {{"hull_id", record.hull_id},
-                     {"if_revision", if_revision},
-                     {"current_revision", record.revision}});
+absl::Status RevisionMismatch(const std::string& kind, const std::string& id, uint64_t revision,
+                              uint64_t if_revision) {
+  const std::string found =
+      revision == 0
+          ? absl::StrCat(" does not exist or is damaged, so it is not at revision ", if_revision)
+          : absl::StrCat(" is at revision ", revision, ", not ", if_revision);
+  return WithReason(
+      absl::AbortedError(
+          absl::StrCat(kind, " \"", id, "\"", found, " (if_revision); read it again, then retry")),
+      v1::ERROR_REASON_REVISION_MISMATCH,
+      {{kind + "_id", id}, {"if_revision", if_revision}, {"current_revision", revision}});
 }
 
 }  // namespace hulld::server

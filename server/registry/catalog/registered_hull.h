@@ -304,7 +304,10 @@ absl::Status HullNotFound(const std::string& id);
 
 // UNAVAILABLE: a shared store lacks an expected record, and no peer server removed it.
 absl::Status StoreDisagrees(const HullRecord& record);
-absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision);
+// ABORTED: the hull or body is not at the required revision. kind: "hull" or "body". revision: the
+// present one; 0: it does not exist, or its record is damaged.
+absl::Status RevisionMismatch(const std::string& kind, const std::string& id, uint64_t revision,
+                              uint64_t if_revision);
 
 }  // namespace hulld::server
 

@@ -39,12 +39,8 @@ struct HullChanges::BuiltChunk {
 
 namespace {
 
-absl::Status GoneWhileStreaming(const HullRecord& record) {
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          QuotedHull(record.hull_id),
-          " was deleted or replaced while points were streamed into it; open the stream again")),
-      v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
+absl::Status GoneWhileStreaming(const RegisteredHull& hull) {
+  return Gone(hull.committed().record.hull_id, "deleted or replaced");
 }
 
 absl::Status Superseded() { return absl::AbortedError("a peer server changed the hull first"); }
@@ -74,7 +70,7 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   }
   const bool untouched = record.revision == record.create_revision;
   if (*chunk.if_revision == 0 && session.created_hull && untouched) return absl::OkStatus();
-  return RevisionMismatch(record, *chunk.if_revision);
+  return RevisionMismatch("hull", record.hull_id, record.revision, *chunk.if_revision);
 }
 
 // Adds the points missing from a builder. Returns false if the result differs from the record; the
@@ -241,8 +237,7 @@ void HullChanges::RunNextChunk(const HullPointer& hull) {
 void HullChanges::RefuseChunks(const HullPointer& hull) {
   Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
-  const absl::Status reason =
-      hull->state.gone() ? GoneWhileStreaming(hull->committed().record) : hull->state.damage();
+  const absl::Status reason = hull->state.gone() ? GoneWhileStreaming(*hull) : hull->state.damage();
   for (PendingChunk& pending : std::exchange(hull->chunks, {})) {
     AnswerChunk(locked, pending.done, pending.chunk.sequence, reason);
     if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
@@ -288,12 +283,12 @@ void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChu
 // Checks a chunk before building. May release the mutex to query the store.
 absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
                                                              const PendingChunk& pending) {
-  if (hull.state.gone()) return GoneWhileStreaming(hull.committed().record);
+  if (hull.state.gone()) return GoneWhileStreaming(hull);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
   const absl::StatusOr<uint64_t> committed = CommittedSequence(locked, hull, writer_id);
   if (!committed.ok()) return committed.status();
-  if (hull.state.gone()) return GoneWhileStreaming(hull.committed().record);
+  if (hull.state.gone()) return GoneWhileStreaming(hull);
   if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {

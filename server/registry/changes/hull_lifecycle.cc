@@ -78,7 +78,7 @@ void HullChanges::CreateLocked(Locked& locked, const std::string& id, bool if_ab
 // to have no hull (checked), and no change of a body with the ID is in flight (not checked: its
 // completion would find the hull).
 void HullChanges::CreateNew(Locked& locked, const std::string& id, const Creation& done) {
-  if (state_.catalog.bodies().contains(id)) return done(locked, BodyExists(id));
+  if (state_.catalog.bodies().contains(id)) return done(locked, IdTaken("body", id));
   if (absl::Status s = state_.catalog.CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
   change.begins = true;
@@ -110,8 +110,9 @@ void HullChanges::DeleteLocked(Locked& locked, const std::string& id,
   const HullPointer hull = state_.catalog.Find(id);
   if (hull == nullptr) return Answer<uint64_t>(locked, done, state_.catalog.NoSuchHull(id));
   const StoredHull& committed = hull->committed();
-  if (if_revision.has_value() && *if_revision != committed.record.revision) {
-    return Answer<uint64_t>(locked, done, RevisionMismatch(committed.record, *if_revision));
+  const uint64_t revision = committed.record.revision;
+  if (if_revision.has_value() && *if_revision != revision) {
+    return Answer<uint64_t>(locked, done, RevisionMismatch("hull", id, revision, *if_revision));
   }
   Change change;
   change.hull = committed;
@@ -153,22 +154,13 @@ void HullChanges::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacemen
 absl::Status HullChanges::CheckReplacement(const RegisteredHull* former,
                                            const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
-  const std::optional<uint64_t>& if_revision = replacement.if_revision;
-  if (former != nullptr) {
-    if (!if_revision.has_value() || *if_revision == former->committed().record.revision) {
-      return absl::OkStatus();
-    }
-    return RevisionMismatch(former->committed().record, *if_revision);
+  const uint64_t revision = former == nullptr ? 0 : former->committed().record.revision;
+  if (replacement.if_revision.value_or(revision) != revision) {
+    return RevisionMismatch("hull", id, revision, *replacement.if_revision);
   }
-  if (if_revision.value_or(0) != 0) {
-    return WithReason(
-        absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
-                                        "revision ", *if_revision, " (if_revision)")),
-        v1::ERROR_REASON_REVISION_MISMATCH,
-        {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
-  }
+  if (former != nullptr) return absl::OkStatus();
   if (!replacement.create_if_absent) return state_.catalog.NoSuchHull(id);
-  if (state_.catalog.bodies().contains(id)) return BodyExists(id);
+  if (state_.catalog.bodies().contains(id)) return IdTaken("body", id);
   return state_.catalog.CheckHullCount();
 }
 
