@@ -172,6 +172,7 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredBody& body)
   std::vector<Change> changes(1);
   changes[0].body = std::make_shared<StoredBody>(body);
   changes[0].revision = body.record.revision;
+  changes[0].begins = true;
   return changes;
 }
 
@@ -185,6 +186,7 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
   change.hull = hull;
   change.hull.layout = {};
   change.revision = hull.record.revision;
+  change.begins = true;
   if (!vertices->empty()) {
     change.hull.layout.base_revision = hull.record.revision;
     change.hull.layout.base_vertices = vertices->size();
@@ -196,6 +198,7 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
     Change committed;
     committed.hull = changes.front().hull;
     committed.revision = hull.record.revision;
+    committed.former_vertices = hull.record.vertex_count;
     committed.writer = std::move(writer);
     changes.push_back(std::move(committed));
   }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <map>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,9 +24,9 @@ constexpr std::chrono::milliseconds kAnswerTime{30'000};
 constexpr char kPrepare[] = R"(
     SET search_path = '';
     SET synchronous_commit = on;
-    PREPARE migrate_fence(bigint) AS UPDATE hulld.store SET written_in = $1;
-    PREPARE migrate_count(bigint, bigint, bigint) AS
-      UPDATE hulld.store SET hulls = hulls + $1, vertices = vertices + $2, bodies = bodies + $3;
+    PREPARE migrate_fence(bigint, bigint, bigint, bigint) AS
+      UPDATE hulld.store SET written_in = $1, hulls = hulls + $2, vertices = vertices + $3,
+        bodies = bodies + $4;
     PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
 
 // The store holds the claim and serves reads; a separate session writes, fenced by the epoch of
@@ -65,41 +63,28 @@ class PostgresTarget : public MigrationTarget {
     statements.push_back(
         {.name = "migrate_begin", .parameters = {source.store_id, EncodeBigint(source.revision)}});
     statements.push_back({.text = "DEALLOCATE migrate_begin"});
-    return Transact(std::move(statements));
+    return Transact(std::move(statements), {});
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    // A hull may be several changes, all of them in this call; a body is one.
-    std::map<std::string_view, uint64_t> vertices;
-    uint64_t bodies = 0;
-    for (const Change* change : changes) {
-      if (change->body == nullptr) {
-        vertices[change->id()] = change->hull.record.vertex_count;
-      } else {
-        ++bodies;
-      }
-    }
-    uint64_t sum = 0;
-    for (const auto& [id, count] : vertices) sum += count;
-    std::vector<Statement> statements = StatementsOf(changes);
-    statements.push_back(
-        {.name = "migrate_count",
-         .parameters = {EncodeBigint(vertices.size()), EncodeBigint(sum), EncodeBigint(bodies)}});
-    return Transact(std::move(statements));
+    return Transact(StatementsOf(changes), AddedBy(changes));
   }
 
   absl::Status Finish(const MigrationSource& source) override {
     std::vector<Statement> statements(2);
     statements[0] = {.name = "migrate_finish", .parameters = {EncodeBigint(source.revision)}};
     statements[1] = {.text = "DROP TABLE hulld.migration"};
-    return Transact(std::move(statements));
+    return Transact(std::move(statements), {});
   }
 
  private:
-  absl::Status Transact(std::vector<Statement> statements) {
+  // added: change of the store's totals.
+  absl::Status Transact(std::vector<Statement> statements, const StoreTotals& added) {
     std::vector<Statement> all(2);
     all[0] = {.text = "BEGIN"};
-    all[1] = {.name = "migrate_fence", .parameters = {EncodeBigint(store_->epoch())}};
+    all[1] = {.name = "migrate_fence",
+              .parameters = {EncodeBigint(store_->epoch()), EncodeBigint(added.hulls),
+                             EncodeBigint(added.vertices), EncodeBigint(added.bodies)}};
     std::ranges::move(statements, std::back_inserter(all));
     all.push_back({.text = "COMMIT"});
     absl::Status status = session_->Ask(all).status();
