@@ -28,7 +28,7 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
   barrier_.WhenFresh(done, [=, this](Locked& locked) {
     // The body is counted by now. A retry after a wait does not count it twice.
     if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) {
-      return Answer<PutBodyResult>(locked, done, s);
+      return Answer(locked, done, s);
     }
     PutLocked(locked, shared, if_revision, done);
   });
@@ -52,7 +52,7 @@ void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
   LockedTask again = [=, this](Locked& later) { PutLocked(later, body, if_revision, done); };
   if (records_.MustWait(locked, id, RecordReader::For::kLife, done, again)) return;
   if (absl::Status s = CheckPut(id, if_revision); !s.ok()) {
-    return Answer<PutBodyResult>(locked, done, s);
+    return Answer(locked, done, s);
   }
   const bool is_new = !state_.catalog.bodies().contains(id);
   const BodyTable::Entry& entry = state_.catalog.bodies().Add(id);
@@ -69,12 +69,11 @@ void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
          [=, this](Locked& later, const absl::Status& status, const Change& put) {
            if (is_new) state_.catalog.EndCreatingBody(status.ok());
            if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-           if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
+           if (!status.ok()) return Answer(later, done, status);
            const BodyRecord& record = body->record();
            state_.ApplyBody(later, record.body_id, body, put.revision);
-           Answer<PutBodyResult>(
-               later, done,
-               PutBodyResult{state_.catalog.revision(), record, body->pieces().size(), is_new});
+           Answer(later, done,
+                  PutBodyResult{state_.catalog.revision(), record, body->pieces().size(), is_new});
          });
 }
 
@@ -95,12 +94,12 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
             ? WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
                          v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}})
             : BodyNotFound(id);
-    return Answer<uint64_t>(locked, done, missing);
+    return Answer(locked, done, missing);
   }
   const std::shared_ptr<const Body> body = entry->committed();
   if (if_revision.has_value() && *if_revision != body->record().revision) {
-    return Answer<uint64_t>(locked, done,
-                            RevisionMismatch("body", id, body->record().revision, *if_revision));
+    return Answer(locked, done,
+                  RevisionMismatch("body", id, body->record().revision, *if_revision));
   }
   Change change;
   change.deleted = true;
@@ -108,9 +107,9 @@ void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
   Submit(locked, std::move(change),
          [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
            if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           if (!status.ok()) return Answer(later, done, status);
            state_.ApplyBody(later, id, nullptr, deletion.revision);
-           Answer<uint64_t>(later, done, deletion.revision);
+           Answer(later, done, deletion.revision);
          });
 }
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -293,7 +294,7 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull();
 
 // Calls `done` after the mutex is released.
 template <typename T>
-void Answer(Locked& locked, const Reply<T>& done, absl::StatusOr<T> result) {
+void Answer(Locked& locked, const Reply<T>& done, std::type_identity_t<absl::StatusOr<T>> result) {
   locked.Afterwards([done, result = std::move(result)] { done(result); });
 }
 

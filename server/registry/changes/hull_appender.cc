@@ -111,7 +111,7 @@ void HullChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
 // Runs on a thread of `writers_`. May release the mutex to query the store.
 void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
   const auto refuse = [request](Locked& later, const absl::Status& status) {
-    Answer<OpenResult>(later, request->done, status);
+    Answer(later, request->done, status);
   };
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
@@ -162,7 +162,7 @@ void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
   result.hull = hull->committed().record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
-  Answer<OpenResult>(locked, request->done, std::move(result));
+  Answer(locked, request->done, std::move(result));
 }
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.

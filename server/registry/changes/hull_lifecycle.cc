@@ -54,22 +54,20 @@ void HullChanges::CreateLocked(Locked& locked, const std::string& id, bool if_ab
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
       if (Committer::IsSuperseded(hull.status())) return later.AfterwardsLocked(again);
-      if (!hull.ok()) return Answer<PutHullResult>(later, done, hull.status());
-      Answer<PutHullResult>(
-          later, done, PutHullResult{state_.catalog.revision(), (*hull)->committed().record, true});
+      if (!hull.ok()) return Answer(later, done, hull.status());
+      Answer(later, done,
+             PutHullResult{state_.catalog.revision(), (*hull)->committed().record, true});
     });
   }
   if (!if_absent) {
-    Answer<PutHullResult>(
-        locked, done,
-        WithReason(absl::AlreadyExistsError(absl::StrCat(QuotedHull(id), " already exists")),
-                   v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
+    Answer(locked, done,
+           WithReason(absl::AlreadyExistsError(absl::StrCat(QuotedHull(id), " already exists")),
+                      v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
   } else if (existing->state.damaged()) {
-    Answer<PutHullResult>(locked, done, existing->state.damage());
+    Answer(locked, done, existing->state.damage());
   } else {
-    Answer<PutHullResult>(
-        locked, done,
-        PutHullResult{state_.catalog.revision(), existing->committed().record, false});
+    Answer(locked, done,
+           PutHullResult{state_.catalog.revision(), existing->committed().record, false});
   }
 }
 
@@ -108,11 +106,11 @@ void HullChanges::DeleteLocked(Locked& locked, const std::string& id,
   LockedTask again = [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); };
   if (records_.MustWait(locked, id, RecordReader::For::kQuiet, done, again)) return;
   const HullPointer hull = state_.catalog.Find(id);
-  if (hull == nullptr) return Answer<uint64_t>(locked, done, state_.catalog.NoSuchHull(id));
+  if (hull == nullptr) return Answer(locked, done, state_.catalog.NoSuchHull(id));
   const StoredHull& committed = hull->committed();
   const uint64_t revision = committed.record.revision;
   if (if_revision.has_value() && *if_revision != revision) {
-    return Answer<uint64_t>(locked, done, RevisionMismatch("hull", id, revision, *if_revision));
+    return Answer(locked, done, RevisionMismatch("hull", id, revision, *if_revision));
   }
   Change change;
   change.hull = committed;
@@ -122,9 +120,9 @@ void HullChanges::DeleteLocked(Locked& locked, const std::string& id,
   Submit(locked, hull, std::move(change),
          [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
            if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           if (!status.ok()) return Answer(later, done, status);
            state_.ApplyDeletion(later, hull, deletion.revision);
-           Answer<uint64_t>(later, done, deletion.revision);
+           Answer(later, done, deletion.revision);
          });
 }
 
@@ -145,7 +143,7 @@ void HullChanges::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacemen
   if (records_.MustWait(locked, id, RecordReader::For::kQuiet, done, std::move(again))) return;
   const HullPointer former = state_.catalog.Find(id);
   if (absl::Status s = CheckReplacement(former.get(), *replacement); !s.ok()) {
-    return Answer<PutHullResult>(locked, done, s);
+    return Answer(locked, done, s);
   }
   CommitReplacement(locked, former, replacement, done);
 }
