@@ -56,7 +56,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
                                                     const std::function<bool()>& should_stop) {
   PostgresOptions options;
   absl::StatusOr<std::string> conninfo =
-      ReadSecretFile(config.postgres_conninfo_file, options.setting);
+      ReadSecretFile(config.postgres_conninfo_file, PostgresOptions::kSetting);
   if (!conninfo.ok()) return conninfo.status();
   options.conninfo = *std::move(conninfo);
   options.take_over = config.take_over;

@@ -237,15 +237,16 @@ std::string OwnerName() {
 }
 
 // Returns the error for the person who starts a server: the failure and, if known, the remedy.
-absl::Status OpenFailed(const PostgresOptions& options, const absl::Status& status) {
+absl::Status OpenFailed(const absl::Status& status) {
   std::string advice;
   if (SqlState(status) == "42501") {
     advice =
         "; the schema \"hulld\" and its tables must belong to the role of hulld, or the role must "
         "be allowed to create them: CREATE SCHEMA hulld AUTHORIZATION the_role";
   }
-  return absl::Status(status.code(), absl::StrCat("the store in PostgreSQL (", options.setting,
-                                                  "): ", status.message(), advice));
+  return absl::Status(status.code(),
+                      absl::StrCat("the store in PostgreSQL (", PostgresOptions::kSetting,
+                                   "): ", status.message(), advice));
 }
 
 }  // namespace
@@ -260,20 +261,26 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
   absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
   if (!conninfo.ok()) {
-    return Prefixed(absl::StrCat(options.setting, ": "), conninfo.status());
+    return Prefixed(absl::StrCat(PostgresOptions::kSetting, ": "), conninfo.status());
   }
   std::unique_ptr<PostgresStore> store(new PostgresStore(std::move(options), *std::move(conninfo)));
   absl::StatusOr<std::unique_ptr<Session>> session = store->OpenKeeper();
-  if (!session.ok()) return OpenFailed(store->options_, session.status());
+  if (!session.ok()) return OpenFailed(session.status());
   store->keeper_session_ = *std::move(session);
-  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok())
-    return OpenFailed(store->options_, s);
-  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(store->options_, s);
+  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
   Session& keeper = *store->keeper_session_;
   const bool shared = store->options_.shared;
   const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
-  if (!made.ok()) return OpenFailed(store->options_, made);
-  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(store->options_, s);
+  if (!made.ok()) return OpenFailed(made);
+  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(s);
+  spdlog::info(
+      "store: {}, PostgreSQL {}; acknowledged changes are committed there{} (synchronous_commit = "
+      "{}); {}epoch {}",
+      keeper.Describe(), keeper.server_version() / 10'000,
+      store->durability_ == Durability::kRelaxed ? ", but an outage may lose them" : "",
+      store->synchronous_commit_, shared ? "peer servers may be active; " : "", store->epoch());
+  store->MeasureDisk().IgnoreError();
   if (shared && store->options_.notices) store->StartNotices();
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;
@@ -443,35 +450,40 @@ absl::Status PostgresStore::MakeTables(Session& session) {
 
 // Makes this server the owner of the store.
 absl::Status PostgresStore::Begin() {
-  absl::StatusOr<std::unique_ptr<Session>> writer = OpenWriter();
-  if (!writer.ok()) return writer.status();
-  writer_ = *std::move(writer);
-  const bool is_relaxed = durability_ == Durability::kRelaxed;
-  const absl::StatusOr<Rows> former = writer_->Run("SELECT store_id, relaxed FROM hulld.store");
+  if (absl::Status s = RenewWriter(); !s.ok()) return s;
+  const absl::StatusOr<Rows> former = writer_->Run("SELECT store_id FROM hulld.store");
   if (!former.ok()) return former.status();
-  const absl::StatusOr<Rows> claimed = writer_->Ask(
-      {.name = "hulld_claim", .parameters = {owner_, RandomId(), std::string(1, is_relaxed)}});
-  if (!claimed.ok()) return claimed.status();
-  if (claimed->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
-  epoch_ = claimed->bigint(0, 0);
-  batch_ = claimed->bigint(0, 1);
-  revision_ = claimed->bigint(0, 2);
-  id_ = std::string(claimed->at(0, 3));
-  totals_ = {claimed->bigint(0, 4), claimed->bigint(0, 5), claimed->bigint(0, 6)};
-  if (id_ != former->at(0, 0)) {
+  const std::string is_relaxed(1, durability_ == Durability::kRelaxed);
+  const absl::Status claimed =
+      Claim({.name = "hulld_claim", .parameters = {owner_, RandomId(), is_relaxed}}).status();
+  if (claimed.ok() && id_ != former->at(0, 0)) {
     spdlog::warn(
         "store {} was open with synchronous_commit = off and not shut down cleanly; its last "
         "acknowledged changes may be lost; continuing at revision {} as store {}",
         std::string(former->at(0, 0)), revision_, id_);
   }
-  spdlog::info(
-      "store: {}, PostgreSQL {}; acknowledged changes are {} (synchronous_commit = "
-      "{}); epoch {}",
-      writer_->Describe(), writer_->server_version() / 10'000,
-      is_relaxed ? "committed there, but an outage may lose it" : "committed there",
-      synchronous_commit_, epoch());
-  MeasureDisk().IgnoreError();
+  return claimed;
+}
+
+absl::Status PostgresStore::RenewWriter() {
+  absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
+  if (!session.ok()) return session.status();
+  writer_ = *std::move(session);
   return absl::OkStatus();
+}
+
+// Takes the state of the store from the row of a claim, whose columns begin with those read here.
+absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
+  absl::StatusOr<Rows> rows = writer_->Ask(std::move(claim));
+  if (!rows.ok()) return rows;
+  if (rows->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
+  epoch_ = rows->bigint(0, 0);
+  batch_ = rows->bigint(0, 1);
+  seen_batch_ = batch_;
+  revision_ = rows->bigint(0, 2);
+  id_ = std::string(rows->at(0, 3));
+  totals_ = {rows->bigint(0, 4), rows->bigint(0, 5), rows->bigint(0, 6)};
+  return rows;
 }
 
 absl::Status PostgresStore::WaitForTurn() {

@@ -16,8 +16,6 @@
 namespace hulld::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // Key of the advisory lock for creating the tables.
 constexpr uint64_t kSchemaLock = 0x68756c6c65;
 // Number of batches with retained changes, for servers that have not read them yet; and the number
@@ -76,11 +74,11 @@ constexpr char kPrepareShared[] = R"(
       WITH joined AS (
         UPDATE hulld.store SET owner = $1, epoch = epoch + (owner <> $1)::integer,
           written_in = epoch + (owner <> $1)::integer
-        RETURNING epoch, batch, revision, store_id, relaxed, hulls, vertices, bodies),
+        RETURNING epoch, batch, revision, store_id, hulls, vertices, bodies, relaxed),
       noted AS (
         INSERT INTO hulld.epochs (epoch, owner, batch, revision)
         SELECT epoch, $1, batch, revision FROM joined ON CONFLICT (epoch) DO NOTHING)
-      SELECT epoch, batch, revision, store_id, relaxed, hulls, vertices, bodies FROM joined;
+      SELECT epoch, batch, revision, store_id, hulls, vertices, bodies, relaxed FROM joined;
     PREPARE hulld_turn AS SELECT batch FROM hulld.store FOR UPDATE;
     PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[], bigint[], bigint[]) AS
       INSERT INTO hulld.changes (batch, id, revision, ended_at, began, body_began)
@@ -186,33 +184,17 @@ absl::Status PostgresStore::MakeSharedSchema(Session& session) {
 
 // Makes this server one of the store's owners and fences off a server that was active alone before.
 absl::Status PostgresStore::Join() {
-  absl::StatusOr<std::unique_ptr<Session>> writer = OpenWriter();
-  if (!writer.ok()) return writer.status();
-  writer_ = *std::move(writer);
+  if (absl::Status s = RenewWriter(); !s.ok()) return s;
   const absl::StatusOr<Rows> joined =
-      writer_->Ask({.name = "hulld_join", .parameters = {kSeveralServers}});
+      Claim({.name = "hulld_join", .parameters = {kSeveralServers}});
   if (!joined.ok()) return joined.status();
-  if (joined->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
-  if (joined->at(0, 4) != std::string(1, '\0')) {
+  if (joined->at(0, 7) != std::string(1, '\0')) {
     return absl::FailedPreconditionError(
         "the store was open with synchronous_commit = off and not shut down cleanly; start and "
         "stop one hulld with --postgres-servers one first, which gives the store a new ID");
   }
   // Drops killed servers. A server that still asks for its last batch committed it recently.
-  const absl::Status dropped = writer_->Ask({.name = "hulld_drop_old_servers"}).status();
-  if (!dropped.ok()) return dropped;
-  epoch_ = joined->bigint(0, 0);
-  batch_ = joined->bigint(0, 1);
-  seen_batch_ = batch_;
-  revision_ = joined->bigint(0, 2);
-  id_ = std::string(joined->at(0, 3));
-  totals_ = {joined->bigint(0, 5), joined->bigint(0, 6), joined->bigint(0, 7)};
-  spdlog::info(
-      "store: {}, PostgreSQL {}; acknowledged changes are committed (synchronous_commit = {}); "
-      "peer servers may be active; epoch {}",
-      writer_->Describe(), writer_->server_version() / 10'000, synchronous_commit_, epoch());
-  MeasureDisk().IgnoreError();
-  return absl::OkStatus();
+  return writer_->Ask({.name = "hulld_drop_old_servers"}).status();
 }
 
 // Removes this server's last batch, which is not needed after an orderly end.
@@ -315,12 +297,6 @@ absl::Status PostgresStore::TakeTurn() {
   return rows.ok() ? NotePeerChanges(rows->back()) : rows.status();
 }
 
-// Returns the turn without a write. status: result of the transaction so far.
-void PostgresStore::GiveTurnBack(const absl::Status& status) {
-  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
-  if (went_back_) GiveNewId();
-}
-
 // Runs one transaction in two round trips. The first takes the turn, which lasts until the end of
 // the transaction: batches are serialized, and all earlier commits of peer servers are known. So
 // the new revisions are the next ones, and no server reads a batch before its predecessor. batch:
@@ -342,15 +318,11 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batc
           {.name = "hulld_prune", .parameters = {EncodeBigint(next.number - kKeptBatches)}});
     }
     statements.push_back(Fence(next));
-    statements.push_back({.text = "COMMIT"});
     *batch = next;
-    status = writer_->AskToCommit(statements).status();
-    if (status.ok()) {
-      Keep(next);
-      return status;
-    }
+    return SendBatch(std::move(statements), next);
   }
-  GiveTurnBack(status);
+  // Returns the turn without a write.
+  EndTransaction(status);
   return status;
 }
 
@@ -369,9 +341,7 @@ void PostgresStore::GiveNewId() {
 // has ended then, and nothing of it can follow, because its COMMIT was sent before. Its sync covers
 // earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
-  absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-  if (!session.ok()) return session.status();
-  writer_ = *std::move(session);
+  if (absl::Status s = RenewWriter(); !s.ok()) return s;
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   statements.push_back({.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}});
@@ -381,40 +351,6 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   if (!rows.ok()) return rows.status();
   const Rows& last = (*rows)[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
-}
-
-absl::Status PostgresStore::CommitShared(std::span<Change* const> changes) {
-  if (absl::Status s = ended(); !s.ok()) return s;
-  const Clock::time_point deadline = Clock::now() + options_.patience;
-  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
-    absl::Status status;
-    Batch batch;
-    if (writer_ == nullptr) {
-      absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-      status = session.status();
-      if (session.ok()) writer_ = *std::move(session);
-    }
-    if (status.ok()) status = AttemptShared(changes, &batch);
-    if (status.ok()) return status;
-    if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
-    if (ViolatedConstraint(status) == "store_fence") {
-      End(Superseded(""));
-      return WriteFailed(ended());
-    }
-    if (!SqlState(status).empty()) return WriteFailed(Refused(status));
-    if (batch.number != 0) {
-      const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
-      if (!committed.ok()) return WriteFailed(OutcomeUnknown(status));
-      spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
-                   std::string(status.message()), *committed ? "committed" : "not committed");
-      if (*committed) {
-        Keep(batch);
-        return absl::OkStatus();
-      }
-    }
-    if (Clock::now() + pause >= deadline) return WriteFailed(Refused(status));
-    if (EndsWithin(pause)) return WriteFailed(Refused(status));
-  }
 }
 
 // Ends sessions that hold the turn and send nothing, for example of a server that stalls while it

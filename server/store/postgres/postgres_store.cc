@@ -78,19 +78,34 @@ Statement PostgresStore::Fence(const Batch& batch) const {
 }
 
 // Runs one transaction. If the session is lost, it may have been committed; after other errors it
-// was not.
-absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, const Batch& batch) {
+// was not. batch: set before anything is sent that may commit it.
+absl::Status PostgresStore::Attempt(std::span<Change* const> changes, Batch* batch) {
+  *batch = {batch_ + 1, NumberChanges(changes, revision_), AddedBy(changes)};
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   // First, so that a superseded server writes nothing.
-  statements.push_back(Fence(batch));
+  statements.push_back(Fence(*batch));
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
+  return SendBatch(std::move(statements), *batch);
+}
+
+// Sends the last statements of a transaction, and COMMIT.
+absl::Status PostgresStore::SendBatch(std::vector<Statement> statements, const Batch& batch) {
   statements.push_back({.text = "COMMIT"});
   const absl::Status status = writer_->AskToCommit(statements).status();
-  if (status.ok()) return status;
-  // A failed transaction cannot be committed, and ends with its session at the latest.
-  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
+  if (status.ok()) {
+    Keep(batch);
+  } else {
+    EndTransaction(status);
+  }
   return status;
+}
+
+// Ends a transaction that was not committed, for this status. A failed transaction cannot be
+// committed, and ends with its session at the latest.
+void PostgresStore::EndTransaction(const absl::Status& status) {
+  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
+  if (went_back_) GiveNewId();
 }
 
 // Returns true if the batch was committed. UNAVAILABLE: unknown at the deadline.
@@ -127,9 +142,7 @@ void PostgresStore::Keep(const Batch& batch) {
 // Raises the epoch in a new session. This waits for the batch's transaction to end if it has locked
 // the row, and fences it off if it has not reached that point. Its sync covers earlier commits.
 absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
-  absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-  if (!session.ok()) return session.status();
-  writer_ = *std::move(session);
+  if (absl::Status s = RenewWriter(); !s.ok()) return s;
   const Statement reclaim = {.name = "hulld_reclaim", .parameters = {owner_}};
   const absl::StatusOr<std::vector<Rows>> rows = writer_->AskToCommit(std::span(&reclaim, 1));
   if (!rows.ok()) return rows.status();
@@ -167,43 +180,43 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
 }
 
 absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
-  if (options_.shared) return CommitShared(changes);
   if (absl::Status s = ended(); !s.ok()) return s;
   if (!unknown_.ok()) return unknown_;
-  const Batch batch = {batch_ + 1, NumberChanges(changes, revision_), AddedBy(changes)};
   const Clock::time_point deadline = Clock::now() + options_.patience;
-  while (true) {
-    if (writer_ == nullptr) {
-      // The former session's outcome is known.
-      absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-      if (!session.ok()) return WriteFailed(Refused(session.status()));
-      writer_ = *std::move(session);
-    }
-    const absl::Status status = Attempt(changes, batch);
+  for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
+    // The outcome of a former session is known.
+    absl::Status status = writer_ == nullptr ? RenewWriter() : absl::OkStatus();
+    Batch batch;
     if (status.ok()) {
-      Keep(batch);
-      return status;
+      status = options_.shared ? AttemptShared(changes, &batch) : Attempt(changes, &batch);
     }
+    if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
-      ++write_failures_;
       End(Superseded(""));
-      return ended();
+      return WriteFailed(ended());
     }
+    // A server that is active alone finds the outcome even after its end.
+    const bool finds_outcome = batch.number != 0 && !options_.shared;
+    if (absl::Status s = ended(); !s.ok() && !finds_outcome) return WriteFailed(s);
     // The database answered with an error, so the batch was not committed.
     if (!SqlState(status).empty()) return WriteFailed(Refused(status));
-    const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
-    if (!committed.ok()) {
-      unknown_ = OutcomeUnknown(status);
-      return WriteFailed(unknown_);
+    if (batch.number != 0) {
+      const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
+      if (!committed.ok()) {
+        const absl::Status unknown = OutcomeUnknown(status);
+        // The next turn of a shared store settles the outcome.
+        if (!options_.shared) unknown_ = unknown;
+        return WriteFailed(unknown);
+      }
+      spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
+                   std::string(status.message()), *committed ? "committed" : "not committed");
+      if (*committed) {
+        Keep(batch);
+        return absl::OkStatus();
+      }
+      if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     }
-    spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
-                 std::string(status.message()), *committed ? "committed" : "not committed");
-    if (*committed) {
-      Keep(batch);
-      return absl::OkStatus();
-    }
-    if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
-    if (Clock::now() >= deadline) return WriteFailed(Refused(status));
+    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return WriteFailed(Refused(status));
   }
 }
 

@@ -31,10 +31,11 @@ inline constexpr std::chrono::milliseconds kFirstRetryPause{10};
 inline constexpr std::chrono::milliseconds kLongestRetryPause{500};
 
 struct PostgresOptions {
+  // Names the file of the connection string, for errors.
+  static constexpr char kSetting[] = "--postgres-conninfo-file";
+
   // A connection string of libpq.
   std::string conninfo;
-  // Setting that supplied the string, for errors of opening the store.
-  std::string setting = "--postgres-conninfo-file";
   // Takes the store from the active server instead of waiting for its end.
   bool take_over = false;
   // Also opens a store with an unfinished migration.
@@ -168,6 +169,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status MakeTables(Session& session);
   absl::Status AddTotals(Session& session) const;
   absl::Status BeginPatiently();
+  absl::Status RenewWriter();
+  absl::StatusOr<Rows> Claim(Statement claim);
   absl::Status Begin();
   absl::Status OpenFirstReaders();
 
@@ -185,7 +188,9 @@ class PostgresStore : public Store, public PeerFeed {
 
   // Committing. batch: its number.
   Statement Fence(const Batch& batch) const;
-  absl::Status Attempt(std::span<const Change* const> changes, const Batch& batch);
+  absl::Status Attempt(std::span<Change* const> changes, Batch* batch);
+  absl::Status SendBatch(std::vector<Statement> statements, const Batch& batch);
+  void EndTransaction(const absl::Status& status);
   void Keep(const Batch& batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   bool EndsWithin(std::chrono::milliseconds pause);
@@ -205,9 +210,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status CheckStore(const Rows& rows);
   void GiveNewId();
   absl::Status NotePeerChanges(const Rows& rows);
-  absl::Status CommitShared(std::span<Change* const> changes);
   absl::Status TakeTurn();
-  void GiveTurnBack(const absl::Status& status);
   absl::Status AttemptShared(std::span<Change* const> changes, Batch* batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
   absl::Status EndStuckTurns();
