@@ -10,6 +10,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/process/descriptors.h"
+
 namespace hulld::server {
 namespace {
 
@@ -33,10 +35,13 @@ std::string CheckAccess(const struct stat& info) {
                          info.st_uid == 0 ? "640 (or tighter)" : "600 (or tighter)");
 }
 
-absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std::string& setting,
+absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string& setting,
                                      bool secret) {
+  const auto failed = [&] { return Problem(setting, path, std::strerror(errno)); };
+  // Nonblocking, so that a pipe is recognized instead of waited for.
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat info = {};
-  if (fstat(fd, &info) != 0) return Problem(setting, path, std::strerror(errno));
+  if (file.number() < 0 || fstat(file.number(), &info) != 0) return failed();
   if (!S_ISREG(info.st_mode)) return Problem(setting, path, "it is not a regular file");
   if (secret) {
     const std::string problem = CheckAccess(info);
@@ -45,23 +50,13 @@ absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std:
   std::string text;
   char buffer[4096];
   for (;;) {
-    const ssize_t count = read(fd, buffer, sizeof buffer);
+    const ssize_t count = read(file.number(), buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) return Problem(setting, path, std::strerror(errno));
+    if (count < 0) return failed();
     if (count == 0) return text;
     text.append(buffer, static_cast<size_t>(count));
     if (text.size() > kMostBytes) return Problem(setting, path, "it holds more than 1 MiB");
   }
-}
-
-absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string& setting,
-                                     bool secret) {
-  // Nonblocking, so that a pipe is recognized instead of waited for.
-  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return Problem(setting, path, std::strerror(errno));
-  absl::StatusOr<std::string> text = ReadOpen(fd, path, setting, secret);
-  close(fd);
-  return text;
 }
 
 }  // namespace

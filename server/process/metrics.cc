@@ -87,18 +87,6 @@ Metrics::Metrics()
       exact_fallbacks_(AddCounters(registry_, "hulld_exact_fallbacks_total",
                                    "Pairs that required exact arithmetic.")
                            .Add({})),
-      points_received_(
-          AddCounters(registry_, "hulld_points_received_total", "Points of committed chunks.")
-              .Add({})),
-      points_outside_(AddCounters(registry_, "hulld_points_kept_total",
-                                  "Points of committed chunks that became vertices.")
-                          .Add({})),
-      points_duplicate_(AddCounters(registry_, "hulld_points_duplicate_total",
-                                    "Points of committed chunks that were vertices already.")
-                            .Add({})),
-      points_inside_(AddCounters(registry_, "hulld_points_inside_total",
-                                 "Points of committed chunks inside the hull.")
-                         .Add({})),
       store_(AddStore(registry_)),
       backup_saved_(AddGauges(registry_, "hulld_backup_saved_timestamp_seconds",
                               "Unix time of the last complete backup; 0: never.")
@@ -121,6 +109,13 @@ Metrics::Metrics()
     message_seconds_[static_cast<size_t>(rpc)] =
         &message_seconds.Add({{"rpc", RpcName(rpc)}}, LatencyBuckets());
   }
+  points_ = {
+      &AddCounter("hulld_points_received_total", "Points of committed chunks.", {}),
+      &AddCounter("hulld_points_kept_total", "Points of committed chunks that became vertices.",
+                  {}),
+      &AddCounter("hulld_points_duplicate_total",
+                  "Points of committed chunks that were vertices already.", {}),
+      &AddCounter("hulld_points_inside_total", "Points of committed chunks inside the hull.", {})};
   auto& pairs = AddCounters(registry_, "hulld_pairs_total", "Pairs answered, by deciding stage.");
   for (size_t i = 0; i < kRungNames.size(); ++i) pairs_[i] = &pairs.Add({{"rung", kRungNames[i]}});
   AddProcess();
@@ -180,13 +175,10 @@ void Metrics::CountToken(const std::string& token) {
 }
 
 void Metrics::CountPoints(const PointCounts& counts) {
-  const auto add = [](prometheus::Counter& counter, uint64_t count) {
-    if (count > 0) counter.Increment(static_cast<double>(count));
-  };
-  add(points_received_, counts.received);
-  add(points_outside_, counts.outside);
-  add(points_duplicate_, counts.duplicate);
-  add(points_inside_, counts.inside);
+  const uint64_t numbers[] = {counts.received, counts.outside, counts.duplicate, counts.inside};
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (numbers[i] > 0) points_[i]->Increment(static_cast<double>(numbers[i]));
+  }
 }
 
 void Metrics::CountPairs(const RungCounts& counts) {

@@ -115,10 +115,8 @@ class Metrics : public prometheus::Collectable {
   std::array<prometheus::Histogram*, kRpcCount> message_seconds_;
   std::array<prometheus::Counter*, kRungCount> pairs_;
   prometheus::Counter& exact_fallbacks_;
-  prometheus::Counter& points_received_;
-  prometheus::Counter& points_outside_;
-  prometheus::Counter& points_duplicate_;
-  prometheus::Counter& points_inside_;
+  // Received, outside, duplicate, inside.
+  std::array<prometheus::Counter*, 4> points_;
   StoreMetrics store_;
   prometheus::Gauge& backup_saved_;
   // Callbacks that update metrics at each exposition.

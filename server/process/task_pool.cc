@@ -14,7 +14,15 @@ using Clock = std::chrono::steady_clock;
 TaskPool::Lane::~Lane() { HULLD_CHECK(slices_.empty()); }
 
 void TaskPool::Lane::Submit(std::function<void()> slice, ClientId client) {
-  pool_.SubmitSlice(*this, std::move(slice), client);
+  {
+    const std::lock_guard lock(pool_.mutex_);
+    client_ = client;
+    if (slices_.empty()) pool_.lanes_.Push(client, this);
+    slices_.push_back({std::move(slice), Clock::now(), true});
+    ++pool_.slices_waiting_;
+    pool_.NoteWaiting();
+  }
+  pool_.ready_.notify_one();
 }
 
 TaskPool::TaskPool(int threads, std::optional<PoolMetrics> single_metrics,
@@ -50,18 +58,6 @@ void TaskPool::Submit(std::function<void()> task, ClientId client) {
 
 void TaskPool::NoteSingleCall() {
   last_single_call_.store(Clock::now().time_since_epoch(), std::memory_order_relaxed);
-}
-
-void TaskPool::SubmitSlice(Lane& lane, std::function<void()> slice, ClientId client) {
-  {
-    const std::lock_guard lock(mutex_);
-    lane.client_ = client;
-    if (lane.slices_.empty()) lanes_.Push(client, &lane);
-    lane.slices_.push_back({std::move(slice), Clock::now(), true});
-    ++slices_waiting_;
-    NoteWaiting();
-  }
-  ready_.notify_one();
 }
 
 void TaskPool::NoteWaiting() {

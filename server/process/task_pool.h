@@ -93,7 +93,6 @@ class TaskPool {
  private:
   // True if a single call arrived less than kReserveTime ago.
   bool IsReserved() const;
-  void SubmitSlice(Lane& lane, std::function<void()> slice, ClientId client);
   void Work();
   // The functions below require the mutex.
   //
