@@ -6,11 +6,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <memory>
 #include <utility>
 
 #include "core/hull/audit.h"
 #include "core/hull/growth/hull_builder.h"
 #include "server/process/log.h"
+#include "server/registry/memory/hull_loader.h"
 #include "server/settings/config.h"
 #include "server/store/rocksdb_store.h"
 
@@ -40,16 +42,9 @@ struct Report {
 absl::Status Examine(RocksDbStore& store, const StoredHull& stored) {
   const absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
   if (!points.ok()) return points.status();
-  HullBuilder builder;
-  if (const auto added = builder.Add(*points); !added.ok()) return added.status();
-  const HullRecord& record = stored.record;
-  if (builder.vertex_count() != record.vertex_count || builder.dimension() != record.dimension) {
-    return absl::DataLossError(absl::StrCat(
-        "hull \"", record.hull_id, "\": its points make a hull of dimension ", builder.dimension(),
-        " with ", builder.vertex_count(), " vertices, its record says ", record.dimension, " and ",
-        record.vertex_count));
-  }
-  return AuditHull(builder.Snapshot());
+  const absl::StatusOr<std::unique_ptr<HullBuilder>> builder =
+      BuildHull(stored.record, *points, /*should_stop=*/{});
+  return builder.ok() ? AuditHull((*builder)->Snapshot()) : builder.status();
 }
 
 Report ExamineAll(RocksDbStore& store) {

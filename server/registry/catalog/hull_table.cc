@@ -49,11 +49,6 @@ HullTable::HullTable(bool readable, MemoryBudget& budget)
         if (readable_) DropCompact();
       }) {}
 
-const HullTable::Entry* HullTable::FindEntry(std::string_view id) const {
-  const auto found = index_.find(id);
-  return found == index_.end() ? nullptr : &(*found)->second;
-}
-
 std::pair<HullTable::Place, bool> HullTable::AddEntry(const std::string& id) {
   if (const auto found = index_.find(id); found != index_.end()) return {*found, false};
   const Place place = entries_.try_emplace(id).first;
@@ -68,13 +63,8 @@ void HullTable::EraseEntry(Place place) {
 }
 
 bool HullTable::contains(const std::string& id) const {
-  const Entry* const entry = FindEntry(id);
-  return entry != nullptr && !entry->is_absent_;
-}
-
-bool HullTable::IsVisible(const std::string& id) const {
-  const Entry* const entry = FindEntry(id);
-  return entry != nullptr && entry->visible();
+  const auto found = index_.find(id);
+  return found != index_.end() && !(*found)->second.is_absent_;
 }
 
 std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {

@@ -107,7 +107,6 @@ class HullTable {
   // Number of hulls in memory; any thread.
   size_t size() const { return size_.load(std::memory_order_relaxed); }
   bool contains(const std::string& id) const;
-  bool IsVisible(const std::string& id) const;
   // Returns true if the ID's state is known, including absence. Unless this is a cache, an ID
   // without an entry is absent.
   bool Knows(const std::string& id) const { return !is_cache() || index_.contains(id); }
@@ -169,8 +168,6 @@ class HullTable {
   };
 
   bool is_cache() const { return most_.has_value(); }
-  // Returns null for an unknown ID.
-  const Entry* FindEntry(std::string_view id) const;
   std::pair<Place, bool> AddEntry(const std::string& id);
   void EraseEntry(Place place);
   Entry& Add(const std::string& id);

@@ -65,7 +65,7 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
   const StoredHull stored = Stored("a", 7);
   table_.AddResting(stored);
   EXPECT_FALSE(IsAwake("a"));
-  EXPECT_TRUE(table_.IsVisible("a"));
+  EXPECT_TRUE(table_.entries().find("a")->second.visible());
   EXPECT_EQ(table_.entries().find("a")->second.Describe("a").record, stored.record);
   EXPECT_EQ(table_.entries().find("a")->second.revision(), 8);
   {
