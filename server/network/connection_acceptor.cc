@@ -58,16 +58,20 @@ void SetOption(int socket, int level, int option, int value) {
   setsockopt(socket, level, option, &value, sizeof value);
 }
 
-// Returns a listening socket, or an invalid one.
-Descriptor ListenAt(const sockaddr* name, socklen_t size, bool both_families) {
+// Returns a listening socket; or an invalid one, and sets `error` to the errno.
+Descriptor ListenAt(const sockaddr* name, socklen_t size, bool both_families, int* error) {
   Descriptor socket(::socket(name->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-  if (socket.number() < 0) return Descriptor();
+  *error = errno;
+  if (socket.number() < 0) return socket;
   if (name->sa_family != AF_UNIX) SetOption(socket.number(), SOL_SOCKET, SO_REUSEADDR, 1);
   if (name->sa_family == AF_INET6) {
     SetOption(socket.number(), IPPROTO_IPV6, IPV6_V6ONLY, both_families ? 0 : 1);
   }
-  if (bind(socket.number(), name, size) != 0) return Descriptor();
-  return listen(socket.number(), kBacklog) == 0 ? std::move(socket) : Descriptor();
+  if (bind(socket.number(), name, size) == 0 && listen(socket.number(), kBacklog) == 0) {
+    return socket;
+  }
+  *error = errno;
+  return Descriptor();
 }
 
 int PortOf(const Descriptor& socket) {
@@ -132,8 +136,10 @@ absl::Status ConnectionAcceptor::BindUnix() {
   struct stat left = {};
   // A killed server leaves its socket behind.
   if (lstat(name.sun_path, &left) == 0 && S_ISSOCK(left.st_mode)) unlink(name.sun_path);
-  Descriptor socket = ListenAt(reinterpret_cast<const sockaddr*>(&name), sizeof name, false);
-  if (socket.number() < 0) return ExplainBindFailure(address_);
+  int error = 0;
+  Descriptor socket =
+      ListenAt(reinterpret_cast<const sockaddr*>(&name), sizeof name, false, &error);
+  if (socket.number() < 0) return BindFailure(address_, error, std::strerror(error));
   listeners_.push_back(std::move(socket));
   return absl::OkStatus();
 }
@@ -143,23 +149,28 @@ absl::Status ConnectionAcceptor::Bind() {
   addrinfo hints = {};
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE;
+  int error = 0;
+  std::string cause;
   // One IPv6 socket serves both families, if the system has IPv6.
   for (const char* const host : {is_wildcard ? "::" : address_.host.c_str(), "0.0.0.0"}) {
     addrinfo* found = nullptr;
-    if (getaddrinfo(host, address_.port.c_str(), &hints, &found) == 0) {
-      for (addrinfo* info = found; info != nullptr; info = info->ai_next) {
-        // All sockets share the port of the first.
-        if (!listeners_.empty()) SetPort(info->ai_addr, port_);
-        Descriptor socket = ListenAt(info->ai_addr, info->ai_addrlen, is_wildcard);
-        if (socket.number() < 0) continue;
-        if (listeners_.empty()) port_ = PortOf(socket);
-        listeners_.push_back(std::move(socket));
+    const int resolved = getaddrinfo(host, address_.port.c_str(), &hints, &found);
+    if (resolved != 0) cause = gai_strerror(resolved);
+    for (addrinfo* info = found; info != nullptr; info = info->ai_next) {
+      // All sockets share the port of the first.
+      if (!listeners_.empty()) SetPort(info->ai_addr, port_);
+      Descriptor socket = ListenAt(info->ai_addr, info->ai_addrlen, is_wildcard, &error);
+      if (socket.number() < 0) {
+        cause = std::strerror(error);
+        continue;
       }
-      freeaddrinfo(found);
+      if (listeners_.empty()) port_ = PortOf(socket);
+      listeners_.push_back(std::move(socket));
     }
+    if (found != nullptr) freeaddrinfo(found);
     if (!listeners_.empty() || !is_wildcard) break;
   }
-  return listeners_.empty() ? ExplainBindFailure(address_) : absl::OkStatus();
+  return listeners_.empty() ? BindFailure(address_, error, cause) : absl::OkStatus();
 }
 
 ConnectionAcceptor::~ConnectionAcceptor() {

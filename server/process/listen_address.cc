@@ -3,7 +3,6 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -17,10 +16,6 @@
 namespace hulld::server {
 namespace {
 
-int OpenSocket(int family, int protocol) {
-  return socket(family, SOCK_STREAM | SOCK_CLOEXEC, protocol);
-}
-
 bool IsPort(const std::string& text) {
   int port = -1;
   const char* end = text.data() + text.size();
@@ -31,16 +26,6 @@ bool IsPort(const std::string& text) {
 absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
   return absl::InvalidArgumentError(absl::StrCat(flag, " is \"", text, "\": ", why,
                                                  "; expected host:port, [v6]:port, or unix:path"));
-}
-
-// Returns 0, or the errno of binding.
-int TryBind(const addrinfo& info) {
-  const Descriptor socket(OpenSocket(info.ai_family, info.ai_protocol));
-  if (socket.number() < 0) return errno;
-  const int yes = 1;
-  setsockopt(socket.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (bind(socket.number(), info.ai_addr, info.ai_addrlen) != 0) return errno;
-  return listen(socket.number(), 1) == 0 ? 0 : errno;
 }
 
 }  // namespace
@@ -95,7 +80,7 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 
 absl::Status CheckSocketFree(const ListenAddress& address) {
   if (!address.is_unix()) return absl::OkStatus();
-  const Descriptor socket(OpenSocket(AF_UNIX, 0));
+  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   sockaddr_un name = {};
   name.sun_family = AF_UNIX;
   std::memcpy(name.sun_path, address.path.c_str(), address.path.size() + 1);
@@ -107,7 +92,8 @@ absl::Status CheckSocketFree(const ListenAddress& address) {
                    ": another server is listening; stop it or choose another path with --listen"));
 }
 
-absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) {
+absl::Status BindFailure(const ListenAddress& address, int error, const std::string& cause,
+                         const char* flag) {
   const std::string what = absl::StrCat(
       "cannot listen on ",
       address.is_unix() ? "unix:" + address.path : address.host + ":" + address.port, ": ");
@@ -115,28 +101,14 @@ absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) 
     return absl::UnavailableError(
         absl::StrCat(what, "check that the socket's directory exists and is writable"));
   }
-  addrinfo hints = {};
-  hints.ai_socktype = SOCK_STREAM;
-  hints.ai_flags = AI_PASSIVE;
-  addrinfo* found = nullptr;
-  const int resolved = getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
-  if (resolved != 0) {
-    return absl::UnavailableError(
-        absl::StrCat(what, gai_strerror(resolved), "; give an address of this machine to ", flag));
-  }
-  int error = 0;
-  for (const addrinfo* info = found; info != nullptr && error == 0; info = info->ai_next) {
-    error = TryBind(*info);
-  }
-  freeaddrinfo(found);
-  const char* advice = "give an address of this machine to ";
-  if (error == EADDRINUSE || error == 0) {
+  if (error == EADDRINUSE) {
     return absl::UnavailableError(
         absl::StrCat(what, "the port is in use; stop the other server or choose another port with ",
                      flag, " (port 0 picks a free one)"));
   }
-  if (error == EACCES) advice = "choose a port above 1023 with ";
-  return absl::UnavailableError(absl::StrCat(what, std::strerror(error), "; ", advice, flag));
+  const char* const advice =
+      error == EACCES ? "choose a port above 1023 with " : "give an address of this machine to ";
+  return absl::UnavailableError(absl::StrCat(what, cause, "; ", advice, flag));
 }
 
 }  // namespace hulld::server

@@ -34,8 +34,10 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 // for TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);
 
-// Finds the reason of a bind failure by retrying: UNAVAILABLE with a remedy.
-absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag = "--listen");
+// UNAVAILABLE with a remedy: the address cannot be bound. error: the errno; 0: the host cannot be
+// resolved. cause: its text.
+absl::Status BindFailure(const ListenAddress& address, int error, const std::string& cause,
+                         const char* flag = "--listen");
 
 }  // namespace hulld::server
 

@@ -106,18 +106,18 @@ class MetricsEndpoint::Listener {
     if (thread_.joinable()) thread_.join();
   }
 
-  // Returns the port; nullopt if it cannot be bound.
-  std::optional<int> Listen(const ListenAddress& address) {
+  // Returns the port. UNAVAILABLE: it cannot be bound.
+  absl::StatusOr<int> Listen(const ListenAddress& address) {
     error_code error;
     const auto found =
         tcp::resolver(context_).resolve(address.host, address.port, tcp::resolver::passive, error);
-    if (error || found.empty()) return std::nullopt;
+    if (error || found.empty()) return BindFailure(address, 0, error.message(), kFlag);
     const tcp::endpoint endpoint = *found.begin();
     acceptor_.open(endpoint.protocol(), error);
     if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
     if (!error) acceptor_.bind(endpoint, error);
     if (!error) acceptor_.listen(tcp::acceptor::max_listen_connections, error);
-    if (error) return std::nullopt;
+    if (error) return BindFailure(address, error.value(), error.message(), kFlag);
     Accept();
     thread_ = std::thread([this] { context_.run(); });
     return acceptor_.local_endpoint().port();
@@ -173,8 +173,8 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const st
   if (!parsed.ok()) return parsed.status();
   std::unique_ptr<MetricsEndpoint> endpoint(
       new MetricsEndpoint(std::make_unique<Listener>(metrics)));
-  const std::optional<int> port = endpoint->listener_->Listen(*parsed);
-  if (!port.has_value()) return ExplainBindFailure(*parsed, kFlag);
+  const absl::StatusOr<int> port = endpoint->listener_->Listen(*parsed);
+  if (!port.ok()) return port.status();
   endpoint->address_ = parsed->Format(*port);
   return endpoint;
 }
