@@ -11,7 +11,7 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/process/metrics.h"
-#include "server/registry/bodies/served_body.h"
+#include "server/registry/catalog/body.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"

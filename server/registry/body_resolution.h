@@ -12,7 +12,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "server/registry/bodies/served_body.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/inline_shapes.h"

@@ -1,8 +1,8 @@
-#include "server/store/change_revisions.h"
-
+// Revisions of changes.
 #include <unordered_map>
 
 #include "core/base/check.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "server/contract/error_info.h"
 #include "server/process/random_id.h"
-#include "server/store/change_revisions.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

@@ -78,6 +78,11 @@ struct Change {
   }
 };
 
+// Assigns revisions to changes, in order, in their records, layouts, and bodies. revision: the
+// store's revision before the first change. Returns the revision after the last. Can be repeated
+// with another revision until the changes are committed. Cost: O(1) each.
+uint64_t NumberChanges(std::span<Change* const> changes, uint64_t revision);
+
 // Receives the ID of a stored hull, and its record, or DATA_LOSS naming the hull if the record is
 // damaged.
 using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<StoredHull>)>;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/registry/bodies/served_body.h"
+#include "server/registry/catalog/body.h"
 
 namespace hulld::server {
 namespace {

@@ -64,6 +64,17 @@ class Body {
   mutable std::shared_ptr<const PieceBoxes> boxes_;
 };
 
+// A body as seen by one call. Holds the hulls of its pieces; charged to --memory-limit.
+struct ServedBody {
+  std::shared_ptr<const Body> body;
+  // In the order of Body::hull_ids().
+  std::vector<HullView> hulls;
+  QueryBody query;
+  MemoryCharge charge;
+
+  const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
+};
+
 // ALREADY_EXISTS: a body has the ID that a hull requests, or a hull the ID that a body requests.
 // kind: of the present one, "hull" or "body".
 absl::Status IdTaken(const std::string& kind, const std::string& id);

@@ -14,8 +14,8 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
-#include "server/registry/catalog/compact_hull.h"
 #include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
@@ -23,6 +23,22 @@
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
+
+// Everything in memory that a small hull at rest needs besides its record. The structures for
+// queries and growth are rebuilt at the next use, in some microseconds.
+struct CompactHull {
+  // At least the vertices, and no point outside the hull.
+  std::vector<Vector> points;
+  // Last sequence of each writer; empty if the store holds them.
+  std::vector<std::pair<std::string, uint64_t>> writers;
+
+  size_t MemoryBytes() const {
+    size_t bytes = sizeof(*this) + points.capacity() * sizeof(Vector) +
+                   writers.capacity() * sizeof(writers.front());
+    for (const auto& [id, sequence] : writers) bytes += id.capacity();
+    return bytes;
+  }
+};
 
 // Hulls of a registry by ID.
 //

@@ -7,6 +7,7 @@
 
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
+#include "server/registry/catalog/hull_table.h"
 
 namespace hulld::server {
 namespace {

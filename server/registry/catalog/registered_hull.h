@@ -19,7 +19,6 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
-#include "server/registry/catalog/compact_hull.h"
 #include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
@@ -29,6 +28,8 @@
 #include "server/store/store.h"
 
 namespace hulld::server {
+
+struct CompactHull;
 
 // A chunk waiting to be built.
 struct PendingChunk {

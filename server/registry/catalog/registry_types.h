@@ -25,7 +25,7 @@
 // Arguments and results of the registry's functions.
 namespace hulld::server {
 
-// A body as seen by one call (bodies/served_body.h).
+// A body as seen by one call (catalog/body.h).
 struct ServedBody;
 
 // A hull as seen by one reader; `served` belongs to the record's revision. In lookups that allow

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/process/random_id.h"
-#include "server/store/change_revisions.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/sealed_hull.h"

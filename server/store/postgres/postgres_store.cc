@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "server/process/random_id.h"
-#include "server/store/change_revisions.h"
 #include "server/store/postgres/batch_statements.h"
 
 namespace hulld::server {

@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "server/contract/error_info.h"
-#include "server/store/change_revisions.h"
 #include "server/store/memory_store.h"
 #include "tests/server/harness/store_fixture.h"
 

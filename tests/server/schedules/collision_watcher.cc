@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "server/registry/bodies/served_body.h"
+#include "server/registry/catalog/body.h"
 
 namespace hulld::server {
 namespace {

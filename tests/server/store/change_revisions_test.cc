@@ -1,9 +1,9 @@
-#include "server/store/change_revisions.h"
-
 #include <gtest/gtest.h>
 
 #include <memory>
 #include <vector>
+
+#include "server/store/store.h"
 
 namespace hulld::server {
 namespace change_revisions_test {

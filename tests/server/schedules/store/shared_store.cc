@@ -6,7 +6,6 @@
 #include <mutex>
 #include <utility>
 
-#include "server/store/change_revisions.h"
 #include "tests/server/schedules/scheduler.h"
 
 namespace hulld::server {

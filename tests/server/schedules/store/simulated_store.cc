@@ -4,7 +4,6 @@
 
 #include <optional>
 
-#include "server/store/change_revisions.h"
 #include "tests/server/schedules/scheduler.h"
 
 namespace hulld::server {
