@@ -15,6 +15,10 @@ namespace {
 constexpr char kKey[] = "authorization";
 constexpr char kScheme[] = "Bearer ";
 
+absl::Status Missing(const char* message) {
+  return WithReason(absl::UnauthenticatedError(message), v1::ERROR_REASON_TOKEN_MISSING);
+}
+
 }  // namespace
 
 std::shared_ptr<const TokenTable> Authenticator::tokens() const {
@@ -39,21 +43,15 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   if (table == nullptr) return Caller();
   const auto [first, last] = metadata.equal_range(kKey);
   if (first == last) {
-    return WithReason(
-        absl::UnauthenticatedError(
-            "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\""),
-        v1::ERROR_REASON_TOKEN_MISSING);
+    return Missing(
+        "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\"");
   }
   if (std::next(first) != last) {
-    return WithReason(
-        absl::UnauthenticatedError("the call carries \"authorization\" twice; send one"),
-        v1::ERROR_REASON_TOKEN_MISSING);
+    return Missing("the call carries \"authorization\" twice; send one");
   }
   const std::string value(first->second.data(), first->second.size());
   if (!absl::StartsWithIgnoreCase(value, kScheme)) {
-    return WithReason(absl::UnauthenticatedError(
-                          "the metadata \"authorization\" must have the form \"Bearer TOKEN\""),
-                      v1::ERROR_REASON_TOKEN_MISSING);
+    return Missing("the metadata \"authorization\" must have the form \"Bearer TOKEN\"");
   }
   const std::optional<Caller> caller = table->Find(value.substr(sizeof kScheme - 1));
   if (!caller.has_value()) {

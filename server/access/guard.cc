@@ -102,9 +102,8 @@ void Guard::RevokeAuthorities() {
 }
 
 absl::Status Guard::ReloadTokens() {
-  absl::StatusOr<TokenTable> table = authenticator_.generation() == 0
-                                         ? ReadTokensFile(config_.tokens_file)
-                                         : RereadTokensFile(config_.tokens_file);
+  const bool is_first = authenticator_.generation() == 0;
+  absl::StatusOr<TokenTable> table = ReadTokensFile(config_.tokens_file, !is_first);
   if (!table.ok()) return table.status();
   if (*table == tokens_) return absl::OkStatus();
   tokens_ = *std::move(table);

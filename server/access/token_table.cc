@@ -133,26 +133,13 @@ bool TokenTable::Knows(const Caller& caller) const {
                      [&](const Entry& entry) { return entry.caller == caller; });
 }
 
-namespace {
-
-absl::StatusOr<TokenTable> ParseTokensFile(const std::string& path) {
+absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty) {
+  if (may_be_empty && IsMissing(path)) return TokenTable();
   const absl::StatusOr<std::string> text = ReadSecretFile(path, "--tokens-file");
   if (!text.ok()) return text.status();
   absl::StatusOr<TokenTable> table = TokenTable::Parse(*text);
   if (!table.ok()) return Prefixed(absl::StrCat("--tokens-file ", path, ": "), table.status());
-  return table;
-}
-
-}  // namespace
-
-absl::StatusOr<TokenTable> RereadTokensFile(const std::string& path) {
-  if (IsMissing(path)) return TokenTable();
-  return ParseTokensFile(path);
-}
-
-absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {
-  absl::StatusOr<TokenTable> table = ParseTokensFile(path);
-  if (table.ok() && table->empty()) {
+  if (table->empty() && !may_be_empty) {
     return absl::InvalidArgumentError(absl::StrCat(
         "--tokens-file ", path,
         ": it contains no token, so every call would be refused; add one with 'hullctl token "

@@ -58,12 +58,10 @@ class TokenTable {
   std::vector<Entry> entries_;
 };
 
-// Reads --tokens-file. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse, or the file holds
-// no token.
-absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path);
-// Rereads --tokens-file. A missing file or one without a token gives an empty table: the last
-// token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse.
-absl::StatusOr<TokenTable> RereadTokensFile(const std::string& path);
+// Reads --tokens-file. may_be_empty: a missing file or one without a token gives an empty table, as
+// the last token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse,
+// or the file may not be empty and holds no token.
+absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty = false);
 
 }  // namespace hulld::server
 

@@ -50,10 +50,6 @@ absl::Status Explain(const Place& place, const absl::Status& status) {
   return Prefixed(absl::StrCat(place.Describe(), ": "), status);
 }
 
-absl::StatusOr<std::string> ReadConninfo(const Place& place, const char* option) {
-  return ReadSecretFile(place.conninfo_file, option);
-}
-
 // Opening a missing store would create it.
 absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data_dir) {
   RocksDbOptions options;
@@ -92,13 +88,13 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& con
 
 absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
   if (!place.data_dir.empty()) return OpenRocksDbSource(place.data_dir);
-  const auto conninfo = ReadConninfo(place, "--from-postgres-conninfo-file");
+  const auto conninfo = ReadSecretFile(place.conninfo_file, "--from-postgres-conninfo-file");
   return conninfo.ok() ? OpenPostgresSource(*conninfo) : conninfo.status();
 }
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenTarget(const Place& place) {
   if (!place.data_dir.empty()) return OpenRocksDbTarget(place.data_dir);
-  const auto conninfo = ReadConninfo(place, "--to-postgres-conninfo-file");
+  const auto conninfo = ReadSecretFile(place.conninfo_file, "--to-postgres-conninfo-file");
   return conninfo.ok() ? OpenPostgresTarget(*conninfo) : conninfo.status();
 }
 

@@ -18,21 +18,16 @@ constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace
 
-void MemoryBudget::Usage::Remove(Kind kind, uint64_t amount) {
-  HULLD_CHECK(bytes[kind] >= amount);
-  bytes[kind] -= amount;
+void MemoryBudget::Usage::Add(Kind kind, int64_t amount) {
+  HULLD_CHECK(amount >= 0 || bytes[kind] >= static_cast<uint64_t>(-amount));
+  bytes[kind] += static_cast<uint64_t>(amount);
 }
 
-void MemoryBudget::Account::Enter() {
+void MemoryBudget::Account::Count(int sign) {
   Usage& usage = *budget_.usage_;
-  usage.Add(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
-  usage.Add(is_for_writing_ ? kForWriting : kForReading, pinned_);
-}
-
-void MemoryBudget::Account::Leave() {
-  Usage& usage = *budget_.usage_;
-  usage.Remove(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
-  usage.Remove(is_for_writing_ ? kForWriting : kForReading, pinned_);
+  usage.Add(is_for_writing_ ? kForWriting : kAtRest,
+            sign * static_cast<int64_t>(bytes_ + resting_));
+  usage.Add(is_for_writing_ ? kForWriting : kForReading, sign * static_cast<int64_t>(pinned_));
 }
 
 void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
@@ -46,10 +41,10 @@ void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
     used.splice(used.begin(), used, place_);
   }
   const std::lock_guard lock(budget_.usage_->mutex);
-  Leave();
+  Count(-1);
   bytes_ = bytes;
   is_for_writing_ = is_for_writing;
-  Enter();
+  Count(1);
 }
 
 void MemoryBudget::Account::Touch() {
@@ -72,9 +67,9 @@ void MemoryBudget::Account::Hold(MemoryParts parts) {
     const std::lock_guard lock(budget_.usage_->mutex);
     for (const MemoryParts* const moved : {parts_.get(), &std::as_const(parts)}) {
       for (const auto& part : *moved) {
-        part->Leave();
+        part->Count(-1);
         part->account_ = moved == &parts ? this : nullptr;
-        part->Enter();
+        part->Count(1);
       }
     }
   }
@@ -86,41 +81,32 @@ void MemoryBudget::Account::Close() {
   Set(0, false);
 }
 
-void MemoryPart::Enter() {
+void MemoryPart::Count(int sign) {
+  const int64_t amount = sign * static_cast<int64_t>(bytes_);
   if (account_ == nullptr) {
-    if (pins_ > 0) usage_->Add(MemoryBudget::kForReading, bytes_);
+    if (pins_ > 0) usage_->Add(MemoryBudget::kForReading, amount);
     return;
   }
-  account_->Leave();
-  (pins_ > 0 ? account_->pinned_ : account_->resting_) += bytes_;
-  account_->Enter();
-}
-
-void MemoryPart::Leave() {
-  if (account_ == nullptr) {
-    if (pins_ > 0) usage_->Remove(MemoryBudget::kForReading, bytes_);
-    return;
-  }
-  account_->Leave();
-  (pins_ > 0 ? account_->pinned_ : account_->resting_) -= bytes_;
-  account_->Enter();
+  account_->Count(-1);
+  (pins_ > 0 ? account_->pinned_ : account_->resting_) += static_cast<uint64_t>(amount);
+  account_->Count(1);
 }
 
 void MemoryPart::SetBytes(uint64_t bytes) {
   const std::lock_guard lock(usage_->mutex);
   if (bytes == bytes_) return;
-  Leave();
+  Count(-1);
   bytes_ = bytes;
-  Enter();
+  Count(1);
 }
 
 void MemoryPart::Pin(const MemoryParts& parts, bool pins) {
   if (parts.empty()) return;
   const std::lock_guard lock(parts.front()->usage_->mutex);
   for (const auto& part : parts) {
-    part->Leave();
+    part->Count(-1);
     part->pins_ += pins ? 1 : -1;
-    part->Enter();
+    part->Count(1);
   }
 }
 
@@ -129,19 +115,20 @@ void MemoryCharge::Set(uint64_t bytes) {
   MemoryBudget::Usage& usage = *budget_->usage_;
   const auto kind = static_cast<MemoryBudget::Kind>(use_);
   const std::lock_guard lock(usage.mutex);
-  usage.Remove(kind, std::exchange(bytes_, bytes));
-  usage.Add(kind, bytes);
+  usage.Add(kind, -static_cast<int64_t>(std::exchange(bytes_, bytes)));
+  usage.Add(kind, static_cast<int64_t>(bytes));
 }
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
   const size_t most = std::min(kMostVisited, used_.size());
-  for (size_t visited = 0; visited < most && !used_.empty() && Total() > limit_bytes_; ++visited) {
+  for (size_t visited = 0; visited < most && !used_.empty() && Statistics().bytes > limit_bytes_;
+       ++visited) {
     Account& account = *used_.back();
     used_.splice(used_.begin(), used_, account.place_);
-    const uint64_t before = Total();
+    const uint64_t before = Statistics().bytes;
     account.drop_(owners);
-    if (Total() < before) ++evictions_;
+    if (Statistics().bytes < before) ++evictions_;
   }
 }
 
@@ -163,11 +150,6 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
 bool MemoryBudget::IsOver(MemoryUse use) const {
   const std::lock_guard lock(usage_->mutex);
   return usage_->bytes[static_cast<size_t>(use)] > share(use);
-}
-
-uint64_t MemoryBudget::Total() const {
-  const std::lock_guard lock(usage_->mutex);
-  return usage_->bytes[kForReading] + usage_->bytes[kForWriting] + usage_->bytes[kAtRest];
 }
 
 MemoryStatistics MemoryBudget::Statistics() const {

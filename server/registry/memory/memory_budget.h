@@ -63,9 +63,9 @@ class MemoryBudget {
     Mutex mutex;
     std::array<uint64_t, 3> bytes{};
 
-    // Requires the mutex (not checked: a Mutex does not know its holder).
-    void Add(Kind kind, uint64_t amount) { bytes[kind] += amount; }
-    void Remove(Kind kind, uint64_t amount);
+    // Adds an amount, or removes a negative one. Requires the mutex (not checked: a Mutex does not
+    // know its holder).
+    void Add(Kind kind, int64_t amount);
   };
 
  public:
@@ -100,9 +100,9 @@ class MemoryBudget {
     friend class MemoryBudget;
     friend class MemoryPart;
 
-    // Add the account's memory to the budget, and remove it. Require the budget's mutex.
-    void Enter();
-    void Leave();
+    // Adds the account's memory to the budget, or, with the sign -1, removes it. Requires the
+    // budget's mutex.
+    void Count(int sign);
     static const std::shared_ptr<const MemoryParts>& NoParts();
 
     MemoryBudget& budget_;
@@ -146,8 +146,6 @@ class MemoryBudget {
   friend class MemoryCharge;
   friend class MemoryPart;
 
-  uint64_t Total() const;
-
   const uint64_t limit_bytes_;
   const std::array<uint64_t, 2> shares_;
   const FairMutex& owners_;
@@ -176,9 +174,8 @@ class MemoryPart {
 
   // Requires: all parts are of one budget.
   static void Pin(const MemoryParts& parts, bool pins);
-  // Require the budget's mutex.
-  void Enter();
-  void Leave();
+  // As Account::Count.
+  void Count(int sign);
 
   const std::shared_ptr<MemoryBudget::Usage> usage_;
   const void* const what_;

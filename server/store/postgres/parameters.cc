@@ -2,15 +2,7 @@
 
 #include <utility>
 
-#include "server/store/store_keys.h"
-
 namespace hulld::server {
-
-std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
-
-uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
-
-std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
 
 void ArrayParameter::Add(std::string_view value) {
   ++count_;

@@ -6,13 +6,15 @@
 #include <string_view>
 #include <vector>
 
+#include "server/store/store_keys.h"
+
 namespace hulld::server {
 
 // Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
-std::string EncodeBigint(uint64_t number);
-uint64_t DecodeBigint(std::string_view bytes);
+inline std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
+inline uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
 // Encodes an integer likewise.
-std::string EncodeInteger(uint32_t number);
+inline std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
 
 // A one-dimensional array in PostgreSQL's binary format.
 class ArrayParameter {

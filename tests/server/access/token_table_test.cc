@@ -73,9 +73,9 @@ TEST(TokenTable, AFileAccessibleToOtherUsersIsRefused) {
   WriteSecret(path, "# nobody\n\n");
   EXPECT_THAT(std::string(ReadTokensFile(path).status().message()),
               HasSubstr("--tokens-file " + path + ": it contains no token"));
-  EXPECT_TRUE(RereadTokensFile(path)->empty());
+  EXPECT_TRUE(ReadTokensFile(path, true)->empty());
   std::remove(path.c_str());
-  EXPECT_TRUE(RereadTokensFile(path)->empty());
+  EXPECT_TRUE(ReadTokensFile(path, true)->empty());
   EXPECT_THAT(std::string(ReadTokensFile(path).status().message()), HasSubstr("No such file"));
 }
 
