@@ -107,7 +107,7 @@ UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, B
 UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
-        EndListed(registry_, readers_, call, Rpc::kListBodies, registry_.bodies(), AddListed);
+        EndListed(registry_, readers_, call, Rpc::kListBodies, {.bodies = true}, AddListed);
       });
 }
 

@@ -67,7 +67,7 @@ WriteReactor* HullService::GetHullMesh(CallContext* context, const Bytes* reques
 UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request, Bytes* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
-        EndListed(registry_, readers_, call, Rpc::kListHulls, registry_, AddListed);
+        EndListed(registry_, readers_, call, Rpc::kListHulls, {.hulls = true}, AddListed);
       });
 }
 

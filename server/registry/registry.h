@@ -44,7 +44,7 @@ namespace hulld::server {
 //                  its place if peer servers commit to the same store, applies their changes
 //   RecordReader   loads and lists records if the store finds records
 //   HullChanges    creates, deletes, replaces, and grows hulls
-//   BodyRegistry   puts, deletes, finds and lists bodies
+//   BodyRegistry   puts, deletes, and finds bodies
 //   HullReader     serves hulls of a single snapshot
 //   ChangeFeed     sends the initial state and then every change to watches
 //
@@ -99,25 +99,27 @@ class Registry {
 
   // Creates, deletes, replaces, and grows hulls.
   HullChanges& hulls() { return changes_; }
-  // Puts, deletes, finds, and lists bodies.
+  // Puts, deletes, and finds bodies.
   BodyRegistry& bodies() { return bodies_; }
   // Serves hulls that are resolved repeatedly or without blocking, and their snapshots.
   HullReader& reader() { return reader_; }
-  // Waits for freshness. Required before functions without a freshness of their own: List,
-  // BodyRegistry::Find and List.
+  // Waits for freshness. Required before functions without a freshness of their own: List, and
+  // BodyRegistry::Find.
   ReadBarrier& barrier() { return *barrier_; }
   // True if peer servers commit to the same store, so that reads may wait for their changes.
   bool has_peers() const { return barrier_->has_peers(); }
   // False if no body exists. Takes no lock.
   bool has_bodies() const { return state_.catalog.BodyCount() > 0; }
 
-  // Returns at most `page_size` hulls with IDs that start with `prefix` and follow `after` in byte
-  // order. Queries the store if it finds records, so it must not run on a gRPC thread then.
-  // UNAVAILABLE: the store cannot be read. CANCELLED: should_stop returned true.
+  // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
+  // follow `after` in byte order; a page of bodies may hold fewer although more follow. Queries the
+  // store if it finds records, so it must not run on a gRPC thread then. UNAVAILABLE: the store
+  // cannot be read. CANCELLED: should_stop returned true.
   absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
-                                  const std::function<bool()>& should_stop = {}) {
+                                  const std::function<bool()>& should_stop = {},
+                                  RecordKinds kinds = {.hulls = true}) {
     return records_.List({.prefix = std::move(prefix),
-                          .kinds = {.hulls = true},
+                          .kinds = kinds,
                           .after = std::move(after),
                           .page_size = page_size},
                          should_stop);

@@ -16,6 +16,7 @@
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/settings/config.h"
+#include "server/store/store.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/page_token.h"
@@ -42,12 +43,12 @@ void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answ
   });
 }
 
-// Ends a unary call that lists records, as EndFresh. lister: the Registry or the BodyRegistry.
-// add: adds an entry to the reply.
-template <typename UnaryCall, typename Lister, typename AddEntry>
-void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, Lister& lister,
+// Ends a unary call that lists records of these kinds, as EndFresh. add: adds an entry to the
+// reply.
+template <typename UnaryCall, typename AddEntry>
+void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, RecordKinds kinds,
                AddEntry add) {
-  const auto answer = [&registry, &lister, call, rpc,
+  const auto answer = [&registry, kinds, call, rpc,
                        add](std::chrono::nanoseconds staleness) -> absl::Status {
     const auto& request = call->request();
     const absl::StatusOr<std::string> prefix =
@@ -57,9 +58,9 @@ void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, L
     if (!after.ok()) return after.status();
     const uint32_t asked =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-    const absl::StatusOr<RecordPage> page =
-        lister.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
-                    [call] { return call->call().ShouldStop(); });
+    const absl::StatusOr<RecordPage> page = registry.List(
+        *prefix, *after, std::min(asked, Config::kMaxPageSize),
+        [call] { return call->call().ShouldStop(); }, kinds);
     if (!page.ok()) return page.status();
     EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
                  call->response().mutable_header());

@@ -4,14 +4,12 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registry_types.h"
@@ -20,7 +18,6 @@
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
-#include "server/registry/watch/page_source.h"
 
 namespace hulld::server {
 
@@ -66,15 +63,6 @@ class BodyRegistry {
   FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop = {});
   // As Find, but returns nullopt without blocking if the store would have to be read.
   std::optional<FoundBodies> TryFind(std::span<const std::string> ids);
-  // As Registry::List. A page may hold fewer than page_size bodies although more follow.
-  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
-                                  const std::function<bool()>& should_stop = {}) {
-    return records_.List({.prefix = std::move(prefix),
-                          .kinds = {.bodies = true},
-                          .after = std::move(after),
-                          .page_size = page_size},
-                         should_stop);
-  }
 
  private:
   void PutLocked(Locked& locked, const std::shared_ptr<Body>& body,

@@ -57,8 +57,9 @@ class ReadBarrier {
   absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
 
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
-  // Required before functions without a freshness of their own (List, FindBodies, ListBodies). Not
-  // for gRPC threads. Errors and cost as AwaitCommits; no effect without peer servers.
+  // Required before functions without a freshness of their own (Registry::List,
+  // BodyRegistry::Find). Not for gRPC threads. Errors and cost as AwaitCommits; no effect without
+  // peer servers.
   absl::Status AwaitPeers(const std::function<bool()>& should_stop);
   virtual absl::Status AwaitPeers(Locked& /*locked*/,
                                   const std::function<bool()>& /*should_stop*/) {

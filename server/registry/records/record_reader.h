@@ -81,7 +81,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
   void OnPeerChange(Locked& locked, const std::string& id,
                     const std::shared_ptr<RegisteredHull>& hull) override;
 
-  // As Registry::List and BodyRegistry::List, for a request by prefix. May query the store on this
+  // As Registry::List, for a request by prefix. May query the store on this
   // thread. Requires that the thread does not hold the mutex (not checked: a mutex does not know
   // its holder).
   absl::StatusOr<RecordPage> List(const PageRequest& request,

@@ -168,7 +168,8 @@ void Client::ListBodies() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
-  const absl::StatusOr<RecordPage> page = simulation_.registry.bodies().List("", "", kHulls);
+  const absl::StatusOr<RecordPage> page =
+      simulation_.registry.List("", "", kHulls, {}, {.bodies = true});
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;

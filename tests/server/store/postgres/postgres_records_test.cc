@@ -260,7 +260,8 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndHasANextPage) {
   std::vector<std::string> listed;
   size_t pages = 0;
   for (std::string after;;) {
-    const absl::StatusOr<RecordPage> page = hulls_->registry().bodies().List("large-", after, 1000);
+    const absl::StatusOr<RecordPage> page =
+        hulls_->registry().List("large-", after, 1000, {}, {.bodies = true});
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_FALSE(page->entries.empty());
     ++pages;
