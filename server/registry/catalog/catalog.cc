@@ -45,13 +45,13 @@ void Catalog::Publish(uint64_t revision) {
   revision_ = revision;
 }
 
-Catalog::HullPointer Catalog::Find(const std::string& id) {
+HullPointer Catalog::Find(const std::string& id) {
   std::optional<HullPointer> hull = hulls_.Ask(id);
   HULLD_CHECK(hull.has_value() || bodies_.contains(id));
   return std::move(hull).value_or(nullptr);
 }
 
-Catalog::HullPointer Catalog::FindVisible(const std::string& id) {
+HullPointer Catalog::FindVisible(const std::string& id) {
   HullPointer hull = Find(id);
   return hull != nullptr && hull->state.visible() ? hull : nullptr;
 }

@@ -38,8 +38,6 @@ namespace hulld::server {
 // takes no lock.
 class Catalog {
  public:
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // limits: the limits in force. Store and budget must outlive this.
   Catalog(const Store& store, const Limits& limits, MemoryBudget& budget);
   Catalog(const Catalog&) = delete;

@@ -67,7 +67,7 @@ bool HullTable::contains(const std::string& id) const {
   return found != index_.end() && !(*found)->second.is_absent_;
 }
 
-std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
+std::optional<HullPointer> HullTable::Ask(const std::string& id) {
   const auto found = index_.find(id);
   if (found == index_.end()) return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
   Entry& entry = (*found)->second;
@@ -137,7 +137,7 @@ void HullTable::ForgetAbsent(const std::string& id) {
   if (found != index_.end() && (*found)->second.is_absent_) EraseEntry(*found);
 }
 
-HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
+HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
   auto hull = std::make_shared<RegisteredHull>(stored, state, readable_, budget_);
   Insert(hull);
   return hull;

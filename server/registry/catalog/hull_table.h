@@ -60,8 +60,6 @@ struct CompactHull {
 // Guarded by the registry's mutex.
 class HullTable {
  public:
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // Approximate bytes of a record with its ID.
   static constexpr uint64_t kBytesOfRecord = 320;
 

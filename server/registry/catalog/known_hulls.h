@@ -21,8 +21,6 @@
 
 namespace hulld::server {
 
-class RegisteredHull;
-
 // Recent changes of what readers see of hulls, in order, each stored as a hash of the hull's ID.
 // Not thread-safe.
 class RecentChanges {
@@ -88,7 +86,7 @@ class KnownHulls {
     bool is_loaded = false;
     bool is_ahead = false;
     // Hull found when the read began; null if it must be looked up.
-    std::shared_ptr<RegisteredHull> found;
+    HullPointer found;
     // Approximate bytes of the hull that this holds.
     uint64_t bytes = 0;
     // Unknown without a message, which costs no allocation, until it was looked up.
@@ -99,7 +97,7 @@ class KnownHulls {
   struct Loading {
     std::shared_ptr<LoadJob> job;
     // Each hull of the job, and its index in hulls_.
-    std::vector<std::shared_ptr<RegisteredHull>> found;
+    std::vector<HullPointer> found;
     std::vector<uint32_t> hulls;
     uint64_t points = 0;
   };

@@ -13,8 +13,6 @@
 
 namespace hulld::server {
 
-class RegisteredHull;
-
 // Prepares hulls: after queries have paid for it (LiveHull::WantsPreparing), or before a hull holds
 // too many points that are no longer vertices. Runs on its own thread, for which no call waits, or
 // on the thread of a reader that expects enough queries.
@@ -23,8 +21,6 @@ class RegisteredHull;
 // by the registry's mutex, which is released during preparation.
 class Preparer {
  public:
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // All must outlive this. metrics: metrics of the queue of hulls to prepare.
   Preparer(FairMutex& mutex, Catalog& catalog, MemoryBudget& memory,
            std::optional<PoolMetrics> metrics)

@@ -161,10 +161,11 @@ struct ChunkResult {
 
 // A hull and all of its state; private to the registry.
 class RegisteredHull;
+using HullPointer = std::shared_ptr<RegisteredHull>;
 
 // A writer's open stream into one incarnation of a hull.
 struct AppendSession {
-  std::shared_ptr<RegisteredHull> hull;
+  HullPointer hull;
   std::string writer_id;
   bool created_hull = false;
   uint64_t watch = 0;

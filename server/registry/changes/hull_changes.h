@@ -49,8 +49,6 @@ struct PendingChunk;
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class HullChanges : public PeerChangeListener {
  public:
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // All must outlive this. Chunks are built on `writers`.
   HullChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
               RecordReader& records, WorkerPool& writers)

@@ -23,8 +23,7 @@ class PeerChangeListener {
   virtual ~PeerChangeListener() = default;
   // Defers the tasks that wait for the ID, after a peer server's change of it was applied. hull:
   // the known hull that the change updated or ended, or null.
-  virtual void OnPeerChange(Locked& locked, const std::string& id,
-                            const std::shared_ptr<RegisteredHull>& hull) = 0;
+  virtual void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) = 0;
 };
 
 // Blocks calls until the catalog satisfies their freshness. This class is the barrier of a store

@@ -39,8 +39,6 @@ namespace hulld::server {
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
  public:
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // All must outlive this. loaders: threads that help readers of many hulls.
   HullReader(RegistryState& state, ReadBarrier& barrier, RecordReader& records, WorkerPool& loaders)
       : state_(state), barrier_(barrier), records_(records), loaders_(loaders) {}

@@ -64,7 +64,7 @@ bool RecordReader::MustWait(Locked& locked, const std::string& id, For need, con
     body->waiting.push_back(std::move(next));
     return true;
   }
-  const std::shared_ptr<RegisteredHull> hull = catalog.Find(id);
+  const HullPointer hull = catalog.Find(id);
   if (hull == nullptr) return false;
   const HullState& state = hull->state;
   const bool waits = need == For::kQuiet ? !state.quiet() : state.changing_life();
@@ -189,7 +189,7 @@ void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Stat
 }
 
 void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
-                                const std::shared_ptr<RegisteredHull>& /*hull*/) {
+                                const HullPointer& /*hull*/) {
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
   const std::shared_ptr<Reading> reading = found->second;
@@ -203,7 +203,7 @@ void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
 void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
                                absl::StatusOr<FoundRecords> found, FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
-  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
+  if (!found.ok() || !IsBehind(*found, nullptr)) return take(locked, found);
   // After this round of the committer, the catalog includes everything that the store held.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
@@ -221,12 +221,7 @@ absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
   if (!found.ok()) return found;
   if (found->revision < asked_at) return WentBack(found->revision, asked_at);
   Locked locked(state_.mutex);
-  bool is_behind = found->revision > state_.catalog.revision();
-  for (auto hull = found->hulls.begin(); !is_behind && hull != found->hulls.end(); ++hull) {
-    locked.NoteLookupMaybeYield();
-    is_behind = IsBehind(hull->first, hull->second);
-  }
-  if (!is_behind) return found;
+  if (!IsBehind(*found, &locked)) return found;
   if (absl::Status s = barrier_.AwaitCommits(locked, should_stop); !s.ok()) return s;
   const uint64_t known = state_.catalog.revision();
   if (found->revision > known) return IsAhead(found->revision, known);
@@ -245,10 +240,12 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
 
 // True if the records are newer than the catalog: committed, perhaps by a peer server, but not yet
 // applied. An answer from them would be followed by an older one from the catalog.
-bool RecordReader::IsBehind(const FoundRecords& found) const {
+bool RecordReader::IsBehind(const FoundRecords& found, Locked* yields) const {
   if (found.revision > state_.catalog.revision()) return true;
-  return std::ranges::any_of(
-      found.hulls, [this](const auto& hull) { return IsBehind(hull.first, hull.second); });
+  return std::ranges::any_of(found.hulls, [&](const auto& hull) {
+    if (yields != nullptr) yields->NoteLookupMaybeYield();
+    return IsBehind(hull.first, hull.second);
+  });
 }
 
 absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,

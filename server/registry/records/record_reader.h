@@ -78,12 +78,10 @@ class RecordReader : public PeerChangeListener, public PageSource {
                             const std::function<bool()>& should_stop);
 
   // Ends the read of the ID; its tasks look the ID up again.
-  void OnPeerChange(Locked& locked, const std::string& id,
-                    const std::shared_ptr<RegisteredHull>& hull) override;
+  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
 
-  // As Registry::List, for a request by prefix. May query the store on this
-  // thread. Requires that the thread does not hold the mutex (not checked: a mutex does not know
-  // its holder).
+  // As Registry::List, for a request by prefix. May query the store on this thread. Requires that
+  // the thread does not hold the mutex (not checked: a mutex does not know its holder).
   absl::StatusOr<RecordPage> List(const PageRequest& request,
                                   const std::function<bool()>& should_stop);
 
@@ -120,10 +118,10 @@ class RecordReader : public PeerChangeListener, public PageSource {
   absl::StatusOr<FoundRecords> AwaitReached(uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                                             const std::function<bool()>& should_stop);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  bool IsBehind(const FoundRecords& found) const;
+  // yields, here and below: if not null, the mutex may be released between lookups.
+  bool IsBehind(const FoundRecords& found, Locked* yields) const;
 
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  // yields: if not null, the mutex may be released between lookups.
   RecordPage Describe(const FoundRecords& found, Locked* yields) const;
   RecordPage CataloguedPage(const PageRequest& request) const;
 

@@ -91,9 +91,8 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
   }
 }
 
-RegistryState::HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
-                                                          const PeerChange& change,
-                                                          uint64_t since) {
+HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
+                                           const PeerChange& change, uint64_t since) {
   const std::optional<Incarnation> former = FindFormer(id, change, since);
   HullPointer hull = catalog.hulls().Find(id);
   // False for changes that were part of the initial load.

@@ -18,8 +18,6 @@
 
 namespace hulld::server {
 
-class RegisteredHull;
-
 // State shared by the parts of a registry, and its state machine: the Apply functions are the only
 // ones that change what readers see. Each applies one committed change to the catalog, publishes
 // its revision, and notes it in the feed.
@@ -27,8 +25,6 @@ class RegisteredHull;
 // Invariant: revisions are applied in increasing order, and each change atomically, within one hold
 // of the mutex.
 struct RegistryState {
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
   // A committed chunk of a hull.
   struct CommittedChunk {
     // The hull with the chunk, and the prefix of its LiveHull.

@@ -83,7 +83,7 @@ void ChangeFeed::Begin(uint64_t revision, PageSource& pages) {
 }
 
 void ChangeFeed::NoteHull(Locked& locked, const std::optional<Incarnation>& former,
-                          const std::shared_ptr<RegisteredHull>& hull) {
+                          const HullPointer& hull) {
   const HullRecord& record = hull->committed().record;
   NotePresent(locked, record.hull_id, former,
               {.is_body = false,

@@ -76,8 +76,7 @@ class ChangeFeed {
   // incarnation that had the ID before, possibly the same one; nullopt: none. It is of the other
   // kind if peer servers turned a hull into a body, or a body into a hull, by several changes.
   // Cost: O(log n) per group that includes the ID, and one hash per length of a watched prefix.
-  void NoteHull(Locked& locked, const std::optional<Incarnation>& former,
-                const std::shared_ptr<RegisteredHull>& hull);
+  void NoteHull(Locked& locked, const std::optional<Incarnation>& former, const HullPointer& hull);
   void NoteBody(Locked& locked, const std::optional<Incarnation>& former,
                 const std::shared_ptr<const Body>& body);
   void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
@@ -121,7 +120,7 @@ class ChangeFeed {
     // Start of the current incarnation, or of the deleted one.
     uint64_t create_revision = 0;
     // Both null for a deletion.
-    std::shared_ptr<RegisteredHull> hull = nullptr;
+    HullPointer hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
     // If the change replaced a hull by a body or a body by a hull: create_revision of the former.
     // Otherwise 0.

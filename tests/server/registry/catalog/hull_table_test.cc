@@ -36,9 +36,9 @@ class HullTableTest : public ::testing::Test {
     return table_.entries().find(id)->second.awake() != nullptr;
   }
   // The hull with the points of a unit cube.
-  HullTable::HullPointer Cube(const std::string& id) {
+  HullPointer Cube(const std::string& id) {
     table_.AddResting(Stored(id, 3));
-    HullTable::HullPointer hull = table_.Find(id);
+    HullPointer hull = table_.Find(id);
     hull->SetLive(std::make_shared<LiveHull>(CubeCorners(), 3));
     hull->NoteUse();
     return hull;
@@ -171,7 +171,7 @@ TEST_F(HullTableTest, IdleHullsInUseStayAwake) {
   expect_awake_while(
       "a reader", [&](RegisteredHull& hull) { served = hull.Serve(); },
       [&](RegisteredHull&) { served = nullptr; });
-  HullTable::HullPointer held;
+  HullPointer held;
   expect_awake_while(
       "a call", [&](RegisteredHull&) { held = table_.Find("x"); },
       [&](RegisteredHull&) { held = nullptr; });
