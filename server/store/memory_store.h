@@ -21,7 +21,7 @@ class MemoryStore : public Store {
   absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
   absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
-    return KeepsNothing();
+    return absl::NotFoundError("an in-memory store has no stored records");
   }
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord&, const std::string&) override {
     return 0;
@@ -39,10 +39,6 @@ class MemoryStore : public Store {
   }
 
  private:
-  static absl::Status KeepsNothing() {
-    return absl::NotFoundError("an in-memory store has no stored records");
-  }
-
   const std::string id_ = RandomId();
   uint64_t revision_ = 0;
 };

@@ -153,22 +153,15 @@ absl::Status RocksDbStore::MakeDirectories() {
     if (!made.ok()) return failure(*path, made);
   }
   for (const fs::path& path : missing) {
-    const rocksdb::Status synced = SyncDirectory(path);
+    const rocksdb::Status synced = SyncDirectory(*files_, path);
     if (!synced.ok()) return failure(path, synced);
   }
   for (fs::path path = above;; path = path.parent_path()) {
-    const rocksdb::Status synced = SyncDirectory(path);
+    const rocksdb::Status synced = SyncDirectory(*files_, path);
     const bool ours = path == above || path == database.parent_path();
     if (!synced.ok() && ours) return failure(path, synced);
     if (path == path.root_path()) return absl::OkStatus();
   }
-}
-
-// Makes the entries of a directory durable.
-rocksdb::Status RocksDbStore::SyncDirectory(const std::string& path) {
-  std::unique_ptr<rocksdb::Directory> directory;
-  const rocksdb::Status opened = env_->NewDirectory(path, &directory);
-  return opened.ok() ? directory->Fsync() : opened;
 }
 
 absl::Status RocksDbStore::OpenDb() {
@@ -345,7 +338,7 @@ absl::Status RocksDbStore::BeginRun() {
   }
   relaxed_run_ = relaxed;
   if (restored &&
-      (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir).ok())) {
+      (!std::filesystem::remove(mark, error) || !SyncDirectory(*files_, options_.data_dir).ok())) {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
   if (restored) {

@@ -109,7 +109,6 @@ class RocksDbStore : public Store {
 
   rocksdb::Options DbOptions() const;
   absl::Status MakeDirectories();
-  rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
   // Opens the database, with the space of the reserve if the disk is full.
   absl::Status OpenDbInRoom();

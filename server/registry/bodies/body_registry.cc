@@ -153,10 +153,7 @@ std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const st
   FoundBodies found;
   found.bodies.resize(ids.size());
   for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
-    if (first > 0) {
-      locked.Unlock();
-      locked.Lock();
-    }
+    if (first > 0) locked.Yield();
     const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
       while (found.status.ok() && !state_.catalog.IsKnown(ids[i])) {

@@ -46,9 +46,7 @@ class Catalog {
   // True if the tables cache records that the store can find.
   bool is_cache() const { return is_cache_; }
   HullTable& hulls() { return hulls_; }
-  const HullTable& hulls() const { return hulls_; }
   BodyTable& bodies() { return bodies_; }
-  const BodyTable& bodies() const { return bodies_; }
   RecentChanges& recent_changes() { return recent_changes_; }
   // Hits, misses, loads, growth and damage; the budget counts the rest.
   CacheStatistics& statistics() { return statistics_; }

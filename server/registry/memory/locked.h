@@ -126,6 +126,11 @@ class Locked {
     mutex_.lock();
     is_held_ = true;
   }
+  // Releases the mutex, runs the deferred tasks, and acquires the mutex again.
+  void Yield() {
+    Unlock();
+    Lock();
+  }
   // For condition variables: wait(lock) releases the mutex while it waits.
   template <typename Wait>
   void WaitOn(const Wait& wait) {
@@ -143,10 +148,7 @@ class Locked {
 
   // Counts one of many lookups; first yields the mutex after kMostLookupsPerHold of them.
   void NoteLookupMaybeYield() {
-    if (lookups() == kMostLookupsPerHold) {
-      Unlock();
-      Lock();
-    }
+    if (lookups() == kMostLookupsPerHold) Yield();
     NoteLookup();
   }
 

@@ -36,8 +36,7 @@ absl::Status ReadBarrier::AwaitCommits(Locked& locked, const std::function<bool(
     wait->changed.notify_all();
   });
   // Runs the deferred tasks before waiting.
-  locked.Unlock();
-  locked.Lock();
+  locked.Yield();
   const auto is_over = [&] { return wait->status.has_value(); };
   while (!is_over()) {
     locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });

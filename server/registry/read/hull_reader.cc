@@ -269,10 +269,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   for (const KnownHulls::Loading& loading : hulls.ahead_) {
     most_points -= std::min(most_points, loading.points);
   }
-  if (locked.lookups() > 0) {
-    locked.Unlock();
-    locked.Lock();
-  }
+  if (locked.lookups() > 0) locked.Yield();
   KnownHulls::Loading next;
   std::vector<StoredHull> stored;
   // due_ is processed from the back.
@@ -410,8 +407,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     const bool is_ending = hull.state.life() == HullState::Life::kEnding;
     if (hull.is_loading() || (failed && is_ending)) {
       // Runs the deferred tasks before waiting.
-      locked.Unlock();
-      locked.Lock();
+      locked.Yield();
       const auto may_go_on = [&] {
         return !hull.is_loading() && !(failed && hull.state.life() == HullState::Life::kEnding);
       };

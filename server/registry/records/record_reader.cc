@@ -94,8 +94,7 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
                                       const std::function<bool()>& should_stop) {
   HULLD_CHECK(!ids.empty() && ids.size() <= kMostAtOnce);
   // Runs the deferred tasks before waiting.
-  locked.Unlock();
-  locked.Lock();
+  locked.Yield();
   Readings own;
   std::shared_ptr<Reading> awaited;
   for (const std::string* const id : ids) {

@@ -129,13 +129,6 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
   return absl::StrCat("the log ", name, " does not hold what was written to it");
 }
 
-IOStatus SyncDirectoryOf(rocksdb::FileSystem& files, const std::string& path) {
-  std::unique_ptr<rocksdb::FSDirectory> directory;
-  const std::string parent = std::filesystem::path(path).parent_path();
-  const IOStatus opened = files.NewDirectory(parent, IOOptions(), &directory, nullptr);
-  return opened.ok() ? directory->Fsync(IOOptions(), nullptr) : opened;
-}
-
 // Renamed only after it is complete and on disk.
 IOStatus Make(rocksdb::FileSystem& files, const std::string& path, const Slot& slot) {
   const std::string unfinished = path + ".new";
@@ -147,10 +140,16 @@ IOStatus Make(rocksdb::FileSystem& files, const std::string& path, const Slot& s
   if (status.ok()) status = file->Sync(IOOptions(), nullptr);
   if (status.ok()) status = file->Close(IOOptions(), nullptr);
   if (status.ok()) status = files.RenameFile(unfinished, path, IOOptions(), nullptr);
-  return status.ok() ? SyncDirectoryOf(files, path) : status;
+  return status.ok() ? SyncDirectory(files, std::filesystem::path(path).parent_path()) : status;
 }
 
 }  // namespace
+
+IOStatus SyncDirectory(rocksdb::FileSystem& files, const std::string& directory) {
+  std::unique_ptr<rocksdb::FSDirectory> opened;
+  const IOStatus status = files.NewDirectory(directory, IOOptions(), &opened, nullptr);
+  return status.ok() ? opened->Fsync(IOOptions(), nullptr) : status;
+}
 
 std::string LogPath(const std::string& directory, uint64_t number) {
   return absl::StrFormat("%s/%06u.log", directory, number);

@@ -33,6 +33,9 @@ struct LogMark {
   friend bool operator==(const LogMark&, const LogMark&) = default;
 };
 
+// Makes the entries of a directory durable.
+rocksdb::IOStatus SyncDirectory(rocksdb::FileSystem& files, const std::string& directory);
+
 // "000012.log" in `directory`, as RocksDB names it.
 std::string LogPath(const std::string& directory, uint64_t number);
 // Returns the number in such a name; nullopt for another file.
