@@ -18,11 +18,6 @@ namespace {
 using grpc::health::v1::HealthCheckRequest;
 using grpc::health::v1::HealthCheckResponse;
 
-std::vector<std::string> WithWholeServer(std::vector<std::string> services) {
-  services.emplace_back();
-  return services;
-}
-
 HealthCheckResponse ResponseOf(HealthCheckResponse::ServingStatus status) {
   HealthCheckResponse response;
   response.set_status(status);
@@ -69,7 +64,9 @@ class HealthService::WatchCall
 };
 
 HealthService::HealthService(Admission& admission, std::vector<std::string> services)
-    : admission_(admission), services_(WithWholeServer(std::move(services))) {}
+    : admission_(admission), services_(std::move(services)) {
+  services_.emplace_back();
+}
 
 HealthService::Status HealthService::StatusOf(const std::string& service) const {
   if (std::find(services_.begin(), services_.end(), service) == services_.end()) {

@@ -42,7 +42,7 @@ class HealthService : public HealthServiceOfBytes {
 
   Admission& admission_;
   // Includes "", the whole server.
-  const std::vector<std::string> services_;
+  std::vector<std::string> services_;
   std::mutex mutex_;
   // The mutex guards the members below.
   bool serving_ = true;

@@ -46,22 +46,28 @@ Registry::~Registry() {
 absl::Status Registry::Load() {
   Locked locked(state_.mutex);
   Catalog& catalog = state_.catalog;
-  catalog.Begin(state_.store.revision());
+  Store& store = state_.store;
+  catalog.Begin(store.revision());
   state_.feed.Begin(catalog.revision(), records_);
   absl::Status status;
   if (catalog.is_cache()) {
-    catalog.SetTotals(state_.store.totals());
+    catalog.SetTotals(store.totals());
   } else {
-    status =
-        state_.store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
-          catalog.AddStored(id, stored);
-        });
+    status = store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+      catalog.AddStored(id, stored);
+    });
   }
   if (catalog.statistics().damaged > 0) {
     spdlog::error("{} of {} hulls are damaged", catalog.statistics().damaged,
                   catalog.hulls().size());
   }
-  if (status.ok() && !catalog.is_cache()) status = bodies_.Load(locked);
+  if (status.ok() && !catalog.is_cache()) {
+    status = store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+      if (catalog.hulls().contains(id)) return Catalog::LogBodyUnderHull(id);
+      catalog.AddBody(locked, id, body);
+      catalog.NoteBodyFound();
+    });
+  }
   if (status.ok()) status = barrier_->Begin(locked, {&changes_, &records_});
   return status;
 }

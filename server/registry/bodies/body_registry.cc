@@ -12,15 +12,6 @@
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
-absl::Status BodyRegistry::Load(Locked& locked) {
-  return state_.store.ForEachBody(
-      [&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
-        if (state_.catalog.hulls().contains(id)) return Catalog::LogBodyUnderHull(id);
-        state_.catalog.AddBody(locked, id, stored);
-        state_.catalog.NoteBodyFound();
-      });
-}
-
 void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());

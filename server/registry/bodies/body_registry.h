@@ -43,9 +43,6 @@ class BodyRegistry {
   BodyRegistry(const BodyRegistry&) = delete;
   BodyRegistry& operator=(const BodyRegistry&) = delete;
 
-  // Loads all bodies of a store that does not find records. Call after loading the hulls.
-  absl::Status Load(Locked& locked);
-
   // Creates or replaces a body atomically for all readers, and assigns its revisions. Calls `done`,
   // on this or another thread, after the change is committed or refused. Requires: valid IDs and
   // poses (not checked), and between one and --max-pieces-per-body pieces. The hulls of the pieces

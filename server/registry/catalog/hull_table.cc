@@ -159,11 +159,6 @@ void HullTable::Erase(const HullPointer& hull) {
   entry.is_absent_ = true;
 }
 
-// True if the record alone can restore the hull.
-bool HullTable::IsUnused(const HullPointer& hull) const {
-  return hull.use_count() == 1 && hull->IsAtRest();
-}
-
 HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
   RestingHull resting(hull.committed());
   resting.box = hull.Describe().box;
@@ -240,7 +235,8 @@ void HullTable::RestSome() {
     const auto looked_at = next++;
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
-      if (!IsUnused(entry.awake_)) continue;
+      // The record alone must be able to restore the hull.
+      if (entry.awake_.use_count() > 1 || !entry.awake_->IsAtRest()) continue;
       ExchangeCompact(entry, nullptr);
       entry.resting_ = AtRest(*entry.awake_);
       entry.awake_ = nullptr;

@@ -186,7 +186,6 @@ class HullTable {
   void EraseEntry(Place place);
   Entry& Add(const std::string& id);
   void Wake(const std::string& id, Entry& entry);
-  bool IsUnused(const HullPointer& hull) const;
   static RestingHull AtRest(const RegisteredHull& hull);
   bool RestCompact(Locked& locked, Entry& entry);
   std::unique_ptr<CompactHull> ExchangeCompact(Entry& entry, std::unique_ptr<CompactHull> compact);
