@@ -62,9 +62,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data
   }
   if (absl::Status s = RocksDbStore::Open(options).status(); !s.ok()) return s;
   options.read_only = false;
-  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
-  if (!store.ok()) return store.status();
-  return *std::move(store);
+  return RocksDbStore::Open(options);
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& conninfo) {
@@ -81,9 +79,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& con
     if (!has_store.ok()) return has_store.status();
     if (!*has_store) return absl::NotFoundError("it contains no hulld store");
   }
-  absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
-  if (!store.ok()) return store.status();
-  return *std::move(store);
+  return PostgresStore::Open(std::move(options));
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
