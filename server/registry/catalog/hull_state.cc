@@ -34,36 +34,18 @@ void HullState::StartEnding() {
   in_flight_ = 1;
 }
 
-void HullState::Commit() {
+void HullState::Settle(bool is_committed) {
   HULLD_CHECK(in_flight_ > 0);
   --in_flight_;
   switch (life_) {
     case Life::kCreating:
-      life_ = Life::kPresent;
+      life_ = is_committed ? Life::kPresent : Life::kGone;
       return;
     case Life::kPresent:
+      if (!is_committed && work_ == Work::kBuilding) work_ = Work::kReverting;
       return;
     case Life::kEnding:
-      life_ = Life::kGone;
-      return;
-    case Life::kGone:
-      break;
-  }
-  HULLD_UNREACHABLE();  // nothing in flight
-}
-
-void HullState::Refuse() {
-  HULLD_CHECK(in_flight_ > 0);
-  --in_flight_;
-  switch (life_) {
-    case Life::kCreating:
-      life_ = Life::kGone;
-      return;
-    case Life::kPresent:
-      if (work_ == Work::kBuilding) work_ = Work::kReverting;
-      return;
-    case Life::kEnding:
-      life_ = Life::kPresent;
+      life_ = is_committed ? Life::kGone : Life::kPresent;
       return;
     case Life::kGone:
       break;

@@ -90,8 +90,8 @@ class HullState {
   // Submits a deletion or a replacement.
   void StartEnding();
   // Commits or refuses the oldest change in flight.
-  void Commit();
-  void Refuse();
+  void Commit() { Settle(true); }
+  void Refuse() { Settle(false); }
 
   // A peer server changed or ended the hull. Requires: the hull is present, with nothing in flight.
   void Supersede();
@@ -102,6 +102,7 @@ class HullState {
 
  private:
   HullState(Life life, int in_flight) : life_(life), in_flight_(in_flight) {}
+  void Settle(bool is_committed);
 
   Life life_;
   Work work_ = Work::kIdle;

@@ -16,11 +16,7 @@ void HullChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
                     [this, hull, charge, finish = std::move(finish)](
                         Locked& later, const absl::Status& status, Change& committed) {
                       charge->Set(0);
-                      if (status.ok()) {
-                        hull->state.Commit();
-                      } else {
-                        hull->state.Refuse();
-                      }
+                      status.ok() ? hull->state.Commit() : hull->state.Refuse();
                       finish(later, status, committed);
                       // The peer change must be applied first.
                       if (Committer::IsSuperseded(status)) {
