@@ -143,9 +143,10 @@ RegistrySizes Catalog::Sizes() const {
   return {revision_, HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
 }
 
-void Catalog::EndCreatingHull(bool is_committed) {
+void Catalog::EndCreatingHull(Locked& locked, const HullPointer& hull, const absl::Status& status) {
   --creating_hulls_;
-  if (is_committed) ++kept_hulls_;
+  if (!status.ok()) return Forget(locked, hull, status);
+  ++kept_hulls_;
 }
 
 void Catalog::EndCreatingBody(bool is_committed) {

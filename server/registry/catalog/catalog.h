@@ -105,9 +105,9 @@ class Catalog {
   // Returns the counts without creations in flight.
   RegistrySizes Sizes() const;
 
-  // Count a creation at its submission, and at its commit or refusal.
+  // Count a creation at its submission, and at its commit or refusal. A refused hull is forgotten.
   void BeginCreatingHull() { ++creating_hulls_; }
-  void EndCreatingHull(bool is_committed);
+  void EndCreatingHull(Locked& locked, const HullPointer& hull, const absl::Status& status);
   void BeginCreatingBody() { ++creating_bodies_; }
   void EndCreatingBody(bool is_committed);
   // Count a committed deletion.

@@ -116,10 +116,6 @@ class HullChanges : public PeerChangeListener {
   void CommitReplacement(Locked& locked, const HullPointer& former,
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done);
-  absl::StatusOr<PutHullResult> FinishReplacement(Locked& locked, const HullPointer& former,
-                                                  const HullPointer& hull,
-                                                  const absl::Status& status, const Change& change);
-
   void RunOpen(const std::shared_ptr<OpenRequest>& request);
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
   void OpenSession(Locked& locked, const HullPointer& hull,

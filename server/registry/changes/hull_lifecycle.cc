@@ -85,12 +85,9 @@ void HullChanges::CreateNew(Locked& locked, const std::string& id, const Creatio
   state_.catalog.BeginCreatingHull();
   Submit(locked, hull, std::move(change),
          [this, hull, done](Locked& later, const absl::Status& status, const Change& creation) {
-           state_.catalog.EndCreatingHull(status.ok());
-           if (!status.ok()) {
-             state_.catalog.Forget(later, hull, status);
-             return done(later, status);
-           }
-           state_.ApplyCreation(later, hull, creation.hull);
+           state_.catalog.EndCreatingHull(later, hull, status);
+           if (!status.ok()) return done(later, status);
+           state_.ApplyCreation(later, nullptr, hull, creation.hull);
            done(later, hull);
          });
 }
@@ -184,35 +181,21 @@ void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
          [=, this](Locked& later, const absl::Status& status, Change& replaced) {
            const bool again = Committer::IsSuperseded(status);
            if (again) TakeBack(*hull, replaced, *replacement);
-           absl::StatusOr<PutHullResult> result =
-               FinishReplacement(later, former, hull, status, replaced);
-           if (!again) return Answer(later, done, std::move(result));
-           later.AfterwardsLocked(
-               [=, this](Locked& once_more) { ReplaceLocked(once_more, replacement, done); });
+           if (former == nullptr) state_.catalog.EndCreatingHull(later, hull, status);
+           if (again) {
+             return later.AfterwardsLocked(
+                 [=, this](Locked& once_more) { ReplaceLocked(once_more, replacement, done); });
+           }
+           if (!status.ok()) return Answer(later, done, status);
+           state_.ApplyCreation(later, former, hull, replaced.hull);
+           hull->DiscardUnneededBuilder(later);
+           hull->NoteUse();
+           state_.catalog.hulls().RestSoon(later, *hull);
+           state_.memory.Evict(later);
+           Answer(
+               later, done,
+               PutHullResult{state_.catalog.revision(), replaced.hull.record, former == nullptr});
          });
-}
-
-// hull: replaces `former`, which may be null, if `status` is OK.
-absl::StatusOr<PutHullResult> HullChanges::FinishReplacement(Locked& locked,
-                                                             const HullPointer& former,
-                                                             const HullPointer& hull,
-                                                             const absl::Status& status,
-                                                             const Change& change) {
-  if (former == nullptr) {
-    state_.catalog.EndCreatingHull(status.ok());
-    if (!status.ok()) state_.catalog.Forget(locked, hull, status);
-  }
-  if (!status.ok()) return status;
-  if (former == nullptr) {
-    state_.ApplyCreation(locked, hull, change.hull);
-  } else {
-    state_.ApplyReplacement(locked, former, hull, change.hull);
-  }
-  hull->DiscardUnneededBuilder(locked);
-  hull->NoteUse();
-  state_.catalog.hulls().RestSoon(locked, *hull);
-  state_.memory.Evict(locked);
-  return PutHullResult{state_.catalog.revision(), change.hull.record, former == nullptr};
 }
 
 }  // namespace hulld::server

@@ -30,25 +30,22 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
       feed(store, mutex, memory, Config::kWatchMarkInterval),
       preparer(mutex, catalog, memory, preparers) {}
 
-void RegistryState::ApplyCreation(Locked& locked, const HullPointer& hull,
-                                  const StoredHull& stored) {
+void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
+                                  const HullPointer& hull, const StoredHull& stored) {
   hull->SetStored(stored);
+  std::optional<Incarnation> replaced;
+  if (former != nullptr) {
+    const HullRecord& record = former->committed().record;
+    replaced = Incarnation::Of(record);
+    hull->state.Commit();
+    catalog.NoteVertices(record.vertex_count, 0);
+    catalog.Forget(locked, former, Gone(record.hull_id, "replaced"));
+    catalog.hulls().Insert(hull);
+  }
   catalog.NoteVertices(0, stored.record.vertex_count);
   catalog.Publish(stored.record.revision);
   catalog.NoteChange(*hull);
-  feed.NoteHull(locked, std::nullopt, hull);
-}
-
-void RegistryState::ApplyReplacement(Locked& locked, const HullPointer& former,
-                                     const HullPointer& hull, const StoredHull& stored) {
-  hull->SetStored(stored);
-  hull->state.Commit();
-  catalog.NoteVertices(former->committed().record.vertex_count, stored.record.vertex_count);
-  catalog.Forget(locked, former, Gone(stored.record.hull_id, "replaced"));
-  catalog.hulls().Insert(hull);
-  catalog.Publish(stored.record.revision);
-  catalog.NoteChange(*hull);
-  feed.NoteHull(locked, Incarnation::Of(former->committed().record), hull);
+  feed.NoteHull(locked, replaced, hull);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {

@@ -40,10 +40,9 @@ struct RegistryState {
 
   // Apply a committed change of a hull. Requires: its HullState no longer counts the change as in
   // flight.
-  void ApplyCreation(Locked& locked, const HullPointer& hull, const StoredHull& stored);
-  // hull: not in the catalog; takes the place of `former`.
-  void ApplyReplacement(Locked& locked, const HullPointer& former, const HullPointer& hull,
-                        const StoredHull& stored);
+  // former: null if `hull` is in the catalog already; otherwise the hull whose place it takes.
+  void ApplyCreation(Locked& locked, const HullPointer& former, const HullPointer& hull,
+                     const StoredHull& stored);
   void ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision);
   void ApplyChunk(Locked& locked, const HullPointer& hull, const CommittedChunk& chunk);
   // body: null after a deletion. Requires an entry of the ID.
