@@ -116,6 +116,7 @@ class HullChanges : public PeerChangeListener {
   void CommitReplacement(Locked& locked, const HullPointer& former,
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done);
+
   void RunOpen(const std::shared_ptr<OpenRequest>& request);
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
   void OpenSession(Locked& locked, const HullPointer& hull,

@@ -193,20 +193,14 @@ std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
 absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
                                                      const std::string& writer_id) {
   const uint64_t incarnation = hull.create_revision;
-  std::string sealed;
-  if (options_.shared) {
-    absl::StatusOr<std::string> read = ReadSequence(hull, writer_id);
-    if (!read.ok()) return read.status();
-    sealed = *std::move(read);
-  } else {
-    const absl::StatusOr<Rows> rows =
-        ReadOne({.name = "hulld_sequence",
-                 .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}});
-    if (!rows.ok()) return rows.status();
-    if (rows->count() > 0) sealed = std::string(rows->at(0, 0));
-  }
-  if (sealed.empty()) return 0;
-  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), sealed);
+  const absl::StatusOr<Rows> rows =
+      ReadOne({.name = options_.shared ? "hulld_sequence_and_record" : "hulld_sequence",
+               .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}});
+  if (!rows.ok()) return rows.status();
+  const absl::Status current = options_.shared ? CheckRecord(hull, *rows) : absl::OkStatus();
+  if (!current.ok()) return current;
+  if (rows->count() == 0 || rows->at(0, 0).empty()) return 0;
+  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), rows->at(0, 0));
 }
 
 absl::StatusOr<std::vector<WriterSequence>> PostgresStore::LoadWriters(const StoredHull& hull) {

@@ -401,18 +401,12 @@ void PostgresStore::OnPeerCommit(std::function<void()> committed) {
   on_peer_commit_ = std::move(committed);
 }
 
-// Reads the sequence, and compares the hull's record with `hull`, in one snapshot.
-absl::StatusOr<std::string> PostgresStore::ReadSequence(const HullRecord& hull,
-                                                        const std::string& writer_id) {
-  const absl::StatusOr<Rows> row =
-      ReadOne({.name = "hulld_sequence_and_record",
-               .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), writer_id}});
-  if (!row.ok()) return row.status();
-  if (row->count() == 0) return Moved();
-  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.hull_id, row->at(0, 1));
+// Compares the hull's record with `hull`, as of a sequence. rows: of hulld_sequence_and_record.
+absl::Status PostgresStore::CheckRecord(const HullRecord& hull, const Rows& rows) {
+  if (rows.count() == 0) return Moved();
+  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.hull_id, rows.at(0, 1));
   if (!now.ok()) return now.status();
-  if (now->record != hull) return Moved();
-  return std::string(row->at(0, 0));
+  return now->record == hull ? absl::OkStatus() : Moved();
 }
 
 // Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.

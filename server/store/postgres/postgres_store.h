@@ -218,7 +218,7 @@ class PostgresStore : public Store, public PeerFeed {
   bool HearsPeers() const;
   absl::Status PollPeers();
   void NotifyPeerCommit();
-  absl::StatusOr<std::string> ReadSequence(const HullRecord& hull, const std::string& writer_id);
+  static absl::Status CheckRecord(const HullRecord& hull, const Rows& rows);
   absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
 
   // Visits every row of a table, in byte order of the IDs: its ID and its sealed value.
