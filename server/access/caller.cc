@@ -23,17 +23,8 @@ absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
 }  // namespace
 
 const char* RoleName(Permission permission) {
-  switch (permission) {
-    case Permission::kNone:
-      return "none";
-    case Permission::kRead:
-      return "read-only";
-    case Permission::kWrite:
-      return "read-write";
-    case Permission::kAdmin:
-      return "admin";
-  }
-  return "admin";
+  static constexpr const char* kNames[] = {"none", "read-only", "read-write", "admin"};
+  return kNames[static_cast<size_t>(permission)];
 }
 
 absl::Status CheckPermission(const Caller& caller, Rpc rpc) {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "core/base/check.h"
-
 namespace hulld::server {
 namespace {
 
@@ -23,21 +21,10 @@ constexpr uint8_t kPadded = 0x8;
 }  // namespace
 
 const char* FrameGuard::Name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kAllowed:
-      return "allowed";
-    case Verdict::kNotHttp2:
-      return "not_http2";
-    case Verdict::kHeaderBlock:
-      return "header_block";
-    case Verdict::kLargeHeaders:
-      return "large_headers";
-    case Verdict::kControlFrames:
-      return "control_frames";
-    case Verdict::kHalfOpenStreams:
-      return "half_open_streams";
-  }
-  HULLD_UNREACHABLE();
+  static constexpr std::array<const char*, kVerdictCount> kNames = {
+      "allowed",       "not_http2",      "header_block",
+      "large_headers", "control_frames", "half_open_streams"};
+  return kNames[static_cast<size_t>(verdict)];
 }
 
 FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open,

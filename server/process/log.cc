@@ -75,19 +75,11 @@ void LogForLibrary(const char* library, spdlog::level::level_enum level, const s
   spdlog::log(level, "{}: {} ({} earlier lines omitted)", library, text, *left_out);
 }
 
-spdlog::level::level_enum LevelOf(gpr_log_severity severity) {
-  switch (severity) {
-    case GPR_LOG_SEVERITY_DEBUG:
-    case GPR_LOG_SEVERITY_INFO:
-      return spdlog::level::debug;
-    case GPR_LOG_SEVERITY_ERROR:
-      return spdlog::level::warn;
-  }
-  return spdlog::level::warn;
-}
-
 void LogForGrpc(gpr_log_func_args* arguments) {
-  LogForLibrary("grpc", LevelOf(arguments->severity), arguments->message);
+  LogForLibrary(
+      "grpc",
+      arguments->severity == GPR_LOG_SEVERITY_ERROR ? spdlog::level::warn : spdlog::level::debug,
+      arguments->message);
 }
 
 // Protobuf's errors are mostly caused by clients. After a fatal one it aborts the process itself.

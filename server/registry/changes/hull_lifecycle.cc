@@ -165,14 +165,13 @@ void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
                                     const std::shared_ptr<Replacement>& replacement,
                                     const Reply<PutHullResult>& done) {
   Change change = MakeChange(former.get(), *replacement);
-  HullPointer hull;
+  const auto hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
+                                                     state_.store.keeps_hulls(), state_.memory);
   if (former == nullptr) {
-    hull = state_.catalog.hulls().Insert(change.hull, HullState::Creating());
+    state_.catalog.hulls().Insert(hull);
     state_.catalog.BeginCreatingHull();
   } else {
-    // Not in the catalog until it replaces the former hull.
-    hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
-                                            state_.store.keeps_hulls(), state_.memory);
+    // `hull` enters the catalog when it replaces the former hull.
     former->state.StartEnding();
   }
   hull->SetLive(std::move(replacement->live));
