@@ -620,6 +620,8 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        max_time_error: float | None = None,
+        resolution: float | None = None,
         limit: int | None = None,
         first_only: bool = False,
         every_piece: bool = False,
@@ -639,13 +641,23 @@ class Client(ClientBase):
         among all pairs. The totals still count every pair within the clearance. Pairs without an
         answer follow, at most as many. first_only: only the pairs in motion that may be the first
         to touch, in ascending order of separated_until; none if no pair touches. The totals then
-        count these pairs only. every_piece: a row for each pair of pieces that is found; the column
+        count these pairs only. max_time_error and resolution apply to each pair in motion, as in
+        check_collision. every_piece: a row for each pair of pieces that is found; the column
         `pieces` distinguishes the rows of two bodies.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
-            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+            axis,
+            analysis,
+            certificate,
+            separation,
+            max_error,
+            witness,
+            clearance,
+            normal,
+            max_time_error,
+            resolution,
         ).for_limit(limit)
         call = requests.find_collisions(
             packed, scene, wanted, limit, tolerance, first_only, every_piece
@@ -668,6 +680,8 @@ class Client(ClientBase):
         witness: bool = False,
         normal: bool = False,
         clearance: float | None = None,
+        max_time_error: float | None = None,
+        resolution: float | None = None,
         limit: int | None = None,
         first_only: bool = False,
         every_piece: bool = False,
@@ -681,7 +695,16 @@ class Client(ClientBase):
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
-            axis, analysis, certificate, separation, max_error, witness, clearance, normal
+            axis,
+            analysis,
+            certificate,
+            separation,
+            max_error,
+            witness,
+            clearance,
+            normal,
+            max_time_error,
+            resolution,
         ).for_limit(limit)
         call = requests.find_collisions(
             packed, scene, wanted, limit, tolerance, first_only, every_piece

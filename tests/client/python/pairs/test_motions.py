@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -177,6 +178,31 @@ def test_options_bound_the_bracket(client: hulld.Client, cube: str) -> None:
         client.check_collision(a, b, to_b=to, max_time_error=2)
     with pytest.raises(hulld.InvalidArgumentError, match="wanted.witness excludes end_pose"):
         client.check_collision(a, b, to_b=to, witness=True)
+
+
+def test_options_bound_the_brackets_of_scenes(either: Any) -> None:
+    turning = hulld.Placement(points=CUBE, pose=(3, 0.25, 0.5), end_pose=(1, 0, 0.25, 1, -1, 0, 0))
+    moving = hulld.Placements.of([hulld.Placement(points=CUBE), turning])
+    widths = {}
+    for error in (None, 1e-3, 0.25):
+        options = {} if error is None else {"max_time_error": error}
+        contact = either.find_collisions(moving, **options)[0].first_contact
+        widths[error] = contact.contact_time - contact.separated_until
+        (parts,) = [p for p in either.iter_find_collisions(moving, **options) if len(p.pairs)]
+        assert parts.answers.contact_times[0] == contact.contact_time
+        assert 0 <= widths[error] <= (error or 2**-30)
+    assert widths[None] < widths[1e-3] < widths[0.25]
+    with pytest.raises(hulld.InvalidArgumentError, match="wanted.max_time_error"):
+        either.find_collisions(moving, max_time_error=2)
+    # The corner of a box that turns by 90 degrees passes a wall, 1e-5 away.
+    wall = CUBE * (1, 10, 10) + (2**0.5 + 1e-5, -5, -5)
+    box = hulld.Placement(points=2 * CUBE - 1, end_pose=(1, 0, 0, 1, 0, 0, 0))
+    passing = hulld.Placements.of([hulld.Placement(points=wall), box])
+    assert len(either.find_collisions(passing).pairs) == 0
+    near = either.find_collisions(passing, resolution=0.1)
+    assert near.answers.relations.tolist() == [hulld.Relation.WITHIN_TOLERANCE]
+    (part,) = [p for p in either.iter_find_collisions(passing, resolution=0.1) if len(p.pairs)]
+    assert part.answers.relations.tolist() == [hulld.Relation.WITHIN_TOLERANCE]
 
 
 def test_scenes_take_motions_and_streams_refuse_them(client: hulld.Client, cube: str) -> None:
