@@ -77,8 +77,8 @@ struct FirstContact {
   // If the pair meets: it is in contact at some time of [separated_until, contact_time], and at
   // contact_time itself unless the contact of two translations ends before the next double. The
   // two times are equal or adjacent doubles for translations without radii. Otherwise they are
-  // adjacent or at most max_time_error apart, and farther only if the separation is below
-  // kLeastRelativeResolution for that long before the contact.
+  // adjacent or at most max_time_error apart, and farther only if the separation at separated_until
+  // is below kLeastRelativeResolution, so that no plane proves more.
   std::optional<double> contact_time;
   // If requested: consecutive intervals from 0 to separated_until, none if that is 0. Empty if a
   // hull is empty.
@@ -98,9 +98,10 @@ struct FirstContact {
 // the bracket is as narrow as requested, and the relation is kWithinTolerance only within the
 // resolution. Swapping A and B mirrors the answer. Empty hulls are separated from everything.
 //
-// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; no
-// plane can be proven because a rotation nearly vanishes, or sizes are out of the range of
-// kMotionMinSize and kMotionMaxSize. CANCELLED: should_stop returned true.
+// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; unless
+// the pair meets before, no plane can be proven because a rotation nearly vanishes (all components
+// of q(t) below 2^-39 of the largest at the ends), or sizes are out of the range of kMotionMinSize
+// and kMotionMaxSize. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});
 

@@ -201,6 +201,14 @@ MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_star
   return bounds;
 }
 
+bool MovingPlane::IsUsableAt(double time) const {
+  const auto is_usable = [=](const Side& side) {
+    return side.size <= kMotionMaxSize &&
+           LargestOf(At(side.q0, side.q1, time)) >= 2 * kInterpolationLeastRemainder;
+  };
+  return size_ >= kMotionMinSize && is_usable(a_) && is_usable(b_);
+}
+
 MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double start, double end,
                                      double margin) const {
   HULLD_DCHECK(0 <= start && start <= end && end <= 1);

@@ -30,6 +30,10 @@ class MovingPlane {
   // and the radii, added.
   double size() const { return size_; }
 
+  // Returns false if planes may be impossible from a time on however far apart the hulls are: their
+  // sizes are out of range, or a rotation nearly vanishes (twice kInterpolationLeastRemainder).
+  bool IsUsableAt(double time) const;
+
   struct Result {
     // True if the plane with these offsets has A and B, with their radii, farther than `margin` on
     // its two sides at all times of the interval.

@@ -324,14 +324,15 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   return time;
 }
 
-// No plane can be proven from separated_ on: the gap is below rounding, if not the rotation.
+// No plane can be proven from separated_ on: the gap is below rounding, if planes are usable.
 absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   const double latest = LatestContactTime();
   const absl::StatusOr<Relation> relation = RelationAt(latest);
   if (!relation.ok()) return relation.status();
   if (*relation != Relation::kSeparated) return Contact(latest, *relation);
-  const absl::StatusOr<bool> near =
-      PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
+  // Where planes are unusable, the hulls may be far apart before they meet.
+  absl::StatusOr<bool> near = plane_.IsUsableAt(separated_);
+  if (*near) near = PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
   if (!near.ok()) return near.status();
   if (*near) {
     const absl::StatusOr<double> soon = FindContactSoon(latest);
