@@ -59,10 +59,14 @@ int SignOfFactor(const Quaternion& q0, const Quaternion& q1) {
     if (sign != 0 && of_pair != sign) return 0;
     sign = of_pair;
   }
+  const auto pivot = std::find_if(q0.begin(), q0.end(), [](double x) { return x != 0; });
+  const size_t k = pivot - q0.begin();
+  // Products that round differently differ.
+  for (size_t i = 0; i < 4; ++i) {
+    if (q0[i] * q1[k] != q0[k] * q1[i]) return 0;
+  }
   const std::array<Integer, 4> m = ToIntegers(q0, LowestBitExponentOf(q0));
   const std::array<Integer, 4> n = ToIntegers(q1, LowestBitExponentOf(q1));
-  const auto pivot = std::find_if(m.begin(), m.end(), [](const Integer& x) { return x != 0; });
-  const size_t k = pivot - m.begin();
   for (size_t i = 0; i < 4; ++i) {
     if (m[i] * n[k] != m[k] * n[i]) return 0;
   }
