@@ -98,10 +98,10 @@ struct FirstContact {
 // the bracket is as narrow as requested, and the relation is kWithinTolerance only within the
 // resolution. Swapping A and B mirrors the answer. Empty hulls are separated from everything.
 //
-// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; unless
-// the pair meets before, no plane can be proven because a rotation nearly vanishes (all components
-// of q(t) below 2^-39 of the largest at the ends), or sizes are out of the range of kMotionMinSize
-// and kMotionMaxSize. CANCELLED: should_stop returned true.
+// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite;
+// unless the pair meets before, no plane can be proven because a rotation nearly vanishes (all
+// components of q(t) below 2^-38 of the largest at the ends), or sizes are out of the range of
+// kMotionMinSize and kMotionMaxSize. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});
 

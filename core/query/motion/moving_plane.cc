@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "core/base/check.h"
 #include "core/numeric/double_double.h"
@@ -46,15 +47,60 @@ PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVect
   return (scale * n + (Dot(v, n) * u + Dot(u, n) * v)) - (p[0] * Cross(v, n) + q[0] * Cross(u, n));
 }
 
-// Returns the largest n.v over the points of a hull, within kSupportBlurFactor times its largest
-// coordinate times a bound of n.
-double ReachAlong(const QueryHull& hull, const PlainVector& n) {
-  // Too short to matter in kMotionPlaneErrorFactor.
-  if (LargestComponent(n) < kDirectionMin) return 0;
-  if (IsFilterSize(hull.max_abs_coordinate())) return hull.Farthest(n).value;
-  double reach = -kInfinity;
-  for (uint32_t i = 0; i < hull.point_count(); ++i) {
-    reach = std::max(reach, hulld::Dot(n, PlainVector(hull.point(i))));
+// Hulls of at most this many points are scanned for several directions at once. A choice.
+constexpr size_t kMostScanned = 16;
+
+// Two doubles in a register.
+using Pair = double __attribute__((vector_size(16)));
+
+// Returns the largest n.v over points for each direction, with the bits of SupportValue.
+template <size_t kCount>
+std::array<double, kCount> ScanAlong(std::span<const Vector> points,
+                                     const std::array<PlainVector, kCount>& n) {
+  constexpr size_t kPairs = (kCount + 1) / 2;
+  Pair x[kPairs];
+  Pair y[kPairs];
+  Pair z[kPairs];
+  Pair most[kPairs];
+  for (size_t i = 0; i < kPairs; ++i) {
+    const PlainVector& n0 = n[2 * i];
+    const PlainVector& n1 = n[std::min(2 * i + 1, kCount - 1)];
+    x[i] = Pair{n0.x, n1.x};
+    y[i] = Pair{n0.y, n1.y};
+    z[i] = Pair{n0.z, n1.z};
+    most[i] = Pair{-kInfinity, -kInfinity};
+  }
+  for (const Vector& v : points) {
+    for (size_t i = 0; i < kPairs; ++i) {
+      const Pair value = (x[i] * v.x() + y[i] * v.y()) + z[i] * v.z();
+      most[i] = value > most[i] ? value : most[i];
+    }
+  }
+  std::array<double, kCount> result;
+  for (size_t i = 0; i < kCount; ++i) result[i] = most[i / 2][i % 2];
+  return result;
+}
+
+// Returns the largest n.v over the points of a hull for each direction, within kSupportBlurFactor
+// times its largest coordinate times a bound of n.
+template <size_t kCount>
+std::array<double, kCount> ReachAlong(const QueryHull& hull,
+                                      const std::array<PlainVector, kCount>& n) {
+  const std::span<const Vector> points = hull.points_together();
+  if (!points.empty() && points.size() <= kMostScanned) return ScanAlong(points, n);
+  std::array<double, kCount> reach;
+  for (size_t i = 0; i < kCount; ++i) {
+    // Too short to matter in kMotionPlaneErrorFactor.
+    if (LargestComponent(n[i]) < kDirectionMin) {
+      reach[i] = 0;
+    } else if (IsFilterSize(hull.max_abs_coordinate())) {
+      reach[i] = hull.Farthest(n[i]).value;
+    } else {
+      reach[i] = -kInfinity;
+      for (uint32_t k = 0; k < hull.point_count(); ++k) {
+        reach[i] = std::max(reach[i], hulld::Dot(n[i], PlainVector(hull.point(k))));
+      }
+    }
   }
   return reach;
 }
@@ -70,56 +116,71 @@ Quartic Product(const Quadratic& f, const Quadratic& g) {
 }
 Quadratic Elevated(double f0, double f1) { return {f0, (f0 + f1) / 2, f1}; }
 
-// Returns the coefficients of R(q)^T n for q from q0 to q1, and n from n0 to n1.
-std::array<PlainVector, 5> TurnedBack(const Quaternion& q0, const Quaternion& q1,
-                                      const PlainVector& n0, const PlainVector& n1, bool turns) {
-  const PlainVector first = TurnedBack(q0, q0, n0);
-  const PlainVector middle = TurnedBack(q0, q1, n0);
-  const PlainVector last = TurnedBack(q1, q1, n0);
-  const PlainVector first_1 = turns ? TurnedBack(q0, q0, n1) : first;
-  const PlainVector middle_1 = turns ? TurnedBack(q0, q1, n1) : middle;
-  const PlainVector last_1 = turns ? TurnedBack(q1, q1, n1) : last;
-  return {first, 0.25 * (first + first_1) + 0.5 * middle,
-          1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
-          0.5 * middle_1 + 0.25 * (last + last_1), last_1};
-}
-
 }  // namespace
 
-// Bernstein coefficients of a hull in motion over an interval.
-struct MovingPlane::Bounds {
-  // Coefficients of |q|^2, of degree 2 and 4.
-  Quadratic norms;
-  Quartic weights;
-  // Their inverses, rounded.
-  Quartic inverse_weights;
-  // The larger of |q|^2 at both ends.
-  double weight = 0;
-  // For each coefficient of |q|^2 n.p, its largest value over all vertices.
-  Quartic most;
-  // Error bound of `most`; the offset adds to it.
-  double error = 0;
-  // False if the hull turns too far.
-  bool usable = false;
+// Bernstein coefficients of a hull in motion over an interval: first those at its ends, which
+// exclude most planes, then the others.
+class MovingPlane::Bounds {
+ public:
+  // Computes the coefficients at the ends.
+  Bounds(Side& side, const PlainVector& n0, const PlainVector& n1, double start, double end);
+  // Computes the others. Requires: usable().
+  void AddMiddle();
 
-  // Returns `most` over the weights for offsets at both ends, less these.
+  // False if the hull turns too far.
+  bool usable() const { return usable_; }
+  // The larger of |q|^2 at both ends.
+  double weight() const { return weight_; }
+  // Returns the farthest that the hull reaches along n at the start and at the end.
+  std::array<double, 2> Reach() const {
+    return {most_[0] * inverse_weights_[0], most_[4] * inverse_weights_[4]};
+  }
+  // Returns `most_` over the weights for offsets at both ends, less these.
   double HeightOver(double offset, double end_offset) const {
-    const Quartic offsets = Product(norms, Elevated(offset, end_offset));
+    const Quartic offsets = Product(norms_, Elevated(offset, end_offset));
     double height = -kInfinity;
     for (int i = 0; i < 5; ++i)
-      height = std::max(height, (most[i] - offsets[i]) * inverse_weights[i]);
+      height = std::max(height, (most_[i] - offsets[i]) * inverse_weights_[i]);
     return height;
   }
-  // Returns the error bound of `most` with offsets. `sizes`: lengths that the offsets are sums of.
-  double ErrorWith(double sizes) const { return error + kMotionPlaneErrorFactor * weight * sizes; }
+  // Returns the error bound of `most_` with offsets. `sizes`: lengths that the offsets are sums of.
+  double ErrorWith(double sizes) const {
+    return error_ + kMotionPlaneErrorFactor * weight_ * sizes;
+  }
   // Returns true if all coefficients are below those of the offsets.
   bool IsBelow(double offset, double end_offset, double sizes) const {
-    const Quartic offsets = Product(norms, Elevated(offset, end_offset));
+    const Quartic offsets = Product(norms_, Elevated(offset, end_offset));
     const double all = ErrorWith(sizes);
     bool below = true;
-    for (int i = 0; i < 5; ++i) below = below && most[i] + all < offsets[i];
+    for (int i = 0; i < 5; ++i) below = below && most_[i] + all < offsets[i];
     return below;
   }
+
+ private:
+  // Returns the coefficients `first` to `first + kCount - 1` of |q|^2 n.p, each at its largest
+  // over all vertices. `turned`: those of R(q)^T n.
+  template <size_t kCount>
+  void SetMost(size_t first, std::array<PlainVector, kCount> turned);
+
+  const Side& side_;
+  const Frame start_;
+  const Frame end_;
+  const PlainVector n0_;
+  const PlainVector n1_;
+  const bool turns_;
+  // Coefficients of |q|^2, of degree 2 and 4.
+  Quadratic norms_;
+  Quartic weights_;
+  // Their inverses, rounded.
+  Quartic inverse_weights_;
+  double weight_ = 0;
+  // Those of |q|^2 n.x.
+  Quartic moved_;
+  // For each coefficient of |q|^2 n.p, its largest value over all vertices.
+  Quartic most_;
+  // Error bound of `most_`; the offset adds to it.
+  double error_ = 0;
+  bool usable_ = false;
 };
 
 MovingPlane::MovingPlane(const MovingHull& a, const MovingHull& b)
@@ -130,7 +191,7 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   const Pose& start = moving.X_WB.start;
   const Pose& end = moving.X_WB.end;
   const Pose& X_BH = moving.X_BH;
-  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0, false};
+  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0, false, {}};
   if (!IsIdentity(X_BH)) side.piece = {PlacedHull(moving.hull, X_BH).R_WH(), X_BH.t};
   int exponent = 0;
   std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
@@ -148,77 +209,151 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   return side;
 }
 
-MovingPlane::Bounds MovingPlane::BoundsOf(const Side& side, const Vector& n_start,
-                                          const Vector& n_end, double start, double end) {
-  Bounds bounds;
-  if (!(side.size <= kMotionMaxSize)) return bounds;
-  const Quaternion p = side.at_rest ? side.q0 : At(side.q0, side.q1, start);
-  const Quaternion q = side.at_rest ? side.q0 : At(side.q0, side.q1, end);
-  if (std::min(LargestOf(p), LargestOf(q)) < kInterpolationLeastRemainder) return bounds;
-  bounds.norms = {Dot(p, p), Dot(p, q), Dot(q, q)};
-  bounds.weights = Product(bounds.norms, {1, 1, 1});
-  bounds.weight = std::max(bounds.norms[0], bounds.norms[2]);
-  for (const double w : bounds.weights) {
-    if (w < kLeastRelativeWeight * bounds.weight) return bounds;
+const MovingPlane::Frame& MovingPlane::FrameAt(Side& side, double time) {
+  if (side.at_rest) time = 0;
+  for (const Frame& frame : side.frames) {
+    if (frame.time == time) return frame;
   }
-  bounds.usable = true;
-
-  const PlainVector n0 = n_start;
-  const PlainVector n1 = n_end;
-  const bool turns = n_start != n_end;
-  std::array<PlainVector, 5> turned = TurnedBack(p, q, n0, n1, turns);
-  const auto position = [&](double t) {
-    PlainVector x;
-    x.x = Interpolated(side.x0.x(), side.x1.x(), t).high;
-    x.y = Interpolated(side.x0.y(), side.x1.y(), t).high;
-    x.z = Interpolated(side.x0.z(), side.x1.z(), t).high;
-    return x;
-  };
-  const PlainVector x0 = side.at_rest ? PlainVector(side.x0) : position(start);
-  const PlainVector x1 = side.at_rest ? x0 : position(end);
-  Quartic moved = Product(
-      bounds.norms,
-      {hulld::Dot(n0, x0), (hulld::Dot(n0, x1) + hulld::Dot(n1, x0)) / 2, hulld::Dot(n1, x1)});
-  const bool is_constant = (side.at_rest || start == end) && !turns;
-  const int count = is_constant ? 1 : 5;
-  for (int i = 0; i < count; ++i) {
-    if (side.piece) {
-      moved[i] += hulld::Dot(turned[i], PlainVector(side.piece->p_BH));
-      turned[i] = TransposedProduct(side.piece->R_BH, turned[i]);
-    }
-    bounds.most[i] = ReachAlong(*side.hull, turned[i]) + moved[i];
-  }
-  if (is_constant) {
-    bounds.weights.fill(bounds.norms[0]);
-    bounds.most.fill(bounds.most[0]);
-    bounds.inverse_weights.fill(1 / bounds.norms[0]);
-  } else {
-    for (int i = 0; i < 5; ++i) bounds.inverse_weights[i] = 1 / bounds.weights[i];
-  }
-  const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
-  const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
-  bounds.error = factor * bounds.weight * largest * std::max(side.size, kMotionMinSize);
-  return bounds;
+  Frame& frame = side.frames[side.oldest];
+  side.oldest = (side.oldest + 1) % side.frames.size();
+  frame.time = time;
+  frame.q = side.at_rest ? side.q0 : At(side.q0, side.q1, time);
+  frame.squared_norm = Dot(frame.q, frame.q);
+  frame.usable = LargestOf(frame.q) >= kInterpolationLeastRemainder;
+  frame.x = side.x0;
+  if (side.at_rest) return frame;
+  frame.x.x = Interpolated(side.x0.x(), side.x1.x(), time).high;
+  frame.x.y = Interpolated(side.x0.y(), side.x1.y(), time).high;
+  frame.x.z = Interpolated(side.x0.z(), side.x1.z(), time).high;
+  return frame;
 }
 
-bool MovingPlane::IsUsableAt(double time) const {
-  const auto is_usable = [=](const Side& side) {
+Pose MovingPlane::PoseAt(Side& side, double time) {
+  const Frame& frame = FrameAt(side, time);
+  return {frame.q, frame.x};
+}
+
+double MovingPlane::ReachAt(Side& side, const PlainVector& n, double time) {
+  const Frame& frame = FrameAt(side, time);
+  PlainVector turned = TurnedBack(frame.q, frame.q, n);
+  double moved = 0;
+  if (side.piece) {
+    moved = hulld::Dot(turned, PlainVector(side.piece->p_BH));
+    turned = TransposedProduct(side.piece->R_BH, turned);
+  }
+  return (ReachAlong<1>(*side.hull, {turned})[0] + moved) / frame.squared_norm +
+         hulld::Dot(n, frame.x);
+}
+
+double MovingPlane::GapAt(const Vector& n, double time) {
+  const PlainVector n_A = n;
+  return (-ReachAt(b_, -n_A, time) - b_.radius) - (ReachAt(a_, n_A, time) + a_.radius);
+}
+
+MovingPlane::Bounds::Bounds(Side& side, const PlainVector& n0, const PlainVector& n1, double start,
+                            double end)
+    : side_(side),
+      start_(FrameAt(side, start)),
+      end_(FrameAt(side, end)),
+      n0_(n0),
+      n1_(n1),
+      turns_(n0.x != n1.x || n0.y != n1.y || n0.z != n1.z) {
+  if (!(side.size <= kMotionMaxSize && start_.usable && end_.usable)) return;
+  const bool is_fixed = start_.time == end_.time;
+  const double middle = is_fixed ? start_.squared_norm : Dot(start_.q, end_.q);
+  norms_ = {start_.squared_norm, middle, end_.squared_norm};
+  weight_ = std::max(norms_[0], norms_[2]);
+  if (is_fixed) {
+    weights_.fill(weight_);
+    inverse_weights_.fill(1 / weight_);
+  } else {
+    weights_ = Product(norms_, {1, 1, 1});
+    for (int i = 0; i < 5; ++i) {
+      if (weights_[i] < kLeastRelativeWeight * weight_) return;
+      inverse_weights_[i] = 1 / weights_[i];
+    }
+  }
+  usable_ = true;
+  moved_ = Product(
+      norms_, {hulld::Dot(n0, start_.x), (hulld::Dot(n0, end_.x) + hulld::Dot(n1, start_.x)) / 2,
+               hulld::Dot(n1, end_.x)});
+  const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
+  const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
+  error_ = factor * weight_ * largest * std::max(side.size, kMotionMinSize);
+  const PlainVector first = TurnedBack(start_.q, start_.q, n0);
+  if (turns_ || !is_fixed) {
+    const PlainVector last = TurnedBack(end_.q, end_.q, n1);
+    SetMost<2>(0, {first, last});
+    most_[4] = most_[1];
+  } else {
+    SetMost<1>(0, {first});
+    most_.fill(most_[0]);
+  }
+}
+
+template <size_t kCount>
+void MovingPlane::Bounds::SetMost(size_t first, std::array<PlainVector, kCount> turned) {
+  std::array<double, kCount> moved;
+  for (size_t i = 0; i < kCount; ++i) {
+    // Two coefficients are those at the ends.
+    moved[i] = moved_[kCount == 2 ? 4 * i : first + i];
+    if (!side_.piece) continue;
+    moved[i] += hulld::Dot(turned[i], PlainVector(side_.piece->p_BH));
+    turned[i] = TransposedProduct(side_.piece->R_BH, turned[i]);
+  }
+  const std::array<double, kCount> reach = ReachAlong(*side_.hull, turned);
+  for (size_t i = 0; i < kCount; ++i) most_[first + i] = reach[i] + moved[i];
+}
+
+void MovingPlane::Bounds::AddMiddle() {
+  if (start_.time == end_.time) {
+    // Each vertex has a linear polynomial. Means of two values err by less than the means of six
+    // directions in kMotionPlaneErrorFactor.
+    for (int i = 1; i < 4; ++i) most_[i] = 0.25 * ((4 - i) * most_[0] + i * most_[4]);
+    return;
+  }
+  const Quaternion& q0 = start_.q;
+  const Quaternion& q1 = end_.q;
+  // Coefficients of R(q)^T n of degree 2 for constant n, then of degree 4.
+  const PlainVector first = TurnedBack(q0, q0, n0_);
+  const PlainVector middle = TurnedBack(q0, q1, n0_);
+  const PlainVector last = TurnedBack(q1, q1, n0_);
+  const PlainVector first_1 = turns_ ? TurnedBack(q0, q0, n1_) : first;
+  const PlainVector middle_1 = turns_ ? TurnedBack(q0, q1, n1_) : middle;
+  const PlainVector last_1 = turns_ ? TurnedBack(q1, q1, n1_) : last;
+  SetMost<3>(1, {0.25 * (first + first_1) + 0.5 * middle,
+                 1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
+                 0.5 * middle_1 + 0.25 * (last + last_1)});
+}
+
+bool MovingPlane::IsUsableAt(double time) {
+  const auto is_usable = [=](Side& side) {
     return side.size <= kMotionMaxSize &&
-           LargestOf(At(side.q0, side.q1, time)) >= 2 * kInterpolationLeastRemainder;
+           LargestOf(FrameAt(side, time).q) >= 2 * kInterpolationLeastRemainder;
   };
   return size_ >= kMotionMinSize && is_usable(a_) && is_usable(b_);
 }
 
 MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double start, double end,
-                                     double margin) const {
+                                     double margin) {
   HULLD_DCHECK(0 <= start && start <= end && end <= 1);
   Result result;
-  const Bounds a = BoundsOf(a_, n0, n1, start, end);
-  const Bounds b = BoundsOf(b_, -n0, -n1, start, end);
-  if (!a.usable || !b.usable) return result;
-  const std::array<double, 2> of_a = {a.most[0] / a.weights[0], a.most[4] / a.weights[4]};
-  const std::array<double, 2> of_b = {-b.most[0] / b.weights[0], -b.most[4] / b.weights[4]};
+  const PlainVector from = n0;
+  const PlainVector to = n1;
+  Bounds a(a_, from, to, start, end);
+  Bounds b(b_, -from, -to, start, end);
+  if (!a.usable() || !b.usable()) return result;
+  const std::array<double, 2> of_a = a.Reach();
+  std::array<double, 2> of_b = b.Reach();
+  of_b = {-of_b[0], -of_b[1]};
+  const double gap = (of_b[0] - b_.radius) - (of_a[0] + a_.radius);
   result.end_gap = (of_b[1] - b_.radius) - (of_a[1] + a_.radius);
+  if (const double least = std::min(gap, result.end_gap); least <= 2 * margin) {
+    result.gap = least;
+    return result;
+  }
+  a.AddMiddle();
+  b.AddMiddle();
   // The offset stays in the middle, or keeps pace with A or with B.
   for (const double share : {0.5, 0.0, 1.0}) {
     const double offset = (1 - share) * of_a[0] + share * of_b[0];
@@ -238,7 +373,7 @@ MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double 
                        std::abs(margin) + (a_.radius + b_.radius);
   result.proven = a.IsBelow(result.offset - margin_a, result.end_offset - margin_a, sizes) &&
                   b.IsBelow(-result.offset - margin_b, -result.end_offset - margin_b, sizes);
-  result.gap -= a.ErrorWith(sizes) / a.weight + b.ErrorWith(sizes) / b.weight;
+  result.gap -= a.ErrorWith(sizes) / a.weight() + b.ErrorWith(sizes) / b.weight();
   return result;
 }
 

@@ -2,11 +2,14 @@
 #define HULLD_CORE_QUERY_MOTION_MOVING_PLANE_H_
 
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <optional>
 
 #include "core/numeric/vector.h"
 #include "core/query/motion/first_contact.h"
+#include "core/query/placed/plain_vector.h"
+#include "core/query/terms/pose.h"
 
 namespace hulld {
 
@@ -20,7 +23,10 @@ namespace hulld {
 // is the hull's support value along one of them. So five support values of each hull prove a plane
 // for all vertices and all times of the interval (Farouki and Rajan 1987). The offset may be chosen
 // last: each coefficient bounds it. The pose of a piece in its body does not depend on time: it
-// turns the five directions into the piece's frame, and adds a constant to each support value.
+// turns the five directions into the piece's frame, and adds a constant to each support value. For
+// a hull at rest, the polynomial is linear, and the support values at both ends suffice.
+//
+// Poses at the times last used are kept.
 class MovingPlane {
  public:
   // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), neither is empty.
@@ -32,7 +38,15 @@ class MovingPlane {
 
   // Returns false if planes may be impossible from a time on however far apart the hulls are: their
   // sizes are out of range, or a rotation nearly vanishes (twice kInterpolationLeastRemainder).
-  bool IsUsableAt(double time) const;
+  bool IsUsableAt(double time);
+
+  // Poses of the frames that move at a time in [0, 1], rounded like those of planes, with
+  // quaternions of any length. Requires: IsUsableAt(time).
+  Pose PoseOfA(double time) { return PoseAt(a_, time); }
+  Pose PoseOfB(double time) { return PoseAt(b_, time); }
+  // Returns the gap along a direction n (as in Try) at a time in [0, 1], up to rounding. Requires:
+  // as above.
+  double GapAt(const Vector& n, double time);
 
   struct Result {
     // True if the plane with these offsets has A and B, with their radii, farther than `margin` on
@@ -42,6 +56,7 @@ class MovingPlane {
     double end_offset = 0;
     // Width of the range in which both offsets may move together, less error bounds; a lower bound
     // of the least separation, up to rounding. -infinity if a hull turns too far for a statement.
+    // If not proven, it may be larger, but not than the gap at either end.
     double gap = -std::numeric_limits<double>::infinity();
     // The gap along the direction at the end, up to rounding.
     double end_gap = -std::numeric_limits<double>::infinity();
@@ -49,9 +64,18 @@ class MovingPlane {
   // Tries the direction that turns from n0 to n1 (world frame, from A toward B, of unit length up
   // to rounding) from time `start` to `end`. A margin may be negative. Requires: 0 <= start <= end
   // <= 1, and the same direction if the times are equal.
-  Result Try(const Vector& n0, const Vector& n1, double start, double end, double margin = 0) const;
+  Result Try(const Vector& n0, const Vector& n1, double start, double end, double margin = 0);
 
  private:
+  // A pose at a time, rounded. The largest component of q is below 1.
+  struct Frame {
+    double time = -1;
+    std::array<double, 4> q;
+    PlainVector x;
+    double squared_norm;
+    // False if q is shorter than kInterpolationLeastRemainder.
+    bool usable;
+  };
   // The pose of a piece in its body.
   struct PieceFrame {
     Eigen::Matrix3d R_BH;
@@ -72,12 +96,17 @@ class MovingPlane {
     double radius;
     // True if the motion ends where it starts.
     bool at_rest;
+    // Those last used.
+    std::array<Frame, 4> frames;
+    uint32_t oldest = 0;
   };
-  struct Bounds;
+  class Bounds;
 
   static Side SideOf(const MovingHull& moving);
-  static Bounds BoundsOf(const Side& side, const Vector& n_start, const Vector& n_end, double start,
-                         double end);
+  static const Frame& FrameAt(Side& side, double time);
+  static Pose PoseAt(Side& side, double time);
+  // Returns the largest value of n.p over the hull at a frame, up to rounding.
+  static double ReachAt(Side& side, const PlainVector& n, double time);
 
   Side a_;
   Side b_;

@@ -11,21 +11,25 @@ bool IsAtRest(const Motion& motion) {
   return motion.start.q == motion.end.q && motion.start.t == motion.end.t;
 }
 
-// Places a hull. A pose of the caller has fewer bits than the same pose as a time of a motion.
+void PlaceAt(const Pose& X_WB, const MovingHull& moving, std::optional<PoseProduct>& product,
+             std::optional<PlacedHull>& placed) {
+  if (IsIdentity(moving.X_BH) && moving.piece_radius == 0) {
+    placed.emplace(moving.hull, X_WB, moving.radius);
+    return;
+  }
+  product.emplace(X_WB, moving.X_BH);
+  placed.emplace(moving.hull, *product, moving.radius, moving.piece_radius);
+}
+
+// A pose of the caller has fewer bits than the same pose as a time of a motion.
 void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& product,
              std::optional<PlacedHull>& placed) {
   const auto& [start, end] = moving.X_WB;
-  const bool is_given = time == 0 || time == 1 || IsAtRest(moving.X_WB);
-  const Pose& given = time == 1 ? end : start;
-  if (is_given && IsIdentity(moving.X_BH) && moving.piece_radius == 0) {
-    placed.emplace(moving.hull, given, moving.radius);
+  if (time == 0 || time == 1 || IsAtRest(moving.X_WB)) {
+    PlaceAt(time == 1 ? end : start, moving, product, placed);
     return;
   }
-  if (is_given) {
-    product.emplace(given, moving.X_BH);
-  } else {
-    product.emplace(moving.X_WB, time, moving.X_BH);
-  }
+  product.emplace(moving.X_WB, time, moving.X_BH);
   placed.emplace(moving.hull, *product, moving.radius, moving.piece_radius);
 }
 
@@ -34,6 +38,12 @@ void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& 
 PairAt::PairAt(const MovingHull& a, const MovingHull& b, double time) {
   PlaceAt(time, a, product_a_, placed_a_);
   PlaceAt(time, b, product_b_, placed_b_);
+  pair_.emplace(*placed_a_, *placed_b_);
+}
+
+PairAt::PairAt(const MovingHull& a, const Pose& X_WA, const MovingHull& b, const Pose& X_WB) {
+  PlaceAt(X_WA, a, product_a_, placed_a_);
+  PlaceAt(X_WB, b, product_b_, placed_b_);
   pair_.emplace(*placed_a_, *placed_b_);
 }
 

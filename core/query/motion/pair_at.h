@@ -12,6 +12,7 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
+#include "core/query/terms/pose.h"
 #include "core/query/terms/pose_product.h"
 
 namespace hulld {
@@ -23,6 +24,8 @@ class PairAt {
   // Both hulls must outlive the result. Requires: neither is empty, valid motions
   // (ValidateMotion), and a time in [0, 1].
   PairAt(const MovingHull& a, const MovingHull& b, double time);
+  // The hulls with their frames at given poses.
+  PairAt(const MovingHull& a, const Pose& X_WA, const MovingHull& b, const Pose& X_WB);
   PairAt(const PairAt&) = delete;
   PairAt& operator=(const PairAt&) = delete;
 

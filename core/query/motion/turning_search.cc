@@ -3,13 +3,16 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/expansion.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/pair_at.h"
+#include "core/query/placed/plain_vector.h"
 #include "core/query/terms/answer.h"
 
 namespace hulld {
@@ -27,10 +30,20 @@ constexpr double kTurnedShare = 0.25;
 constexpr double kLeastCosine = 0.5;
 // Trials keep this share of an interval away from its ends. A choice.
 constexpr double kLeastShare = 0x1p-4;
-// Leaps are given up after this many that failed. A choice.
-constexpr int kMostFailedLeaps = 3;
 // Share of the last step over which the rate of the gap is taken. A choice.
 constexpr double kRateShare = 0x1p-10;
+// A leap leaves at least this share of the distance to the likely contact, and this multiple of the
+// error that is expected from the last one. Choices.
+constexpr double kLeastLeftShare = 0x1p-20;
+constexpr double kLeapSlack = 8;
+// A bracket below this is narrow. A choice.
+constexpr double kNarrowBracket = 0x1p-20;
+// The most times at which a passage is cut, and the least share of an interval on either side.
+// Choices.
+constexpr int kMostCuts = 10;
+constexpr double kLeastCutShare = 0x1p-5;
+// Two directions are one if the gaps along them differ by less than this share. A choice.
+constexpr double kSameShare = 0x1p-6;
 // Factor between the lengths of successive steps, at first trial. A choice.
 constexpr double kGrowth = 4;
 // A tolerable step that is shorter than this makes no progress. A choice.
@@ -63,6 +76,20 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap,
   return proven + length * std::clamp(share, kLeastShare, 1 - kLeastShare);
 }
 
+// Returns a unit direction within 54 degrees of m: n or, between both, the nearest to n.
+Vector TurnedToward(const PlainVector& m, const PlainVector& n) {
+  constexpr double kCosine = 0.6;
+  constexpr double kSine = 0.8;
+  constexpr double kLeastSine = 0x1p-4;
+  const double cosine = Dot(m, n);
+  if (cosine >= kCosine) return n;
+  const PlainVector across = n - cosine * m;
+  const double sine = Norm(across);
+  if (!(sine > kLeastSine)) return m;
+  const PlainVector turned = kCosine * m + kSine / sine * across;
+  return 1 / Norm(turned) * turned;
+}
+
 // Returns the least positive root of a + b x + c x^2, or infinity. Requires: a > 0.
 double SmallestRoot(double a, double b, double c) {
   const double squared = b * b - 4 * a * c;
@@ -84,8 +111,9 @@ TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const Mot
 }
 
 absl::StatusOr<FirstContact> TurningSearch::Run() {
+  if (absl::Status s = ProvePassage(); !s.ok()) return s;
   bool may_tolerate = true;
-  for (;;) {
+  while (separated_ < 1 && separated_ <= options_.latest) {
     if (poll_.Step()) return MotionStopped();
     absl::StatusOr<std::optional<Step>> found = NextStep();
     if (!found.ok()) return found.status();
@@ -97,32 +125,20 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       }
       exact_ = true;
       turns_ = false;
+      is_nearest_ = false;
       absl::StatusOr<std::optional<Step>> exact = NextStep();
       if (!exact.ok()) return exact.status();
       if (!*found && !*exact) return ConcludeStuck();
       if (*exact && (!*found || (*exact)->until > (*found)->until)) found = std::move(exact);
     }
     const Step& step = **found;
-    if (options_.want_certificate) {
-      // In place: g++ 12 warns of a variant that is moved there.
-      SeparatedInterval& interval = intervals_.emplace_back();
-      interval.until = step.until;
-      interval.direction = step.direction;
-      interval.offset = step.plane.found.offset;
-      interval.end = {step.plane.end_direction, step.plane.found.end_offset};
-    }
-    turns_ = step.plane.end_direction != step.direction;
-    last_length_ = step.until - separated_;
-    last_gap_ = step.gap;
-    exact_ = exact_ && step.plane.found.gap <= kExactShare * plane_.size();
-    direction_ = step.plane.end_direction;
-    separated_ = step.until;
-    if (separated_ == 1 || separated_ > options_.latest) {
-      return WithoutContact(Relation::kSeparated);
-    }
+    Take(step);
+    if (separated_ == 1 || separated_ > options_.latest) break;
     // Contact is likely where the plane fails, and after it.
     const double latest = LatestContactTime();
-    for (const double time : {step.failed, latest}) {
+    // In a narrow bracket, the later time needs exact arithmetic less often.
+    const bool is_narrow = latest - step.failed < kNarrowBracket;
+    for (const double time : {is_narrow ? latest : step.failed, is_narrow ? step.failed : latest}) {
       if (step.failed > latest) break;
       const absl::StatusOr<Relation> relation = RelationAt(time);
       if (!relation.ok()) return relation.status();
@@ -135,6 +151,103 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       may_tolerate = false;
     }
   }
+  return WithoutContact(Relation::kSeparated);
+}
+
+void TurningSearch::Take(const Step& step) {
+  if (options_.want_certificate) {
+    // In place: g++ 12 warns of a variant that is moved there.
+    SeparatedInterval& interval = intervals_.emplace_back();
+    interval.until = step.until;
+    interval.direction = step.direction;
+    interval.offset = step.plane.found.offset;
+    interval.end = {step.plane.end_direction, step.plane.found.end_offset};
+  }
+  turns_ = step.plane.end_direction != step.direction;
+  is_nearest_ = turns_;
+  last_length_ = step.until - separated_;
+  last_gap_ = step.gap;
+  exact_ = exact_ && step.plane.found.gap <= kExactShare * plane_.size();
+  direction_ = step.plane.end_direction;
+  separated_ = step.until;
+}
+
+absl::StatusOr<TurningSearch::Ahead> TurningSearch::LookAt(double time) {
+  const absl::StatusOr<Vector> n = DirectionAt(time);
+  if (!n.ok()) return n.status();
+  return Ahead{time, *n, n->isZero(0) ? 0 : plane_.GapAt(*n, time)};
+}
+
+// Proves the separation up to the end or to shortly before a contact, by few planes. While no plane
+// between two times is proven, another time between them is added, at which the hulls may be
+// nearest. Gives up early; intervals_ hold what it proved.
+absl::Status TurningSearch::ProvePassage() {
+  absl::StatusOr<Ahead> from = LookAt(0);
+  if (!from.ok()) return from.status();
+  direction_ = from->direction;
+  is_nearest_ = true;
+  if (!(from->gap > 0)) return absl::OkStatus();
+  std::array<Ahead, kMostCuts + 1> ahead;
+  size_t count = 0;
+  // Whatever options_.latest is, so that searches for another latest time take the same steps.
+  double next = 1;
+  for (int cuts = 0; cuts <= kMostCuts; ++cuts) {
+    if (poll_.Step()) return MotionStopped();
+    absl::StatusOr<Ahead> to = LookAt(next);
+    if (!to.ok()) return to.status();
+    if (!(to->gap > 0)) {
+      contact_ = next;
+      break;
+    }
+    ahead[count++] = *to;
+    std::optional<double> cut;
+    while (count > 0 && !(cut = CutOf(*from, ahead[count - 1]))) *from = ahead[--count];
+    if (separated_ > options_.latest) break;
+    if (!cut || !(*cut > from->time && *cut < ahead[count - 1].time)) break;
+    next = *cut;
+  }
+  return absl::OkStatus();
+}
+
+// Takes a step between two times, if a plane is proven whose direction is that at one of them, or
+// turns from one to the other. Otherwise returns a time between them.
+std::optional<double> TurningSearch::CutOf(const Ahead& from, const Ahead& to) {
+  const auto try_plane = [&](const Vector& start, const Vector& end) {
+    const MovingPlane::Result found = plane_.Try(start, end, from.time, to.time);
+    if (!found.proven) return false;
+    Take({to.time, start, {found, end}, from.gap, 2});
+    direction_ = to.direction;
+    is_nearest_ = true;
+    return true;
+  };
+  const double gap_at_end = plane_.GapAt(from.direction, to.time);
+  const double gap_at_start = plane_.GapAt(to.direction, from.time);
+  if (gap_at_start > 0 && try_plane(to.direction, to.direction)) return std::nullopt;
+  if (gap_at_end > 0 && try_plane(from.direction, from.direction)) return std::nullopt;
+  // If both gaps were linear in time, that along the plane would have these Bernstein coefficients
+  // of degree 4, up to factors.
+  const double middle = (gap_at_end + gap_at_start) / 2;
+  if (from.gap + middle > 0 && (from.gap + to.gap) + 4 * middle > 0 && middle + to.gap > 0) {
+    // The end with the larger gap can spare some.
+    const bool starts_wide = from.gap > to.gap;
+    const Vector start = starts_wide ? TurnedToward(to.direction, from.direction) : from.direction;
+    const Vector end = starts_wide ? to.direction : TurnedToward(from.direction, to.direction);
+    if (try_plane(start, end)) return std::nullopt;
+  }
+  const double length = to.time - from.time;
+  const double excess = (from.gap - gap_at_start) + (to.gap - gap_at_end);
+  double share = 0.5;
+  if (excess > kSameShare * (from.gap + to.gap)) {
+    // Where both gaps are equal, if they are linear.
+    share = (from.gap - gap_at_start) / excess;
+  } else {
+    // Where a parabola is least.
+    const double soon = from.time + kRateShare * length;
+    const double rate = (plane_.GapAt(from.direction, soon) - from.gap) / kRateShare;
+    const double curvature = gap_at_end - from.gap - rate;
+    if (rate < 0 && curvature > 0) share = -rate / (2 * curvature);
+  }
+  return from.time + std::clamp(share, kLeastCutShare, 1 - kLeastCutShare) * length;
 }
 
 absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
@@ -145,8 +258,10 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
 }
 
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) {
-  const PairAt at(a_, b_, time);
-  if (exact_) return ExactNearestUnit(at.pair(), options_.should_stop);
+  if (!plane_.IsUsableAt(time)) return Vector(Vector::Zero());
+  if (exact_) return ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
+  // Rounded like the plane that the direction is for.
+  const PairAt at(a_, plane_.PoseOfA(time), b_, plane_.PoseOfB(time));
   const Vector first =
       direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
   if (at.pair().usable() && first.isZero(0)) return Vector(Vector::UnitX());
@@ -170,7 +285,7 @@ absl::StatusOr<TurningSearch::Plane> TurningSearch::TryPlane(const Vector& n, do
 
 // Returns a step from separated_ along the nearest direction, or none if there is no progress.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
-  if (!turns_) {
+  if (!is_nearest_) {
     const absl::StatusOr<Vector> n = DirectionAt(separated_);
     if (!n.ok()) return n.status();
     direction_ = *n;
@@ -186,10 +301,11 @@ bool TurningSearch::IsPoor(const Step& step) const {
 
 // Returns a time at which contact is likely, with `gap` along the nearest direction n: where the
 // parabola through this gap, the last one, and the present rate vanishes. Infinite if nowhere.
-double TurningSearch::LikelyContact(const Vector& n, double gap) const {
+double TurningSearch::LikelyContact(const Vector& n, double gap) {
   if (!(last_gap_ < kInfinity)) return kInfinity;
   const double soon = std::min(1.0, separated_ + kRateShare * last_length_);
-  const double rate = (plane_.Try(n, n, separated_, soon).end_gap - gap) / (soon - separated_);
+  if (!plane_.IsUsableAt(soon)) return kInfinity;
+  const double rate = (plane_.GapAt(n, soon) - gap) / (soon - separated_);
   const double curvature = (last_gap_ - gap + rate * last_length_) / (last_length_ * last_length_);
   return separated_ + SmallestRoot(gap, rate, curvature);
 }
@@ -199,7 +315,13 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
                                                                          const Vector& n,
                                                                          double gap) {
   const double length = contact - separated_;
-  const double share = std::min(kLeftShare, length / last_length_);
+  double share = std::min(kLeftShare, length / last_length_);
+  if (leap_length_ > 0) {
+    // The error of a parabola, as a share of the length, falls at least as the length does.
+    const double error = std::abs(contact - likely_contact_) / leap_length_;
+    share =
+        std::min(share, std::max(kLeapSlack * error * (length / leap_length_), kLeastLeftShare));
+  }
   const double until = contact - std::max(share * length, options_.max_time_error / 4);
   if (!(until > separated_ && until <= 1)) return std::nullopt;
   const absl::StatusOr<Vector> at_end = DirectionAt(until);
@@ -208,6 +330,9 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
   const MovingPlane::Result turned = plane_.Try(n, *at_end, separated_, until);
   // Past a graze, the gap is not nearly closed.
   if (!turned.proven || turned.end_gap > 4 * kLeftShare * gap) return std::nullopt;
+  likely_contact_ = contact;
+  leap_length_ = length;
+  failed_leaps_ = 0;
   return Step{until, n, {turned, *at_end}, gap, contact};
 }
 
@@ -219,18 +344,22 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const
   if (!start.proven) return std::nullopt;
   // Up to rounding, without the error bound.
   const double gap = start.end_gap;
-  if (failed_leaps_ < kMostFailedLeaps) {
+  if (steps_to_leap_ > 0) {
+    --steps_to_leap_;
+  } else {
     const double contact = LikelyContact(n, gap);
     if (contact <= separated_ + last_length_) {
       const absl::StatusOr<std::optional<Step>> leap = LeapTo(contact, n, gap);
       if (!leap.ok() || *leap) return leap;
-      ++failed_leaps_;
+      steps_to_leap_ = ++failed_leaps_;
+      leap_length_ = 0;
     }
   }
   turns_ = turns_ || gap > kTurnedShare * last_gap_;
   Step step = {separated_, n, {start, n}, gap, 2};
   Plane failed = step.plane;
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
+  if (contact_ > separated_) trial = std::min(trial, contact_);
   const double shortest = std::min(kShortestExactStep, kShortestExactShare * last_length_);
   for (int i = 0; i < kMostTrials || step.until == separated_; ++i) {
     if (!(trial > step.until) || trial == step.failed) break;

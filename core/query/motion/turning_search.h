@@ -28,9 +28,15 @@ namespace hulld {
 // the interval's length, so a graze needs a number of steps proportional to the logarithm of its
 // gap.
 //
+// Before these steps, the search tries to prove the motion by few planes between the times at which
+// the hulls seem to be nearest. If the gaps along the nearest directions at two times were linear,
+// and the hulls polyhedra that translate, the hulls would be nearest where both gaps are equal. So
+// a miss, however near, needs few planes, and the time of a contact is known roughly.
+//
 // Near a contact, a step first tries to leap to just before the contact that a parabola predicts,
-// from the present gap, its rate, and the previous gap. Leaps converge superlinearly, and leave few
-// exact queries. After kMostFailedLeaps wrong predictions, the search leaps no more.
+// from the present gap, its rate, and the previous gap. The first prediction's error tells how near
+// the next leap may lead. Leaps converge superlinearly, and leave few exact queries. After k wrong
+// predictions in a row, k steps do not leap.
 //
 // Once the gap is within the resolution, planes that the hulls may cross by the resolution decide
 // if the least separation of the remaining motion is within it, too.
@@ -60,13 +66,24 @@ class TurningSearch {
     double failed;
   };
 
+  // The nearest direction at a time, and the gap along it; not positive if none is found.
+  struct Ahead {
+    double time;
+    Vector direction;
+    double gap;
+  };
+
+  void Take(const Step& step);
+  absl::Status ProvePassage();
+  std::optional<double> CutOf(const Ahead& from, const Ahead& to);
+  absl::StatusOr<Ahead> LookAt(double time);
   absl::StatusOr<Relation> RelationAt(double time) const;
   absl::StatusOr<Vector> DirectionAt(double time);
   absl::StatusOr<Plane> TryPlane(const Vector& n, double start, double end, bool turns,
                                  double margin = 0);
   absl::StatusOr<std::optional<Step>> NextStep();
   bool IsPoor(const Step& step) const;
-  double LikelyContact(const Vector& n, double gap) const;
+  double LikelyContact(const Vector& n, double gap);
   absl::StatusOr<std::optional<Step>> LeapTo(double contact, const Vector& n, double gap);
   absl::StatusOr<std::optional<Step>> FindStep(const Vector& n);
   double LatestContactTime() const;
@@ -91,10 +108,19 @@ class TurningSearch {
   // Length of the last step, and the direction at its end; the next ones start from them.
   double last_length_ = 1;
   Vector direction_ = Vector::Zero();
+  // direction_ is the nearest one at separated_.
+  bool is_nearest_ = false;
+  // A time at which floating point saw no gap; above 1 if none.
+  double contact_ = 2;
   // The nearest direction turns faster than the gap closes.
   bool turns_ = false;
   double last_gap_ = std::numeric_limits<double>::infinity();
+  // Wrong predictions in a row, and the number of steps until the next one.
   int failed_leaps_ = 0;
+  int steps_to_leap_ = 0;
+  // The contact that the last leap predicted, and its distance then; 0 after one that failed.
+  double likely_contact_ = 0;
+  double leap_length_ = 0;
   // The pairs that were last nearest in floating point.
   FloatCombination nearest_pairs_;
   // Directions are exact but for their rounding: the hulls are too near for floating point.
