@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/formats/affine.h"
 #include "client/formats/gltf/gltf_document.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
@@ -20,32 +21,6 @@ namespace {
 
 using google::protobuf::Struct;
 using google::protobuf::Value;
-
-// Row-major 3 x 4: rotation, scale and shear, then translation.
-struct Affine {
-  std::array<std::array<double, 4>, 3> m = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
-};
-
-Affine operator*(const Affine& a, const Affine& b) {
-  Affine product;
-  for (size_t row = 0; row < 3; ++row) {
-    for (size_t column = 0; column < 4; ++column) {
-      double sum = column == 3 ? a.m[row][3] : 0;
-      for (size_t k = 0; k < 3; ++k) sum += a.m[row][k] * b.m[k][column];
-      product.m[row][column] = sum;
-    }
-  }
-  return product;
-}
-
-std::array<double, 3> operator*(const Affine& a, const std::array<double, 3>& p) {
-  std::array<double, 3> q;
-  for (size_t row = 0; row < 3; ++row) {
-    const auto& m = a.m[row];
-    q[row] = m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3];
-  }
-  return q;
-}
 
 // A primitive of a mesh, placed by a node.
 struct Primitive {
