@@ -158,6 +158,15 @@ bool ByteSource::Skip(uint64_t size) {
   }
 }
 
+std::string ByteSource::ReadRest() {
+  std::string bytes;
+  do {
+    bytes.append(buffer_.data() + begin_, end_ - begin_);
+    begin_ = end_;
+  } while (Refill());
+  return bytes;
+}
+
 std::string_view ByteSource::Peek(size_t size) {
   while (end_ - begin_ < size && Refill()) continue;
   return {buffer_.data() + begin_, std::min(size, end_ - begin_)};

@@ -39,6 +39,8 @@ class ByteSource {
   // Reads exactly `size` bytes; returns false if fewer are left.
   bool Read(void* out, size_t size);
   bool Skip(uint64_t size);
+  // Reads the rest of the file; what was read before an error, see status().
+  std::string ReadRest();
   // The next `size` bytes, fewer at the end of the file; they stay to be read. Valid until the next
   // call.
   std::string_view Peek(size_t size);

@@ -118,12 +118,7 @@ size_t GltfDocument::CountOf(const std::string& list) {
 }
 
 void GltfDocument::ReadContainer() {
-  std::string bytes;
-  char block[1 << 16];
-  while (const size_t count = source_->Peek(sizeof(block)).size()) {
-    (void)source_->Read(block, count);
-    bytes.append(block, count);
-  }
+  std::string bytes = source_->ReadRest();
   if (!source_->status().ok()) {
     status_ = source_->status();
     return;
