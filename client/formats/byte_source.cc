@@ -132,6 +132,14 @@ bool ByteSource::ReadLine(std::string_view* line) {
   *line = std::string_view(buffer_.data() + begin_, length);
   begin_ = std::min(begin_ + length + 1, end_);
   while (!line->empty() && line->back() == '\r') line->remove_suffix(1);
+  // The end mark of text under DOS.
+  if (at_end_ && begin_ == end_ && !line->empty() && line->back() == '\x1A') line->remove_suffix(1);
+  for (const auto& [byte, name] : {std::pair('\0', "NUL"), std::pair('\x1A', "^Z")}) {
+    if (line->find(byte) == std::string_view::npos) continue;
+    status_ = ErrorAtLine(absl::StrCat("the line contains the byte ", static_cast<int>(byte), " (",
+                                       name, "); is the file text, and undamaged?"));
+    return false;
+  }
   return true;
 }
 

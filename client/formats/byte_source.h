@@ -18,7 +18,8 @@ namespace hulld {
 // Reads a file or pipe from front to back, as lines or bytes, through one buffer. Memory does not
 // grow with the file. Tracks its position for errors.
 //
-// Lines end at LF or CR LF, or at CR if the first line does. A UTF-8 byte order mark is skipped.
+// Lines end at LF or CR LF, or at CR if the first line does. A UTF-8 byte order mark is skipped, as
+// is ^Z at the end of the file. Other lines with a NUL byte or ^Z are errors.
 class ByteSource {
  public:
   static constexpr size_t kMaxLineBytes = size_t{16} << 20;

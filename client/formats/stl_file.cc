@@ -156,12 +156,23 @@ bool IsControl(char c) {
   return byte < 0x20 && !absl::ascii_isspace(byte);
 }
 
+// True if control characters are errors, because the header of a binary file would not look so.
+bool IsDamagedText(std::string_view start) {
+  const std::string text = absl::AsciiStrToLower(std::string(start));
+  return absl::StartsWith(text, "solid") && absl::StrContains(text, "facet normal");
+}
+
 }  // namespace
 
 absl::Status WalkStl(ByteSource* source, const StlReceiver& receiver) {
   std::string_view start = source->Peek(kBytesToClassify);
   if (!source->status().ok()) return source->status();
-  if (std::any_of(start.begin(), start.end(), IsControl)) return WalkBinaryStl(source, receiver);
+  // The end mark of text under DOS.
+  if (start.size() < kBytesToClassify && !start.empty() && start.back() == '\x1A')
+    start.remove_suffix(1);
+  if (std::any_of(start.begin(), start.end(), IsControl) && !IsDamagedText(start)) {
+    return WalkBinaryStl(source, receiver);
+  }
   if (start.empty())
     return absl::InvalidArgumentError(source->name() + ": not an STL file: it is empty");
   if (start.substr(0, 3) == "\xEF\xBB\xBF") start.remove_prefix(3);

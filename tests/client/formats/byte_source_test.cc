@@ -43,6 +43,37 @@ TEST(ByteSource, SkipsAUtf8Mark) {
   EXPECT_EQ(Lines("\xEF\xBB"), (Strings{"\xEF\xBB"}));
 }
 
+TEST(ByteSource, SkipsTheEndMarkOfDos) {
+  EXPECT_EQ(Lines("x\ny\x1A"), (Strings{"x", "y"}));
+  EXPECT_EQ(Lines("x\r\n\x1A"), (Strings{"x", ""}));
+}
+
+TEST(ByteSource, RefusesBytesThatNoTextContains) {
+  for (const auto& [text, message] :
+       {std::pair(std::string("x\ny\0z\n", 6), "2: the line contains the byte 0 (NUL); is"),
+        std::pair(std::string("x\n\0\0\0", 5), "2: the line contains the byte 0 (NUL); is"),
+        std::pair(std::string("\x1A\nx"), "1: the line contains the byte 26 (^Z); is"),
+        std::pair(std::string("x\ny\x1A\n"), "2: the line contains the byte 26 (^Z); is")}) {
+    const TempFile file("lines", text);
+    auto source = ByteSource::Open(file.path());
+    std::string_view line;
+    while ((*source)->ReadLine(&line)) continue;
+    EXPECT_NE((*source)->status().message().find(message), absl::string_view::npos)
+        << (*source)->status();
+  }
+}
+
+TEST(ByteSource, ReadsTheRest) {
+  const std::string content(1000000, 'a');
+  const TempFile file("bytes", "xy\n" + content);
+  auto source = ByteSource::Open(file.path());
+  std::string_view line;
+  EXPECT_TRUE((*source)->ReadLine(&line));
+  EXPECT_EQ((*source)->ReadRest(), content);
+  EXPECT_EQ((*source)->ReadRest(), "");
+  EXPECT_TRUE((*source)->status().ok());
+}
+
 TEST(ByteSource, RefusesUtf16WithAdvice) {
   const TempFile file("utf16", std::string("\xFF\xFEv\0 \0", 6));
   auto source = ByteSource::Open(file.path());

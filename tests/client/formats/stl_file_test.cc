@@ -106,6 +106,14 @@ TEST(StlText, OtherFilesAreRefusedWithLineAndCount) {
   EXPECT_THAT(Error("solid\n" + Facet() + "endsolid\nx"), HasSubstr("\"solid\" is expected"));
 }
 
+// Also in the first KiB, where control characters are a sign of a binary file.
+TEST(TextStl, DamagedTextIsNotTakenForBinary) {
+  const std::string whole = "solid\n" + Facet() + "endsolid\n";
+  EXPECT_EQ(Error(whole + "\x1A"), "");
+  EXPECT_THAT(Error(Replaced(whole, "endloop", std::string("\0ndloop", 7))),
+              HasSubstr("FILE:7: the line contains the byte 0 (NUL)"));
+}
+
 std::string Binary(uint32_t count, uint32_t triangles, const std::string& header = "") {
   std::string bytes = header + std::string(80 - header.size(), ' ');
   bytes.append(reinterpret_cast<const char*>(&count), 4);

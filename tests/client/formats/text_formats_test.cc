@@ -51,6 +51,24 @@ TEST(ObjFile, FacesOfABrokenFileAreErrors) {
             "FILE: holds no vertex: no line starts with v; is it an OBJ file?");
 }
 
+// Of an OBJ file, lines with an unknown keyword are ignored: a block of zeros lost vertices.
+TEST(TextFiles, BytesThatNoTextContainsAreErrors) {
+  const std::string zeros(4, '\0');
+  EXPECT_THAT(ReadText("v 1 2 3\n" + zeros + "\nv 4 5 6\n", PointFormat::kObj).error(),
+              HasSubstr("FILE:2: the line contains the byte 0 (NUL)"));
+  EXPECT_THAT(ReadText("1 2 3\n4 5 6" + zeros, PointFormat::kXyz).error(),
+              HasSubstr("FILE:2: the line contains the byte 0 (NUL)"));
+  EXPECT_THAT(ReadText("x,y,z\n1,2,3\n" + zeros, PointFormat::kCsv).error(),
+              HasSubstr("FILE:3: the line contains the byte 0 (NUL)"));
+  for (const char* text : {"1 2 3\n4 5 6\x1A", "1 2 3\r\n4 5 6\r\n\x1A"}) {
+    EXPECT_THAT(ReadText(text, PointFormat::kXyz).xyz(), ElementsAre(1, 2, 3, 4, 5, 6));
+    EXPECT_THAT(ReadText(text, PointFormat::kPts).xyz(), ElementsAre(1, 2, 3, 4, 5, 6));
+  }
+  EXPECT_THAT(ReadText("v 1 2 3\n\x1A", PointFormat::kObj).xyz(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("OFF\n1 0 0\n1 2 3\n\x1A", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("x,y,z\n1,2,3\n\x1A", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
 TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
   const PointsRead read =
       ReadText("1e-310 0.1 -1e308\n5e-324 9007199254740993 1e-400 extra 7\n", PointFormat::kXyz);
