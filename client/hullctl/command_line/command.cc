@@ -1,5 +1,6 @@
 #include "client/hullctl/command_line/command.h"
 
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <absl/strings/str_split.h>
@@ -68,11 +69,18 @@ Option& Option::Variable(const std::string& variable) {
 
 Option& Option::OneOf(const std::vector<std::string>& values) {
   description_->choices = values;
-  return Check([values](const std::string& value) -> std::string {
-    if (std::find(values.begin(), values.end(), value) != values.end()) return "";
-    return absl::StrCat(Quoted(value), " is none of ", absl::StrJoin(values, ", "),
-                        Suggestion(value, values));
-  });
+  option_->transform(CLI::Validator(
+      [values](std::string& value) -> std::string {
+        for (const std::string& known : values) {
+          if (!absl::EqualsIgnoreCase(value, known)) continue;
+          value = known;
+          return "";
+        }
+        return absl::StrCat(Quoted(value), " is none of ", absl::StrJoin(values, ", "),
+                            Suggestion(value, values));
+      },
+      ""));
+  return *this;
 }
 
 Option& Option::Check(std::function<std::string(const std::string&)> check) {

@@ -35,7 +35,7 @@ class Option {
   Option& Completes(ValueKind kind);
   // Sets the environment variable named in the help; the declaring code reads it.
   Option& Variable(const std::string& variable);
-  // Allows only these values.
+  // Allows only these values, in any letter case. The variable receives them as listed here.
   Option& OneOf(const std::vector<std::string>& values);
   // Rejects values for which `check` returns a nonempty reason.
   Option& Check(std::function<std::string(const std::string&)> check);

@@ -1,4 +1,5 @@
 // hullctl's commands against the real server: their output matches the server's answers.
+#include <absl/strings/ascii.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
@@ -46,6 +47,21 @@ class HullctlQuestions : public HullctlOnServer {
     return {request, response};
   }
 };
+
+TEST_F(HullctlQuestions, ValuesFromAListTakeAnyLetterCase) {
+  const TempFile file("points", "1 2 3\n4 5 6\n");
+  for (const std::string& name : PointFormatNames()) {
+    const Ran lower = Ask({"append", name, file.path(), "--create", "--format", name});
+    const Ran upper =
+        Ask({"append", name, file.path(), "--create", "--format", absl::AsciiStrToUpper(name)});
+    EXPECT_EQ(upper.code, lower.code) << upper.err;
+    EXPECT_THAT(upper.err, Not(HasSubstr("is none of")));
+  }
+  const Ran ran =
+      Ask({"append", "cloud", file.path(), "--create", "--format", "Xyz", "--output", "JSON"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("\"opened\""));
+}
 
 TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   Put("cube", server::Cube());
