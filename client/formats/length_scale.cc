@@ -79,12 +79,16 @@ std::optional<LengthScale> LengthScale::FromText(std::string_view decimal) {
   return scale;
 }
 
-NumberText LengthScale::ParseDecimal(std::string_view text, double* value) const {
+std::optional<LengthScale> LengthScale::Times(const LengthScale& other) const {
+  return FromText(
+      Product(absl::StrCat(other.negative_ ? "-" : "", other.mantissa_, "e", other.exponent_)));
+}
+
+std::string LengthScale::Product(std::string_view text) const {
   Decimal product = Split(text);
   Multiply(mantissa_, &product.digits);
-  const bool negative = product.negative != negative_;
-  return ParseDouble(
-      absl::StrCat(negative ? "-" : "", product.digits, "e", product.exponent + exponent_), value);
+  return absl::StrCat(product.negative != negative_ ? "-" : "", product.digits, "e",
+                      product.exponent + exponent_);
 }
 
 NumberText LengthScale::Parse(std::string_view text, double* value) const {
@@ -92,7 +96,7 @@ NumberText LengthScale::Parse(std::string_view text, double* value) const {
   const bool is_decimal =
       kind == NumberText::kTooLarge || (kind == NumberText::kNumber && std::isfinite(*value));
   if (is_one() || !is_decimal) return kind;
-  return ParseDecimal(text, value);
+  return ParseDouble(Product(text), value);
 }
 
 double LengthScale::Apply(double x) const {
@@ -122,7 +126,7 @@ double LengthScale::Apply(double x) const {
   const char* const end =
       std::to_chars(text, text + sizeof(text), x, std::chars_format::scientific, 766).ptr;
   double product = 0;
-  if (ParseDecimal(std::string_view(text, static_cast<size_t>(end - text)), &product) ==
+  if (ParseDouble(Product({text, static_cast<size_t>(end - text)}), &product) ==
       NumberText::kTooLarge) {
     return (x < 0) != negative_ ? -HUGE_VAL : HUGE_VAL;
   }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "client/formats/text_number.h"
@@ -20,6 +21,9 @@ class LengthScale {
   // nearest double.
   static std::optional<LengthScale> FromText(std::string_view decimal);
 
+  // Returns the product of both factors as FromText parses it.
+  std::optional<LengthScale> Times(const LengthScale& other) const;
+
   bool is_one() const { return mantissa_ == 1 && exponent_ == 0 && !negative_; }
 
   // Returns x times the scale.
@@ -30,8 +34,8 @@ class LengthScale {
   NumberText Parse(std::string_view text, double* value) const;
 
  private:
-  // Parses a finite decimal number that ParseDouble accepts.
-  NumberText ParseDecimal(std::string_view text, double* value) const;
+  // Returns the exact product with `text`, a finite decimal number that ParseDouble accepts.
+  std::string Product(std::string_view text) const;
 
   // mantissa_ * 10^exponent_; the mantissa does not end in 0.
   uint64_t mantissa_ = 1;

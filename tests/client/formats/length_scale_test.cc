@@ -192,5 +192,21 @@ TEST(ScaledPoints, TextAndFloatsAreScaledByAxis) {
               HasSubstr("beyond the largest double"));
 }
 
+TEST(LengthScale, ProductsAreExact) {
+  const LengthScale inches = Scale("0.0254");
+  const auto product = inches.Times(Scale("-2e-3"));
+  ASSERT_TRUE(product.has_value());
+  EXPECT_EQ(product->Apply(1), -0.0000508);
+  EXPECT_EQ(product->Apply(10), -0.000508);
+  EXPECT_TRUE(inches.Times(LengthScale())->Apply(3) == 0.0762);
+  EXPECT_TRUE(Scale("0.5").Times(Scale("2"))->is_one());
+  EXPECT_TRUE(Scale("-1").Times(Scale("-1"))->is_one());
+  EXPECT_FALSE(Scale("1e200").Times(Scale("1e200")).has_value());
+  EXPECT_FALSE(Scale("1e-200").Times(Scale("1e-200")).has_value());
+  // More than 18 digits stand for the shortest number with the same nearest double.
+  const auto many = Scale("0.123456789012345678").Times(Scale("0.123456789012345678"));
+  EXPECT_EQ(many->Apply(1), 0.015241578753238836);
+}
+
 }  // namespace length_scale_test
 }  // namespace hulld
