@@ -197,7 +197,7 @@ absl::Status ReadNamedParts(const std::string& path, PointFormat format,
     case PointFormat::kGltf:
       return ReadGltfParts(source->get(), parts);
     default:
-      return ReadDaeParts(path, parts);
+      return ReadDaeParts(source->get(), parts);
   }
 }
 

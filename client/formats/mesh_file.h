@@ -49,7 +49,7 @@ absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts);
 absl::Status ReadStlParts(ByteSource* source, std::vector<MeshPart>* parts);
 absl::Status ReadGltfParts(ByteSource* source, std::vector<MeshPart>* parts);
-absl::Status ReadDaeParts(const std::string& path, std::vector<MeshPart>* parts);
+absl::Status ReadDaeParts(ByteSource* source, std::vector<MeshPart>* parts);
 
 // Adds `part` to `to`. INVALID_ARGUMENT, naming `file`, if there are too many vertices.
 absl::Status AddMesh(const std::string& file, const TriangleMesh& part, TriangleMesh* to);

@@ -88,6 +88,7 @@ class PointCollector {
   absl::Status Flush();
 
   const ReadCounts& counts() const { return counts_; }
+  const std::array<LengthScale, 3>& scale() const { return options_.scale; }
 
  private:
   template <typename Scalar, typename ErrorAt>

@@ -54,22 +54,9 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
     case PointFormat::kGltf:
       return ReadGltf(source->get(), points);
     case PointFormat::kDae:
-      break;
+      return ReadDae(source->get(), points);
   }
-  return absl::InternalError("not a format that is read as a stream");
-}
-
-absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
-  if (request.format != PointFormat::kDae) return ReadText(request, points);
-  if (request.path == "-") {
-    return absl::InvalidArgumentError(
-        "dae cannot be read from standard input; save it to a file first");
-  }
-  // Reports plainly why a file cannot be opened.
-  auto source = ByteSource::Open(request.path);
-  if (!source.ok()) return source.status();
-  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
-  return ReadDae(request.path, points);
+  return absl::InternalError("an unknown format");
 }
 
 }  // namespace
@@ -110,7 +97,7 @@ bool IsMeshFormat(PointFormat format) {
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {
   PointCollector points(request.options, receive);
-  if (absl::Status status = ReadAny(request, &points); !status.ok()) return status;
+  if (absl::Status status = ReadText(request, &points); !status.ok()) return status;
   if (absl::Status status = points.Flush(); !status.ok()) return status;
   return points.counts();
 }

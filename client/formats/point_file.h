@@ -32,10 +32,10 @@ bool IsMeshFormat(PointFormat format);
 // vertex; xyz, pts: the first three columns; csv: the columns x, y, and z; stl: each corner of each
 // triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that shows
 // it. COLLADA (dae) is converted to meters by the file's own unit and keeps its axes, as robot
-// descriptions expect: up_axis is ignored.
+// descriptions expect: up_axis is ignored. Coordinates of a mesh that no node moves are rounded
+// once.
 //
-// `path` "-" is standard input, which dae refuses. `progress`, if set, periodically receives
-// the number of bytes read.
+// `path` "-" is standard input. `progress`, if set, periodically receives the number of bytes read.
 struct ReadRequest {
   std::string path;
   PointFormat format;
@@ -55,7 +55,7 @@ absl::Status ReadPts(ByteSource* source, PointCollector* points);
 absl::Status ReadLas(ByteSource* source, PointCollector* points);
 absl::Status ReadStl(ByteSource* source, PointCollector* points);
 absl::Status ReadGltf(ByteSource* source, PointCollector* points);
-absl::Status ReadDae(const std::string& path, PointCollector* points);
+absl::Status ReadDae(ByteSource* source, PointCollector* points);
 
 // Parses the first three tokens of `text`, the coordinates of a point on the source's current line,
 // and adds the point.

@@ -127,6 +127,43 @@ TEST(RealFiles, GltfNodesMoveTheirMeshes) {
   for (const double coordinate : box.xyz()) EXPECT_EQ(std::abs(coordinate), 0.5);
 }
 
+// The counts are those of the accessors of POSITION, by a script that is not part of the project.
+TEST(RealFiles, ColladaModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  const std::pair<const char*, size_t> sizes[] = {
+      {"COLLADA.dae", 3370},
+      {"Cinema4D.dae", 707},
+      {"ConcavePolygon.dae", 64},
+      {"anims_with_full_rotations_between_keys.DAE", 1536},
+      {"cube_UTF8BOM.dae", 8},
+      {"cube_emptyTags.dae", 8},
+      {"cube_tristrips.dae", 24},
+      {"cube_xmlspecialchars.dae", 8},
+      {"duck.dae", 2108},
+      {"kwxport_test_vcolors.dae", 8},
+      {"regr01.dae", 236},
+      {"sphere_triangulate.dae", 382},
+      {"teapot_instancenodes.DAE", 1060}};
+  for (const auto& [name, size] : sizes) {
+    const PointsRead read = ReadPath(Models() / "Collada" / name);
+    ASSERT_TRUE(read.status.ok()) << read.status;
+    EXPECT_EQ(read.counts.points, size) << name;
+    EXPECT_FALSE(read.all_float());
+    const auto mesh = ReadMesh((Models() / "Collada" / name).string());
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->vertices.size(), size) << name;
+    EXPECT_GT(mesh->triangles.size(), 0u) << name;
+  }
+  for (const auto& [name, reason] :
+       {std::pair("box_nested_animation.dae", "a skin or morph targets"),
+        std::pair("library_animation_clips.dae", "a skin or morph targets"),
+        std::pair("cameras.dae", "contains no vertex"), std::pair("lights.dae", "no vertex"),
+        std::pair("teapots.DAE", ":15: \"0,010000\" is not a number (the decimal mark"),
+        std::pair("cube_UTF16LE.dae", "iconv")}) {
+    EXPECT_THAT(ReadPath(Models() / "Collada" / name).error(), HasSubstr(reason)) << name;
+  }
+}
+
 TEST(RealFiles, NonFiniteGltfPointsAreFound) {
   const fs::path path = Models() / "glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb";
   SKIP_WITHOUT(path);

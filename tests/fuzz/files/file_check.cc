@@ -75,6 +75,8 @@ PointReader ReaderOf(FileKind kind) {
       return ReadStl;
     case FileKind::kGltf:
       return ReadGltf;
+    case FileKind::kDae:
+      return ReadDae;
     default:
       return nullptr;
   }
@@ -122,7 +124,8 @@ PointsRead ReadPointsOf(PointReader reader, std::string_view content, const Read
 FileVerdict CheckPoints(PointReader reader, std::string_view content) {
   const PointsRead whole = ReadPointsOf(reader, content, {});
   if (!whole.finding.empty()) return {whole.finding, false};
-  const bool has_geometry = reader == ReadObj || reader == ReadStl || reader == ReadGltf;
+  const bool has_geometry =
+      reader == ReadObj || reader == ReadStl || reader == ReadGltf || reader == ReadDae;
   if (whole.status.ok() && has_geometry && whole.xyz.empty()) return {"read as empty", false};
   ReadOptions options;
   options.points_per_block = kSmallBlock;
@@ -295,6 +298,8 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
       return CheckMesh(MeshOfParts<ReadStlParts>, content);
     case FileKind::kGltfMesh:
       return CheckMesh(MeshOfParts<ReadGltfParts>, content);
+    case FileKind::kDaeMesh:
+      return CheckMesh(MeshOfParts<ReadDaeParts>, content);
     case FileKind::kBatch:
     case FileKind::kYamlScene:
       return CheckScene(content);
@@ -348,6 +353,59 @@ const char* SmallGltf() {
          R"("count":3,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":0,"byteOffset":33,)"
          R"("componentType":5121},"values":{"bufferView":0,"byteOffset":2}}},{"bufferView":0,)"
          R"("byteOffset":32,"componentType":5121,"count":3,"type":"SCALAR"}]})";
+}
+
+// Elements are lines, so that changes of lines are changes of elements.
+const char* SmallDae() {
+  return R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="inch" meter="0.0254"/></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="s"><float_array id="a" count="13">
+9 0 0 0 1 0 0 0 1 0 .5 -2 1e3
+</float_array><technique_common>
+<accessor source="#a" offset="1" count="4" stride="3">
+<param name="X" type="float"/>
+<param name="Y" type="float"/>
+<param name="Z" type="float"/>
+</accessor></technique_common></source>
+<vertices id="v">
+<input semantic="POSITION" source="#s"/>
+</vertices>
+<polylist count="2">
+<input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="NORMAL" source="#n" offset="1"/>
+<vcount>3 4</vcount>
+<p>0 7 1 7 2 7 0 7 1 7 2 7 3 7</p>
+</polylist>
+<tristrips count="1">
+<input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 1 2 3</p>
+</tristrips>
+</mesh></geometry></library_geometries>
+<library_nodes><node id="n">
+<rotate>0 0 1 30</rotate>
+<instance_geometry url="#g"/>
+</node></library_nodes>
+<library_visual_scenes><visual_scene id="c">
+<node id="m">
+<matrix>1 0 0 4 0 1 0 5 0 0 2 6 0 0 0 1</matrix>
+<lookat>1 2 3 4 5 6 0 0 1</lookat>
+<instance_node url="#n"/>
+<node>
+<scale>1 -1 2</scale>
+<skew>30 1 0 0 0 1 0</skew>
+<instance_node url="#n"/>
+</node>
+</node>
+<node id="k">
+<translate>0 0 0</translate>
+<instance_geometry url="#g"/>
+</node>
+</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#c"/></scene>
+</COLLADA>
+)";
 }
 
 // LAS 1.2 with two points of format 0, scale 1 and offset 0.
@@ -405,6 +463,8 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kStlMesh, SmallBinaryStl()},
       {FileKind::kGltf, SmallGltf()},
       {FileKind::kGltfMesh, SmallGltf()},
+      {FileKind::kDae, SmallDae()},
+      {FileKind::kDaeMesh, SmallDae()},
       {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},
       {FileKind::kOffMesh, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n"},
       {FileKind::kBatch,
@@ -455,13 +515,16 @@ std::vector<SeedFile> SeedFiles() {
 
 namespace {
 
-// Returns the positions of all pieces of a kind: lines, runs of digits, or aligned words.
+// Returns the positions of all pieces of a kind: lines, runs of digits, aligned words, or tags with
+// the text after them.
 std::vector<std::pair<size_t, size_t>> Pieces(const std::string& content, size_t kind) {
   std::vector<std::pair<size_t, size_t>> pieces;
   for (size_t at = 0; at < content.size();) {
     size_t end = at + 1;
     if (kind == 0) {
       end = std::min(content.find('\n', at), content.size() - 1) + 1;
+    } else if (kind == 3) {
+      end = std::min(content.find('<', end), content.size());
     } else if (kind == 1) {
       while (end < content.size() && (content[at] >= '0' && content[at] <= '9') &&
              content[end] >= '0' && content[end] <= '9') {
@@ -486,7 +549,7 @@ void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* con
                                    "-1",         "1e999",      "1e-999",
                                    "nan"};
   constexpr uint32_t kWords[] = {0, 1, 2, 0xffffffff, 0x7fffffff, 0x80000000, 0x7f800000, 50, 84};
-  const size_t kind = next(3);
+  const size_t kind = next(content->find('<') == std::string::npos ? 3 : 4);
   const auto pieces = Pieces(*content, kind);
   if (pieces.empty()) return;
   const auto [at, size] = pieces[next(pieces.size())];
@@ -584,6 +647,13 @@ const std::vector<std::string>& FileTokens() {
                                                                   "place: ",
                                                                   "  - ",
                                                                   "<link name=\"z\"/>",
+                                                                  "<instance_node url=\"#m\"/>",
+                                                                  "<instance_geometry url=\"#g\"/>",
+                                                                  "<rotate>0 1 0 90</rotate>",
+                                                                  "<polygons><ph><p>0 1 2</p>",
+                                                                  "<h>0 1 2</h></ph></polygons>",
+                                                                  "<!DOCTYPE a [<!ENTITY b 'c'>]>",
+                                                                  "]]>",
                                                                   "<robot",
                                                                   "</",
                                                                   "/>",

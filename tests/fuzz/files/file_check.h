@@ -22,10 +22,12 @@ enum class FileKind {
   kLas,
   kStl,
   kGltf,
+  kDae,
   kObjMesh,
   kOffMesh,
   kStlMesh,
   kGltfMesh,
+  kDaeMesh,
   kBatch,
   kSceneJson,
   kAnswerJson,
@@ -57,7 +59,7 @@ struct SeedFile {
 };
 std::vector<SeedFile> SeedFiles();
 
-// Mutates `content` once: swaps, repeats, or drops a line, number, or binary word, replaces a
+// Mutates `content` once: swaps, repeats, or drops a line, number, binary word, or tag, replaces a
 // number or word by an extreme value, or truncates the file. next(n) chooses a number below n.
 void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* content);
 
