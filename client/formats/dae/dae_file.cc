@@ -26,7 +26,7 @@ using Vector = std::array<double, 3>;
 
 // Limits for files that show their nodes in each other many times over.
 constexpr int kMostLevels = 256;
-constexpr size_t kMostElements = size_t{1} << 22;
+constexpr size_t kMostElements = size_t{1} << 20;
 constexpr size_t kMostCorners = size_t{1} << 28;
 
 constexpr std::array<LengthScale, 3> kUnscaled = {};

@@ -207,7 +207,7 @@ TEST(DaeScene, NodesThatMultiplyAreRefused) {
     absl::StrAppend(&nodes, "<node id='n", i, "'>", next, next, "</node>\n");
   }
   EXPECT_THAT(Error(Scene(nodes + "<node id='n30'/>")),
-              HasSubstr("is shown too often, with others: more than 4194304 elements"));
+              HasSubstr("is shown too often, with others: more than 1048576 elements"));
 }
 
 // 100,000 triangles, 1,000 times.
