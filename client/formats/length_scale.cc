@@ -71,7 +71,13 @@ std::optional<LengthScale> LengthScale::FromText(std::string_view decimal) {
     digits.pop_back();
     ++parsed.exponent;
   }
-  if (digits.size() > kMaxDigits) return FromText(ShortestText(value));
+  if (digits.size() > kMaxDigits) {
+    // At most 17 digits. Without an exponent, 2^64 would have all of its 20 digits.
+    char text[32];
+    const char* const end =
+        std::to_chars(text, text + sizeof(text), value, std::chars_format::scientific).ptr;
+    return FromText({text, static_cast<size_t>(end - text)});
+  }
   LengthScale scale;
   std::from_chars(digits.data(), digits.data() + digits.size(), scale.mantissa_);
   scale.exponent_ = static_cast<int>(parsed.exponent);

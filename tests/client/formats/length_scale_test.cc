@@ -192,6 +192,13 @@ TEST(ScaledPoints, TextAndFloatsAreScaledByAxis) {
               HasSubstr("beyond the largest double"));
 }
 
+// As a URDF or COLLADA file may name it; recursion without end, formerly.
+TEST(LengthScale, IntegersOfManyDigitsAreShortened) {
+  EXPECT_EQ(Scale("18446744073709551615").Apply(1), 0x1p64);
+  EXPECT_EQ(Scale("-9007199254740993000001").Apply(1), -9007199254740993000001.0);
+  EXPECT_EQ(Scale("1" + std::string(300, '0') + "1").Apply(1), 1e301);
+}
+
 TEST(LengthScale, ProductsAreExact) {
   const LengthScale inches = Scale("0.0254");
   const auto product = inches.Times(Scale("-2e-3"));
