@@ -66,7 +66,7 @@ TEST(RoundToNearest, TheEndsOfTheRangeSaturate) {
   EXPECT_EQ(RoundToNearest(1, 1, 1024).value, kLargestDouble);
   EXPECT_EQ(RoundToNearest(1, 1, 1024).bound, kInfinity);
   EXPECT_EQ(RoundToNearest(-5, 3, 9000).value, -kLargestDouble);
-  // Half a unit above the largest double is a tie, and goes to infinity in IEEE arithmetic.
+  // Half a unit above the largest double is a tie, which IEEE arithmetic rounds to infinity.
   const Integer largest = (Integer(1) << 53) - 1;
   EXPECT_EQ(RoundToNearest(largest, 1, 971).bound, 0);
   EXPECT_EQ(RoundToNearest(4 * largest + 1, 4, 971).value, kLargestDouble);

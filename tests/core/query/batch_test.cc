@@ -69,7 +69,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
     options.method = method;
     options.want_axis = true;
     options.want_analysis = true;
-    // The textbook on all pairs would be slow: every seventh suffices.
+    // The textbook method on all pairs would be slow; every seventh pair suffices.
     std::vector<PlacedPair> pairs;
     for (size_t i = 0; i < crowd.pairs.size(); i += method == Method::kTextbookSat ? 7 : 1) {
       pairs.push_back(crowd.pairs[i]);

@@ -233,7 +233,7 @@ TEST(Normal, EmptyHullsAndQuestionsWithToleranceHaveNone) {
   QueryOptions options = WantNormal();
   options.tolerance = 1;
   EXPECT_EQ(CheckCollision(cube, Pose(), cube, Pose(), options).status().message(),
-            "tolerance is 1, but want_normal needs the exact relation; leave out one of them");
+            "tolerance is 1, but want_normal needs the exact relation; omit one of them");
   options.tolerance = 0;
   options.method = Method::kTextbookSat;
   EXPECT_TRUE(

@@ -298,7 +298,7 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
     });
   };
   const std::string start = "tolerance is 1, but ";
-  const std::string rest = " needs the exact relation; leave out one of them";
+  const std::string rest = " needs the exact relation; omit one of them";
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_separation = true; }),
             start + "want_separation" + rest);
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_certificate = true; }),

@@ -50,7 +50,7 @@ TEST(Tolerance, IsUsedOnlyWhereTheSeparationIsWithinIt) {
   EXPECT_GT(seen[static_cast<size_t>(Relation::kWithinTolerance)], 10);
 }
 
-// Near contact the tolerance avoids the exact rung, which touching contact otherwise needs.
+// Near contact, the tolerance avoids the exact rung, which touching would otherwise require.
 TEST(Tolerance, SparesExactArithmeticInContact) {
   Random random(TestSeed(811));
   int spared = 0;

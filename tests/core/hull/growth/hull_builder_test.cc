@@ -539,7 +539,7 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
     int asked = 0;
     const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
     EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled) << stopped.status();
-    // After a stop it does not poll again.
+    // After a stop, it does not poll again.
     EXPECT_EQ(asked, last);
   }
   EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
@@ -578,7 +578,7 @@ TEST(HullBuilder, NewVerticesComeFromTheLastBlock) {
       const PointCounts counts = builder.Add(points).value();
       const std::vector<Vector> fresh = builder.NewVertices();
       ASSERT_EQ(fresh.size(), counts.outside) << "seed " << seed << " round " << round;
-      // Each exactly one time, with no former and no missing vertex.
+      // Each vertex occurs exactly once; none is missing or out of date.
       const auto after = SetOf(builder.Vertices());
       std::set<std::tuple<double, double, double>> expected;
       std::set_difference(after.begin(), after.end(), before.begin(), before.end(),

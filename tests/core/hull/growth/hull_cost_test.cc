@@ -147,7 +147,7 @@ TEST(HullCost, UndoingCostsAsMuchAsTheChange) {
     limits.max_vertices = static_cast<size_t>(vertices);
     ASSERT_TRUE(builder.Add(inside, limits).ok());
     of_inside.push_back(builder.undo_bytes());
-    // Each equals a vertex.
+    // Every point equals a vertex.
     ASSERT_TRUE(builder.Add(std::span(sphere).first(2000), limits).ok());
     EXPECT_LE(builder.undo_bytes(), 2000 * 48u) << "seed " << seed;
     // Refused at the end, after all were added.

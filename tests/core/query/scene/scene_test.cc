@@ -200,7 +200,7 @@ TEST(BoxTree, IsTheSameOnAnyNumberOfThreads) {
       for (const uint32_t child : one.children(node)) waiting.push_back(child);
     }
     EXPECT_TRUE(std::ranges::all_of(placed, [](bool is_placed) { return is_placed; }));
-    // The whole world meets all but the empty ones.
+    // All of space intersects every box except empty ones.
     std::vector<uint32_t> found;
     two.AppendMeeting(Box::All(), 0, found);
     EXPECT_EQ(found.size(),
