@@ -19,7 +19,7 @@ absl::Status Problem(const std::string& setting, const std::string& path, const 
   return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
 }
 
-// Returns an empty string if only this user, or the group of a file of root, has access.
+// Returns an empty string if only this user has access, or, for a file owned by root, its group.
 std::string CheckAccess(const struct stat& info) {
   if (info.st_uid != 0 && info.st_uid != geteuid()) {
     return absl::StrFormat(
@@ -50,13 +50,13 @@ absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std:
     if (count < 0) return Problem(setting, path, std::strerror(errno));
     if (count == 0) return text;
     text.append(buffer, static_cast<size_t>(count));
-    if (text.size() > kMostBytes) return Problem(setting, path, "it holds more than 1 MiB");
+    if (text.size() > kMostBytes) return Problem(setting, path, "it is larger than 1 MiB");
   }
 }
 
 absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string& setting,
                                      bool secret) {
-  // Nonblocking, so that a pipe is recognized instead of waited for.
+  // Nonblocking, so that opening a pipe is detected as an error instead of blocking.
   const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return Problem(setting, path, std::strerror(errno));
   absl::StatusOr<std::string> text = ReadOpen(fd, path, setting, secret);

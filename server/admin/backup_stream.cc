@@ -16,12 +16,12 @@
 namespace hulld::server {
 namespace {
 
-// A backup holds the hulls of all callers.
+// A backup contains the hulls of all callers.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return WithReason(absl::PermissionDeniedError(absl::StrCat(
-                        "token \"", caller.name, "\" is limited to \"", caller.prefix,
-                        "\", and a backup holds the whole store; use a token without a prefix")),
+                        "token \"", caller.name, "\" is limited to the prefix \"", caller.prefix,
+                        "\", but a backup contains the whole store; use a token without a prefix")),
                     v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }
 
@@ -63,7 +63,7 @@ absl::Status BackupStream::Begin() {
   return absl::OkStatus();
 }
 
-// Runs on a reader thread, since it reads files.
+// Runs on a reader thread because it reads files.
 void BackupStream::OnSent() {
   RunOn(readers_, [this] {
     const absl::StatusOr<bool> more = NextMessage();

@@ -33,7 +33,7 @@ struct Report {
   uint64_t vertices = 0;
   uint64_t bodies = 0;
   std::vector<Finding> findings;
-  // Error that kept the hulls from being read.
+  // Error that prevented reading the hulls.
   std::string failure;
 };
 
@@ -45,9 +45,9 @@ absl::Status Examine(RocksDbStore& store, const StoredHull& stored) {
   const HullRecord& record = stored.record;
   if (builder.vertex_count() != record.vertex_count || builder.dimension() != record.dimension) {
     return absl::DataLossError(absl::StrCat(
-        "hull \"", record.hull_id, "\": its points make a hull of dimension ", builder.dimension(),
-        " with ", builder.vertex_count(), " vertices, its record says ", record.dimension, " and ",
-        record.vertex_count));
+        "hull \"", record.hull_id, "\": its points form a hull of dimension ", builder.dimension(),
+        " with ", builder.vertex_count(), " vertices, but its record says ", record.dimension,
+        " and ", record.vertex_count));
   }
   return AuditHull(builder.Snapshot());
 }

@@ -69,7 +69,7 @@ class PostgresTarget : public MigrationTarget {
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    // A hull may be several changes, all of them in this call; a body is one.
+    // A hull may take several changes, all in this call; a body takes one.
     std::map<std::string_view, uint64_t> vertices;
     uint64_t bodies = 0;
     for (const Change* change : changes) {

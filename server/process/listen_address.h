@@ -19,7 +19,7 @@ struct ListenAddress {
   bool is_unix() const { return !path.empty(); }
   // True if only this machine can reach it: unix sockets, 127.0.0.0/8, ::1 and localhost.
   bool is_local() const;
-  // Formats the address as gRPC and people write it, with `bound_port` in place of the port.
+  // Formats the address in the usual notation, with `bound_port` in place of the port.
   std::string Format(int bound_port) const;
 };
 
@@ -34,7 +34,7 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 // for TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);
 
-// Finds the reason of a bind failure by retrying: UNAVAILABLE with a remedy.
+// Determines the cause of a bind failure by binding again: UNAVAILABLE with a remedy.
 absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag = "--listen");
 
 }  // namespace hulld::server

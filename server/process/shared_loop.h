@@ -19,9 +19,9 @@ namespace hulld::server {
 class SharedLoop {
  public:
   // Runs `work` on disjoint ranges that cover [0, count), on this thread and on up to
-  // `most_helpers` free threads of a pool. Waits for started helpers, and not for queued ones, so
-  // it may be called on any thread that may block. Several threads call `work` concurrently.
-  // Requires step > 0.
+  // `most_helpers` free threads of a pool. Waits for helpers that have started but not for queued
+  // ones, so it may be called on any thread that may block. Several threads call `work`
+  // concurrently. Requires step > 0.
   static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step,
                   std::function<void(size_t begin, size_t end)> work) {
     HULLD_CHECK(step > 0);

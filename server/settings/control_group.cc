@@ -11,8 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In a container, the path may be the host's. Then only the root exists, and it is the container's
-// own group.
+// In a container, the path may be the host's. Then only the root directory exists, and it belongs
+// to the container's own group.
 uint64_t LeastAlong(const fs::path& mount, const std::string& group, const GroupLimit& limit) {
   uint64_t least = limit(mount);
   fs::path path = mount;
@@ -25,7 +25,7 @@ uint64_t LeastAlong(const fs::path& mount, const std::string& group, const Group
 
 }  // namespace
 
-// A line is hierarchy:controllers:group. Version 2 is the hierarchy 0, without controllers.
+// A line is hierarchy:controllers:group. Version 2 uses hierarchy 0 and lists no controllers.
 uint64_t LeastGroupLimit(const fs::path& root, const std::string& controller,
                          const GroupLimit& version_2, const GroupLimit& version_1) {
   const fs::path mount = root / "sys/fs/cgroup";

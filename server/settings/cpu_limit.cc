@@ -15,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A quota of time per period, both in microseconds, in thousandths of a processor. A quota of -1,
-// in version 1, is none.
+// Converts a quota of time per period, both in microseconds, to thousandths of a processor. In
+// version 1, a quota of -1 means none.
 uint64_t Thousandths(double quota, double period) {
   if (!(quota > 0 && period > 0)) return kNoGroupLimit;
   return static_cast<uint64_t>(std::max(1.0, std::round(1000 * quota / period)));
@@ -54,7 +54,7 @@ std::string CpuLimit::Describe() const {
 
 CpuLimit ReadCpuLimit(const fs::path& root) {
   CpuLimit limit;
-  // The C library counts the processors of the affinity.
+  // The C library counts the processors in the affinity mask.
   limit.processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const uint64_t thousandths = LeastGroupLimit(root, "cpu", ReadCpuMax, ReadCfsQuota);
   if (thousandths != kNoGroupLimit) limit.quota = 0.001 * static_cast<double>(thousandths);

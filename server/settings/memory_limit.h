@@ -6,12 +6,13 @@
 
 namespace hulld::server {
 
-// Returns the least memory limit of the control group of this process and its ancestors, in bytes,
-// of versions 1 and 2. UINT64_MAX: no limit. root: parent of /proc and /sys/fs/cgroup, for tests.
+// Returns the lowest memory limit, in bytes, among the control group of this process and its
+// ancestors, of versions 1 and 2. UINT64_MAX: no limit. root: parent of /proc and /sys/fs/cgroup,
+// for tests.
 uint64_t ControlGroupMemory(const std::filesystem::path& root = "/");
 
-// Returns half of the memory that this process may use, in bytes: that of the machine, or
-// ControlGroupMemory() if it is less.
+// Returns half of the memory that this process may use, in bytes: the machine's memory, or
+// ControlGroupMemory() if that is less.
 uint64_t DefaultMemoryLimit();
 
 }  // namespace hulld::server

@@ -163,7 +163,7 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   });
   EXPECT_THAT(std::string(broken.status().message()), HasSubstr("the file ends early"));
   EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
-  // A severed stream differs from one ended by its client only in the missing last message.
+  // A severed stream differs from one ended by its client only by the missing last message.
   grpc::ClientContext context;
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);

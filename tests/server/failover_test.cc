@@ -109,7 +109,7 @@ TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
   EXPECT_GE((*appender)->totals().reconnects, 1);
 }
 
-// The suspended process may resume at any later time: then it changes nothing and exits.
+// The suspended process may resume at any later time; it must then exit without changing anything.
 TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneStandsStill) {
   const std::unique_ptr<Process> active = Start();
   const auto former = Connect(*active);

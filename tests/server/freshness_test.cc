@@ -140,7 +140,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
     EXPECT_TRUE(queue.Next(&tag, &ok));
     return static_cast<Call*>(tag);
   };
-  // One more than may run: the first to end is refused, and the rest wait.
+  // One more call than may run: the first to end is refused, and the rest wait.
   std::vector<Call> calls(kCallsPerClient + 1);
   for (Call& call : calls) ask(call);
   EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);

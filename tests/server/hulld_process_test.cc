@@ -67,7 +67,7 @@ TEST(HulldProgram, EveryThreadHasThePriorityOfTheProcess) {
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   const auto stub = v1::CollisionService::NewStub(
       grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
-  // After a batch, as threads may start lazily.
+  // After a batch, because threads may start lazily.
   grpc::ClientContext context;
   v1::BatchCheckCollisionsRequest request;
   request.add_placements()->set_hull_id("none");

@@ -195,7 +195,7 @@ TEST(LinearizabilityCheck, RefusesAConditionThatDidNotHold) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
   conditional.if_revision = 2;
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
-  // A refusal of a condition that held is refused as well.
+  // Refusing a condition that held is a fault as well.
   conditional.outcome = Outcome::kAborted;
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
 }
@@ -258,7 +258,7 @@ TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
   const Operation lost = Unanswered(replace);
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0x40)})), "");
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0xe0)})), "");
-  // The points are new, but the counts or the incarnation are not.
+  // The points are new, but the counts or the incarnation are old.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 3, 3)})),
             "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 1, 2)})),

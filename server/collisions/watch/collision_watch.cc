@@ -105,7 +105,7 @@ absl::Status CollisionWatch::HandleMessage() {
     case v1::WatchCollisionsRequest::kOpen:
       if (is_open_) {
         return absl::InvalidArgumentError(
-            "open came twice; other placements or pairs need another watch");
+            "open was sent twice; start a new watch for other placements or pairs");
       }
       return Prefixed("open: ", HandleOpen(*request().mutable_open()));
     case v1::WatchCollisionsRequest::kUpdate:
@@ -142,8 +142,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
                           open.ignore_same_group() || open.has_movers();
   if (open.pairs_size() > 0 && has_groups) {
     return absl::InvalidArgumentError(
-        "pairs are set, and groups or movers too; name the pairs, or say which of all to leave "
-        "out");
+        "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
   absl::Status valid =
       ValidatePairs(open.pairs(), table->size(), limits.max_pairs_per_batch, "the watch");

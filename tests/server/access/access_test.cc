@@ -36,7 +36,7 @@ struct Outcome {
   std::string replies;
 };
 
-// A call as the tests below exercise it.
+// A call, in the form used by the tests below.
 struct CallRule {
   Permission needed;
   // The messages of a request about a hull.
@@ -390,7 +390,7 @@ TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
       Outcome absent = Do(call, "cell's secret", none);
       const std::string& said =
           rule.refusal == CallRule::kByStatus ? there.status.error_message() : there.replies;
-      EXPECT_THAT(said, HasSubstr("is outside of \"cell-1/\"")) << call << " " << theirs;
+      EXPECT_THAT(said, HasSubstr("is outside the prefix \"cell-1/\"")) << call << " " << theirs;
       EXPECT_EQ(there.status.error_code(), rule.refusal == CallRule::kByStatus
                                                ? grpc::StatusCode::PERMISSION_DENIED
                                                : grpc::StatusCode::OK)

@@ -1,4 +1,4 @@
-// Memory that callers can make the program hold, before and after they are authenticated.
+// Memory that callers can make the server allocate, before and after they are authenticated.
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -40,7 +40,7 @@ long StatusField(pid_t pid, const std::string& name) {
   return 0;
 }
 
-// Empty placements, two bytes each: parsed they take forty times as much.
+// Empty placements, two bytes each: parsed, they take forty times as much.
 grpc::ByteBuffer EmptyPlacements() {
   std::string bytes;
   while (bytes.size() < (16u << 20) - 64) bytes.append("\x0a\x00", 2);

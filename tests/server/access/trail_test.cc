@@ -120,7 +120,7 @@ TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
   EXPECT_THAT(log.text(), Not(HasSubstr("points appended")));
 }
 
-// gRPC knows no peer any more once the connection is gone.
+// gRPC no longer knows the peer after the connection is closed.
 TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
   Restart(TestConfig());
   const CapturedLog log;
@@ -156,7 +156,7 @@ TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
     return ValueOf(context.GetServerTrailingMetadata(), "traceparent");
   };
   EXPECT_EQ(ask({kTraceparent}, "a"), kTraceparent);
-  // A malformed or repeated header is no trace.
+  // A malformed or repeated header does not count as a trace.
   EXPECT_EQ(ask({"00-00000000000000000000000000000000-b7ad6b7169203331-01"}, "b"), "");
   EXPECT_EQ(ask({kTraceparent, kTraceparent}, "c"), "");
   EXPECT_EQ(ask({}, "d"), "");

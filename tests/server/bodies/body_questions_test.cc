@@ -244,7 +244,7 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   take(stream->Update(update));
   EXPECT_THAT(relations, ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING));
   EXPECT_THAT(pieces, ElementsAre(-1, -1, 0, -1));
-  // The body is put again, then one of its hulls is deleted; a refresh shows each change.
+  // Puts the body again, then deletes one of its hulls; a refresh shows each change.
   ASSERT_TRUE(PutBody("pair", {PlacementOf("cube", 30, 0, 0)}).ok());
   v1::CollisionStreamUpdate refresh;
   refresh.set_refresh_hulls(true);

@@ -199,7 +199,7 @@ TEST_F(BodyCalls, BodiesCountAgainstTheMemoryLimit) {
   const auto second = PutBody("second", pieces);
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_THAT(TextOf(second.status()), HasSubstr("--memory-limit"));
-  // Memory does not suffice for queries either: each call copies the pieces.
+  // Memory is also insufficient for queries: each call copies the pieces.
   EXPECT_TRUE(absl::IsResourceExhausted(Ask(PlacementOf("first"), PlacementOf("cube")).status()));
   // Refused or deleted bodies are no longer counted.
   ASSERT_TRUE(MakeClient().DeleteBody("first").ok());

@@ -264,7 +264,7 @@ TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   expect({open, open}, "open was sent twice");
   expect({v1::AppendPointsRequest()}, "set open or chunk");
   expect({OpenMessage("a//b", "w")}, "open.hull_id \"a//b\" has an empty segment");
-  expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id holds 257");
+  expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id has 257");
   expect({open, ChunkMessage(0, Cube())}, "sequences start at 1");
   expect({open, ChunkMessage(1, {1, 2, 3, 4})}, "chunk 1: points.xyz holds 4 numbers");
   v1::AppendPointsRequest both = ChunkMessage(1, {1, 2, 3});

@@ -322,7 +322,7 @@ TEST_F(HullCalls, APrefixLongerThanAnyIdIsRefusedAndNotSentBack) {
   request.set_prefix(std::string(100'000, 'x'));
   const grpc::Status status = List(request, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.error_message(), "prefix holds 100000 characters; an ID holds at most 256");
+  EXPECT_EQ(status.error_message(), "prefix has 100000 characters; the limit is 256");
 }
 
 TEST_F(HullCalls, ForeignPageTokensAreRefused) {

@@ -200,7 +200,7 @@ TEST_P(MigrationTest, TheCopyServesTheSame) {
   EXPECT_THAT(ran.out, HasSubstr("\nverified: all records match; "));
   const auto source = from_->Serve();
   const auto copy = to_->Serve();
-  EXPECT_THAT(ran.out, HasSubstr("is store " + copy->store().id() + " now\n"));
+  EXPECT_THAT(ran.out, HasSubstr("is now store " + copy->store().id() + "\n"));
   ExpectSame(*source, *copy);
   // It continues at the source's revision.
   ASSERT_TRUE(copy->Put("grown", {{0, 0, 99}}).ok());

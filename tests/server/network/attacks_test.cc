@@ -1,6 +1,6 @@
 // Small programs that attack hulld. Each ends with a server that still answers and, for attacks on
-// one connection, with the end of that connection. The same against haproxy as configured by
-// docker/haproxy/front.cfg.
+// one connection, with the end of that connection. The same attacks run against haproxy as
+// configured by docker/haproxy/front.cfg.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>

@@ -221,7 +221,7 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  // None of this waits; the canonical snapshot is no work for gRPC's thread.
+  // None of these calls waits; building the canonical snapshot is not a job for gRPC's thread.
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 0);
   Get("a");
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
@@ -257,7 +257,7 @@ TEST_F(Observation, ReaderAndWriterMemoryAreReportedSeparately) {
   v1::StreamCollisionsResponse answer;
   ASSERT_TRUE(stream->Read(&answer));
   EXPECT_GT(Metric("hulld_cache_reading_bytes"), 0);
-  // With memory alone, no hull is at rest.
+  // Without storage, no hull can be evicted.
   EXPECT_EQ(Metric("hulld_cache_bytes"),
             Metric("hulld_cache_reading_bytes") + Metric("hulld_cache_writing_bytes"));
   stream->WritesDone();
@@ -442,7 +442,7 @@ TEST_F(Observation, SlowRequestsAreLoggedWithTheirSizes) {
   Restart(config);
   Put("ball", Sphere(100));
   const CapturedLog log;
-  // Some 10^8 operations: more than a millisecond on any machine.
+  // About 10^8 operations: more than a millisecond on any machine.
   v1::BatchCheckCollisionsRequest request;
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
   *request.add_placements() = PlacementOf("ball");

@@ -157,7 +157,7 @@ TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
   std::promise<void> done;
   TaskPool pool(2);
   TaskPool::Lane lane(pool);
-  // Each waits for the other.
+  // Both tasks wait for each other.
   lane.Submit([&] {
     first.set_value();
     second.get_future().wait();

@@ -187,7 +187,7 @@ TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
   environment_["HULLD_STORE"] = "postgres";
   environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
   EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");
-  // Servers that always took over would forever take the store from each other.
+  // Servers that always took over would keep taking the store from each other forever.
   environment_["HULLD_TAKE_OVER"] = "true";
   EXPECT_FALSE(Accepted({}).take_over);
 }

@@ -39,7 +39,7 @@ TEST_F(CpuLimitTest, AContainerSeesItsOwnGroupAsTheRoot) {
   EXPECT_EQ(Quota(), 2);
 }
 
-TEST_F(CpuLimitTest, TheLeastOfTheGroupsAboveCounts) {
+TEST_F(CpuLimitTest, TheLowestLimitOfAllAncestorsApplies) {
   Write("proc/self/cgroup", "0::/a/b/c");
   Write("sys/fs/cgroup/a/cpu.max", "300000 100000");
   Write("sys/fs/cgroup/a/b/cpu.max", "75000 50000");

@@ -17,7 +17,7 @@ namespace store_damage_test {
 
 using ::testing::HasSubstr;
 
-// Makes three hulls. Tests damage the second one.
+// Creates three hulls. Tests damage the second one.
 template <typename Hulls>
 void PutThree(Hulls& hulls) {
   for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(hulls.Put(id, CubeCorners()).ok());

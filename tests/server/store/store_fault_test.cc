@@ -54,7 +54,7 @@ class StoreFault : public StoreTest {
       }
       files_->SetFault(Fault::kNone);
     }
-    // No restart, not even a new stream.
+    // Neither a restart nor a new stream is needed.
     const absl::StatusOr<ChunkResult> accepted = hulls_->Append(session, 2, {{9, 9, 9}});
     ASSERT_TRUE(accepted.ok()) << accepted.status();
     EXPECT_GT(accepted->hull_revision, revision);
@@ -359,7 +359,7 @@ TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
   EXPECT_EQ(directories(), before);
 }
 
-// Its former revisions may be given to other changes.
+// Its former revisions may be assigned to other changes.
 TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);

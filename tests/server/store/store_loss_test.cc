@@ -23,7 +23,8 @@ using ::testing::HasSubstr;
 
 class StoreLoss : public StoreTest {
  protected:
-  // Makes each hull in a log of its own, without a flush, and copies the store like a kill.
+  // Creates each hull in a separate log, without a flush, and copies the store as a kill would
+  // leave it.
   void PutInLogsOfTheirOwn(const std::vector<std::string>& hulls) {
     Start();
     rocksdb::DB& db = hulls_->store().db();
@@ -193,12 +194,12 @@ TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
   EXPECT_EQ(hulls.View("c").status().code(), absl::StatusCode::kNotFound);
 }
 
-// RocksDB takes zeros for preallocated bytes.
+// RocksDB interprets zeros as preallocated bytes.
 TEST_F(StoreLoss, ALogEndingInZerosIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   const std::string content = Read(Logs()[0]);
   Write(Logs()[0], std::string(content.size(), '\0'));
-  ExpectLoss("does not hold what was written");
+  ExpectLoss("differ from what was written");
 }
 
 TEST_F(StoreLoss, AnOlderCopyOfTheLogIsRefused) {

@@ -42,7 +42,7 @@ class StoreRoom : public StoreTest {
     files_->SetRoom(files_->used() + 4096);
     ExpectFull();
   }
-  // A change of 1.4 MB is refused again and again, and changes nothing.
+  // A change of 1.4 MB is refused each time, without effect.
   void ExpectFull() {
     const uint64_t revision = hulls_->registry().Sizes().store_revision;
     for (int attempt = 0; attempt < 3; ++attempt) {
@@ -141,7 +141,7 @@ TEST(SmallDiskRoom, AFullDiskTakesDeletionsAndIsStartedOn) {
   };
   for (; count < 20; ++count) ASSERT_TRUE(put().ok());
   for (int attempt = 0; attempt < 3; ++attempt) {
-    // Preallocated bytes of the log take some more changes.
+    // Preallocated bytes of the log have space for some more changes.
     absl::Status refused;
     for (; refused.ok(); ++count) {
       disk.Fill();

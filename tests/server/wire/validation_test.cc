@@ -45,7 +45,7 @@ TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
   expect("a\nb", "\"a\\nb\" is malformed at character 1");
   expect("\xC3\xA4", "\"\xC3\xA4\" is malformed at character 0");
   expect(std::string("a\0b", 3), "malformed at character 1");
-  expect(std::string(257, 'a'), "holds 257 characters; the limit is 256");
+  expect(std::string(257, 'a'), "has 257 characters; the limit is 256");
 }
 
 TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {

@@ -84,7 +84,7 @@ TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
     return false;
   };
   auto next = std::async(std::launch::async, [this] { return Open(); });
-  // It found the store claimed.
+  // The server found the store claimed.
   asked.get_future().get();
   EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
   hulls_ = nullptr;

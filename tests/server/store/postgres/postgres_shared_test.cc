@@ -613,7 +613,7 @@ TEST_F(PostgresShared, AServerThatWasActiveAloneIsShutOutAndShutsOut) {
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   options_.shared = true;
   options_.should_stop = [] { return true; };
-  // It waits for the server that is active alone.
+  // It waits for the server that requires exclusive access.
   EXPECT_TRUE(absl::IsCancelled(Open().status()));
   hulls_ = nullptr;
   options_.should_stop = {};
