@@ -65,7 +65,7 @@ absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
     return absl::InvalidArgumentError(
         "dae cannot be read from standard input; save it to a file first");
   }
-  // Reports plainly why a file cannot be opened.
+  // Explains why a file cannot be opened.
   auto source = ByteSource::Open(request.path);
   if (!source.ok()) return source.status();
   if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
@@ -87,7 +87,8 @@ absl::StatusOr<PointFormat> PointFormatFromName(const std::string& name) {
   for (const FormatName& entry : kFormatNames) {
     if (absl::AsciiStrToLower(name) == entry.name) return entry.format;
   }
-  return absl::InvalidArgumentError(absl::StrCat("unknown format ", Quoted(name), "; known are ",
+  return absl::InvalidArgumentError(absl::StrCat("unknown format ", Quoted(name),
+                                                 "; supported formats are ",
                                                  absl::StrJoin(PointFormatNames(), ", ")));
 }
 

@@ -1,4 +1,4 @@
-// Packed placements are equivalent to a list of placements, in every call that takes them.
+// Packed placements are equivalent to a list of placements, in every call that accepts them.
 
 #include "client/packed_placements.h"
 

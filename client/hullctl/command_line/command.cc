@@ -70,7 +70,7 @@ Option& Option::OneOf(const std::vector<std::string>& values) {
   description_->choices = values;
   return Check([values](const std::string& value) -> std::string {
     if (std::find(values.begin(), values.end(), value) != values.end()) return "";
-    return absl::StrCat(Quoted(value), " is none of ", absl::StrJoin(values, ", "),
+    return absl::StrCat(Quoted(value), " is not one of ", absl::StrJoin(values, ", "),
                         Suggestion(value, values));
   });
 }

@@ -101,7 +101,7 @@ TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
   const Deadline deadline = now + milliseconds(800);
   EXPECT_TRUE(absl::IsUnavailable(
       CallWithRetries(policy, deadline, [] { return absl::UnavailableError(""); })));
-  // The third would end at or after the deadline, 700 ms in.
+  // The third would end at or after the deadline of 700 ms.
   EXPECT_THAT(waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400)));
   // Call deadlines use the wall clock, as gRPC requires: they denote the same time.
   const auto before = std::chrono::system_clock::now();

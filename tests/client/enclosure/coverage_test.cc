@@ -57,7 +57,7 @@ TEST(Coverage, TwoHalvesEncloseTheWhole) {
   EXPECT_GT(coverage.clipped, 0u);
 }
 
-// A box rotated by a third turn about the diagonal (1, 1, 1), and moved, takes its axes with it.
+// The axes of a box rotate with it: a third turn about the diagonal (1, 1, 1), and a translation.
 TEST(Coverage, APieceStandsAtItsPose) {
   const CoveringPiece turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
   EXPECT_TRUE(Cover({turned}, BoxMesh({10, 0, 0}, {13, 1, 2})).uncovered.empty());
@@ -100,7 +100,7 @@ TEST(Coverage, PiecesThatMeetTurned) {
             1u);
 }
 
-// A gap of a unit in the last place is a gap.
+// A gap of one unit in the last place counts as a gap.
 TEST(Coverage, TheNarrowestGapIsSeen) {
   const double start = std::nextafter(0.7, 1);
   const Coverage coverage =

@@ -160,7 +160,7 @@ TEST(HostileFiles, ARowOfManyGigabytesIsRefused) {
                        "DATA binary\nxx",
                        PointFormat::kPcd)
                   .error(),
-              HasSubstr("WIDTH times HEIGHT is beyond 2^64"));
+              HasSubstr("WIDTH times HEIGHT exceeds 2^64"));
 }
 
 }  // namespace hostile_files_test

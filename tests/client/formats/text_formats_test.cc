@@ -40,15 +40,15 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
 TEST(ObjFile, FacesOfABrokenFileAreErrors) {
   const std::string vertices = "v 1 2 3\nv 4 5 6\n";
   EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
-            "FILE:4: a face names vertex 3, but the file holds 2");
+            "FILE:4: a face names vertex 3, but the file has 2");
   EXPECT_EQ(ReadText(vertices + "f 1 0 2\n", PointFormat::kObj).error(),
-            "FILE:3: \"0\" names no vertex; 2 came before");
+            "FILE:3: \"0\" is not a vertex; 2 precede this line");
   EXPECT_THAT(ReadText(vertices + "f -1 -3\n", PointFormat::kObj).error(),
-              HasSubstr("FILE:3: \"-3\" names no vertex"));
+              HasSubstr("FILE:3: \"-3\" is not a vertex"));
   EXPECT_EQ(ReadText(vertices + "f\n", PointFormat::kObj).error(),
             "FILE:3: a face names no vertex");
   EXPECT_EQ(ReadText("", PointFormat::kObj).error(),
-            "FILE: holds no vertex: no line starts with v; is it an OBJ file?");
+            "FILE: contains no vertices: no line starts with v; is it an OBJ file?");
 }
 
 TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
@@ -95,7 +95,7 @@ TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
   EXPECT_THAT(error("1,5 2,5 3,5\n"),
               HasSubstr("FILE:1: \"1,5 2,5 3,5\" has white space and \",\" between its numbers"));
   EXPECT_THAT(error("1 2 3\n1,2,3 255 0 0\n"), HasSubstr("FILE:2:"));
-  EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("the decimal mark is a point"));
+  EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("use a point as the decimal mark"));
   EXPECT_THAT(error("x,y,z\n1,2,3\n"),
               HasSubstr("\"x\" is not a number; --format csv reads tables with a header"));
   EXPECT_THAT(error("1,,3\n"), HasSubstr("\"\" is not a number"));
@@ -117,7 +117,7 @@ TEST(XyzFile, ANumberTooLargeIsAnErrorEvenWhenNonFinitePointsAreSkipped) {
   ReadOptions options;
   options.skip_nonfinite = true;
   EXPECT_THAT(ReadText("1 2 3\n1 1e999 3\n", PointFormat::kXyz, options).error(),
-              HasSubstr("FILE:2: \"1e999\" is beyond the largest double"));
+              HasSubstr("FILE:2: \"1e999\" exceeds the largest double"));
 }
 
 TEST(XyzFile, NonFinitePointsAreErrorsThatNameFileAndPoint) {
@@ -194,7 +194,7 @@ TEST(CsvFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("a,b,c\n1,2,3\n", PointFormat::kCsv).error(),
             "FILE:1: the header has no column \"x\"; it must name x, y and z");
   EXPECT_EQ(ReadText("1,5;2,5;3,5\n", PointFormat::kCsv).error(),
-            "FILE:1: \"1,5\" is not a number (the decimal mark is a point)");
+            "FILE:1: \"1,5\" is not a number (use a point as the decimal mark)");
   EXPECT_EQ(ReadText("1,,3\n", PointFormat::kCsv).error(), "FILE:1: \"\" is not a number");
 }
 
@@ -215,7 +215,7 @@ TEST(OffFile, FacesWithoutVerticesAreAnError) {
             "FILE:2: the file declares 1 faces, but no vertex");
 }
 
-// A count of vertices that is too small makes faces of the last ones.
+// If the vertex count is too small, the last vertices are parsed as faces.
 TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
   const std::string rows = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n";
   const auto error = [&](const std::string& counts) {
@@ -225,7 +225,7 @@ TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
   EXPECT_THAT(error("3 2 0"), HasSubstr("FILE:"));
   EXPECT_THAT(error("3 3 0"), HasSubstr("FILE:"));
   EXPECT_EQ(error("4 1 0"),
-            "FILE:8: the file goes on after 4 vertices and 1 face, the counts of its header");
+            "FILE:8: the file continues after 4 vertices and 1 face, the counts of its header");
   EXPECT_THAT(ReadText("OFF\n1 1 0\n1 2 3\n3 0 0 1\n", PointFormat::kOff).error(),
               HasSubstr("FILE:4: a face needs its number of corners"));
 }
@@ -345,7 +345,7 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText(std::string(kPcdHead) + "POINTS 1\nWIDTH 1\nDATA ascii\n0 1 2 3 0 0 0 8\n",
                      PointFormat::kPcd)
                 .error(),
-            "FILE:13: \"8\" is beyond the 7 values of a point that FIELDS and COUNT declare");
+            "FILE:13: \"8\" is one value too many; FIELDS and COUNT declare 7 per point");
   EXPECT_EQ(
       ReadText("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", PointFormat::kPcd)
           .error(),

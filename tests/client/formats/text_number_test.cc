@@ -67,7 +67,7 @@ TEST(TextNumber, TooLargeNumbersAreReported) {
   EXPECT_EQ(KindOf(std::string(400, '9')), NumberText::kTooLarge);
   EXPECT_EQ(KindOf(std::string(400, '9') + ".5"), NumberText::kTooLarge);
   EXPECT_EQ(NumberProblem(NumberText::kTooLarge, "1e999"),
-            "\"1e999\" is beyond the largest double, about 1.8e308; rescale the points");
+            "\"1e999\" exceeds the largest double, about 1.8e308; rescale the points");
 }
 
 TEST(TextNumber, ReadsNanAndInfinityAsSuch) {

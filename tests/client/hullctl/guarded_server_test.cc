@@ -96,7 +96,7 @@ TEST_F(GuardedServer, TheServerAcceptsTokensMadeByHullctl) {
   EXPECT_THAT(list.out, AllOf(HasSubstr("cell-1/a"), Not(HasSubstr("cell-10/a"))));
   const Ran denied = As("cell", {"get", "cell-10/a"});
   EXPECT_EQ(denied.code, 1);
-  EXPECT_THAT(denied.err, HasSubstr("is outside of \"cell-1/\""));
+  EXPECT_THAT(denied.err, HasSubstr("is outside the prefix \"cell-1/\""));
   const Ran role = As("view", {"delete", "cell-1/a"});
   EXPECT_EQ(role.code, 1);
   EXPECT_THAT(role.err, HasSubstr("token \"view\" has the role read-only"));

@@ -104,7 +104,7 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
                         "\"contactTime\":0.5}"));
   ran = Ask(with({"--separation"}));
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("wanted.separation excludes end_pose"));
+  EXPECT_THAT(ran.err, HasSubstr("wanted.separation cannot be combined with end_pose"));
 
   ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
@@ -179,7 +179,7 @@ TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
   EXPECT_EQ(Ask({"cast", "1,2", "8,0,0"}).code, 2);
   ran = Ask({"cast", "1e308,0,0", "1e308,0,0"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION is beyond the largest double"));
+  EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION exceeds the largest double"));
   EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 

@@ -147,7 +147,7 @@ TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
   EXPECT_EQ(error({"list", "--servr=x:1"}),
             "hullctl: 'hullctl list' has no option \"--servr\"; did you mean \"--server\"?");
   EXPECT_EQ(error({"list", "--output", "jsn"}),
-            "hullctl: --output: \"jsn\" is none of table, wide, name, json; did you mean "
+            "hullctl: --output: \"jsn\" is not one of table, wide, name, json; did you mean "
             "\"json\"?");
   EXPECT_EQ(error({"list", "--limit"}), "hullctl: --limit needs a value: --limit N");
 }
@@ -529,7 +529,7 @@ TEST_F(HullctlTest, AFalseSimplificationIsNotWritten) {
   EXPECT_EQ(many.code, 5);
   EXPECT_EQ(many.out, "");
   EXPECT_THAT(many.err, HasSubstr("is invalid; nothing was written: the simplification "
-                                  "has 4 vertices; at most 3 were asked for"));
+                                  "has 4 vertices; at most 3 were requested"));
   const Ran whole = Ask({"mesh", "a", "--verify"});
   EXPECT_EQ(whole.code, 2);
   EXPECT_THAT(whole.err, HasSubstr("--max-vertices"));

@@ -389,11 +389,11 @@ TEST(MotionCheck, TheEndOfAPlaneIsWhole) {
 TEST(MotionCheck, RotationsNeedOffsets) {
   Claim claim = RodTouches();
   claim.contact.mutable_intervals(0)->clear_offset();
-  ExpectInvalid(claim, kCeiling, kTurningRod, "intervals[0]: there is no offset");
+  ExpectInvalid(claim, kCeiling, kTurningRod, "intervals[0]: the offset is missing");
   // The rotation vanishes at half time.
   const Moving flipped = Turned(Cube(), kNoTurn, {-1, 0, 0, 0});
   const Moving far_away = Shifted(Cube(), {9, 0, 0}, {9, 0, 0});
-  ExpectInvalid(Separated().Until(1, {1, 0, 0}), flipped, far_away, "there is no offset");
+  ExpectInvalid(Separated().Until(1, {1, 0, 0}), flipped, far_away, "the offset is missing");
   ExpectInvalid(Separated().Until(1, {1, 0, 0}, 4), flipped, far_away, "A does not stay");
 }
 
@@ -550,7 +550,8 @@ TEST(MotionCheck, DirectionsAndOffsetsMustBeOfUse) {
 
 TEST(MotionCheck, MalformedMotionsAreRefused) {
   const Claim claim = Separated().Until(1, {1, 0, 0});
-  ExpectInvalid(claim, kCube, Coming(3, kNaN), "a translation holds a number that is not finite");
+  ExpectInvalid(claim, kCube, Coming(3, kNaN),
+                "a translation contains a number that is not finite");
   ExpectInvalid(claim, Turned(Cube(), kNoTurn, {0, 0, 0, 0}), Coming(3, 2), "rotation is zero");
 }
 

@@ -111,9 +111,9 @@ TEST(SimplificationCheck, KnowsInsideFromOutsideToTheLastBit) {
 TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const HullMesh simple = Claiming(1.5, TetrahedronInCube());
-  ExpectInvalid(Asked(kInside, 3), cube, simple, "has 4 vertices; at most 3 were asked for");
+  ExpectInvalid(Asked(kInside, 3), cube, simple, "has 4 vertices; at most 3 were requested");
   ExpectInvalid(Asked(kInside, 0, 1.25), cube, simple,
-                "the error is 1.5; at most 1.25 was asked for");
+                "the error is 1.5; at most 1.25 was requested");
   ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
   // With both limits, the nearest that the server finds is accepted.
   ExpectValid(Asked(kInside, 4, 1.25), cube, simple);

@@ -170,14 +170,14 @@ TEST(GltfFile, MorphTargetsMoveVerticesByTheirWeights) {
   EXPECT_THAT(read("[0,0]", ""), ElementsAre(x, 0, 0, 1, 0, 0, 0, 2, 0));
   EXPECT_THAT(read("[0.5,0]", ""), ElementsAre(x + 1, 2, 4, 2, 2, 4, 1, 4, 4));
   EXPECT_THAT(read("[0.5,1]", ""), ElementsAre(x + 1 + 100, 2, 4, 102, 2, 4, 101, 4, 4));
-  // The node's weights win.
+  // The node's weights take precedence.
   EXPECT_THAT(read("[9,9]", "[-0.5,0]"), ElementsAre(x - 1, -2, -4, 0, -2, -4, -1, 0, -4));
   EXPECT_THAT(Error(Replaced(MorphGltf("[1,0]", ""), R"("count":3,"byteOffset":36)",
                              R"("count":2,"byteOffset":36)")),
               HasSubstr("a morph target has 2 positions for 3 vertices"));
 }
 
-// The first vertex hangs on nodes[1], the second on nodes[2], the third on both.
+// The first vertex follows nodes[1], the second nodes[2], the third both.
 std::string SkinGltf() {
   const std::string bytes = Bytes(kTriangle) +
                             Bytes<uint8_t>({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}) +

@@ -58,7 +58,7 @@ TEST_F(ListAndDelete, SeveralAreDeletedOnlyWithConfirmation) {
   EXPECT_EQ(Names({"list"}), "box\n");
   const Ran none = Ask({"delete", "--prefix", "arm/", "--yes"});
   EXPECT_EQ(none.code, 0);
-  EXPECT_THAT(none.err, HasSubstr("no hull starts with \"arm/\""));
+  EXPECT_THAT(none.err, HasSubstr("no hull ID starts with \"arm/\""));
 }
 
 TEST_F(ListAndDelete, AMissingHullDoesNotPreventOtherDeletions) {

@@ -61,7 +61,7 @@ TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("contain no points"), HasSubstr("hullctl create")));
   EXPECT_FALSE(Exists("new"));
-  // Adding nothing to an existing hull is allowed.
+  // Appending no points to an existing hull is allowed.
   Put("h", server::Cube());
   EXPECT_EQ(Ask({"append", "h", empty.path(), "--create"}).code, 0);
 }
@@ -75,7 +75,7 @@ TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoint
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("the limit is 3"));
   EXPECT_FALSE(Exists("new"));
-  // A previously existing hull stays, though empty.
+  // A hull that existed before is kept, even if empty.
   Create("mine");
   EXPECT_EQ(Ask({"append", "mine", file.path(), "--create"}).code, 1);
   EXPECT_TRUE(Exists("mine"));

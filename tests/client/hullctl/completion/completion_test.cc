@@ -92,7 +92,7 @@ TEST(CompletionScript, CallsTheProgramThatIsTyped) {
   }
   const Ran other = RunTool({"completion", "csh"});
   EXPECT_EQ(other.code, 2);
-  EXPECT_THAT(other.err, HasSubstr("\"csh\" is none of bash, zsh, fish"));
+  EXPECT_THAT(other.err, HasSubstr("\"csh\" is not one of bash, zsh, fish"));
 }
 
 }  // namespace completion_test

@@ -150,8 +150,8 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
     EXPECT_EQ(ran.code, 2) << table;
     EXPECT_THAT(ran.err, HasSubstr(what)) << table;
   };
-  error("", "the table holds no answers");
-  error("a,b,colliding\n", "the table holds no answers");
+  error("", "the table contains no answers");
+  error("a,b,colliding\n", "the table contains no answers");
   error("a,colliding\n", "answers.csv:1: the header has no column b");
   error("a,b,b_x\n", "needs relation, colliding, distance, depth, or contact_time");
   error("a,b,colliding,A\n", "the header names \"a\" twice");
@@ -171,8 +171,7 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
         "b_to_qw, b_to_qx, b_to_qy, b_to_qz are all 0");
   error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is not a time from 0 to 1");
   error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
-  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n",
-        "distance and depth apply only to a pair at rest");
+  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n", "distance and depth apply only to pairs at rest");
   error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is not a duration of at least 0");
 }
 

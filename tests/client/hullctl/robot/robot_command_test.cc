@@ -96,7 +96,7 @@ TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
   EXPECT_THAT(ran.out, HasSubstr("# separated 2 touching 0 overlapping 1 failed 0\n"));
 }
 
-// More waypoints than one message holds.
+// More waypoints than fit in one message.
 TEST_F(HullctlRobot, LongTrajectoriesGoInSeveralMessages) {
   std::string text = "j\n";
   for (int i = 0; i < 5000; ++i) text += i == 4321 ? "-2\n" : "0\n";

@@ -52,7 +52,7 @@ TEST_F(HullctlScene, ApplyRepairsDifferencesAndPrunes) {
             "# 1 hull unchanged\n");
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--dry-run"});
   EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tto delete\n"));
-  // Without a terminal no prompt is possible.
+  // Without a terminal, prompting is impossible.
   ASSERT_EQ(Ask({"append", "cell/table", far.path()}).code, 0);
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path(), "--prune"});
@@ -280,7 +280,8 @@ TEST_F(HullctlScene, AMissingFileNamesItsPlace) {
 
 class SceneUnits : public HullctlOnServer {};
 
-// Each coordinate is rounded one time: 3 in is the double nearest to 0.0762 m, as is that text.
+// Each coordinate is rounded only once: 3 in is the double nearest to 0.0762 m, just as the text
+// 0.0762.
 TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMeters) {
   const struct {
     const char* unit;

@@ -140,7 +140,7 @@ TEST(SceneFile, ASceneIsReadToItsEndAndNoFurther) {
   const auto source = ByteSource::Open(file.path());
   ASSERT_TRUE(ReadScene(source->get()).ok());
   EXPECT_THAT(std::string(RefuseUpdates(source->get(), "batch").message()),
-              HasSubstr(":4: 'hullctl batch' takes no updates after the scene"));
+              HasSubstr(":4: 'hullctl batch' does not accept updates after the scene"));
 }
 
 TEST(SceneFile, JsonThatIsNoSceneIsExplained) {
