@@ -297,7 +297,7 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
 
 // Clients disappear in the middle of a stream. Everything committed stays, and the next client with
 // the same writer ID continues from there.
-TEST_F(Interrupted, ClientsThatVanishLeaveWholeChunks) {
+TEST_F(Interrupted, DisconnectedClientsLeaveWholeChunks) {
   const std::vector<std::vector<Vector>> blocks = GrowingBall(60, 300);
   StartServer();
   std::mt19937_64 random(Seed());

@@ -117,7 +117,7 @@ TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
 
 // Waiting queries use no thread; cancelled ones release their resources although the store does not
 // answer.
-TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
+TEST_F(FreshReads, QueriesThatWaitForTheStoreEndWhenCancelled) {
   Append(0, "h", 1);
   const auto collisions = v1::CollisionService::NewStub(Connect(0));
   v1::CheckCollisionRequest pair;
@@ -177,7 +177,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
 }
 
 // Queries that wait without a thread count as those that wait for one.
-TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
+TEST_F(FreshReads, QueriesThatWaitForTheStoreAreBounded) {
   constexpr int kMost = 8;
   constexpr int kSent = 200;
   constexpr size_t kSurelyRefused = 40;

@@ -63,7 +63,7 @@ TEST(HostileFiles, EveryPrefixOfAFileIsReadOrRefused) {
   EXPECT_GT(refused, 300);
 }
 
-TEST(HostileFiles, AnyByteChangedIsReadOrRefused) {
+TEST(HostileFiles, AnyChangedByteIsReadOrRefused) {
   std::mt19937 random(7);
   int refused = 0;
   for (const Sample& sample : Samples()) {
@@ -98,7 +98,7 @@ long PeakMemory() {
   return usage.ru_maxrss * 1024;
 }
 
-TEST(HostileFiles, DeclaredCountsCostNothing) {
+TEST(HostileFiles, DeclaredCountsAllocateNothing) {
   const std::string huge = "18446744073709551615";
   const std::string point(12, '\0');
   const long before = PeakMemory();

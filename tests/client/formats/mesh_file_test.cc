@@ -108,7 +108,7 @@ constexpr char kCollada[] = R"(<?xml version="1.0" encoding="utf-8"?>
 </COLLADA>
 )";
 
-TEST(MeshFile, ColladaComesInMetersWithItsAxesAsTheyAre) {
+TEST(MeshFile, ColladaIsConvertedToMetersAndKeepsItsAxes) {
   const TempFile file("plate.dae", kCollada);
   const auto mesh = ReadMesh(file.path());
   ASSERT_TRUE(mesh.ok()) << mesh.status();

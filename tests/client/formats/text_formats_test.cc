@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST(ObjFile, TakesEachVLineAndNothingElse) {
+TEST(ObjFile, ReadsEachVLineAndNothingElse) {
   const PointsRead read = ReadText(
       "# v 9 9 9\no thing\nv 1 2 3\nvn 5 5 5\nvt 0 1\n  v\t+4 -5e-1 .5 1.0\nv 7 8 9 0.1 0.2 0.3\n"
       "f 1 2 3\nvp 1 2 3\n",
@@ -69,7 +69,7 @@ TEST(XyzFile, HeadersOfCloudCompareAreComments) {
 }
 
 // Cut at the comment mark, the third coordinate would be 1.
-TEST(XyzFile, InfinitiesWithACommentMarkAreNotCut) {
+TEST(XyzFile, InfinitiesWithACommentMarkAreNotTruncated) {
   for (const PointFormat format : {PointFormat::kXyz, PointFormat::kPts}) {
     EXPECT_EQ(ReadText("1 2 3\n4 5 1.#INF\n", format).error(),
               "FILE:2: point 2 has z = infinity; skip such points with --skip-nonfinite");
@@ -137,7 +137,7 @@ TEST(XyzFile, NonFinitePointsCanBeSkippedAndCounted) {
   EXPECT_EQ(read.counts.points, 2u);
 }
 
-TEST(Blocks, HoldTheNumberOfPointsAskedFor) {
+TEST(Blocks, HaveTheRequestedNumberOfPoints) {
   ReadOptions options;
   options.points_per_block = 2;
   const PointsRead read =
@@ -156,7 +156,7 @@ TEST(Blocks, AreAboutOneMebibyteByDefault) {
   EXPECT_EQ(read.blocks[0].size(), (1u << 20) / 24);
 }
 
-TEST(Blocks, TheReceiversErrorEndsTheReading) {
+TEST(Blocks, AnErrorOfTheReceiverStopsReading) {
   const TempFile file("points", "1 2 3\n4 5 6\n7 8 9\n");
   ReadRequest request{file.path(), PointFormat::kXyz, {}, {}};
   request.options.points_per_block = 1;
@@ -179,7 +179,7 @@ TEST(CsvFile, FindsColumnsByTheHeader) {
   EXPECT_THAT(ReadText("//X,Y,Z,R\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
 
-TEST(CsvFile, KnowsSemicolonsTabsAndQuotes) {
+TEST(CsvFile, SupportsSemicolonsTabsAndQuotes) {
   EXPECT_THAT(ReadText("x;y;z\n1;2;3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("1\t2\t3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("name,x,y,z\n\"a,b\",1,2,3\n", PointFormat::kCsv).xyz(),
@@ -216,7 +216,7 @@ TEST(OffFile, FacesWithoutVerticesAreAnError) {
 }
 
 // If the vertex count is too small, the last vertices are parsed as faces.
-TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
+TEST(OffFile, CountsThatContradictTheFileAreErrors) {
   const std::string rows = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n";
   const auto error = [&](const std::string& counts) {
     return ReadText("OFF\n" + counts + "\n" + rows, PointFormat::kOff).error();
@@ -277,7 +277,7 @@ TEST(PlyFile, AsciiErrorsNameFileAndLine) {
 }
 
 // RealSense Viewer writes a vertex and its color on two lines; other writers use one.
-TEST(PlyFile, AsciiValuesMayStandOnAnyLines) {
+TEST(PlyFile, AsciiValuesMayBeOnAnyLines) {
   const std::string head =
       "ply\r\nformat ascii 1.0\r\nelement vertex 2\r\nproperty float x\r\nproperty float y\r\n"
       "property float z\r\nproperty uchar red\r\nproperty uchar green\r\nelement face 1\r\n"
@@ -293,7 +293,7 @@ TEST(PlyFile, AsciiValuesMayStandOnAnyLines) {
 }
 
 // A surplus or missing value shifts all later ones: the points read are then wrong.
-TEST(PlyFile, AsciiFilesThatDoNotFitTheirHeaderAreErrors) {
+TEST(PlyFile, AsciiFilesThatContradictTheirHeaderAreErrors) {
   const auto error = [](const std::string& counts, const std::string& body) {
     return ReadText("ply\nformat ascii 1.0\n" + counts +
                         "property float x\nproperty float y\nproperty float z\nend_header\n" + body,
@@ -315,7 +315,7 @@ TEST(PlyFile, AsciiFilesThatDoNotFitTheirHeaderAreErrors) {
   EXPECT_EQ(error("element vertex 0\n", ""), "");
 }
 
-TEST(PlyFile, FilesCutWithinTheirFacesAreErrors) {
+TEST(PlyFile, FilesTruncatedWithinTheirFacesAreErrors) {
   const std::string head =
       std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n";
   EXPECT_THAT(ReadText(head, PointFormat::kPly).error(), HasSubstr("within the element face"));
@@ -352,7 +352,7 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
       "FILE:5: FIELDS must name x, y and z");
 }
 
-TEST(Formats, AreKnownByExtensionInAnyCase) {
+TEST(Formats, AreRecognizedByExtensionInAnyCase) {
   EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
   EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
   EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
@@ -376,7 +376,7 @@ TEST(Formats, CompressedAndUtf16FilesAreRefusedAsSuch) {
   }
 }
 
-TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {
+TEST(Formats, EmptyFilesOfHeaderlessFormatsHaveNoPoints) {
   for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
     const PointsRead read = ReadText("", format);
     EXPECT_TRUE(read.status.ok()) << read.status;

@@ -380,7 +380,7 @@ TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
   EXPECT_EQ(answers[2].columns().relations(0), v1::RELATION_SEPARATED);
 }
 
-TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
+TEST_F(HullctlQuestions, EachCommandAcceptsEachSceneFormat) {
   Put("cube", server::Cube());
   const TempFile yaml("yaml",
                       "place:\n  a: {id: cube}\n  b: {id: cube, at: [1, 0, 0]}\n"
@@ -521,7 +521,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   EXPECT_EQ(left.hulls_size(), 0);
 }
 
-TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
+TEST_F(HullctlQuestions, NonsensicalLoadOptionsAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests per second"));

@@ -167,7 +167,7 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
 }
 
 // A power of two on each axis: exponents spread beyond the reach of a common power of two.
-TEST(Orient3d, ExactWhereAxesAreFarApart) {
+TEST(Orient3d, ExactIfAxesDifferInMagnitude) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const auto& [low, high] : {std::array{-1060, 1020},
@@ -199,7 +199,7 @@ TEST(Orient3d, ExactWhereAxesAreFarApart) {
 
 // Any two or three of the points are close together and the rest far away: the determinant is far
 // below the error of differences from a far point. No exact arithmetic is needed.
-TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
+TEST(Orient3d, NearbyPointsAreDecidedRelativeToOneOfThem) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto any = [&](double size) {

@@ -96,7 +96,7 @@ Rational ExactValue(const ScaledInteger& x) {
   return PowerOfTwo(x.exponent) * Rational(BigInteger(x.mantissa.str()));
 }
 
-TEST(ExactSum, LosesNothing) {
+TEST(ExactSum, IsExact) {
   const std::vector<double> terms = {0x1p1000, 1, -0x1p-1074, 0, 3 * 0x1p-60, -0x1p1000};
   Rational sum = 0;
   for (const double term : terms) sum += ExactValue(term);

@@ -51,7 +51,7 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
 }
 
 // Regression test: formerly, a single call returned EXACT and a stream BOUNDS.
-TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
+TEST(Collision, AnEmptyHullIsDecidedByTheSameRungInEveryCall) {
   const Hull empty;
   const Hull cube = UnitCube();
   const QueryHull query_empty(empty);
@@ -253,7 +253,7 @@ TEST(Collision, PoseErrorsNameTheCoordinate) {
   EXPECT_TRUE(ValidatePose(pose).ok());
 }
 
-TEST(Collision, NoAxisUnlessWanted) {
+TEST(Collision, NoAxisUnlessRequested) {
   const Hull cube = UnitCube();
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     QueryOptions options = Options(method);
@@ -469,7 +469,7 @@ TEST(Collision, CancellationEndsTheTextbook) {
   }
 }
 
-TEST(Collision, ShouldStopThatSaysNoChangesNothing) {
+TEST(Collision, ShouldStopThatReturnsFalseChangesNothing) {
   const Hull sphere = BuildHull(FibonacciSphere(100));
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     QueryOptions options = Options(method);

@@ -227,7 +227,7 @@ TEST(Normal, OtherOptionsDoNotChangeIt) {
   }
 }
 
-TEST(Normal, EmptyHullsAndQuestionsWithToleranceHaveNone) {
+TEST(Normal, EmptyHullsAndQueriesWithAToleranceHaveNone) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   EXPECT_FALSE(CheckCollision(cube, Pose(), Hull(), Pose(), WantNormal())->normal.has_value());
   QueryOptions options = WantNormal();

@@ -379,7 +379,7 @@ TEST_F(Access, EveryCallNeedsItsRole) {
 }
 
 // Neither the code nor the message nor the reply differs from that of a missing hull.
-TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
+TEST_F(Access, NoCallRevealsHullsUnderOtherPrefixes) {
   for (const auto& [call, rule] : Rules()) {
     if (rule.refusal == CallRule::kNoHull) continue;
     for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
@@ -477,7 +477,7 @@ TEST_F(Access, HealthNeedsNoToken) {
   EXPECT_TRUE(Run("/grpc.health.v1.Health/Check", {}, {""}).status.ok());
 }
 
-TEST_F(Access, ChangedTokensCountFromTheNextCallAndABrokenFileChangesNothing) {
+TEST_F(Access, ChangedTokensApplyFromTheNextCallAndABrokenFileChangesNothing) {
   const auto code = [this](const std::string& token) {
     return Do("hulld.v1.HullService.GetHull", token, "cell-1/own").status.error_code();
   };

@@ -97,7 +97,7 @@ class HostileRequest : public ::testing::Test {
   }
 };
 
-TEST_F(HostileRequest, CallersWithoutATokenTakeLittleMemory) {
+TEST_F(HostileRequest, CallersWithoutATokenUseLittleMemory) {
   std::string pattern = ::testing::TempDir() + "/hulld_hostile_XXXXXX";
   ASSERT_NE(mkdtemp(pattern.data()), nullptr);
   WriteSecret(pattern + "/tokens", "robot read-only * sha256:" + std::string(64, '0') + "\n");
@@ -105,7 +105,7 @@ TEST_F(HostileRequest, CallersWithoutATokenTakeLittleMemory) {
   std::filesystem::remove_all(pattern);
 }
 
-TEST_F(HostileRequest, AuthorizedCallersTakeLittleMemory) {
+TEST_F(HostileRequest, AuthorizedCallersUseLittleMemory) {
   ExpectLittleMemory({}, grpc::RESOURCE_EXHAUSTED);
 }
 

@@ -121,7 +121,7 @@ TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
 }
 
 // gRPC no longer knows the peer after the connection is closed.
-TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
+TEST_F(Trail, ADisconnectedWriterIsStillNamed) {
   Restart(TestConfig());
   const CapturedLog log;
   for (int i = 0; i < 20; ++i) {
@@ -142,7 +142,7 @@ TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
   EXPECT_THAT(log.text(), Not(HasSubstr("peer=unknown")));
 }
 
-TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
+TEST_F(Trail, ATraceAppearsInTheLogAndTheReply) {
   const CapturedLog log;
   const auto ask = [this](const std::vector<std::string>& traceparents,
                           const std::string& hull_id) {

@@ -130,7 +130,7 @@ TEST_F(BodyCalls, HullsAndBodiesShareTheirIds) {
   EXPECT_TRUE(client.CreateHull("body").ok());
 }
 
-TEST_F(BodyCalls, ListsCountAndComeInPages) {
+TEST_F(BodyCalls, ListsAreCountedAndPaged) {
   for (const char* id : {"a/2", "b/1", "a/1", "a/3"}) {
     ASSERT_TRUE(PutBody(id, {PlacementOf("x")}).ok());
   }
@@ -156,7 +156,7 @@ TEST_F(BodyCalls, ListsCountAndComeInPages) {
   EXPECT_EQ(client.GetStatus()->hull_count(), 1u);
 }
 
-TEST_F(BodyCalls, APageTokenBelongsToTheCallThatGaveIt) {
+TEST_F(BodyCalls, APageTokenIsValidOnlyForTheCallThatReturnedIt) {
   for (const char* id : {"a", "b"}) ASSERT_TRUE(PutBody(id, {PlacementOf("x")}).ok());
   for (const char* id : {"c", "d"}) Create(id);
   const Client client = MakeClient();

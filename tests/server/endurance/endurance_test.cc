@@ -553,7 +553,7 @@ class Endurance : public RestartableServer {
   std::thread reader_;
 };
 
-TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
+TEST_F(Endurance, AllAnswersAreRightAndNoResourceLeaks) {
   const auto seed = static_cast<uint64_t>(NumberIn("HULLD_TEST_SEED", 1));
   const int rounds = NumberIn("HULLD_ENDURANCE_ROUNDS", kRounds);
   ClientOptions options;

@@ -113,7 +113,7 @@ TEST_F(AppendPoints, AReconnectedWriterResumesAfterItsLastSequence) {
   EXPECT_EQ(other.opened().last_sequence(), 0);
 }
 
-TEST_F(AppendPoints, AWriterWithoutNameGetsARandomOne) {
+TEST_F(AppendPoints, AWriterWithoutANameGetsARandomOne) {
   Create("h");
   Appender one(*hulls_, "h", "");
   Appender two(*hulls_, "h", "");
@@ -121,7 +121,7 @@ TEST_F(AppendPoints, AWriterWithoutNameGetsARandomOne) {
   EXPECT_NE(one.opened().writer_id(), two.opened().writer_id());
 }
 
-TEST_F(AppendPoints, SequencesStartAgainInAnotherIncarnation) {
+TEST_F(AppendPoints, SequencesStartOverInANewIncarnation) {
   Put("h", Cube());
   ASSERT_TRUE(Delete("h").ok());
   Create("h");
@@ -140,7 +140,7 @@ TEST_F(AppendPoints, AGapNamesTheExpectedSequence) {
   EXPECT_EQ(Get("h").hull().counts().received(), 8);
 }
 
-TEST_F(AppendPoints, ARefusedChunkChangesNothingAndEarlierOnesStand) {
+TEST_F(AppendPoints, ARefusedChunkChangesNothingAndEarlierOnesRemain) {
   Create("h");
   Coordinates bad = Cube(5);
   bad[3 * 6 + 1] = std::numeric_limits<double>::quiet_NaN();
@@ -178,7 +178,7 @@ TEST_F(AppendPoints, AcksOfEarlierChunksArriveBeforeTheError) {
   EXPECT_EQ(received, 20);
 }
 
-TEST_F(AppendPoints, AClientThatReadsNoAckUntilTheEndIsServed) {
+TEST_F(AppendPoints, AClientThatReadsAcksOnlyAtTheEndIsServed) {
   Create("h");
   grpc::ClientContext context;
   auto stream = hulls_->AppendPoints(&context);

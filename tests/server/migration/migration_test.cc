@@ -191,7 +191,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
   std::unique_ptr<StorePlace> to_;
 };
 
-TEST_P(MigrationTest, TheCopyServesTheSame) {
+TEST_P(MigrationTest, TheCopyServesTheSameContents) {
   FillSource();
   const Ran ran = Migrate(*from_, *to_);
   ASSERT_EQ(ran.code, 0) << ran.err;
@@ -287,7 +287,7 @@ TEST_P(MigrationTest, ASourceWithChangedCountsIsCopiedAgain) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
-TEST_P(MigrationTest, OnlyAnEmptyDestinationIsTaken) {
+TEST_P(MigrationTest, OnlyAnEmptyDestinationIsAccepted) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
   // A store created by a server that never held data is accepted.
   { to_->Serve(); }

@@ -76,7 +76,7 @@ class Observation : public ServerTest {
   }
 };
 
-TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
+TEST_F(Observation, MetricsAreServedOverHttpOnlyOnLoopback) {
   EXPECT_EQ(server_->metrics_address(), "");
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
@@ -134,7 +134,7 @@ TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
 }
 
 // A client that sends half a request, or reads no reply, delays no other.
-TEST_F(Observation, AConnectionThatSaysNothingDoesNotHoldUpTheMetrics) {
+TEST_F(Observation, ASilentConnectionDoesNotDelayTheMetrics) {
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
   Restart(config);
@@ -178,7 +178,7 @@ TEST_F(Observation, OpenAndRunningCallsAreShown) {
   EXPECT_EQ(Metric("hulld_snapshot_duration_seconds_count"), 1);
 }
 
-TEST_F(Observation, TokensAreCountedByNameUpToANumber) {
+TEST_F(Observation, TokensAreCountedByNameUpToALimit) {
   server::Metrics metrics;
   metrics.CountToken("");
   for (size_t i = 0; i < server::Metrics::kMostTokens + 7; ++i)
@@ -309,7 +309,7 @@ std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& met
   return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
+TEST_F(Observation, RepliesCarryTheGivenOrReportedRequestId) {
   const auto ask = [this](const std::string& given, const std::string& hull_id = "none") {
     grpc::ClientContext context;
     if (!given.empty()) context.AddMetadata("x-request-id", given);
@@ -379,7 +379,7 @@ TEST_F(Observation, ErrorsNameTheRequestInTheirDetails) {
                          message + "\x1a" + std::string(1, static_cast<char>(any.size())) + any));
 }
 
-TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
+TEST(LineBudget, AllowsALimitedNumberOfLinesAndCountsTheRest) {
   const LineBudget::Clock::time_point start{};
   LineBudget budget(2, std::chrono::seconds(10));
   EXPECT_EQ(budget.Spend(start), 0);

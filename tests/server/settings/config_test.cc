@@ -169,7 +169,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
   expect_all(Accepted({}));
 }
 
-TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
+TEST_F(ConfigTest, PostgresNeedsItsFileAndNoSettingsOfOtherStores) {
   const std::vector<std::string> postgres = {"--store=postgres", "--postgres-conninfo-file=/p"};
   EXPECT_EQ(Accepted(postgres).postgres_conninfo_file, "/p");
   EXPECT_FALSE(Accepted(postgres).take_over);
@@ -239,7 +239,7 @@ TEST_F(ConfigTest, ErrorsOfTheFileNameItsLine) {
   refused("threads = 1\nconfig = \"other.toml\"\n", "unknown key \"config\"");
 }
 
-TEST_F(ConfigTest, SizesTakeUnits) {
+TEST_F(ConfigTest, SizesAcceptUnits) {
   EXPECT_EQ(Accepted({"--memory-limit=1GB"}).limits.memory_limit, 1'000'000'000);
   EXPECT_EQ(Accepted({"--memory-limit=64MiB"}).limits.memory_limit, 64 << 20);
   EXPECT_EQ(Accepted({"--memory-limit=0"}).limits.memory_limit, 0);
@@ -265,7 +265,7 @@ TEST_F(ConfigTest, TheWrongOneOfSeveralVariablesOfTheProcessIsNamed) {
               HasSubstr("HULLD_MAX_HULLS: --max-hulls: \"many\""));
 }
 
-TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
+TEST_F(ConfigTest, TheDefaultDataDirectoryFollowsXdg) {
   EXPECT_EQ(Accepted({}).data_dir, "hulld-data");
   environment_["HOME"] = "/home/me";
   EXPECT_EQ(Accepted({}).data_dir, "/home/me/.local/state/hulld");
@@ -274,7 +274,7 @@ TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
   EXPECT_EQ(Accepted({"--data-dir", "here"}).data_dir, "here");
 }
 
-TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
+TEST_F(ConfigTest, PrintedSettingsReadBackAsTheSameSettings) {
   environment_["HULLD_TLS_CERT"] = "/c \"d\"";
   const std::vector<std::string> arguments = {"--max-hulls=7", "--insecure", "--check-config"};
   const absl::StatusOr<CommandLine> parsed = Parse(arguments);

@@ -109,7 +109,7 @@ class StoreLoss : public StoreTest {
   std::string doctor_says_;
 };
 
-TEST_F(StoreLoss, NothingIsLostWhereNothingWasTouched) {
+TEST_F(StoreLoss, AnIntactStoreIsAccepted) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   ASSERT_EQ(Logs().size(), 3);
   for (int start = 0; start < 2; ++start) {
@@ -122,13 +122,13 @@ TEST_F(StoreLoss, NothingIsLostWhereNothingWasTouched) {
   EXPECT_THAT(doctor_says_, HasSubstr(store_id_));
 }
 
-TEST_F(StoreLoss, ALogThatIsCutWithinARecordIsRefused) {
+TEST_F(StoreLoss, ALogTruncatedWithinARecordIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   fs::resize_file(Logs()[0], fs::file_size(Logs()[0]) - 10);
   ExpectLoss("holds");
 }
 
-TEST_F(StoreLoss, ALogThatIsCutBetweenTwoRecordsIsRefused) {
+TEST_F(StoreLoss, ALogTruncatedBetweenRecordsIsRefused) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   fs::path log;
@@ -145,7 +145,7 @@ TEST_F(StoreLoss, ALogThatIsCutBetweenTwoRecordsIsRefused) {
   ExpectLoss("holds");
 }
 
-TEST_F(StoreLoss, AChunkThatChangedNoVertexIsMissedToo) {
+TEST_F(StoreLoss, ALostChunkThatChangedNoVertexIsDetected) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   const uint64_t revision = hulls_->registry().Sizes().store_revision;
@@ -158,13 +158,13 @@ TEST_F(StoreLoss, AChunkThatChangedNoVertexIsMissedToo) {
   EXPECT_EQ(OpenStore("left").status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST_F(StoreLoss, TheOnlyLogIsMissed) {
+TEST_F(StoreLoss, AMissingOnlyLogIsDetected) {
   PutInLogsOfTheirOwn({"a"});
   fs::remove(Logs()[0]);
   ExpectLoss("is missing");
 }
 
-TEST_F(StoreLoss, EachOfSeveralLogsIsMissed) {
+TEST_F(StoreLoss, EachMissingLogIsDetected) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   const fs::path whole = directory_ + "/whole";
   fs::copy(Left(), whole, fs::copy_options::recursive);
@@ -182,7 +182,7 @@ TEST_F(StoreLoss, EachOfSeveralLogsIsMissed) {
 }
 
 // Logs after a gap are not replayed, so the store has the state at one revision.
-TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
+TEST_F(StoreLoss, ATruncatedLogEndsTheHistoryBeforeLaterLogs) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   fs::resize_file(Logs()[1], 0);
   ExpectLoss("holds 0 bytes");
@@ -278,7 +278,7 @@ TEST_F(StoreLoss, ADamagedMarkIsRefused) {
   EXPECT_EQ((*store)->revision(), revision_);
 }
 
-TEST_F(StoreLoss, TheDoctorLeavesAStoreAloneThatAServerHasOpen) {
+TEST_F(StoreLoss, TheDoctorRefusesAStoreThatAServerHasOpen) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   for (const std::vector<std::string>& arguments :
@@ -294,7 +294,7 @@ TEST_F(StoreLoss, TheDoctorLeavesAStoreAloneThatAServerHasOpen) {
   EXPECT_EQ(OpenStore().status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST_F(StoreLoss, AServerIsRefusedWhileTheDoctorLooks) {
+TEST_F(StoreLoss, AServerIsRefusedWhileTheDoctorRuns) {
   Start();
   hulls_ = nullptr;
   RocksDbOptions options;

@@ -119,7 +119,7 @@ TEST(LasFile, CompressedFilesAreRefusedByName) {
   EXPECT_EQ(*PointFormatOfPath("scan.LAZ"), PointFormat::kLas);
 }
 
-TEST(LasFile, FilesThatLackPointsAreErrors) {
+TEST(LasFile, FilesWithMissingPointsAreErrors) {
   LasText las;
   las.xyz = {1, 2, 3, 4, 5, 6};
   const std::string text = las.Text();
@@ -143,7 +143,7 @@ TEST(LasFile, FilesThatLackPointsAreErrors) {
               HasSubstr("declares 2 points in its legacy field and 9 in its LAS 1.4 field"));
 }
 
-TEST(LasFile, HeadersThatAreNotUnderstoodAreErrors) {
+TEST(LasFile, UnsupportedHeadersAreErrors) {
   LasText las;
   las.xyz = {1, 2, 3};
   const auto changed = [&](auto change) {

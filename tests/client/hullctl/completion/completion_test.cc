@@ -64,7 +64,7 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   EXPECT_THAT(parts, ElementsAre("arm/", ":"));
 }
 
-TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreTaken) {
+TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreAccepted) {
   Create("bolt");
   ASSERT_EQ(RunTool({"body", "put", "bracket", "bolt", "--server", server_->address()}).code, 0);
   EXPECT_THAT(Offers({"check", "b"}), ElementsAre("bolt", "bracket", ":"));

@@ -31,7 +31,7 @@ TEST(Combine, EarlierLayersWinSettingBySetting) {
   EXPECT_EQ(Combine({}).at("server").source, "default");
 }
 
-TEST(Combine, AContextForAnotherServerIsLeftAsideWithItsToken) {
+TEST(Combine, AContextForAnotherServerIsIgnoredWithItsToken) {
   const SettingsLayer context{"context c", {{"server", "c:1"}, {"token-file", "c.token"}}, true};
   EXPECT_FALSE(Combine({Options({{"server", "a:1"}}), context}).contains("token-file"));
   EXPECT_TRUE(Combine({Options({{"server", "c:1"}}), context}).contains("token-file"));

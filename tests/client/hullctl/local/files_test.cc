@@ -65,7 +65,7 @@ TEST_F(Files, AreCheckedWithoutBeingStored) {
   EXPECT_TRUE(StoresNothing());
 }
 
-TEST_F(Files, MeetHullsAndAreVerified) {
+TEST_F(Files, CollideWithHullsAndAreVerified) {
   Put("ball", server::Sphere(300));
   const std::string cube = Write("cube.xyz", server::Cube());
   for (const char* const pose : {"0,0,0", "1,0,0", "3,0,0"}) {

@@ -72,7 +72,7 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
-TEST_F(Judge, AProgramThatOnlySaysCollidingMayCallTouchingEither) {
+TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayJudgeTouchingEitherWay) {
   const Ran ran = JudgeText(
       "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
   EXPECT_EQ(ran.code, 1);
@@ -144,7 +144,7 @@ TEST_F(Judge, PairsWithoutAnAnswerFailAlone) {
   EXPECT_THAT(ran.out, StartsWith("# 2 answers, 0 wrong, 1 failed\n"));
 }
 
-TEST_F(Judge, NamesLineAndColumnOfAMistake) {
+TEST_F(Judge, ErrorsNameLineAndColumn) {
   const auto error = [this](const std::string& table, const std::string& what) {
     const Ran ran = JudgeText(table);
     EXPECT_EQ(ran.code, 2) << table;
@@ -204,7 +204,7 @@ TEST_F(Judge, TimesOfContactAreJudgedAgainstTheProvenBracket) {
   EXPECT_EQ(Ask({"verify", Write("record.json", record)}).out, "OVERLAPPING: valid\n");
 }
 
-TEST_F(Judge, ThePlotShowsTheProgramBesideTheServer) {
+TEST_F(Judge, ThePlotShowsTheProgramNextToTheServer) {
   const std::string table = "a,b,b_x,distance,us\ncube,cube,3,2.25,12\ncube,cube,4,3,8\n";
   const std::string chart = Write("trade.svg", "");
   const Ran ran = JudgeText(table, {"--plot", chart});

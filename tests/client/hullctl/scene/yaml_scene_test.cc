@@ -96,7 +96,7 @@ TEST(YamlScene, WithoutPlacementsIsAnEmptyRequest) {
   EXPECT_FALSE(scene->request.ignore_same_group());
 }
 
-TEST(YamlScene, BodiesArePutAsTheyAreWritten) {
+TEST(YamlScene, BodiesArePutAsWritten) {
   const v1::PutBodyRequest request = BodyRequest(Parse(kCell).bodies[0]);
   EXPECT_EQ(request.body_id(), "cell/corner");
   ASSERT_EQ(request.pieces_size(), 3);
@@ -153,7 +153,7 @@ TEST(YamlScene, PlacementsMoveOnTheShorterPath) {
   EXPECT_THAT(ErrorOf(head + "to: [1, 2]}\n"), HasSubstr("to"));
 }
 
-TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
+TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotQueried) {
   const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n";
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h}, b: {body: b}}"),
               ElementsAre("a b/h", "a b/h-2"));
@@ -170,7 +170,7 @@ TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
   EXPECT_THAT(PairsIn(kCell).size(), 3u + 9u);
 }
 
-TEST(YamlScene, PairsAndMoversAreTaken) {
+TEST(YamlScene, PairsAndMoversAreRead) {
   const std::string head =
       "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n"
       "place: {a: {hull: h}, b: {body: b}, c: {hull: h}}\n";
@@ -179,7 +179,7 @@ TEST(YamlScene, PairsAndMoversAreTaken) {
   EXPECT_THAT(PairsIn(head + "ask: {movers: [c]}"), ElementsAre("c a", "c b/h", "c b/h-2"));
 }
 
-TEST(YamlScene, AliasesStandForTheirAnchors) {
+TEST(YamlScene, AliasesResolveToTheirAnchors) {
   EXPECT_THAT(PairsIn("hulls: {h: {box: &size [1, 1, 1]}, i: {box: *size}}\n"
                       "place: {a: {hull: h, at: &pose [1, 2, 3]}, b: {hull: i, at: *pose}}"),
               ElementsAre("a b"));
@@ -229,7 +229,7 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
   EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("not valid YAML"));
 }
 
-TEST(YamlScene, TheOneReaderTakesIt) {
+TEST(YamlScene, IsReadByReadScene) {
   const TempFile file("cell.yaml",
                       "# comment\n\nplace:\n  a: {id: x}\n  b: {id: x, at: [1, 0, 0]}\n");
   const auto source = ByteSource::Open(file.path());

@@ -9,7 +9,7 @@ namespace conninfo_test {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Conninfo, KeywordsAndUrisAreTaken) {
+TEST(Conninfo, KeywordsAndUrisAreAccepted) {
   for (const char* text : {"host=db.example dbname=hulls user=hulld password='two words'\n",
                            "postgresql://hulld:two%20words@db.example/hulls"}) {
     const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(text);
