@@ -16,8 +16,8 @@ namespace hulld {
 
 // One AppendPoints stream, driven by one thread that never blocks past its deadline.
 //
-// gRPC calls On...Done on its own threads; these only record the event and wake the driving thread.
-// A hold keeps the call open while the driving thread may still start writes.
+// gRPC calls the On...Done functions on its own threads; they only record the event and wake the
+// driving thread. A hold keeps the call open while the driving thread may still start writes.
 class AppendConnection final
     : public grpc::ClientBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse> {
  public:
@@ -35,15 +35,15 @@ class AppendConnection final
   // Removes the oldest pending response. Returns false if there is none.
   bool TakeResponse(v1::AppendPointsResponse* response);
 
-  // Waits for a response, for room to write (if `to_write`), or for the end of the stream. Returns
-  // false at the deadline.
+  // Waits for a response, for the end of the stream, or, if `to_write`, until a write is possible.
+  // Returns false at the deadline.
   bool WaitForEvent(bool to_write, Deadline deadline);
 
   // Returns true if no further response will arrive; pending responses remain available.
   bool ended();
   // Returns the final status. Requires ended() (checked).
   grpc::Status Close();
-  // Returns the context with the server's trailing metadata. Requires that Close returned
+  // Returns the context with the server's trailing metadata. Requires that Close has returned
   // (checked).
   const grpc::ClientContext& context();
 

@@ -86,7 +86,7 @@ absl::Status Appender::OpenFirst() {
   next_sequence_ = opened_.last_sequence() + 1;
   totals_.hull_revision = opened_.hull().revision();
   totals_.vertex_count = opened_.hull().vertex_count();
-  // The hull exists now. If it is missing at a reconnect, creating it again would hide the loss of
+  // The hull exists now. If it is missing on reconnect, recreating it would hide the loss of
   // points.
   open_.set_create_if_absent(false);
   return absl::OkStatus();
@@ -144,7 +144,7 @@ absl::Status Appender::Append(v1::PointBlock points) {
   ++totals_.chunks_sent;
   totals_.points_sent += chunk.points;
   unacknowledged_.push_back(std::move(chunk));
-  // Leaves room for the next chunk.
+  // Makes room for the next chunk.
   return PumpUntil(std::max<size_t>(options_.max_in_flight_chunks, 1) - 1,
                    std::max<size_t>(options_.max_in_flight_bytes, 1) - 1);
 }
@@ -229,8 +229,8 @@ absl::Status Appender::Finish() {
     v1::AppendPointsResponse ignored;
     if (!connection_->TakeResponse(&ignored) && !connection_->WaitForEvent(false, deadline)) break;
   }
-  // Everything is acknowledged, so a draining or lost server that did not end the stream properly
-  // does no harm.
+  // Everything is acknowledged, so it does not matter if a draining or lost server did not end the
+  // stream properly.
   absl::Status status = connection_->ended() ? EndOf(connection_.get()) : absl::OkStatus();
   connection_ = nullptr;
   failed_ = absl::FailedPreconditionError("the append stream is finished");

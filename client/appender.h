@@ -22,7 +22,7 @@ struct AppendOptions {
   // Writer ID. Empty: a random one.
   std::string writer_id;
   bool create_if_absent = false;
-  // Chunks in flight are kept for resending. Append waits while they reach either bound.
+  // Chunks in flight are kept for resending. Append waits while either bound is reached.
   size_t max_in_flight_bytes = size_t{8} << 20;
   size_t max_in_flight_chunks = 64;
 };
@@ -46,8 +46,8 @@ struct AppendTotals {
 // A pipelined stream of chunks into one hull, with a bounded number in flight. If the connection
 // breaks, or the server ends the stream with a retry hint, the appender reconnects as the same
 // writer, reads the last committed sequence, and resends the missing chunks. Each chunk is applied
-// exactly once. The appender fails if the hull or the store was replaced, as acknowledged points
-// would be missing.
+// exactly once. The appender fails if the hull or the store was replaced, because acknowledged
+// points would be missing.
 //
 // Not thread-safe. The destructor cancels chunks in flight.
 class Appender {
@@ -61,7 +61,8 @@ class Appender {
   const std::string& writer_id() const { return open_.writer_id(); }
 
   // Queues one chunk with the writer's next sequence number. Waits while too much is in flight. An
-  // error ends the stream, may concern an earlier chunk, and is returned by every further call.
+  // error, which may be about an earlier chunk, ends the stream and is returned by every later
+  // call.
   absl::Status Append(v1::PointBlock points);
 
   // Waits until every chunk is acknowledged, then ends the stream.

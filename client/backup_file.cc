@@ -107,8 +107,8 @@ constexpr char kStagingName[] = "restoring";
 // The subdirectory by which hulld recognizes a store.
 constexpr char kDatabaseName[] = "rocksdb";
 
-// Returns true if the directory holds only the remains of a killed restore and the entries of a
-// file system root.
+// Returns true if the directory contains only the remains of a killed restore and the standard
+// entries of a file system root.
 bool IsFree(const fs::path& directory) {
   std::error_code error;
   bool restoring = false;
@@ -169,7 +169,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   return absl::OkStatus();
 }
 
-// Restores from a file after its first line was read.
+// Restores from a file whose first line has been read.
 absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* check) {
   const fs::path staging = target / kStagingName;
   std::error_code error;

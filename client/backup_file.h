@@ -13,8 +13,8 @@
 namespace hulld {
 
 // A backup of a store in one file: a line that identifies the format, then the parts of SaveBackup.
-// Each part follows its size and the CRC-32 of its bytes (32 bits each, little endian). `end` is
-// the last part, so truncation is detected.
+// Each part is preceded by its size and the CRC-32 of its bytes (32 bits each, little endian).
+// `end` is the last part, so truncation is detected.
 
 // Checks that parts form a complete backup in order.
 class BackupCheck {
@@ -69,7 +69,7 @@ inline constexpr char kRestoredMark[] = "restored";
 // Creates a data directory from a backup: the complete store, or none. An existing directory must
 // be empty, except for lost+found and the remains of a killed call. Writes nothing outside the
 // directory. Returns the checked backup; the store that hulld opens there has another ID.
-// INVALID_ARGUMENT: the file is no backup, damaged, or truncated. FAILED_PRECONDITION: the
+// INVALID_ARGUMENT: the file is not a backup, or is damaged or truncated. FAILED_PRECONDITION: the
 // directory exists and is not empty. UNAVAILABLE: it cannot be written.
 absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::string& directory);
 

@@ -17,7 +17,7 @@ namespace hulld {
 
 // Aborts the process unless `condition` holds. A broken invariant is a defect of the client or of
 // its caller, never bad input or a bad reply (these return a Status). Always enabled, so keep the
-// condition cheap. Separate from core's check, as the client includes nothing of core.
+// condition cheap. Separate from core's check because the client includes nothing from core.
 #define HULLD_CLIENT_CHECK(condition) \
   ((condition) ? (void)0 : ::hulld::ClientCheckFailed(__FILE__, __LINE__, #condition))
 

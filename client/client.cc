@@ -57,7 +57,8 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
 absl::Status CheckConsistent(const HullMesh& mesh) {
   if (mesh.xyz.size() != 3 * mesh.header.vertex_count() ||
       mesh.facet_sizes.size() != mesh.header.facet_count()) {
-    return absl::InternalError("the mesh stream ended early, or its header miscounts");
+    return absl::InternalError(
+        "the mesh stream ended early, or the counts of its header are wrong");
   }
   uint64_t corners = 0;
   for (const uint32_t size : mesh.facet_sizes) corners += size;
@@ -67,11 +68,11 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
   const size_t vertices = mesh.vertex_count();
   const auto in_range = [vertices](uint32_t index) { return index < vertices; };
   if (!std::all_of(mesh.facet_indices.begin(), mesh.facet_indices.end(), in_range)) {
-    return absl::InternalError("the mesh stream names a vertex that it does not hold");
+    return absl::InternalError("the mesh stream refers to a vertex that it does not contain");
   }
   const auto is_finite = [](double x) { return std::isfinite(x); };
   if (!std::all_of(mesh.xyz.begin(), mesh.xyz.end(), is_finite)) {
-    return absl::InternalError("the mesh stream holds a coordinate that is not finite");
+    return absl::InternalError("the mesh stream contains a coordinate that is not finite");
   }
   return absl::OkStatus();
 }

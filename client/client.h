@@ -37,10 +37,11 @@ struct ClientOptions {
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
-  // Freshness of reads without a freshness of their own (proto/hulld/v1/freshness.proto). Absent:
+  // Freshness of reads whose request does not set one (proto/hulld/v1/freshness.proto). Absent:
   // linearizable. The pages of a list never go back in revision.
   std::optional<v1::Freshness> freshness;
-  // True: opens a separate connection. By default a process shares its connections to one server.
+  // True: opens a separate connection. By default, all clients of a process share one connection
+  // per server.
   bool own_connection = false;
   // TLS and the token.
   ConnectionSecurity security;
@@ -125,7 +126,7 @@ class Client {
   // As ListAllHulls.
   absl::StatusOr<v1::ListBodiesResponse> ListAllBodies(const std::string& prefix,
                                                        uint64_t limit = 0) const;
-  // Never retried, as DeleteHull.
+  // Never retried, like DeleteHull.
   absl::StatusOr<v1::DeleteBodyResponse> DeleteBody(const std::string& body_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
@@ -142,7 +143,7 @@ class Client {
   absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                     const BatchReceiver& receive) const;
 
-  // Returns a stream of pose changes. Its first message opens it and takes the freshness of the
+  // Returns a stream of pose changes. The first message opens it, with the freshness of the
   // options. The timeout bounds the wait for each answer.
   std::unique_ptr<CollisionStream> OpenCollisionStream() const;
 
@@ -175,7 +176,8 @@ class Client {
   template <typename Request>
   const Request& WithFreshness(const Request& request, Request* copy) const;
 
-  // Runs one unary call; retries it if `retry`, which requires that it is safe to repeat.
+  // Runs one unary call; retries it if `retry` is true, which requires a call that is safe to
+  // repeat.
   template <typename Response, typename Request, typename Stub>
   absl::StatusOr<Response> Call(Stub* stub,
                                 grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,

@@ -98,8 +98,8 @@ void CollisionStream::ReleaseHold() {
   RemoveHold();
 }
 
-// Wakes the waiting thread once, when its complete answer has arrived, and outside the mutex, which
-// the thread would otherwise contend for.
+// Wakes the waiting thread once, when its complete answer has arrived, and outside the mutex to
+// avoid contention.
 void CollisionStream::OnReadDone(bool ok) {
   bool is_over = false;
   {

@@ -16,7 +16,7 @@
 namespace hulld {
 
 // One StreamCollisions call, step by step: the client sends poses, the server returns the relations
-// of the affected pairs. Never retried, as the server's state ends with the stream. Not
+// of the affected pairs. Never retried because the server's state ends with the stream. Not
 // thread-safe.
 class CollisionStream final
     : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
@@ -57,7 +57,7 @@ class CollisionStream final
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by the mutex, as all members below.
+  // Guarded by the mutex, like all members below.
   v1::StreamCollisionsResponse answer_;
   bool answered_ = false;
   bool written_ = false;

@@ -29,7 +29,7 @@ using grpc::experimental::Interceptor;
 using grpc::experimental::InterceptorBatchMethods;
 
 // Adds the token to every call of a channel, so that no call can omit it. (gRPC sends call
-// credentials only over TLS, so not even over unix sockets.)
+// credentials only over TLS, not even over unix sockets.)
 class TokenSender : public Interceptor {
  public:
   explicit TokenSender(std::string authorization) : authorization_(std::move(authorization)) {}
@@ -118,7 +118,8 @@ absl::StatusOr<std::string> ReadTokenFile(const std::string& path) {
   std::string token;
   std::string more;
   if (!(file >> token) || file >> more || !IsToken(token)) {
-    return problem("it does not hold one token, as 'hullctl token new --token-out' writes it");
+    return problem(
+        "it must contain exactly one token, as written by 'hullctl token new --token-out'");
   }
   return token;
 }

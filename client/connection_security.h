@@ -39,7 +39,7 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const grpc::ChannelArguments& arguments);
 
 // Reads a token file: a single line. INVALID_ARGUMENT: the file cannot be read, other users can
-// read it, or it holds no token. Errors never contain its text.
+// read it, or it contains no token. Errors never quote its text.
 absl::StatusOr<std::string> ReadTokenFile(const std::string& path);
 
 }  // namespace hulld

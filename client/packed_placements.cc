@@ -12,7 +12,7 @@
 namespace hulld {
 namespace {
 
-// Widens single-precision coordinates, as all shapes share one block.
+// Widens single-precision coordinates because all shapes share one block.
 void AddShape(const v1::PointBlock& points, v1::PackedPlacements* packed) {
   google::protobuf::RepeatedField<double>* const xyz =
       packed->mutable_shape_points()->mutable_xyz();

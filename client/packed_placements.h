@@ -7,8 +7,9 @@
 
 namespace hulld {
 
-// Returns the same placements in the same order, with each hull named, and each inline shape sent,
-// only once: about 60 bytes each instead of 100, and many times faster to parse on the server.
+// Returns the same placements in the same order, with each hull ID and each inline shape stored
+// only once: about 60 bytes per placement instead of 100, and many times faster to parse on the
+// server.
 v1::PackedPlacements PackPlacements(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements);
 

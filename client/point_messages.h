@@ -15,8 +15,8 @@ namespace hulld {
 // amortize the cost of a message.
 inline constexpr size_t kPointsPerMessage = 40000;
 
-// Sends points, n x 3, in messages of at most kPointsPerMessage. Stops at an error of `send` and
-// returns it.
+// Sends points, n x 3, in messages of at most kPointsPerMessage. Stops at the first error of `send`
+// and returns it.
 absl::Status SendInMessages(std::span<const double> xyz,
                             const std::function<absl::Status(v1::PointBlock)>& send);
 

@@ -15,7 +15,7 @@
 // and any other gRPC target name.
 namespace hulld {
 
-// INVALID_ARGUMENT: the name has none of these forms; the message names the valid ones.
+// INVALID_ARGUMENT: the name has none of these forms; the message lists the valid ones.
 absl::Status ValidateServer(const std::string& server);
 
 // Returns true if calls are spread round robin over several servers (a list, or dns:///), limited

@@ -62,7 +62,7 @@ void ExpectNone(const std::string& directory, const std::vector<std::string>& fo
   }
 }
 
-TEST(Includes, CoreKnowsNoServiceLogOrFile) {
+TEST(Includes, CoreUsesNoServiceLogOrFile) {
   ExpectNone("core",
              {"server/", "client/", "tests/", "proto/", "hulld/", "grpc", "google/", "spdlog",
               "fmt/", "CLI/", "pugixml", "fstream", "iostream", "filesystem", "cstdio", "stdio.h"});
@@ -104,7 +104,7 @@ TEST(Includes, FoldersDependOnEachOtherInOneDirection) {
   }
 }
 
-TEST(Includes, NoRoomIsCrowded) {
+TEST(Includes, NoFolderIsCrowded) {
   constexpr int kMostFiles = 24;
   const fs::path root = SourceTree();
   for (const std::string top : {"core", "server", "client", "tests", "proto", "docker"}) {
@@ -212,7 +212,7 @@ bool RunsThreads(const fs::path& source) {
 }
 
 // ThreadSanitizer covers every test program that runs threads and can be instrumented.
-TEST(Programs, ThatRunThreadsArePartOfThePresetTsan) {
+TEST(Programs, WithThreadsAreInThePresetTsan) {
   // gRPC is not instrumented.
   const std::string grpc[] = {"hulld_test_server", "hulld_client", "hulld_fake", "hulld_history",
                               "hullctl_commands"};
@@ -244,9 +244,9 @@ TEST(Includes, CoreUsesNoOtherLibrary) {
   }
 }
 
-TEST(Includes, ClientKnowsNeitherCoreNorServer) { ExpectNone("client", {"core/", "server/"}); }
+TEST(Includes, ClientIncludesNeitherCoreNorServer) { ExpectNone("client", {"core/", "server/"}); }
 
-TEST(Includes, ServerKnowsNoClient) { ExpectNone("server", {"client/", "tests/"}); }
+TEST(Includes, ServerDoesNotIncludeClient) { ExpectNone("server", {"client/", "tests/"}); }
 
 TEST(Includes, OracleSharesNoCodeWithCore) {
   ExpectNone("tests/oracle", {"core/", "server/", "client/", "tests/core/", "Eigen/"});

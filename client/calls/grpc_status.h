@@ -16,11 +16,12 @@ namespace hulld {
 // Returns the same code and message, with the server's reason.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
-// Same as above, with the request ID and the retry hint. `context` is that of the ended call.
+// Same as above, with the request ID and the retry hint. context: of the finished call.
 absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContext& context);
 
-// Returns hulld's reason for the error. ERROR_REASON_UNSPECIFIED: hulld gave none, this version of
-// the contract does not know it, or the error is gRPC's own, as when no server is reached.
+// Returns hulld's reason for the error. ERROR_REASON_UNSPECIFIED: hulld sent none, this version of
+// the contract does not know it, or the error comes from gRPC itself, for example if no server can
+// be reached.
 v1::ErrorReason ReasonOf(const absl::Status& status);
 
 // Returns a value that error.proto lists for the reason, such as "expected_sequence"; nullopt if
@@ -30,7 +31,7 @@ std::optional<std::string> MetadataOf(const absl::Status& status, const std::str
 // Returns the ID of the failed call in the server's log; empty if unknown.
 std::string RequestIdOf(const absl::Status& status);
 
-// Returns the delay that the server requests before a retry; nullopt if the server does not invite
+// Returns the delay that the server requests before a retry; nullopt if the server did not suggest
 // one.
 std::optional<std::chrono::milliseconds> RetryHintOf(const absl::Status& status);
 

@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// Monotonic: setting the system clock neither ends nor prolongs a wait.
+// Monotonic, so that setting the system clock neither ends nor prolongs a wait.
 using Deadline = std::chrono::steady_clock::time_point;
 
 // Retries calls that are safe to repeat: after UNAVAILABLE (the server is unreachable or draining),
@@ -44,8 +44,8 @@ bool MayRetry(const absl::Status& status);
 bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
                      const absl::Status& status = absl::OkStatus());
 
-// Calls `attempt` until its status permits no retry, the attempts are exhausted, or the deadline is
-// near. Returns the last status. Requires: `attempt` is safe to repeat.
+// Calls `attempt` until its status rules out a retry, the attempts are exhausted, or the deadline
+// is near. Returns the last status. Requires: `attempt` is safe to repeat.
 absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
                              const std::function<absl::Status()>& attempt);
 

@@ -215,7 +215,7 @@ absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& x
   for (size_t i = 0; i < mesh.vertex_count(); ++i) missing.insert(key(PointAt(mesh.xyz, i)));
   for (size_t i = 0; i < xyz.size() / 3; ++i) {
     const Point p = PointAt(xyz, i);
-    // A vertex needs no test.
+    // Vertices need no test.
     if (missing.erase(key(p)) > 0) continue;
     if (!region->Holds(p, OnGrid(p, grid))) return false;
   }

@@ -13,7 +13,7 @@
 namespace hulld {
 
 // A closed half space: the points p with normal . P <= offset, where P is p in integers of the
-// common exponent. Also holds a floating-point filter for quick certain answers.
+// common exponent. Also stores a floating-point filter that answers clear cases quickly.
 class HalfSpace {
  public:
   // `grid` is the exponent of the integers.
@@ -40,12 +40,12 @@ class HalfSpace {
 // points contains no point.
 class ConvexRegion {
  public:
-  // Returns the region of a hull of the server. Requires that all numbers of the mesh were included
-  // in the grid. INTERNAL: facets that do not match the vertices.
+  // Returns the region of a hull from the server. Requires that all numbers of the mesh were
+  // included in the grid. INTERNAL: facets that do not match the vertices.
   static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const CommonExponent& grid);
-  // Returns the region of a hull at a pose, exactly: half spaces rotate by products of the
-  // quaternion alone, without a quotient. The grid must also include the translation. Requires a
-  // nonzero quaternion; unchecked, as the server rejects a zero one.
+  // Returns the region of a hull at a pose, exactly: half spaces are rotated by products of
+  // quaternion components, without division. The grid must also include the translation. Requires a
+  // nonzero quaternion (unchecked because the server rejects zero).
   static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const RigidPose& X_WH,
                                            const CommonExponent& grid);
 
@@ -66,8 +66,8 @@ class ConvexRegion {
 // Returns the point on the grid.
 BigVector OnGrid(const std::array<double, 3>& p, const CommonExponent& grid);
 
-// Returns true if the hull is that of exactly these points, n x 3: each is in the hull, and each
-// vertex of the hull is one of them. Exact. Cost: one test per point and facet.
+// Returns true if the hull is the convex hull of these points, n x 3: each point is in the hull,
+// and each vertex of the hull is one of them. Exact. Cost: one test per point and facet.
 absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& xyz);
 
 }  // namespace hulld

@@ -45,7 +45,8 @@ Corner Crossing(const Corner& a, const BigInteger& h, const Corner& b, const Big
 
 // The two parts of a polygon. The outer part is empty if no corner is strictly outside. Otherwise
 // the inner part is empty if no corner is strictly inside: the part on the boundary has a lower
-// dimension than the polygon, and as pieces are closed, the cover of the rest covers it too.
+// dimension than the polygon, and because pieces are closed, whatever covers the rest covers it,
+// too.
 struct Parts {
   Polygon inside;
   Polygon outside;
@@ -233,7 +234,7 @@ class Cover {
       rest = std::move(parts.inside);
       if (rest.empty()) break;
     }
-    // No part is in the region: the polygon stays whole.
+    // No part is in the region, so the polygon stays whole.
     if (rest.empty()) {
       outside->push_back(polygon);
       return;

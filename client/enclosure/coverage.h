@@ -33,7 +33,7 @@ struct Coverage {
   // Triangles that lie in no single piece and were cut into parts.
   uint64_t clipped = 0;
   // For one piece: the largest distance of any point of the mesh from it, up to rounding. For
-  // several: a lower bound, as the farthest point need not be a corner.
+  // several: a lower bound, because the farthest point need not be a corner.
   double distance = 0;
 };
 
@@ -43,18 +43,19 @@ struct CoveringPiece {
   RigidPose X_WH = kNoMotion;
 };
 
-// Checks if convex pieces cover a mesh, its triangles taken as closed sets, in exact arithmetic.
+// Checks in exact arithmetic whether convex pieces cover a mesh, with its triangles as closed
+// sets.
 //
 // A triangle with all corners in one piece lies in it. Any other is clipped by the half spaces of
 // each piece in turn into the part in the piece and convex polygons outside. Polygons left after
 // all pieces are uncovered. Corners are quotients of integers of any length, so nothing is rounded
-// before the answer. They are reduced, so that their digits are bounded by the digits of the planes
-// that meet in them, regardless of the number of cuts.
+// before the answer. They are reduced to lowest terms, so that the size of the integers depends on
+// the planes that meet in a corner, not on the number of cuts.
 //
 // Poses are exact, too: half spaces rotate with their piece.
 //
-// Only the surface is checked. One piece that contains the surface contains its interior, as it is
-// convex; several pieces may cover the surface of a solid and leave a cavity inside.
+// Only the surface is checked. A single piece that contains the surface also contains its interior
+// because it is convex; several pieces may cover the surface of a solid and leave a cavity inside.
 //
 // `progress` receives the number of finished triangles. INTERNAL: facets that do not match their
 // vertices. Cost: one test per vertex and facet, and exact arithmetic for each cut.

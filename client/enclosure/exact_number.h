@@ -9,8 +9,8 @@ namespace hulld {
 // the range of doubles.
 double Approximate(const BigInteger& number, int exponent = 0);
 
-// Returns a quotient with the same accuracy. Requires a nonzero denominator; unchecked, as callers
-// compare it with 0 before.
+// Returns a quotient with the same accuracy. Requires a nonzero denominator (unchecked because
+// callers test for 0).
 double ApproximateQuotient(const BigInteger& numerator, const BigInteger& denominator);
 
 }  // namespace hulld

@@ -17,7 +17,7 @@ using Point = std::array<double, 3>;
 std::vector<uint32_t> Merged(const TriangleMesh& mesh) {
   std::vector<uint32_t> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0);
-  // -0 and 0 compare equal, as they are the same place.
+  // -0 and 0 compare equal because they are the same position.
   std::sort(order.begin(), order.end(),
             [&mesh](uint32_t a, uint32_t b) { return mesh.vertices[a] < mesh.vertices[b]; });
   std::vector<uint32_t> merged(order.size());

@@ -9,14 +9,14 @@
 namespace hulld {
 
 // Returns true if the triangles enclose a volume: each edge is traversed equally often in both
-// directions. Vertices at the same coordinates count as one, as files such as STL repeat them.
-// Cost: n log n.
+// directions. Vertices at the same coordinates count as one because formats such as STL repeat
+// them. Cost: n log n.
 bool IsClosed(const TriangleMesh& mesh);
 
 // Returns the volume of the hull divided by that of the mesh: each summed exactly (signed
 // tetrahedra, Gauss 1813), the quotient rounded. Overlapping parts of the mesh count twice; its
 // orientation does not matter. Nullopt if the mesh is not closed or has no volume. Requires planar
-// facets of the hull, as the server returns them. Cost: exact arithmetic for each triangle.
+// facets of the hull, as returned by the server. Cost: exact arithmetic for each triangle.
 std::optional<double> VolumeRatio(const HullMesh& hull, const TriangleMesh& mesh);
 
 }  // namespace hulld

@@ -52,8 +52,8 @@ double LoadAs(const unsigned char* little_endian) {
   return static_cast<double>(scalar);
 }
 
-// Returns the value of SizeOf(type) bytes. Exact, except for 64-bit integers beyond 2^53, which are
-// rounded to nearest.
+// Returns the value stored in SizeOf(type) bytes. Exact, except for 64-bit integers beyond 2^53,
+// which are rounded to nearest.
 inline double LoadScalar(ScalarType type, const unsigned char* bytes, bool big_endian) {
   unsigned char little[kMaxScalarBytes];
   const size_t size = SizeOf(type);

@@ -40,14 +40,14 @@ class ByteSource {
   // Reads exactly `size` bytes; returns false if fewer are left.
   bool Read(void* out, size_t size);
   bool Skip(uint64_t size);
-  // Reads the rest of the file; what was read before an error, see status().
+  // Reads the rest of the file, or as much as possible before an error; see status().
   std::string ReadRest();
-  // The next `size` bytes, fewer at the end of the file; they stay to be read. Valid until the next
-  // call.
+  // Returns the next `size` bytes without consuming them; fewer at the end of the file. Valid until
+  // the next call.
   std::string_view Peek(size_t size);
 
-  // Returns an error if the file is compressed or UTF-16 text, by its first bytes, which stay to be
-  // read. Otherwise binary readers would misread such a file.
+  // Returns an error if the first bytes show that the file is compressed or UTF-16 text, which
+  // binary readers would misread. Consumes nothing.
   absl::Status CheckStart();
 
   // Returns the error that stopped reading; OK at the end of the file.

@@ -13,7 +13,7 @@ namespace {
 // Columns of x, y, and z.
 using Columns = std::array<size_t, 3>;
 
-// Returns the separator. A semicolon or tab anywhere in the first row is one; a comma may then be a
+// Returns the separator: a semicolon or tab if the first row contains one. A comma may then be a
 // decimal mark, which fails later.
 char SeparatorOf(std::string_view first_row) {
   for (const char separator : {';', '\t'}) {
@@ -40,8 +40,8 @@ void SplitRow(std::string_view row, char separator, std::vector<std::string_view
   }
 }
 
-// Returns true if the row holds only names. A cell that starts like a number counts as a number
-// even if it is malformed, such as 1,5.
+// Returns true if the row consists of names only. A cell that starts like a number counts as a
+// number even if it is malformed, such as 1,5.
 bool IsHeader(const std::vector<std::string_view>& cells) {
   double ignored;
   for (const std::string_view cell : cells) {
@@ -101,7 +101,8 @@ absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
     const std::string_view content = Trim(line);
     if (content.empty() || (content.front() == '#' && !first)) continue;
     if (first) separator = SeparatorOf(content);
-    // Splits the whole line, as trimming would remove the tab next to an empty first or last cell.
+    // Splits the untrimmed line, because trimming would remove the tab next to an empty first or
+    // last cell.
     SplitRow(line, separator, &cells);
     absl::Status status;
     if (first && IsHeader(cells)) {

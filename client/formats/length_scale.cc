@@ -18,7 +18,8 @@ struct Decimal {
 };
 
 constexpr size_t kMaxDigits = 18;
-// Beyond this, the exponent alone decides between 0 and infinity, as no text has that many digits.
+// Beyond this, the exponent alone decides between 0 and infinity, because no text has that many
+// digits.
 constexpr int64_t kMaxExponent = int64_t{1} << 40;
 
 // Requires a finite number that ParseDouble accepts.
@@ -47,7 +48,7 @@ Decimal Split(std::string_view text) {
 }
 
 // Multiplies the digits in place by long multiplication. A carry and nine mantissas fit into 64
-// bits, as the mantissa is below 10^18.
+// bits because the mantissa is below 10^18.
 void Multiply(uint64_t mantissa, std::string* digits) {
   uint64_t carry = 0;
   for (auto digit = digits->rbegin(); digit != digits->rend(); ++digit) {

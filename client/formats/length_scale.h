@@ -13,12 +13,12 @@ namespace hulld {
 // An exact decimal factor of coordinates, such as 0.0254 from inches to meters. Default: 1.
 //
 // Scaling has a single rounding: the result is the double nearest to the real product, ties to
-// even, or infinity if the product is beyond the largest double.
+// even, or infinity if the product exceeds the largest double.
 class LengthScale {
  public:
   // Parses a decimal number. Returns nullopt unless its nearest double is finite and nonzero. A
-  // number of more than 18 significant digits stands for the shortest decimal number with the same
-  // nearest double.
+  // number with more than 18 significant digits is replaced by the shortest decimal number with the
+  // same nearest double.
   static std::optional<LengthScale> FromText(std::string_view decimal);
 
   // Returns the product of both factors as FromText parses it.

@@ -74,13 +74,13 @@ std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uin
 
 // Returns the connected components of a mesh.
 std::vector<MeshPart> Components(const TriangleMesh& mesh) {
-  // Each vertex leads to another one of its component, and finally to the component's
+  // Each vertex points to another one of its component, and eventually to the component's
   // representative.
   std::vector<uint32_t> leader(mesh.vertices.size());
   std::map<std::array<double, 3>, uint32_t> first;
   for (uint32_t i = 0; i < leader.size(); ++i) {
     const std::array<double, 3>& p = mesh.vertices[i];
-    // Adding 0 makes -0 the same as 0.
+    // Adding 0 turns -0 into 0.
     leader[i] = first.emplace(std::array{p[0] + 0, p[1] + 0, p[2] + 0}, i).first->second;
   }
   const auto find = [&leader](uint32_t i) {

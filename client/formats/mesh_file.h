@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// A mesh, held whole in memory.
+// A mesh, entirely in memory.
 struct TriangleMesh {
   std::vector<std::array<double, 3>> vertices;
   // Indices into vertices, all in range.
@@ -20,10 +20,10 @@ struct TriangleMesh {
 };
 
 // Reads obj, off, stl, gltf, glb or dae, by the extension; polygons become fans. INVALID_ARGUMENT
-// names the file and the place.
+// names the file and the location.
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path);
 
-// A part of a file. The name is the file's, or empty.
+// A part of a file. The name comes from the file, or is empty.
 struct MeshPart {
   std::string name;
   TriangleMesh mesh;
@@ -33,8 +33,8 @@ enum class SplitBy {
   // By name: objects and groups of obj, solids of stl, nodes of gltf and dae. Parts with the same
   // name form one part; off has no names and forms one part.
   kName,
-  // By connected component: triangles that share a vertex, at the same coordinates, belong
-  // together. Named "component-1" and so on, in the order of the file.
+  // By connected component: triangles that share a vertex (by coordinates) belong together. Named
+  // "component-1" and so on, in the order of the file.
   kComponent,
 };
 

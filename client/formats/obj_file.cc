@@ -59,7 +59,7 @@ class ObjWalk {
       if (error != std::errc() || stop != end || vertex <= 0 ||
           vertex > std::numeric_limits<uint32_t>::max()) {
         return source_->ErrorAtLine(
-            absl::StrCat(Quoted(token), " names no vertex; ", vertices_, " came before"));
+            absl::StrCat(Quoted(token), " is not a vertex; ", vertices_, " precede this line"));
       }
       if (vertex > largest_) {
         largest_ = vertex;
@@ -75,19 +75,19 @@ class ObjWalk {
   absl::Status Finish() const {
     if (vertices_ == 0) {
       return absl::InvalidArgumentError(absl::StrCat(
-          source_->name(), ": holds no vertex: no line starts with v; is it an OBJ file?"));
+          source_->name(), ": contains no vertices: no line starts with v; is it an OBJ file?"));
     }
     if (largest_ <= vertices_) return absl::OkStatus();
     return absl::InvalidArgumentError(absl::StrCat(source_->name(), ":", largest_line_,
                                                    ": a face names vertex ", largest_,
-                                                   ", but the file holds ", vertices_));
+                                                   ", but the file has ", vertices_));
   }
 
   ByteSource* source_;
   const ObjReceiver& receiver_;
   std::vector<uint32_t> corners_;
   int64_t vertices_ = 0;
-  // The largest number of a vertex in a face, from 1, and its line.
+  // The largest vertex number in a face, from 1, and its line.
   int64_t largest_ = 0;
   uint64_t largest_line_ = 0;
 };

@@ -16,7 +16,7 @@ namespace hulld {
 struct ObjReceiver {
   // The text after `v`: three coordinates, then weight or color.
   std::function<absl::Status(std::string_view text)> vertex;
-  // The vertices of a face, counted from 0. They exist once the whole file is read.
+  // The vertices of a face, counted from 0. They may be defined later in the file.
   std::function<void(const std::vector<uint32_t>& corners)> face;
   // `o` or `g`, and the name after it.
   std::function<void(std::string_view keyword, std::string_view name)> name;

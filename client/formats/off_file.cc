@@ -29,7 +29,7 @@ absl::Status OffReader::ReadHeader() {
   std::string_view rest;
   if (!NextContent(&rest)) return source_->Truncated("before the keyword OFF");
   std::string_view keyword = NextToken(&rest);
-  // Files of ModelNet lack the white space in between: OFF8 12 0.
+  // ModelNet files lack the white space in between: OFF8 12 0.
   if (const size_t digits = keyword.find_first_of("0123456789");
       digits != std::string_view::npos && IsPositionFirst(keyword.substr(0, digits))) {
     rest = {keyword.data() + digits, static_cast<size_t>(rest.end() - keyword.data()) - digits};
@@ -80,8 +80,8 @@ absl::Status OffReader::Finish() {
   std::string_view content;
   if (!NextContent(&content)) return source_->status();
   return source_->ErrorAtLine(
-      absl::StrCat("the file goes on after ", Counted(vertex_count_, "vertex", "vertices"), " and ",
-                   Counted(face_count_, "face"), ", the counts of its header"));
+      absl::StrCat("the file continues after ", Counted(vertex_count_, "vertex", "vertices"),
+                   " and ", Counted(face_count_, "face"), ", the counts of its header"));
 }
 
 absl::Status ReadOff(ByteSource* source, PointCollector* points) {

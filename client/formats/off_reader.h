@@ -26,7 +26,7 @@ class OffReader {
   // Reads the next face, the `index`-th. Faces follow all vertices.
   absl::Status NextFace(uint64_t index, std::vector<uint32_t>* corners);
   // Requires that all faces were read. INVALID_ARGUMENT if more follows: a wrong count makes
-  // readers take vertices for faces.
+  // readers mistake vertices for faces.
   absl::Status Finish();
 
   // Reads the next line that is not blank, without comments. Returns false at the end.

@@ -69,9 +69,9 @@ absl::Status ParseFormat(const ByteSource& source, std::string_view rest, PlyHea
   } else if (encoding == "binary_big_endian") {
     header->encoding = Encoding::kBigEndian;
   } else {
-    return source.ErrorAtLine(
-        absl::StrCat("format ", Quoted(encoding),
-                     " is unknown; known are ascii, binary_little_endian and binary_big_endian"));
+    return source.ErrorAtLine(absl::StrCat(
+        "format ", Quoted(encoding),
+        " is unknown; supported are ascii, binary_little_endian and binary_big_endian"));
   }
   return absl::OkStatus();
 }
@@ -177,7 +177,7 @@ class AsciiBody {
         if (absl::Status status = SkipList(element, token); !status.ok()) return status;
         continue;
       }
-      // Other values are not checked, such as "1.#QNAN" of a normal.
+      // Other values, such as a "1.#QNAN" in a normal, are not checked.
       if (!property.axis) continue;
       const NumberText kind = points_.Parse(token, *property.axis, &(*xyz)[*property.axis]);
       if (kind != NumberText::kNumber) return source_->ErrorAtLine(NumberProblem(kind, token));
@@ -191,7 +191,7 @@ class AsciiBody {
     return points->AddScaled(xyz[0], xyz[1], xyz[2], error_at);
   }
 
-  // Extra values mean that the file was read out of step, and its points are wrong.
+  // Extra values mean that the file was misread and its points are wrong.
   absl::Status Finish() {
     std::string_view token;
     if (!NextValue(&token)) return source_->status();
@@ -256,7 +256,7 @@ class BinaryBody {
     return absl::OkStatus();
   }
 
-  // Floats stay floats if all three coordinates are.
+  // Keeps floats if all three coordinates are floats.
   template <typename ErrorAt>
   static absl::Status Add(const std::array<double, 3>& xyz, const Element& vertex,
                           const ErrorAt& error_at, PointCollector* points) {

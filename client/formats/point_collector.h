@@ -31,7 +31,8 @@ using BlockReceiver = std::function<absl::Status(PointChunk block)>;
 struct ReadOptions {
   // Points per block; the last block of a file may be smaller. 0: about 1 MiB of coordinates.
   size_t points_per_block = 0;
-  // Counts and skips points with a NaN or infinite coordinate. Otherwise the first one is an error.
+  // Counts and skips points with a NaN or infinite coordinate. If false, the first such point is an
+  // error.
   bool skip_nonfinite = false;
   // Counts and skips points at exactly (0, 0, 0), which depth cameras write for missing data.
   bool skip_zero = false;
@@ -103,7 +104,7 @@ class PointCollector {
       ++counts_.zeros;
       return absl::OkStatus();
     }
-    // A block holds one kind of scalar.
+    // A block contains one kind of scalar.
     if (to->size() != 3 * block_.size()) {
       if (absl::Status status = Flush(); !status.ok()) return status;
     }

@@ -74,7 +74,8 @@ absl::StatusOr<PointFormat> PointFormatFromName(const std::string& name) {
   for (const FormatName& entry : kFormatNames) {
     if (absl::AsciiStrToLower(name) == entry.name) return entry.format;
   }
-  return absl::InvalidArgumentError(absl::StrCat("unknown format ", Quoted(name), "; known are ",
+  return absl::InvalidArgumentError(absl::StrCat("unknown format ", Quoted(name),
+                                                 "; supported formats are ",
                                                  absl::StrJoin(PointFormatNames(), ", ")));
 }
 

@@ -24,14 +24,14 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path);
 bool IsMeshFormat(PointFormat format);
 
 // Reads the points of a file and passes them on in blocks, in the file's order; blocks before an
-// error are delivered. Text becomes the nearest double; binary scalars are taken as they are.
-// Errors of the file are INVALID_ARGUMENT and name file and line, or file and byte. Errors of
-// `receive` are returned unchanged.
+// error are delivered. Text becomes the nearest double; binary scalars are kept unchanged. Errors
+// of the file are INVALID_ARGUMENT and name file and line, or file and byte. Errors of `receive`
+// are returned unchanged.
 //
 // Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each
 // vertex; xyz, pts: the first three columns; csv: the columns x, y, and z; stl: each corner of each
-// triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that shows
-// it. COLLADA (dae) is converted to meters by the file's own unit and keeps its axes, as robot
+// triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that uses
+// it. COLLADA (dae) is converted to meters using the file's unit, and keeps its axes, as robot
 // descriptions expect: up_axis is ignored. Coordinates of a mesh that no node moves are rounded
 // once.
 //

@@ -15,8 +15,8 @@ namespace {
 
 constexpr size_t kStlHeaderBytes = 80;
 constexpr size_t kTriangleBytes = 50;
-// Prefix that holds the count and 18 triangles of a binary file; one of their bytes is a control
-// character, at the latest the high byte of the count if there are less than 2^24 triangles.
+// A prefix that contains the count and 18 triangles of a binary file. One of its bytes is a control
+// character: at the latest the high byte of the count, if the file has less than 2^24 triangles.
 constexpr size_t kBytesToClassify = 1024;
 
 // Text is a sequence of words: lines matter only after `solid` and `endsolid`, where the name is
@@ -78,7 +78,7 @@ class StlText {
   }
 
   absl::Status ReadFacet() {
-    // `normal` and three words, which may be missing and are not used.
+    // Skips `normal` and three words, which may be missing.
     for (int words = 0;; ++words) {
       if (!NextWord()) return Ended("outer");
       if (Is("outer")) break;

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// Makes an error that names the place of a corner.
+// Creates an error that names the location of a corner.
 using StlErrorAt = std::function<absl::Status(const std::string& message)>;
 
 // Receives the solids of an STL file in order, and three corners for each facet.

@@ -12,9 +12,9 @@ bool IsSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
-// Distinguishes 1e999 from 1e-999, for both of which std::from_chars returns "out of range", by the
-// decimal exponent of the first nonzero digit: for a valid number outside the range of double it is
-// above 300 or below -300.
+// Distinguishes 1e999 from 1e-999, because std::from_chars returns "out of range" for both: by the
+// decimal exponent of the first nonzero digit, which is above 300 or below -300 for a valid number
+// outside the range of double.
 bool IsHuge(std::string_view text) {
   long long exponent = -1;
   bool in_fraction = false;
@@ -43,7 +43,7 @@ bool IsHuge(std::string_view text) {
   return exponent + (negative ? -written : written) > 0;
 }
 
-// Parses 1.#INF and its kin without a sign. Printing with a precision adds zeros.
+// Parses 1.#INF and its variants without a sign. Printing with a precision adds zeros.
 bool ParseNonFinite(std::string_view text, double* value) {
   while (!text.empty() && text.back() == '0') text.remove_suffix(1);
   const bool is_infinite = text == "1.#INF";
@@ -155,7 +155,7 @@ std::string Quoted(std::string_view text) {
   constexpr size_t kLongest = 40;
   size_t end = text.size();
   if (end > kLongest) {
-    // Ends before a whole character.
+    // Cuts only between whole characters.
     for (end = kLongest; end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80;) --end;
   }
   std::string quoted = "\"";
@@ -181,10 +181,10 @@ std::string Printable(std::string_view text) {
 
 std::string NumberProblem(NumberText kind, std::string_view text) {
   if (kind == NumberText::kTooLarge) {
-    return Quoted(text) + " is beyond the largest double, about 1.8e308; rescale the points";
+    return Quoted(text) + " exceeds the largest double, about 1.8e308; rescale the points";
   }
   std::string problem = Quoted(text) + " is not a number";
-  if (text.find(',') != std::string_view::npos) problem += " (the decimal mark is a point)";
+  if (text.find(',') != std::string_view::npos) problem += " (use a point as the decimal mark)";
   return problem;
 }
 

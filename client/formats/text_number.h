@@ -23,7 +23,7 @@ enum class NumberText {
 // infinity and NaN. Independent of the locale.
 NumberText ParseDouble(std::string_view text, double* value);
 
-// Parses a decimal number without a sign that fits 64 bits.
+// Parses an unsigned decimal number that fits in 64 bits.
 bool ParseUnsigned(std::string_view text, uint64_t* value);
 
 // Returns the shortest decimal text that ParseDouble reads back as the same bits.
@@ -33,11 +33,11 @@ std::string ShortestText(double value);
 // end.
 std::string_view NextToken(std::string_view* rest);
 
-// Returns the text without spaces at both ends.
+// Returns the text without leading and trailing spaces.
 std::string_view Trim(std::string_view text);
 
-// Returns the line without the comment that starts at its first '#'. The one in 1.#QNAN is part of
-// a number.
+// Returns the line without the comment that starts at its first '#'. The # in 1.#QNAN is part of a
+// number.
 std::string_view WithoutComment(std::string_view line);
 
 // Returns the text in double quotes, shortened and with unprintable characters replaced, for an

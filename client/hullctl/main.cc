@@ -7,8 +7,8 @@
 #include "client/hullctl/hullctl.h"
 
 int main(int argc, char** argv) {
-  // Debian builds Abseil without NDEBUG, so its mutexes, which gRPC locks for every call, look for
-  // deadlocks by default.
+  // Debian builds Abseil without NDEBUG, so by default its mutexes, which gRPC locks for every
+  // call, check for deadlocks.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
   // A closed pipe becomes a failed write, which is reported.
   std::signal(SIGPIPE, SIG_IGN);

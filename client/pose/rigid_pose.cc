@@ -9,7 +9,7 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-// p turned by the quaternion w + v, of any length: p + 2 (w v x p + v x (v x p)) / |q|^2.
+// p rotated by the quaternion w + v, of any length: p + 2 (w v x p + v x (v x p)) / |q|^2.
 Vector Turn(double w, const Vector& v, const Vector& p) {
   if (v[0] == 0 && v[1] == 0 && v[2] == 0) return p;
   const double scale = 2 / (w * w + v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);

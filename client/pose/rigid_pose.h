@@ -12,7 +12,7 @@ using RigidPose = std::array<double, kPoseNumbers>;
 inline constexpr RigidPose kNoMotion = {1, 0, 0, 0, 0, 0, 0};
 
 // Returns the rotation by `angle` (radians) about `axis`, which need not have unit length. An axis
-// of length 0 gives no rotation.
+// of length 0 yields the identity.
 RigidPose RotationAbout(const std::array<double, 3>& axis, double angle);
 
 // Returns the rotation by roll, pitch, and yaw (radians) about the fixed axes x, y, and z in this
@@ -21,7 +21,7 @@ RigidPose RotationOf(const std::array<double, 3>& roll_pitch_yaw);
 
 // Returns X_AC = X_AB X_BC, rounded: each number has an error of a few units of roundoff of the
 // lengths involved. If X_AB has no rotation (its quaternion is (w, 0, 0, 0)), only the sum of the
-// translations is rounded. Requires nonzero quaternions; a zero one gives NaN.
+// translations is rounded. Requires nonzero quaternions; a zero quaternion yields NaN.
 RigidPose Compose(const RigidPose& X_AB, const RigidPose& X_BC);
 
 }  // namespace hulld

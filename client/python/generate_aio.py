@@ -3,8 +3,8 @@
     python3 generate_aio.py SOURCE TARGET
 
 Reads the modules of MODULES in SOURCE (client/python/hulld) and writes them to TARGET/aio. A
-function becomes a coroutine if it calls one, beginning with those of hulld/aio/transport.py. A line
-that ends in "# sync only" is left out.
+function becomes a coroutine if it calls one, beginning with those of hulld/aio/transport.py. Lines
+that end in "# sync only" are omitted.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ CLASS_DOCUMENTATION = (
 
 
 def called(node: ast.AST) -> tuple[str, bool]:
-    """The name that a call calls, and True if it is a method of RECEIVERS; "" for other calls."""
+    """The name of the called function, and True if it is a method of RECEIVERS; "" for other
+    calls."""
     if not isinstance(node, ast.Call):
         return "", False
     if isinstance(node.func, ast.Name):
@@ -125,7 +126,7 @@ class ToAsync(ast.NodeTransformer):
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST | None:
         if node.name == "__del__":
-            # The garbage collector runs in any thread, and a loop has one.
+            # The garbage collector runs in any thread, but a loop belongs to one.
             return None
         nodes = own_nodes(node)
         becomes_async = node.name in ASYNC_METHODS or any(map(self._colors.waits, nodes))
@@ -168,7 +169,7 @@ class ToAsync(ast.NodeTransformer):
         self.generic_visit(node)
         if not isinstance(node.value, ast.YieldFrom):
             return node
-        # An asynchronous generator has no `yield from`.
+        # An asynchronous generator cannot use `yield from`.
         item = ast.Expr(ast.Yield(ast.Name("item", ast.Load())))
         target = ast.Name("item", ast.Store())
         return ast.For(target=target, iter=node.value.value, body=[item], orelse=[])

@@ -69,8 +69,8 @@ absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<JointVariable>
       absl::StrCat(Quoted(name), " has several values; its columns are ", NamesOf(parts)));
 }
 
-// Checks that a table has all four columns of a quaternion or none: three numbers do not determine
-// the fourth.
+// Checks that a table has either all four columns of a quaternion or none, because three numbers do
+// not determine the fourth.
 absl::Status CheckRotations(const ByteSource& source, const Robot& robot,
                             const std::vector<JointVariable>& variables,
                             const std::vector<int>& columns) {

@@ -66,17 +66,17 @@ void AddRotation(double rate, double rounding, MotionBound* bound) {
 
 // Adds a rotation about a fixed axis from one angle to another.
 void AddTurn(double from, double to, MotionBound* bound) {
-  // The angle enters the quaternion by its half.
+  // The quaternion contains half of the angle.
   const double angle_rounding = kInterpolation / 2 * kUnit * std::max(std::abs(from), std::abs(to));
   AddRotation(std::abs(to - from), angle_rounding + kAxisQuaternion * kUnit, bound);
 }
 
-// Adds an offset that moves from one place to another, each `factor` times the given length.
+// Adds an offset that moves from one position to another, each `factor` times the given length.
 void AddTravel(const double* from, const double* to, double factor, double steps,
                MotionBound* bound) {
   const double delta[] = {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
   const double length = factor * std::max(LengthOf(from), LengthOf(to));
-  // Each component may come from a different end.
+  // The maximum of each component may come from a different end.
   AddOffset(length, factor * LengthOf(delta), 2 * steps * kUnit * length, bound);
 }
 
@@ -112,7 +112,7 @@ void AddJoint(const RobotJoint& joint, const JointValue& from, const JointValue&
     }
     case JointKind::kPlanar: {
       const double ends[2][3] = {{from[0], from[1], 0}, {to[0], to[1], 0}};
-      // Turned into the plane.
+      // Rotated into the plane.
       AddTravel(ends[0], ends[1], 1, kInterpolation + kTurnedOffset, bound);
       AddTurn(from[2], to[2], bound);
       break;
@@ -135,7 +135,7 @@ double MotionBound::Travel(double duration, double reach) const {
 double MotionBound::Deviation(double duration, double reach) const {
   const double curved = duration * duration / 8 * (bend + reach * turn * turn / 2);
   const double rounded = rounding + 2 * reach * (quaternion_rounding + kNormalization * kUnit);
-  // The least normal double covers underflow.
+  // The smallest normal double covers underflow.
   return kRoundedUp * (curved + rounded) + std::numeric_limits<double>::min();
 }
 

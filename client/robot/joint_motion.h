@@ -29,18 +29,18 @@ struct MotionBound {
   // in a time span of this duration.
   double Travel(double duration, double reach) const;
 
-  // Returns an upper bound (proven) of the distance between the exact place of a point within
-  // `reach` of the origin and its place in the motion of Placement.end_pose between the computed
-  // poses at the ends of a time span of this duration, at the same time, for normalized quaternions
-  // that are not negated.
+  // Returns an upper bound (proven) of the distance between the exact position of a point within
+  // `reach` of the origin and its position in the motion of Placement.end_pose between the
+  // computed poses at the ends of a time span of this duration, at the same time, for normalized
+  // quaternions that are not negated.
   //
   // Requires duration * turn <= kMostTurn, so that the rotation of that motion does not vanish.
   double Deviation(double duration, double reach) const;
   static constexpr double kMostTurn = 2;
 };
 
-// Returns the bound of each link's frame. Requires values of AllJointValues, as aligned by
-// AlignTurns (unchecked: callers compute them so).
+// Returns the bound of each link's frame. Requires values of AllJointValues aligned by AlignTurns
+// (unchecked: callers compute them this way).
 std::vector<MotionBound> BoundMotions(const Robot& robot, const RigidPose& X_WB,
                                       std::span<const JointValue> from,
                                       std::span<const JointValue> to);
@@ -48,7 +48,7 @@ std::vector<MotionBound> BoundMotions(const Robot& robot, const RigidPose& X_WB,
 // Returns the bound of a frame fixed at X_LS in a link with this bound.
 MotionBound BoundFixedFrame(const MotionBound& link, const RigidPose& X_LS);
 
-// Negates the quaternions of floating joints in `to` where that makes the rotation the shorter one.
+// Negates the quaternions of floating joints in `to` where that shortens the rotation.
 void AlignTurns(const Robot& robot, std::span<const JointValue> from, std::span<JointValue> to);
 
 // Returns the joint values at time t in [0, 1], each within 3 units of roundoff of the larger of

@@ -24,7 +24,7 @@ bool IsFile(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-// Returns the file `folder`/`name`. URIs may hold escapes such as %20, and so may names of files.
+// Returns the file `folder`/`name`. URIs may contain escapes such as %20, and so may file names.
 std::optional<std::string> FileIn(const fs::path& folder, const std::string& name) {
   for (const std::string& spelled : {name, PercentDecoded(name)}) {
     if (IsFile(folder / spelled)) return (folder / spelled).string();

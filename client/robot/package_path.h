@@ -14,7 +14,7 @@ struct PackagePaths {
   // Path of the description. Its folder and the folders above it are searched; relative names start
   // there.
   std::string description;
-  // Packages given by name: name to folder.
+  // Explicitly given packages: name to folder.
   std::map<std::string, std::string> named;
   // Folders of packages, as in ROS_PACKAGE_PATH, and prefixes with a share/ folder of packages, as
   // in AMENT_PREFIX_PATH.

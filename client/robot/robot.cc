@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// A number of a joint's value: the suffix of its name, and its index.
+// A component of a joint's value: the suffix of its name, and its index.
 struct NamedPlace {
   const char* suffix;
   size_t place;
@@ -30,7 +30,7 @@ std::span<const NamedPlace> PlacesOf(const RobotJoint& joint) {
 
 // Moves by x and y in the plane with that normal, then by theta about the normal.
 RigidPose PlanarMotion(const std::array<double, 3>& n, const JointValue& value) {
-  // The shortest rotation from z to n, about z x n; for -z, half a turn about x.
+  // The shortest rotation from z to n, about z x n; for n = -z, half a turn about x.
   RigidPose turn = {1 + n[2], -n[1], n[0], 0, 0, 0, 0};
   if (turn[0] == 0) turn[1] = 1;
   const RigidPose moved = Compose(turn, {1, 0, 0, 0, value[0], value[1], 0});

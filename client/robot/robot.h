@@ -44,8 +44,8 @@ struct RobotLink {
 
 enum class JointKind { kFixed, kRevolute, kContinuous, kPrismatic, kPlanar, kFloating };
 
-// Values of a joint; values that its kind lacks are 0. Floating: the child's pose. Planar: x, y,
-// then the angle theta. Other kinds: one value, unused for a fixed joint.
+// Value of a joint; unused components are 0. Floating: the child's pose. Planar: x, y, then the
+// angle theta. Other kinds: one value, unused for a fixed joint.
 using JointValue = std::array<double, 7>;
 
 struct RobotJoint {
@@ -104,8 +104,8 @@ std::vector<JointValue> AllJointValues(const Robot& robot, std::span<const doubl
 // 0; 1 for the w of a rotation.
 std::vector<double> RestValues(const Robot& robot);
 
-// Returns the name of a floating joint with the quaternion 0 0 0 0, which is no rotation; empty if
-// none has it.
+// Returns the name of a floating joint with the quaternion 0 0 0 0, which is not a rotation; empty
+// if there is none.
 std::string JointWithoutRotation(const Robot& robot, std::span<const double> free_values);
 
 // Returns X_WL of each link for a root at X_WB. Floating point: each joint on the path adds an
@@ -115,7 +115,7 @@ std::vector<RigidPose> LinkPoses(const Robot& robot, const RigidPose& X_WB,
                                  std::span<const JointValue> joint_values);
 
 // Returns the violations of joint limits, one sentence each; empty if all values are within limits.
-// Same requirement.
+// Same requirement as above.
 std::vector<std::string> LimitProblems(const Robot& robot,
                                        std::span<const JointValue> joint_values);
 

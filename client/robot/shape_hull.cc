@@ -27,7 +27,7 @@ ShapeHull BoxHull(const CollisionShape& box) {
 
 ShapeHull CylinderHull(const CollisionShape& cylinder) {
   ShapeHull hull;
-  // The sides of a regular polygon are nearer to its center than its corners, by this factor.
+  // Ratio of the distance of a regular polygon's sides from its center to that of its corners.
   const double reach = kOutward * cylinder.radius / std::cos(std::numbers::pi / kCylinderSides);
   for (int side = 0; side < kCylinderSides; ++side) {
     const double angle = 2 * std::numbers::pi * side / kCylinderSides;
@@ -72,7 +72,8 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
     return absl::OkStatus();
   });
   if (!counts.ok()) return counts.status();
-  if (hull.xyz.empty()) return absl::InvalidArgumentError(absl::StrCat(file, ": holds no vertex"));
+  if (hull.xyz.empty())
+    return absl::InvalidArgumentError(absl::StrCat(file, ": contains no vertices"));
   return hull;
 }
 

@@ -10,21 +10,21 @@
 
 namespace hulld {
 
-// A rounded hull that stands for a shape.
+// A rounded hull that represents a shape.
 struct ShapeHull {
   // n x 3, in the frame of the shape.
   std::vector<double> xyz;
   // Placement.radius, in meters.
   double radius = 0;
   // The rounded hull contains the shape and extends at most this far beyond it, in meters; proven,
-  // up to the rounding of this number. 0 but for cylinders; a mesh is replaced by its hull.
+  // up to the rounding of this number. 0 except for cylinders; a mesh is replaced by its hull.
   double excess = 0;
 };
 
 // Returns the rounded hull of a shape. Box: its corners. Sphere: its center and radius. Capsule:
-// its segment and radius. These are exact but for halving the smallest numbers. Cylinder: a prism
-// of kCylinderSides sides around it, as tight as possible within a few units of roundoff. Requires
-// sizes above 0, as ReadUrdf ensures, and no mesh.
+// its segment and radius. These are exact, except for halving the smallest numbers. Cylinder: a
+// prism of kCylinderSides sides around it, as tight as possible within a few units of roundoff.
+// Requires sizes above 0, as ReadUrdf ensures, and no mesh.
 ShapeHull PrimitiveHull(const CollisionShape& shape);
 inline constexpr int kCylinderSides = 32;
 

@@ -91,8 +91,8 @@ absl::StatusOr<std::set<LinkPair>> ReadDisabledPairs(const std::string& path, co
 
 std::set<LinkPair> AdjacentPairs(const Robot& robot) {
   // Two links with shapes are neighbors if the path between them has no other link with shapes. So
-  // each is a neighbor of its nearest ancestor with shapes, and all links below the same links
-  // without shapes are neighbors of each other.
+  // each link is a neighbor of its nearest ancestor with shapes, and all links directly below the
+  // same group of links without shapes are neighbors of each other.
   std::set<LinkPair> pairs;
   const int count = static_cast<int>(robot.links.size());
   // Topmost of the links without shapes above a link, or its nearest ancestor with shapes.

@@ -27,7 +27,7 @@ absl::StatusOr<std::set<LinkPair>> ParseDisabledPairs(const std::string& text,
 
 // Returns the adjacent pairs of links: connected by a joint, or by a chain of joints through links
 // without collision shapes. MoveIt disables these pairs. Planar and floating joints do not connect
-// links here, as their links can move apart, and into each other.
+// links here, because their links can move apart and into each other.
 std::set<LinkPair> AdjacentPairs(const Robot& robot);
 
 // A disabled pair, with the reason in the terms of MoveIt's files.

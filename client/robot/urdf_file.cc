@@ -110,8 +110,8 @@ class UrdfCheck {
     if (std::find(std::begin(kShapes), std::end(kShapes), kind) == std::end(kShapes)) {
       return document_.ErrorAt(
           shape == nullptr ? *geometry : *shape,
-          absl::StrCat("<geometry> holds ", shape == nullptr ? "nothing" : Quoted(kind),
-                       "; it takes a box, cylinder, sphere, capsule or mesh"));
+          absl::StrCat("<geometry> contains ", shape == nullptr ? "nothing" : Quoted(kind),
+                       "; it must contain a box, cylinder, sphere, capsule or mesh"));
     }
     if (kind == "mesh") return CheckMesh(*shape);
     if (kind == "box") return CheckSizes(*shape, "size", 3);
@@ -218,7 +218,7 @@ class UrdfCheck {
 
   absl::Status CheckMimic(const TiXmlElement& joint) const {
     std::string name = AttributeOf(joint, "name");
-    // As many steps as joints reach the end of the chain, or prove a cycle.
+    // A chain with more steps than joints proves a cycle.
     for (size_t step = 0; step <= joints_.size(); ++step) {
       const TiXmlElement* const at = joints_.at(name);
       const TiXmlElement* const mimic = at->FirstChildElement("mimic");
@@ -237,8 +237,9 @@ class UrdfCheck {
       for (const std::string& one : {name, leader}) {
         const std::string kind = AttributeOf(*joints_.at(one), "type");
         if (kind != "planar" && kind != "floating") continue;
-        return document_.ErrorAt(*mimic, absl::StrCat("joint ", Quoted(one), " is ", kind,
-                                                      "; joints that mimic have one value each"));
+        return document_.ErrorAt(
+            *mimic, absl::StrCat("joint ", Quoted(one), " is ", kind,
+                                 "; a mimic joint and its leader must have one value each"));
       }
       name = std::move(leader);
     }
@@ -285,7 +286,7 @@ class UrdfCheck {
 struct ShapePlace {
   int line = 0;
   bool is_capsule = false;
-  // For a mesh: exact, as the library rounds it to doubles.
+  // For a mesh: the exact text, because the library rounds it to doubles.
   std::array<LengthScale, 3> scale;
 };
 

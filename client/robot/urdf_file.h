@@ -11,12 +11,12 @@ namespace hulld {
 
 // Reads links, joints, and collision shapes from a robot description; "-" is standard input.
 // Ignores other elements (visual, inertial, transmissions, simulators). liburdfdom parses the
-// values. Capsules, which its version 3 does not know, are parsed here.
+// values. Capsules, which its version 3 does not support, are parsed here.
 //
 // INVALID_ARGUMENT names file and line, and the defect of the element: malformed XML, an invalid
 // number, a link or joint without a name or with a duplicate name, a shape without a size above 0,
-// a mesh scaled by 0, links that form no tree, a joint that mimics itself or a joint of several
-// values, or a planar joint without an axis.
+// a mesh scaled by 0, links that do not form a tree, a joint that mimics itself or a joint of
+// several values, or a planar joint without an axis.
 absl::StatusOr<Robot> ReadUrdf(const std::string& path);
 absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name);
 

@@ -29,7 +29,7 @@ std::string MovedText(const char* what, uint64_t revision, const v1::HullVersion
                       "; the answer is from revision ", version.revision());
 }
 
-// Returns the reason that precludes a check; none for an answer that matches the question.
+// Returns the reason that precludes a check; none for an answer that matches the query.
 std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement& a,
                                       const v1::HullVersion& of_a, const v1::Placement& b,
                                       const v1::HullVersion& of_b) {

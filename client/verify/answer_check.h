@@ -22,9 +22,9 @@ enum class Verdict {
   kValid,
   // It does not prove the relation.
   kInvalid,
-  // Nothing to check, or the hulls of the answer no longer exist.
+  // There is nothing to check, or the hulls of the answer no longer exist.
   kCannotCheck,
-  // Same as above, because a hull has changed since; a new query may succeed.
+  // Same as above, because a hull has since changed; a new query may succeed.
   kMoved,
 };
 
@@ -34,7 +34,7 @@ struct Verification {
   std::string reason;
 };
 
-// One answer and its question.
+// One answer and its query.
 struct CheckedAnswer {
   const v1::Placement& a;
   const v1::Placement& b;
@@ -44,7 +44,7 @@ struct CheckedAnswer {
   const v1::HullVersion& hull_b;
   // For a pair in motion; null if the answer has none.
   const v1::FirstContact* first_contact = nullptr;
-  // Requested width of its bracket.
+  // Maximum width of its bracket, as requested.
   double max_time_error = 0;
 };
 
@@ -76,7 +76,7 @@ class AnswerChecker {
   // `client` must outlive this object.
   explicit AnswerChecker(const Client& client) : client_(client) {}
 
-  // Fetches missing hulls and returns errors of these calls. A deleted hull gives kMoved.
+  // Fetches missing hulls and returns errors of these calls. A deleted hull results in kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
   absl::StatusOr<Verification> Check(const CheckedBodies& answer);
   // Same as above, for a single call, which may concern bodies.

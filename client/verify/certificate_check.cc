@@ -25,7 +25,7 @@ absl::Status ReadInteger(const std::string& text, BigInteger* number) {
   if (text.size() == sign || text.size() > kMostDigits || !digits) {
     return ProofFails("integer_direction is not a decimal integer");
   }
-  // A leading 0 would mean octal.
+  // Boost would parse a leading 0 as octal.
   const size_t first = std::min(text.find_first_not_of('0', sign), text.size() - 1);
   *number = BigInteger(text.substr(first));
   if (sign == 1) *number = -*number;
@@ -149,7 +149,8 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n, int
     case v1::Certificate::kDirection: {
       const v1::Vector3& d = certificate.direction();
       const std::array<double, 3> numbers = {d.x(), d.y(), d.z()};
-      if (!AreFinite(numbers)) return ProofFails("the direction holds a number that is not finite");
+      if (!AreFinite(numbers))
+        return ProofFails("the direction contains a number that is not finite");
       CommonExponent common;
       common.Include(numbers);
       for (int i = 0; i < 3; ++i) (*n)[i] = common.ToInteger(numbers[i]);

@@ -23,7 +23,7 @@ std::array<double, 3> Translation(const v1::Pose& pose) {
 
 absl::Status CheckFinite(std::span<const double> numbers, const char* what) {
   if (AreFinite(numbers)) return absl::OkStatus();
-  return absl::FailedPreconditionError(absl::StrCat(what, " holds a number that is not finite"));
+  return absl::FailedPreconditionError(absl::StrCat(what, " contains a number that is not finite"));
 }
 
 absl::Status CheckPose(const v1::Pose& pose) {

@@ -66,8 +66,8 @@ BigVector Combination(const BigVector& n, const BigVector (&rows)[3]);
 // of two. The power of two of a quaternion cancels.
 struct ExactHull {
   // Requires CheckPlacement, an exponent that covers the hull (IncludeLengths), and its vertices at
-  // that exponent. (The number of vertices is checked. Their values are not, as that would repeat
-  // the conversion.)
+  // that exponent. (The number of vertices is checked. Their values are not, because that would
+  // repeat the conversion.)
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
 
   // p_W = rotation(p) + translation / divisor. Requires divisor > 0. The vertices of a piece are

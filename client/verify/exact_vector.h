@@ -48,8 +48,8 @@ class CommonExponent {
 };
 
 // Returns true if 0 is in the convex hull of the points. Requires that all lie in a closed half
-// space with 0 on its boundary; unchecked, as callers find the half space by exact arithmetic just
-// before. Cost: cubic in the number of points.
+// space with 0 on its boundary; unchecked, because callers have just found the half space by exact
+// arithmetic. Cost: cubic in the number of points.
 bool HoldsOriginOnBoundary(std::span<const BigVector> points);
 
 // Returns true if 0 is in the interior of the convex hull of the points.

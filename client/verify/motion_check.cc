@@ -296,7 +296,7 @@ absl::Status CheckPlane(const MovingPair& pair, const std::array<Plane, 2>& plan
 absl::Status CheckTranslation(const MovingPair& pair, const BigVector& n,
                               const std::array<double, 2>& times, bool may_end) {
   if (!pair.IsTranslation()) {
-    return ProofFails("there is no offset, which only translations do without");
+    return ProofFails("the offset is missing, which is allowed only for translations");
   }
   const int at_end = pair.GapSignAt(n, times[1]);
   if (pair.GapSignAt(n, times[0]) > 0 && (at_end > 0 || (may_end && at_end == 0))) {

@@ -24,14 +24,14 @@ double MaxTimeError(const v1::Wanted& wanted);
 // the certificate proves their contact at contact.contact_time; for SEPARATED, if the intervals
 // cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: all is
 // proven, but the two times are more than max_time_error apart, which the contract allows if the
-// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, as
+// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, like
 // CheckCertificate.
 //
-// Of a translation without radii, the certificate proves contact at contact_time, or between
+// For a translation without radii, the certificate proves contact at contact_time, or between
 // separated_until and contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING
 // pair which touches at contact_time overlaps later, is not part of the proof.
 //
-// Cost: O(vertices) operations on integers of any length per interval: some microseconds per
+// Cost: O(vertices) operations on integers of any length per interval: a few microseconds per
 // vertex.
 absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
                                const v1::Certificate& at_contact, const MovingVertices& a,

@@ -132,8 +132,8 @@ class ExactPieces {
  private:
   std::span<const PlacedVertices> pieces_;
   std::vector<std::optional<ExactHull>> exact_;
-  // Keyed by the coordinates of a piece, so that a hull shared by several pieces is converted one
-  // time.
+  // Keyed by the coordinates of a piece, so that a hull shared by several pieces is converted only
+  // once.
   std::map<const double*, BigVertices> vertices_;
 };
 

@@ -156,7 +156,7 @@ class AskedHull {
  private:
   explicit AskedHull(const Measure& measure) : measure_(measure) {}
 
-  // Adding 0 makes -0 the same as 0.
+  // Adding 0 turns -0 into 0.
   static Point3 Key(const Point3& p) { return {p[0] + 0, p[1] + 0, p[2] + 0}; }
   static double DistanceSquared(const Point3& a, const Point3& b) {
     double sum = 0;
@@ -225,11 +225,11 @@ absl::Status CheckHeader(const v1::Simplification& asked, const HullMesh& simpli
   }
   if (asked.max_vertices() > 0 && simplified.vertex_count() > asked.max_vertices()) {
     return NotShown(absl::StrCat("the simplification has ", simplified.vertex_count(),
-                                 " vertices; at most ", asked.max_vertices(), " were asked for"));
+                                 " vertices; at most ", asked.max_vertices(), " were requested"));
   }
   if (asked.max_vertices() == 0 && error > asked.max_error()) {
     return NotShown(absl::StrCat("the error is ", Text(error), "; at most ",
-                                 Text(asked.max_error()), " was asked for"));
+                                 Text(asked.max_error()), " was requested"));
   }
   return absl::OkStatus();
 }

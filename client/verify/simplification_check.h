@@ -18,14 +18,14 @@ namespace hulld {
 //
 // Inside: each vertex is a vertex of the hull, and each vertex of the hull is within the error of
 // the simplification. Outside: the simplification contains each vertex of the hull, and each of its
-// vertices is within the error of the hull. This bounds the Hausdorff distance, as the distance
-// from a convex set is largest at vertices. The number of vertices is at most max_vertices; with
-// max_error alone, the error is at most that. With both, the check does not look for another hull
-// that satisfies both.
+// vertices is within the error of the hull. This bounds the Hausdorff distance, because the
+// distance from a convex set is largest at a vertex. The number of vertices is at most
+// max_vertices; with max_error alone, the error is at most that. With both, the check does not look
+// for another hull that satisfies both.
 //
 // A point is within the error if it is within the error of a triangle of vertices, and inside if a
 // tetrahedron of vertices contains it. Facets only guide the search: wrong facets can make the
-// check reject a true claim, but never accept a false one. Cost: about n log n, and some ten
+// check reject a true claim, but never accept a false one. Cost: about n log n, and about ten
 // microseconds of exact arithmetic per vertex.
 absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
                                  const HullMesh& simplified);

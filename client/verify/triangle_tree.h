@@ -18,8 +18,8 @@ inline Point3 PointAt(std::span<const double> xyz, size_t i) {
   return {xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]};
 }
 
-// Maps points to the unit of the box of all included points: each coordinate is from 0 to 1, so
-// that floating point serves any size and position.
+// Maps the bounding box of all included points to coordinates from 0 to 1, so that floating point
+// works at any size and position.
 class UnitBox {
  public:
   // Requires at least one point.

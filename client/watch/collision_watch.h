@@ -17,14 +17,14 @@
 namespace hulld {
 
 // WatchCollisions, message by message: reports collisions of pairs as they begin and end. After a
-// lost connection the watch resumes: it opens another call with the current poses, reports the
-// changes since the loss without repeating events, and ends them with another `synced`. Code that
-// folds the events need not handle connections. Next and Update may each be called by one thread,
-// the same or different ones; Cancel by any.
+// lost connection, the watch resumes: it opens another call with the current poses, reports the
+// changes since the loss without repeating events, and marks their end with another `synced`. Code
+// that accumulates the events need not handle connections. Next and Update may each be called by
+// one thread, the same or different ones; Cancel by any thread.
 class CollisionWatch {
  public:
-  // Connects in Next. patience: time to search for a lost server. The first call, and a refused
-  // one, fail as `retry` specifies.
+  // Connects in Next. patience: time to reconnect to a lost server. The first call and refused
+  // calls fail as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
                  RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.
@@ -37,8 +37,8 @@ class CollisionWatch {
   absl::StatusOr<v1::WatchCollisionsResponse> Next();
 
   // Sets the poses of placements. While disconnected, they are kept for the next connection.
-  // INVALID_ARGUMENT, without effect: it names a placement that does not exist, or does not have
-  // seven numbers for each.
+  // INVALID_ARGUMENT, without effect: the update names a placement that does not exist, or does not
+  // have seven numbers for each placement.
   absl::Status Update(const v1::CollisionWatchUpdate& update);
 
   // Makes the current and every later call of Next return.
@@ -68,8 +68,8 @@ class CollisionWatch {
   // True after the first message: a server was reached and has reported pairs.
   bool connected_ = false;
 
-  // Acquired before cancel_mutex_. Guards the current poses, the number of updates, the call that
-  // receives them, and that a call begins with `open`.
+  // Acquired before cancel_mutex_. Guards the current poses, the number of updates, and the call
+  // that receives them, and ensures that a call begins with `open`.
   std::mutex update_mutex_;
   v1::CollisionWatchOpen open_;
   uint64_t updates_ = 0;

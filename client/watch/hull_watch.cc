@@ -29,7 +29,7 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     if (call == nullptr) return absl::CancelledError("the watch was cancelled");
     v1::WatchHullsResponse message;
     if (call->reader->Read(&message)) {
-      // A call that did not resume sends the full state, without deletions since the loss.
+      // A call that could not resume sends the full state but not the deletions since the loss.
       if (is_new && reported_ && request_.after_revision() == 0) message.set_restarted(true);
       connected_ = true;
       reported_ = reported_ || message.events_size() > 0;
@@ -38,7 +38,7 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
       return message;
     }
     const absl::Status status = Close();
-    // Counts from the first failure, as the watch may have been quiet for hours before it.
+    // Counts from the first failure because the watch may have been quiet for hours before it.
     if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }

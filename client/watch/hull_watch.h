@@ -13,13 +13,14 @@
 
 namespace hulld {
 
-// WatchHulls, message by message. After a lost connection the watch resumes: it opens another call
-// after the last header's revision, and ends the missed events with another `synced`. Code that
-// folds the events need not handle connections. Next may be called by one thread, Cancel by any.
+// WatchHulls, message by message. After a lost connection, the watch resumes: it opens another call
+// after the last header's revision, and marks the end of the missed events with another `synced`.
+// Code that accumulates the events need not handle connections. Next may be called by one thread,
+// Cancel by any thread.
 class HullWatch {
  public:
-  // Connects in Next. patience: time to search for a lost server. The first call, and a refused
-  // one, fail as `retry` specifies.
+  // Connects in Next. patience: time to reconnect to a lost server. The first call and refused
+  // calls fail as `retry` specifies.
   HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
             RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.
@@ -48,7 +49,7 @@ class HullWatch {
   v1::WatchHullsRequest request_;
   const RetryPolicy retry_;
   const std::chrono::milliseconds patience_;
-  // connected_: a message arrived, so a server was reached. reported_: events arrived, which a
+  // connected_: a message arrived, so a server was reached. reported_: events arrived that a
   // restart must revoke.
   bool connected_ = false;
   bool reported_ = false;

@@ -13,8 +13,9 @@
 namespace hulld {
 
 // Pair states reported by a WatchCollisions call. When another call replaces it and starts with the
-// full state, this removes known events and adds the events of pairs that ended in between, so that
-// both calls together report the same events as one. Memory: the pairs that collide or are near.
+// full state, this class removes events already reported and adds the end events of pairs that no
+// longer collide, so that both calls together report the same events as a single one. Memory: the
+// pairs that collide or are near.
 class ReportedPairs {
  public:
   // `open` is the watch's first message: it names the hulls of placements and any clearance.
@@ -37,8 +38,8 @@ class ReportedPairs {
   void TakeHulls(const v1::WatchCollisionsResponse& message);
   void TakeProblems(v1::WatchCollisionsResponse* message);
   void TakeEvents(v1::WatchCollisionsResponse* message);
-  // Records the state of the event's pair. Returns false if it was known, so that the event is
-  // dropped.
+  // Records the state of the event's pair. Returns false if that state was already reported, so
+  // that the event is dropped.
   bool TakeEvent(v1::CollisionEvent* event);
   // Adds the end events of pairs that the new call did not report.
   void ReportEnded(v1::WatchCollisionsResponse* message);

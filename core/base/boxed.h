@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// An optional value on the heap. It takes one pointer if absent, so that a structure with many
-// optional parts is small if few of them are present. A copy copies the value.
+// An optional value on the heap. Takes one pointer if absent, so a structure with many optional
+// parts is small when few are present. Copying copies the value.
 template <typename T>
 class Boxed {
  public:

@@ -20,7 +20,7 @@ class ScanPoll {
   ScanPoll(const ScanPoll&) = delete;
   ScanPoll& operator=(const ScanPoll&) = delete;
 
-  // Returns true if the scan should end after this many items. Requires: a call for each item.
+  // Returns true if the scan should end after this many items. Must be called for each item.
   bool StopsAfter(size_t items) {
     if (items % kItemsPerPoll != 0 || should_stop_ == nullptr) return false;
     if (!stopped() && (*should_stop_)()) stopped_.store(true, std::memory_order_relaxed);

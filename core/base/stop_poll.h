@@ -8,9 +8,9 @@
 
 namespace hulld {
 
-// Polls a caller's should_stop from within long work: at the first step, so that abandoned work
-// does not begin, and then every `steps_per_poll` steps. After should_stop returns true it is not
-// polled again. Not thread-safe; threads that share work have a poll each.
+// Polls a caller's should_stop during long work: at the first step, so that abandoned work does not
+// start, and then every `steps_per_poll` steps. After should_stop returns true it is not polled
+// again. Not thread-safe; threads that share work have a poll each.
 class StopPoll {
  public:
   // For steps that take at most about 10 us each, most of them far less.

@@ -63,8 +63,8 @@ absl::Status CheckVertices(const Hull& hull, StopPoll& poll) {
   return absl::OkStatus();
 }
 
-// Returns the normal of a facet by its first corner, not normalized; zero if the corner is
-// straight. Requires: at least three corners.
+// Returns the unnormalized normal of a facet at its first corner; zero if the corner is straight.
+// Requires: at least three corners.
 IntegerVector NormalOf(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet) {
   HULLD_CHECK(facet.size() >= 3);
   return Cross(v[facet[1]] - v[facet[0]], v[facet[2]] - v[facet[0]]);
@@ -133,7 +133,7 @@ struct SharedEdge {
 };
 
 // Returns every side by tail and head, with the opposite side of the neighboring facet: the one at
-// the same place in the order by head and tail.
+// the same position in the order by head and tail.
 absl::StatusOr<std::vector<SharedEdge>> CheckManifold(const Hull& hull, StopPoll& poll) {
   const size_t count = hull.vertices().size();
   std::vector<Side> sides;
@@ -275,7 +275,7 @@ absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull,
   const std::span<const uint32_t> facet = hull.facet(0);
   if (absl::Status s = CheckFacet(v, facet, 0, poll); !s.ok()) return s;
   if (facet[1] > facet.back()) return Finding("the polygon is not the canonical way round");
-  // Place in the loop, by vertex. If a vertex occurs twice, another vertex has no place.
+  // Position in the loop, by vertex. If a vertex occurs twice, another vertex has no position.
   std::vector<size_t> places(v.size(), SIZE_MAX);
   for (size_t i = 0; i < facet.size(); ++i) {
     if (poll.Step()) return Stopped();

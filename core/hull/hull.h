@@ -32,7 +32,7 @@ class Hull {
   Hull() = default;
 
   // Assembles a snapshot from canonical parts. `facet_starts` has one entry per facet plus one.
-  // Requires: the invariants of the class comment. Checks only those that cost O(1); AuditHull
+  // Requires: the invariants of the class comment. Checks only the ones that cost O(1); AuditHull
   // checks all of them.
   Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> facet_starts,
        std::vector<uint32_t> facet_vertices, std::vector<Edge> edges);
@@ -53,7 +53,8 @@ class Hull {
   // The mean of the six vertices that are extreme along the coordinate axes, rounded: a point in
   // the hull where searches start. Zero if empty.
   const Vector& center() const { return center_; }
-  // Memory, by capacities, in bytes: below 100 a vertex if facets are triangles and vertices many.
+  // Memory, by capacities, in bytes: below 100 per vertex for hulls with many vertices and
+  // triangular facets.
   size_t MemoryBytes() const {
     return sizeof(*this) + vertices_.capacity() * sizeof(Vector) +
            (facet_starts_.capacity() + facet_vertices_.capacity()) * sizeof(uint32_t) +

@@ -18,7 +18,7 @@ namespace hulld {
 struct HullProperties {
   // Length^3. 0 if the dimension is less than 3.
   Rounded volume;
-  // Area of the surface, length^2: of both sides of a polygon, the limit for solids that become
+  // Area of the surface, length^2; for a polygon, of both sides, the limit for solids that become
   // flat. 0 if the dimension is less than 2. The bound is 2^-52 of the value, or the least double.
   Rounded area;
   // The mean of the points of the hull: of a solid by volume, of a polygon by area, of a segment by

@@ -36,7 +36,8 @@ inline Vector CubeDirection(uint32_t face, double s, double t) {
 
 // The intersection of a direction with the cube: the face, and the coordinates there times
 // largest(). Branch-free on data, because directions are unpredictable. Among equally large
-// components, the first counts. Zero meets face 0; a non-finite direction meets some face.
+// components, the first one wins. Zero maps to face 0, and a non-finite direction to an arbitrary
+// face.
 class OnCube {
  public:
   OnCube(double x, double y, double z) : components_{x, y, z, x, y} {

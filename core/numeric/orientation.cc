@@ -74,12 +74,12 @@ Vector ToUnitSize(const Vector& difference) {
   return difference * first * second;
 }
 
-// The filter with another point as the origin, and each difference on a scale of its own.
+// The filter with another point as the origin, and each difference scaled separately.
 //
 // The bound grows in proportion to the three differences. If some of the points lie close together,
 // differences from one of these are small, and so is the bound, while the determinant is the same.
-// Scales change no sign, so nothing overflows and little is lost to underflow. Tried only if it
-// promises more than the first filter. Requires: no difference overflows.
+// Scales change no sign, so nothing overflows and little is lost to underflow. Tried only if it is
+// likely to decide more than the first filter. Requires: no difference overflows.
 std::optional<int> FilteredFromNearest(const FourPoints& points) {
   // The sum of the exponents of the three differences from each point.
   std::array<int, 4> sizes{};
@@ -109,7 +109,7 @@ std::optional<int> FilteredFromNearest(const FourPoints& points) {
   return nearest % 2 == 0 ? *sign : -*sign;
 }
 
-// Four points as integers below 2^60 in magnitude, on one scale.
+// Four points as integers below 2^60 in magnitude, scaled alike.
 struct FixedPoints {
   std::array<std::array<int64_t, 3>, 4> points;
 };
@@ -253,7 +253,7 @@ int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d)
     ++counts.filter;
     return *sign;
   }
-  // Duplicates lead to queries with the corners and the edges of triangles themselves.
+  // Duplicate points lead to queries with corners and edges of the triangles themselves.
   if (d == a || d == b || d == c || c == a || c == b) {
     ++counts.filter;
     return 0;

@@ -91,7 +91,7 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
   Integer remainder;
   divide_qr(Integer(abs(numerator) << std::max(shift, 0)),
             Integer(denominator << std::max(-shift, 0)), quotient, remainder);
-  // A lowest bit of 1 stands for what follows it.
+  // Sets the lowest bit if any bit below it is set (sticky bit).
   const uint64_t bits = static_cast<uint64_t>(quotient) | (remainder.is_zero() ? 0 : 1);
   const int dropped = std::max(static_cast<int>(std::bit_width(bits)) - 53, kLeastExponent - unit);
   const uint64_t half = uint64_t{1} << (dropped - 1);

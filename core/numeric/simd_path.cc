@@ -4,7 +4,7 @@ namespace hulld {
 
 SimdPath BestSimdPath() {
 #ifdef HULLD_HAS_AVX2_PATH
-  __builtin_cpu_init();  // this may run before the constructor that would do so
+  __builtin_cpu_init();  // this may run before the constructor that initializes the CPU model
   if (__builtin_cpu_supports("avx2")) return SimdPath::kAvx2;
 #endif
 #ifdef HULLD_HAS_NEON_PATH

@@ -151,7 +151,7 @@ template <int kResult, int kA, int kB>
     }
     if (i + kB < kResult) product.word(i + kB) = carry;
   }
-  // Corrects for negative factors, which the unsigned product takes as 2^(64 kA) or 2^(64 kB) too
+  // Corrects for negative factors, which the unsigned product treats as 2^(64 kA) or 2^(64 kB) too
   // large.
   const auto subtract_above = [&](const auto& other, int other_words, int first, bool negative) {
     const uint64_t mask = negative ? ~uint64_t{0} : 0;

@@ -21,7 +21,7 @@ struct Box {
   Vector high;
 
   static Box Empty();
-  // Meets every box but the empty one.
+  // Intersects every box except the empty one.
   static Box All();
   bool IsEmpty() const { return (low.array() > high.array()).any(); }
   bool Meets(const Box& other) const {
@@ -100,11 +100,11 @@ class BoxTree {
     Vector center;  // twice the center; 0 for a box that covers all of space
     uint32_t index;
   };
-  // Most boxes of a part that is not shared by threads: some 200 us of work.
+  // Maximum number of boxes in a part that is not shared by threads: about 200 us of work.
   static constexpr uint32_t kMostUnshared = 2048;
 
   static uint32_t NodesOf(uint32_t boxes);
-  // Builds the node `index` and those below it. `begin`: the place of the first item.
+  // Builds the node `index` and those below it. `begin`: the position of the first item.
   void Build(std::span<const Box> boxes, std::span<Item> items, uint32_t begin, uint32_t index,
              const std::function<bool()>& should_stop);
 

@@ -33,7 +33,7 @@ IntegerVector ExactlyOf(const Vector& n) {
   return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
 }
 
-// Returns n in its shortest form for which `proves` holds, as it does for n.
+// Returns n in the shortest form for which `proves` holds. Requires: it holds for n.
 template <typename Proves>
 ExactDirection Shortest(const IntegerVector& n, const Proves& proves) {
   IntegerVector reduced = Reduced(n);

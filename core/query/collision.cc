@@ -79,7 +79,7 @@ bool IsRounded(const PlacedHull& a, const PlacedHull& b) {
 absl::Status ValidateRadii(const PlacedHull& a, const PlacedHull& b, const QueryOptions& options) {
   if (options.method != Method::kTextbookSat || !IsRounded(a, b)) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      "the textbook method applies to hulls without a radius; leave out one of them");
+      "the textbook method applies to hulls without a radius; omit one of them");
 }
 
 AxisKind Mirrored(AxisKind kind) {
@@ -258,7 +258,8 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
       Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
              Purpose::kRelation, options.should_stop, decision);
   if (swapped && cache != nullptr) Mirror(*cache);
-  // All returns name this variable, so that the compiler constructs it in the caller's storage.
+  // Every return statement names this variable, so that the compiler constructs it in the caller's
+  // storage.
   absl::StatusOr<Answer> answer(absl::in_place);
   if (decided.ok()) {
     answer->relation = decision.relation;

@@ -34,7 +34,7 @@ class TextbookCheck {
   static absl::StatusOr<TextbookCheck> Begin(const PlacedHull& a, const PlacedHull& b,
                                              const QueryOptions& options);
 
-  // Works until `end`, but makes some progress in every call. Returns true if only Finish remains.
+  // Works until `end`, but makes progress in every call. Returns true if only Finish remains.
   // CANCELLED: should_stop returned true.
   absl::StatusOr<bool> Advance(std::chrono::steady_clock::time_point end);
 

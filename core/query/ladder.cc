@@ -48,7 +48,7 @@ bool CentersMaySettle(const FloatPair& pair, const PlainVector& n) {
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
-  // Coarse bounds settle little except overlaps of hulls with centers this near.
+  // Coarse bounds settle little except overlaps of hulls with centers this close.
   const double reach = a.radius() + b.radius();
   return 4 * SquaredNorm(n) < reach * reach;
 }
@@ -123,7 +123,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
                                        const PlainVector& along, PairCache& cache) {
   const bool touches = decision.relation == Relation::kTouching;
   const std::optional<RelativePose> pose = touches ? RelativePoseOf(pair) : std::nullopt;
-  // The pairs of the contact that was in the cache are often those of this one.
+  // The pairs of the cached contact are often those of this one.
   if (pose && cache.touching && cache.pair_count == 3 && decision.pair_count == 3 &&
       std::equal(cache.pairs, cache.pairs + 3, decision.pairs.begin())) {
     *cache.touching = *pose;

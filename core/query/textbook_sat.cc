@@ -73,8 +73,8 @@ class AxisTable {
     for (uint32_t i = 0; i < count_b; ++i) positions_b_.push_back(filter_.PositionB(i));
   }
 
-  // The pair in integers, with every vertex multiplied out. Made for the first axis that floating
-  // point leaves open. Thread-safe.
+  // The pair in integers, with every vertex multiplied out. Created for the first axis that
+  // floating point leaves open. Thread-safe.
   ExactPair& exact() {
     std::call_once(multiplied_out_, [this] {
       if (!exact_) exact_.emplace(filter_, should_stop_);
@@ -108,7 +108,7 @@ class AxisTable {
       const double d = kMinkowskiErrorFactor * filter_.size();
       const double bound = kGapNormalFactor * normal.error * filter_.size() +
                            kGapPositionFactor * normal.n.cwiseAbs().maxCoeff() * d;
-      // In this form, a bound that underflowed to zero, or a NaN, is never certain.
+      // Written so that a bound that underflowed to zero, or a NaN, is never certain.
       if (bound > kGapMinBound && gap > bound) return Gap::kSeparated;
       if (bound > kGapMinBound && gap < -bound) return Gap::kOverlap;
     }
@@ -264,7 +264,7 @@ void LowerTo(std::atomic<uint64_t>& lowest, uint64_t value) {
 }
 
 // Finds the lowest axis that separates and the lowest that shows a zero gap. Skips axes beyond a
-// separating one; this hides no lower axis.
+// separating one, which cannot hide a lower axis.
 struct Scan {
   using Clock = TextbookSearch::Clock;
 

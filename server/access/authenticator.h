@@ -15,8 +15,8 @@
 
 namespace hulld::server {
 
-// Identifies the caller by "authorization: Bearer TOKEN" in the metadata of a call. Without tokens
-// every caller may do everything. Thread-safe.
+// Identifies the caller by "authorization: Bearer TOKEN" in the metadata of a call. Without tokens,
+// every caller has all rights. Thread-safe.
 class Authenticator {
  public:
   using Metadata = std::multimap<grpc::string_ref, grpc::string_ref>;
@@ -25,7 +25,7 @@ class Authenticator {
   // it. PERMISSION_DENIED: the token's role does not allow the call.
   absl::StatusOr<Caller> Authenticate(const Metadata& metadata, Rpc rpc) const;
 
-  // Requires one of these tokens from now on. Does not end running calls (see Knows).
+  // Replaces the accepted tokens. Does not end running calls (see Knows).
   void SetTokens(TokenTable tokens);
 
   // Returns true if the token of an authenticated caller is still valid, with the same rights.

@@ -13,11 +13,11 @@ namespace {
 
 absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
                            const std::string& value) {
-  return WithReason(absl::PermissionDeniedError(absl::StrCat(
-                        field, " \"", absl::Utf8SafeCEscape(value), "\" is outside of \"",
-                        caller.prefix, "\", which token \"", caller.name,
-                        "\" is limited to; use an ID that starts with it, or another token")),
-                    v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
+  return WithReason(
+      absl::PermissionDeniedError(absl::StrCat(
+          field, " \"", absl::Utf8SafeCEscape(value), "\" is outside the prefix \"", caller.prefix,
+          "\" of token \"", caller.name, "\"; use an ID with that prefix, or another token")),
+      v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }
 
 }  // namespace
@@ -45,9 +45,8 @@ absl::Status CheckHullId(const Caller& caller, const std::string& id, const std:
 
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix) {
   if (prefix.size() > Config::kMaxIdCharacters) {
-    return absl::InvalidArgumentError(absl::StrCat("prefix holds ", prefix.size(),
-                                                   " characters; an ID holds at most ",
-                                                   Config::kMaxIdCharacters));
+    return absl::InvalidArgumentError(absl::StrCat(
+        "prefix has ", prefix.size(), " characters; the limit is ", Config::kMaxIdCharacters));
   }
   if (prefix.starts_with(caller.prefix)) return prefix;
   if (caller.prefix.starts_with(prefix)) return caller.prefix;

@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Logs each error of a file, and its recovery, without repetition.
+// Logs each new error of a file, and its recovery, once.
 void Complain(const char* what, const absl::Status& status, std::string* complaint) {
   const std::string message(status.message());
   if (message == *complaint) return;

@@ -21,7 +21,7 @@ absl::Status Problem(const std::string& setting, const std::string& path, const 
   return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
 }
 
-// Returns an empty string if only this user, or the group of a file of root, has access.
+// Returns an empty string if only this user has access, or, for a file owned by root, its group.
 std::string CheckAccess(const struct stat& info) {
   if (info.st_uid != 0 && info.st_uid != geteuid()) {
     return absl::StrFormat(
@@ -55,7 +55,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string&
     if (count < 0) return failed();
     if (count == 0) return text;
     text.append(buffer, static_cast<size_t>(count));
-    if (text.size() > kMostBytes) return Problem(setting, path, "it holds more than 1 MiB");
+    if (text.size() > kMostBytes) return Problem(setting, path, "it is larger than 1 MiB");
   }
 }
 

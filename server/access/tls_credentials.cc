@@ -32,7 +32,7 @@ grpc_ssl_certificate_config_reload_status TlsCredentials::Fetch(
   if (credentials->fetched_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
   const TlsIdentity& identity = credentials->identity_;
   const grpc_ssl_pem_key_cert_pair pair = {identity.key.c_str(), identity.certificates.c_str()};
-  // gRPC insists on authorities even where it asks clients for no certificate.
+  // gRPC requires authorities even if it does not request client certificates.
   const bool has_authorities = !identity.client_authorities.empty();
   *config = grpc_ssl_server_certificate_config_create(
       (has_authorities ? identity.client_authorities : identity.certificates).c_str(), &pair, 1);

@@ -16,14 +16,14 @@ namespace hulld::server {
 // TLS 1.2 or later with a replaceable identity. New connections use the latest identity, existing
 // connections keep theirs. Clients need a certificate if the first identity has authorities.
 //
-// gRPC's C++ interface can only watch files, without checking that key and certificate match. So
-// this uses its core, which fetches the identity at each handshake.
+// gRPC's C++ interface can only watch files, without checking that key and certificate match. This
+// class therefore uses gRPC's core, which fetches the identity at each handshake.
 class TlsCredentials : public grpc::ServerCredentials {
  public:
   explicit TlsCredentials(TlsIdentity identity);
   ~TlsCredentials() override;
 
-  // Thread-safe. Requires: an identity of LoadTlsIdentity that has authorities if and only if the
+  // Thread-safe. Requires: an identity from LoadTlsIdentity that has authorities if and only if the
   // first one had.
   void SetIdentity(TlsIdentity identity);
 

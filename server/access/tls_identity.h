@@ -28,13 +28,13 @@ struct TlsIdentity {
 
 // Reads --tls-cert, --tls-key, and --tls-client-ca, and checks that they are complete and match, so
 // that a partial replacement of the files is detected. Requires: config.has_tls(). INVALID_ARGUMENT
-// names the setting. An expired certificate is no error here.
+// names the setting. An expired certificate is not an error here.
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config);
 
-// Returns true if --tls-client-ca is set and its file is missing or holds no PEM block.
+// Returns true if --tls-client-ca is set and its file is missing or contains no PEM block.
 bool HasLostAuthorities(const Config& config);
-// Returns the first certificate of PEM text that LoadTlsIdentity accepted. As an authority of
-// clients, it admits only the owner of its key.
+// Returns the first certificate of PEM text that LoadTlsIdentity accepted. Used as the client
+// authority, it admits only the owner of its key.
 std::string FirstCertificate(const std::string& certificates);
 
 // Returns OK if the certificate is valid at `now`. INVALID_ARGUMENT: it has expired, or is not

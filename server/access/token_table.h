@@ -31,11 +31,11 @@ class TokenTable {
   // the line; it never quotes a hash.
   static absl::StatusOr<TokenTable> Parse(const std::string& text);
 
-  // Returns the owner of the token, if any. Takes the same time however long a prefix of a hash
-  // matches.
+  // Returns the owner of the token, if any. Takes constant time with respect to the length of a
+  // matching hash prefix.
   std::optional<Caller> Find(const std::string& token) const;
 
-  // Returns true if a token identifies this caller, with the same rights. Cost: O(tokens), some
+  // Returns true if a token identifies this caller, with the same rights. Cost: O(tokens), a few
   // nanoseconds each.
   bool Knows(const Caller& caller) const;
 
@@ -60,7 +60,7 @@ class TokenTable {
 
 // Reads --tokens-file. may_be_empty: a missing file or one without a token gives an empty table, as
 // the last token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse,
-// or the file may not be empty and holds no token.
+// or the file contains no token and may not be empty.
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty = false);
 
 }  // namespace hulld::server

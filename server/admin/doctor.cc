@@ -35,7 +35,7 @@ struct Report {
   uint64_t vertices = 0;
   uint64_t bodies = 0;
   std::vector<Finding> findings;
-  // Error that kept the hulls from being read.
+  // Error that prevented reading the hulls.
   std::string failure;
 };
 

@@ -15,7 +15,7 @@
 
 namespace hulld::server {
 
-// The generated service; its methods take and return bytes (message_bytes.h).
+// The generated service, with methods on bytes (message_bytes.h).
 using HealthServiceOfBytes = grpc::health::v1::Health::WithRawCallbackMethod_Check<
     grpc::health::v1::Health::WithRawCallbackMethod_Watch<grpc::health::v1::Health::Service>>;
 
@@ -30,7 +30,7 @@ class HealthService : public HealthServiceOfBytes {
   UnaryReactor* Check(CallContext* context, const Bytes* request, Bytes* response) override;
   WriteReactor* Watch(CallContext* context, const Bytes* request) override;
 
-  // Reports NOT_SERVING from now on, and ends every Watch after that report.
+  // Switches the status to NOT_SERVING, and ends every Watch after reporting it.
   void EndServing();
 
  private:

@@ -20,7 +20,7 @@ using google::protobuf::FileDescriptor;
 
 constexpr size_t kMostRequestBytes = 4096;
 
-// Adds the file and, before it, all that it needs and `added` lacks.
+// Adds the file, preceded by its dependencies that are not in `added`.
 void AddFile(const FileDescriptor& file, std::set<const FileDescriptor*>& added,
              reflection::FileDescriptorResponse* response) {
   if (!added.insert(&file).second) return;

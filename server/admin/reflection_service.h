@@ -12,14 +12,14 @@
 
 namespace hulld::server {
 
-// The generated service; its method takes and gives bytes (message_bytes.h).
+// The generated service, with its method on bytes (message_bytes.h).
 using ReflectionServiceOfBytes =
     grpc::reflection::v1alpha::ServerReflection::WithRawCallbackMethod_ServerReflectionInfo<
         grpc::reflection::v1alpha::ServerReflection::Service>;
 
 // grpc.reflection.v1alpha.ServerReflection: lists the services for tools such as grpcurl. It needs
 // no token, since the contract is no secret. Its streams count toward --max-streams-per-client and
-// hold no thread while they wait.
+// occupy no thread while they wait.
 class ReflectionService : public ReflectionServiceOfBytes {
  public:
   // services: full names of the services to list. The admission must outlive this.

@@ -23,11 +23,11 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
   if (absl::Status s = CheckHullId(caller, request.body_id(), "body_id"); !s.ok()) return s;
   if (request.pieces().empty()) {
     return absl::InvalidArgumentError(
-        "pieces is empty; a body has at least one (DeleteBody removes a body)");
+        "pieces is empty; a body needs at least one piece (use DeleteBody to remove a body)");
   }
   const auto count = static_cast<uint64_t>(request.pieces_size());
   if (count > max_pieces) {
-    return LimitExceeded(absl::StrCat("the body holds ", count, " pieces"), max_pieces,
+    return LimitExceeded(absl::StrCat("the body has ", count, " pieces"), max_pieces,
                          "max-pieces-per-body");
   }
   StoredBody body;
@@ -38,7 +38,7 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
     const v1::Placement& piece = request.pieces(i);
     if (piece.has_points()) {
       return absl::InvalidArgumentError(absl::StrCat(
-          "pieces[", i, "].points is set; a piece is a registered hull, so give its ID"));
+          "pieces[", i, "].points is set; a piece must be a registered hull; set its ID"));
     }
     const auto [known, is_new] =
         index_of.try_emplace(piece.hull_id(), static_cast<uint32_t>(body.hull_ids.size()));
@@ -47,13 +47,13 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       if (!valid.ok()) return Prefixed(absl::StrCat("pieces[", i, "]."), valid);
       if (piece.hull_id() == request.body_id()) {
         return absl::InvalidArgumentError(
-            absl::StrCat("pieces[", i, "].hull_id is the body itself; a piece is a hull"));
+            absl::StrCat("pieces[", i, "].hull_id is the body itself; a piece must be a hull"));
       }
       body.hull_ids.push_back(piece.hull_id());
     }
     if (piece.has_end_pose()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("pieces[", i, "].end_pose is set; a piece is at rest in its body"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "pieces[", i, "].end_pose is set; a piece cannot move relative to its body"));
     }
     const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
     if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());

@@ -83,8 +83,7 @@ absl::Status PairQuestion::ReadRequest() {
   if (options_.method == Method::kTextbookSat && radius > 0) {
     return absl::InvalidArgumentError(absl::StrCat(
         is_of_a ? "a" : "b", ".radius is ", radius,
-        ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; leave out one of "
-        "them"));
+        ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; omit one of them"));
   }
   if (table_.has_motions()) {
     if (absl::Status s = ValidateForMotions(options_); !s.ok()) return s;

@@ -63,26 +63,27 @@ absl::Status SceneStream::Validate() {
 
 absl::Status SceneStream::ValidateChoice() const {
   if (request().first_only() && request().has_limit()) {
-    return absl::InvalidArgumentError("first_only excludes a limit; leave out one of them");
+    return absl::InvalidArgumentError("first_only and limit cannot be combined; omit one of them");
   }
   if (request().first_only() && !table_.has_motions()) {
     return absl::InvalidArgumentError(
         "first_only orders pairs by their first contact, but no placement has an end_pose; set "
-        "one, or leave first_only out");
+        "one, or omit first_only");
   }
   if (request().every_piece() && request().has_limit()) {
-    return absl::InvalidArgumentError("every_piece excludes a limit; leave out one of them");
+    return absl::InvalidArgumentError("every_piece and limit cannot be combined; omit one of them");
   }
   if (request().every_piece() && table_.has_motions()) {
     return absl::InvalidArgumentError(
-        "every_piece excludes end_pose; leave out one of them, or query the pairs of pieces");
+        "every_piece and end_pose cannot be combined; omit one of them, or query the pairs of "
+        "pieces");
   }
   return request().has_limit() ? ValidateLimit() : absl::OkStatus();
 }
 
 absl::Status SceneStream::ValidateLimit() const {
   if (request().limit() == 0) {
-    return absl::InvalidArgumentError("limit is 0; set at least 1, or leave it out");
+    return absl::InvalidArgumentError("limit is 0; set it to at least 1, or omit it");
   }
   if (request().wanted().separation() && request().wanted().has_clearance()) {
     return absl::OkStatus();

@@ -24,8 +24,8 @@ struct MetadataEntry {
   std::string value;
 };
 
-// Returns the status with its reason and the metadata that error.proto lists for it; replaces a
-// former reason. Stored as a payload, which Prefixed preserves.
+// Returns the status with a reason and the metadata that error.proto lists for it; replaces any
+// earlier reason. Stored as a payload, which Prefixed preserves.
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
                         std::initializer_list<MetadataEntry> metadata = {});
 

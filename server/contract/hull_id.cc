@@ -18,7 +18,7 @@ absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field) 
   if (id.empty()) return absl::InvalidArgumentError(absl::StrCat(field, " is empty; give an ID"));
   if (id.size() > Config::kMaxIdCharacters) {
     return absl::InvalidArgumentError(absl::StrCat(
-        field, " holds ", id.size(), " characters; the limit is ", Config::kMaxIdCharacters));
+        field, " has ", id.size(), " characters; the limit is ", Config::kMaxIdCharacters));
   }
   bool segment_start = true;
   for (size_t i = 0; i <= id.size(); ++i) {

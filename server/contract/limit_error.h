@@ -16,8 +16,8 @@ absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag);
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag);
 
-// As LimitExceeded, with the reason OVERLOADED: other calls use up the limit, and the same request
-// may succeed after `retry`.
+// As LimitExceeded, with the reason OVERLOADED: other calls have used up the limit, and the same
+// request may succeed after `retry`.
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry);
 
@@ -27,7 +27,8 @@ absl::Status AtLimit(const absl::Status& status, uint64_t limit, const std::stri
 // Returns the flag of the limit that caused this error, if any.
 std::optional<std::string> ExceededLimit(const absl::Status& status);
 
-// Returns the delay after which a request with this error may be retried, if soon.
+// Returns the delay after which a request with this error may be retried, if retrying soon may
+// help.
 std::optional<std::chrono::milliseconds> RetryAfter(const absl::Status& status);
 
 }  // namespace hulld::server

@@ -6,7 +6,8 @@
 #include <chrono>
 #include <functional>
 
-// Early end of work after should_stop reports that no caller waits for its answer.
+// Status of work that stopped early because should_stop reported that no caller is waiting for the
+// answer.
 namespace hulld::server {
 
 // should_stop: may be empty.

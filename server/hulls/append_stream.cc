@@ -16,9 +16,8 @@ namespace {
 
 absl::Status ValidateWriterId(const std::string& writer_id) {
   if (writer_id.size() <= Config::kMaxIdCharacters) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("open.writer_id holds ", writer_id.size(),
-                                                 " bytes; the limit is ",
-                                                 Config::kMaxIdCharacters));
+  return absl::InvalidArgumentError(absl::StrCat(
+      "open.writer_id has ", writer_id.size(), " bytes; the limit is ", Config::kMaxIdCharacters));
 }
 
 // One chunk being built and one being decoded.
@@ -48,7 +47,7 @@ void AppendStream::OnDone() {
   });
 }
 
-// Requires that gRPC still has the call.
+// Requires that the call has not finished in gRPC.
 void AppendStream::LogApplied() {
   if (applied_chunks_ == 0) return;
   call().LogChange(

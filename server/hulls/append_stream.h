@@ -18,10 +18,10 @@
 namespace hulld::server {
 
 // An AppendPoints call. Reads a chunk, queues it at the registry, and reads at most one chunk ahead
-// of the one being built, so that a fast client fills gRPC's window and not the server's memory;
-// built chunks wait for their commit without their points. An ack that must wait for the previous
-// one is merged with the next. Reading does not wait for writing, so a client that sends everything
-// before it reads an ack works too.
+// of the one being built, so a fast client fills gRPC's window rather than the server's memory.
+// Built chunks drop their points before they wait for their commit. An ack that must wait for the
+// previous one is merged with the next. Reading does not wait for writing, so a client that sends
+// everything before it reads an ack works too.
 class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPointsResponse>,
                                           v1::AppendPointsRequest> {
  public:

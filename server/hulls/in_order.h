@@ -7,15 +7,15 @@
 
 namespace hulld::server {
 
-// Puts results that arrive in any order into the order of their requests. Not thread-safe.
+// Delivers results, which arrive in any order, in the order of their requests. Not thread-safe.
 template <typename Result>
 class InOrder {
  public:
   // Returns the number of the next request.
   uint64_t Number() { return requests_++; }
 
-  // Takes the result of a request, once each. Passes on the results that wait for no
-  // earlier one.
+  // Accepts the result of a request, once per request. Delivers every result that no longer waits
+  // for an earlier one.
   template <typename Pass>
   void Take(uint64_t number, Result result, const Pass& pass) {
     early_.emplace(number, std::move(result));

@@ -38,7 +38,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
 
   Registry& registry_;
   WorkerPool& readers_;
-  // The hull to send, or its stand-in.
+  // The hull to send, or its simplification.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;
   size_t next_facet_ = 0;

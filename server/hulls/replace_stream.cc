@@ -37,7 +37,7 @@ void ReplaceStream::OnMessage() {
   });
 }
 
-// Handles a message, except for building.
+// Handles a message, but does not build.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
   switch (request().message_case()) {
@@ -98,7 +98,8 @@ void ReplaceStream::Commit() {
   // The registry answers on another thread after the commit.
   const Store& store = registry_.store();
   const auto done = [this, &store](const absl::StatusOr<PutHullResult>& result) {
-    // The memory was counted twice after the registry took it; at worst, that evicted a snapshot.
+    // The memory was counted twice after the registry took ownership; at worst, that evicted a
+    // snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
     call().LogChange(result->created ? "hull created" : "hull replaced",

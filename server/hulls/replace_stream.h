@@ -15,12 +15,12 @@
 
 namespace hulld::server {
 
-// A ReplaceHull call: builds a hull aside, message by message on a writer thread, and passes it to
-// the registry when the client has sent everything. One operation is in flight, a read or a build,
-// so the state needs no mutex.
+// A ReplaceHull call: builds a separate hull, message by message on a writer thread, and passes it
+// to the registry when the client has sent everything. One operation is in flight, a read or a
+// build, so the state needs no mutex.
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
-  // writers: the threads that build. response: as gRPC holds it until the call ends.
+  // writers: the threads that build. response: owned by gRPC until the call ends.
   ReplaceStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& writers,
                 Bytes* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
@@ -42,11 +42,11 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   Registry& registry_;
   WorkerPool& writers_;
   Bytes* const response_;
-  // Covers the builder until the registry has it.
+  // Memory charged for the builder until the registry takes over.
   MemoryCharge charge_;
   Replacement replacement_;
   uint64_t messages_ = 0;
-  // The last message was an empty block.
+  // True if the last message was an empty block.
   bool complete_ = false;
 };
 

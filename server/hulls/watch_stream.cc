@@ -100,8 +100,8 @@ absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
   return WatchPosition{request().after_revision(), request().store_id()};
 }
 
-// Sends the next batch, or waits for on_ready, which calls this again. At most one call runs or is
-// due.
+// Sends the next batch, or waits for on_ready, which calls this again. At most one such call is
+// running or pending.
 void WatchStream::SendNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());

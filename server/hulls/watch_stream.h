@@ -41,7 +41,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void SendNext();
   absl::Status LoadBoxes(WatchBatch* batch);
   void SendBatch(const WatchBatch& batch);
-  // Makes the stream check if it should stop.
+  // Makes the stream check whether it should stop.
   void Nudge();
 
   Registry& registry_;

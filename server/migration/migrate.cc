@@ -123,7 +123,7 @@ std::string Describe(const MigrationCounts& counts) {
   return absl::StrCat(text, "; ", counts.resumed, " of them copied by an earlier run");
 }
 
-// Reopens the target, so that the comparison reads the data that a server will open, and nothing
+// Reopens the target, so that the comparison reads the data that a server will open instead of data
 // that is still in memory.
 absl::Status CompareReopened(const Place& to, const Migration& migration,
                              absl::StatusOr<std::unique_ptr<MigrationTarget>>* target) {
@@ -158,8 +158,8 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   lines.SetPhase("compared");
   absl::Status compared = CompareReopened(to, *migration, &target);
   if (absl::IsDataLoss(compared) && counts->resumed > 0) {
-    // Points that move no vertex do not change the store's revision, so the source may have changed
-    // undetected since the earlier run.
+    // Points that change no vertex do not raise the store's revision, so the source may have
+    // changed unnoticed since the earlier run.
     out << std::string(compared.message()) << "; starting the copy over" << std::endl;
     if (absl::Status s = (*target)->Begin(migration->source()); !s.ok()) return s;
     lines.SetPhase("copied");
@@ -170,8 +170,8 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   }
   if (!compared.ok()) return compared;
   if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
-  out << "verified: all records match; " << to.Describe() << " is store " << (*target)->store().id()
-      << " now\n";
+  out << "verified: all records match; " << to.Describe() << " is now store "
+      << (*target)->store().id() << "\n";
   return absl::OkStatus();
 }
 

@@ -7,10 +7,11 @@
 
 namespace hulld::server {
 
-// 'hulld migrate': copies a store that no server has open to another place, of another kind or the
-// same, and compares the two. arguments: the arguments after "migrate". Prints progress and results
-// to `out`, and errors to `err`. Returns the exit status of the process: 0 if everything is copied
-// and equal, 1 if it failed midway and can be run again, 2 if it was refused and changed nothing.
+// 'hulld migrate': copies a store that no server has open to another store, of the same kind or
+// another, and compares the two. arguments: the command line after "migrate". Prints progress and
+// results to `out`, and errors to `err`. Returns the exit status of the process: 0 if everything is
+// copied and equal, 1 if it failed midway and can be resumed, 2 if it was refused and changed
+// nothing.
 int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace hulld::server

@@ -118,8 +118,8 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   return migration;
 }
 
-// Continues a migration that has begun to fill the target from the present state of this source.
-// Restarts one from an earlier state.
+// Resumes an unfinished migration if it copied the current state of this source. Restarts one that
+// copied an earlier state.
 absl::Status Migration::Prepare(MigrationTarget& target) {
   const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
   if (!mark.ok()) return mark.status();

@@ -30,8 +30,8 @@ class Migration {
   // Receives the number of hulls and bodies done, and the total.
   using Progress = std::function<void(uint64_t done, uint64_t all)>;
 
-  // Reads the records of hulls and bodies. The source must outlive this, and must not change.
-  // DATA_LOSS naming the first damaged hull or body.
+  // Reads the records of hulls and bodies. The source must outlive this and must not change.
+  // DATA_LOSS, naming the first damaged hull or body.
   static absl::StatusOr<Migration> Read(Store& source, Progress progress);
 
   // Copies the hulls and bodies missing in the target, each as a whole, in byte order of the IDs.
@@ -40,8 +40,9 @@ class Migration {
   // the source is damaged. Other errors: as the target's.
   absl::StatusOr<MigrationCounts> CopyTo(MigrationTarget& target);
 
-  // Reads everything back, from both. DATA_LOSS naming the first hull or body that differs: its
-  // record and revisions, its vertices bit by bit, its writers' sequences, its pieces.
+  // Reads both stores back and compares them. DATA_LOSS, naming the first hull or body that
+  // differs: its record and revisions, its vertices bit by bit, its writers' sequences, its
+  // pieces.
   absl::Status Compare(Store& copy) const;
 
   const MigrationSource& source() const { return as_of_; }

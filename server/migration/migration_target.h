@@ -22,9 +22,9 @@ struct MigrationSource {
   friend bool operator==(const MigrationSource&, const MigrationSource&) = default;
 };
 
-// A store being filled by a migration. A mark in it names the source from Begin to Finish; hulld
-// does not open a store with that mark. Each call is one transaction: when it returns, either all
-// of it is on disk or nothing.
+// A store being filled by a migration. From Begin to Finish, a mark in it names the source; hulld
+// refuses to open a store with that mark. Each call is one transaction: on return, either all of
+// its changes are on disk or none.
 class MigrationTarget {
  public:
   virtual ~MigrationTarget() = default;

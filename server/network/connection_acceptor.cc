@@ -26,16 +26,18 @@ namespace hulld::server {
 namespace {
 
 // Descriptors reserved for the store and everything else: this many, or a quarter of the limit if
-// it is low. A store has some hundreds of files.
+// it is low. A store opens a few hundred files.
 constexpr uint64_t kReservedDescriptors = 256;
 constexpr int kBacklog = 4096;
 // Connections accepted from a listener before the next listener's turn.
 constexpr int kMostAtOnce = 64;
-// Longest wait for gRPC to close evicted connections, so that a stuck one never stops the acceptor.
+// Maximum wait for gRPC to close evicted connections, so that a stuck connection never stops the
+// acceptor.
 constexpr std::chrono::seconds kLongestWait(1);
 // Pause if even the reserve descriptor does not help.
 constexpr int kPauseMilliseconds = 50;
-// As set by gRPC with its keepalive: a peer that does not acknowledge for this long is gone.
+// As gRPC sets it along with keepalive: a peer that acknowledges nothing for this long is
+// considered gone.
 constexpr int kUserTimeoutMs = 20'000;
 
 // Event key of `wake_`; listeners use their index.
@@ -242,7 +244,7 @@ bool ConnectionAcceptor::AcceptFrom(int listener) {
     if (error == EAGAIN || error == EWOULDBLOCK) return true;
     failures_.Increment();
     if (IsOutOfDescriptors(error)) return RefuseWithReserve(listener);
-    // ECONNABORTED and network errors concern a single connection.
+    // ECONNABORTED and network errors affect only a single connection.
   }
   return true;
 }

@@ -30,9 +30,9 @@ namespace hulld::server {
 // stops accepting: connections above a limit are accepted and closed immediately, so that the
 // backlog drains.
 //
-// An idle connection is evicted to make room for a new one. gRPC closes evicted connections, a
-// little later. Until it does, they hold reserved descriptors; if they hold too many, new
-// connections stay in the backlog.
+// An idle connection is evicted to make room for a new one. gRPC closes evicted connections shortly
+// after. Until then they occupy reserved descriptors; if they occupy too many, new connections stay
+// in the backlog.
 class ConnectionAcceptor {
  public:
   // Listens at the address; port 0 picks a free one. TCP: on every address of the host name; a
@@ -68,7 +68,7 @@ class ConnectionAcceptor {
   absl::Status Bind();
   absl::Status BindUnix();
   void Run();
-  // Blocks while evicted connections hold too many descriptors. Returns false after Stop.
+  // Blocks while evicted connections occupy too many descriptors. Returns false after Stop.
   bool AwaitRoom();
   // Accepts pending connections, a few per call. Returns false to pause.
   bool AcceptFrom(int listener);
@@ -84,7 +84,7 @@ class ConnectionAcceptor {
   ConnectionTable& table_;
   int port_ = 0;
   // First descriptor number reserved for everything except connections. The system assigns the
-  // lowest free number, so a higher one shows that all below are open.
+  // lowest free number, so receiving a reserved one shows that all lower ones are in use.
   int first_reserved_;
   // Maximum number of evicted connections that gRPC has not closed yet.
   size_t most_closing_;
@@ -99,7 +99,7 @@ class ConnectionAcceptor {
   // The mutex guards the members below. It is never held during calls of gRPC or of
   // guarded_sockets.h, which call OnClosed.
   std::map<uint64_t, Connection> connections_;
-  // Number of evicted ones among them.
+  // Number of evicted connections among them.
   size_t closing_ = 0;
   bool stopping_ = false;
   std::condition_variable room_;

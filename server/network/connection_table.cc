@@ -49,7 +49,7 @@ void ConnectionTable::Erase(Connections::iterator connection) {
   Connection& gone = connection->second;
   if (gone.network != nullptr) {
     if (gone.calls == 0) EndIdle(gone);
-    // The port may be in use again.
+    // A new connection may have reused the port.
     const auto known = by_peer_.find(gone.peer);
     if (known != by_peer_.end() && known->second == connection->first) by_peer_.erase(known);
     if (--gone.network->connections == 0) networks_.erase(gone.peer.Network());

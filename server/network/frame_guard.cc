@@ -103,7 +103,7 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
       return CountControlFrame();
     case kWindowUpdate:
-      // Clients send one for every few KiB that they read.
+      // Clients send one WINDOW_UPDATE for every few KiB that they read.
       return Verdict::kAllowed;
     default:
       return CountControlFrame();
@@ -143,7 +143,7 @@ void FrameGuard::TakeData(std::string_view bytes) {
   const auto found = Find(data_stream_);
   if (found == half_open_.end()) return;
   HalfOpen& message = *found;
-  // The prefix: a compression flag, then four bytes of length.
+  // The prefix is a compression flag followed by a four-byte length.
   while (message.prefix_left > 0 && !bytes.empty()) {
     if (message.prefix_left < kPrefixBytes) {
       message.length = message.length << 8 | static_cast<uint8_t>(bytes.front());

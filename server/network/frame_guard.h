@@ -32,8 +32,8 @@ struct FrameLimits {
   size_t all_half_open_streams = 4096;
 };
 
-// Parses the frame headers of a client's bytes on one connection and detects excess over the
-// limits. Keeps its state between reads of any size. Not thread-safe. Cost: ~10 ns per frame;
+// Parses the frame headers in the bytes that a client sends on one connection, and detects
+// violations of the limits. Reads may have any size. Not thread-safe. Cost: ~10 ns per frame;
 // allocates only for half-open streams.
 class FrameGuard {
  public:

@@ -20,7 +20,7 @@ namespace {
 // Guard of the connection at one descriptor. Slots are never freed, because a read may be in flight
 // when its connection ends.
 struct Slot {
-  // 0 without a guarded connection; read first, without the mutex.
+  // 0 if no connection is guarded; checked first, without the mutex.
   std::atomic<uint64_t> connection = 0;
   std::mutex mutex;
   // The mutex guards the members below.
@@ -127,7 +127,8 @@ extern "C" int close(int descriptor) {
   static const auto kNext = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "close"));
   hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
   if (slot == nullptr || slot->connection == 0) return kNext(descriptor);
-  // Holds the mutex during the close, so that ShutDown never meets another socket of this number.
+  // Holds the mutex during the close, so that ShutDown never affects another socket that reuses the
+  // number.
   const std::lock_guard lock(slot->mutex);
   const int result = kNext(descriptor);
   const int error = errno;

@@ -23,9 +23,9 @@ namespace hulld::server {
 inline constexpr int kMostGuardedDescriptors = 1 << 20;
 
 // Guards the socket `descriptor` until it is closed or Unguard. limits: null for encrypted bytes,
-// which are not inspected. on_closed: called one time, right after the close, on the closing
-// thread; it may not call the functions below. Requires: no thread reads from the socket yet, and
-// 0 <= descriptor < kMostGuardedDescriptors. connection: unique, not 0.
+// which are not inspected. on_closed: called once, right after the close, on the closing thread;
+// it may not call the functions below. Requires: no thread reads from the socket yet, and 0 <=
+// descriptor < kMostGuardedDescriptors. connection: unique, not 0.
 void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
                  std::function<void()> on_closed);
 

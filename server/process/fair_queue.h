@@ -49,7 +49,7 @@ class FairQueue {
   }
 
  private:
-  // Queues that take turns. Holds only those with items, except during Push and Pop.
+  // Queues that take turns. Contains only non-empty queues, except during Push and Pop.
   template <typename Queue>
   class Turns {
    public:
@@ -60,9 +60,9 @@ class FairQueue {
       if (queue.empty()) turns_.push_back(key);
       return queue;
     }
-    // Returns the queue that has its turn.
+    // Returns the queue whose turn it is.
     Queue& Next() { return queues_.find(turns_.front())->second; }
-    // Moves on to the next turn, after an item was removed.
+    // Advances to the next turn after an item was removed.
     void EndTurn() {
       const auto queue = queues_.find(turns_.front());
       if (queue->second.empty()) {

@@ -12,7 +12,7 @@
 namespace hulld::server {
 namespace {
 
-// Free bytes that malloc may keep. A choice: ordinary work leaves fewer.
+// Free bytes that malloc may keep. A choice: ordinary work leaves less free.
 constexpr size_t kWorthIt = 64 << 20;
 // Blocks of at least this size are mapped and unmapped individually. A choice: above the lists of a
 // message of some MiB, which double as they grow.

@@ -5,15 +5,15 @@
 
 namespace hulld::server {
 
-// Configures malloc for messages. The number of arenas is bounded by the number of cores, because
-// messages are allocated on one thread and freed on another, and memory kept by one arena is lost
-// to the rest. Keeps the memory of messages of several MiB for later ones. By default, malloc
-// returns it to the system each time, which dominated the cost of such a message (**observed**:
-// 16384 pairs of packed placements, 2 MB, in 1.0 ms instead of 1.5 to 1.9, and 300 page faults
-// fewer). Call before the first thread starts.
+// Configures malloc for messages. Bounds the number of arenas by the number of cores, because
+// messages are allocated on one thread and freed on another, and memory cached by one arena is
+// unavailable to the others. Keeps the memory of messages of several MiB for later ones. By
+// default, malloc returns it to the system each time, which dominated the cost of such a message
+// (**observed**: 16384 pairs of packed placements, 2 MB, in 1.0 ms instead of 1.5 to 1.9, with 300
+// fewer page faults). Call before the first thread starts.
 void SetUpHeap();
 
-// Resident memory of this process, and the part that no file backs; 0 without /proc.
+// Resident memory of this process, and the part not backed by a file; 0 without /proc.
 struct ResidentMemory {
   size_t bytes = 0;
   size_t anonymous_bytes = 0;

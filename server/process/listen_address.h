@@ -19,7 +19,7 @@ struct ListenAddress {
   bool is_unix() const { return !path.empty(); }
   // True if only this machine can reach it: unix sockets, 127.0.0.0/8, ::1 and localhost.
   bool is_local() const;
-  // Formats the address as gRPC and people write it, with `bound_port` in place of the port.
+  // Formats the address in the usual notation, with `bound_port` in place of the port.
   std::string Format(int bound_port) const;
 };
 

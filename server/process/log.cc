@@ -60,7 +60,7 @@ class JsonFormatter : public spdlog::formatter {
   }
 };
 
-// Both budgets live as long as the process, because libraries log during exit, too.
+// Both budgets live as long as the process because libraries also log during exit.
 LineBudget& BudgetOf(const char* library) {
   static auto* const kGrpc = new LineBudget(kLibraryLines, std::chrono::minutes(1));
   static auto* const kProtobuf = new LineBudget(kLibraryLines, std::chrono::minutes(1));

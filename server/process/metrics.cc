@@ -22,7 +22,7 @@ constexpr std::array<const char*, kRungCount> kRungNames = {"bounds", "cached", 
 constexpr std::array<Rpc, 4> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
                                               Rpc::kStreamCollisions, Rpc::kWatchCollisions};
 
-// Seconds: from a loopback round trip to the wait of a patient client.
+// Seconds: from a loopback round trip to the longest wait of a patient client.
 Buckets LatencyBuckets() {
   return {50e-6,  100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3,
           100e-3, 200e-3, 500e-3, 1,      2,    5,    10,   20,    60};

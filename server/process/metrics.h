@@ -60,8 +60,8 @@ class Metrics : public prometheus::Collectable {
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is "unauthenticated" or "permission_denied".
   void CountAuthFailure(const std::string& reason);
-  // hulld_token_requests_total{token}: does not count an empty name. Beyond kMostTokens names,
-  // further ones count as "other", because a file may name any number of tokens.
+  // hulld_token_requests_total{token}: ignores the empty name. Beyond kMostTokens names, further
+  // ones count as "other", because a file may contain any number of tokens.
   void CountToken(const std::string& token);
   static constexpr size_t kMostTokens = 100;
   // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of a committed chunk.
@@ -89,8 +89,8 @@ class Metrics : public prometheus::Collectable {
   // Adds a gauge read at each exposition. State used by `read` must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
 
-  // Adds a callback that runs at each exposition, before the reading of metrics that are added
-  // later. Its state must outlive the exposition.
+  // Adds a callback that runs at each exposition, before metrics that are added later are read.
+  // Its state must outlive the exposition.
   void AddRefresh(std::function<void()> refresh);
 
   // Returns the metrics for Prometheus.

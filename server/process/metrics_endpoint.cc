@@ -26,7 +26,7 @@ using boost::system::error_code;
 using tcp = boost::asio::ip::tcp;
 
 constexpr char kFlag[] = "--metrics-address";
-// Enough for a few scrapers and people; further connections are closed immediately.
+// Enough for a few scrapers and manual queries; further connections are closed immediately.
 constexpr size_t kMostConnections = 64;
 constexpr uint32_t kMostHeaderBytes = 8 << 10;
 // Timeout for receiving a request, and for sending its reply.

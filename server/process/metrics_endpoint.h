@@ -15,8 +15,8 @@ namespace hulld::server {
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed);
 
 // HTTP endpoint for Prometheus: GET /metrics, neither encrypted nor authenticated. One thread
-// serves a bounded number of connections that do not delay each other: requests without a body, of
-// a few KiB, each in limited time.
+// serves a bounded number of connections that do not delay each other: Requests have no body, a few
+// KiB at most, and a time limit.
 class MetricsEndpoint {
  public:
   // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: true if other machines

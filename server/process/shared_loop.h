@@ -18,7 +18,7 @@ namespace hulld::server {
 // A loop over [0, count) shared by several threads: each takes the next `step` indices.
 class SharedLoop {
  public:
-  // Called by several threads concurrently.
+  // Several threads call it concurrently.
   using Work = std::function<void(size_t begin, size_t end)>;
 
   // Starts to run `work` on disjoint ranges that cover [0, count), on up to `most_helpers` free

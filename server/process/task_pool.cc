@@ -31,7 +31,7 @@ TaskPool::TaskPool(int threads, std::optional<PoolMetrics> single_metrics,
       slice_metrics_(slice_metrics),
       last_single_call_((Clock::now() - kReserveTime).time_since_epoch()) {
   HULLD_CHECK(threads > 0);
-  // Under the mutex, because the first threads read threads().
+  // Holds the mutex because the first threads read threads().
   const std::lock_guard lock(mutex_);
   threads_.reserve(threads);
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Work(); });
@@ -93,7 +93,7 @@ std::optional<TaskPool::Task> TaskPool::Next() {
 }
 
 void TaskPool::Work() {
-  // Otherwise the system may extend a pause by 50 us.
+  // By default, the system may extend a pause by 50 us.
   prctl(PR_SET_TIMERSLACK, 1000UL);
   std::unique_lock lock(mutex_);
   while (true) {

@@ -67,7 +67,7 @@ class TaskPool {
     TaskPool& pool_;
     // The pool's mutex guards the members below.
     ClientId client_ = kNoClient;
-    // The lane is in the turns unless this is empty.
+    // The lane is scheduled unless this is empty.
     std::deque<Task> slices_;
   };
 

@@ -41,7 +41,7 @@ class WorkerPool {
   };
 
   void Work();
-  // Requires the mutex (not checked: a Mutex does not know its holder).
+  // Requires the mutex (not checked: a Mutex does not track its owner).
   void NoteWaiting();
 
   std::optional<PoolMetrics> metrics_;

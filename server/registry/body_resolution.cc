@@ -152,7 +152,7 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
     return WithReason(
         absl::PermissionDeniedError(absl::StrCat(
             QuotedBody(body.record().body_id), ": the hull of piece ", PieceWith(body, hull),
-            " is outside of \"", prefix, "\", which the token is limited to; use another token")),
+            " is outside the token's prefix \"", prefix, "\"; use another token")),
         v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", prefix}});
   }
   return absl::OkStatus();

@@ -29,7 +29,7 @@ constexpr uint64_t kMaxPieceIndex = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 
 constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
-// Least --memory-limit: one message of the default largest size.
+// Minimum --memory-limit: one message of the default maximum size.
 constexpr uint64_t kLeastMemory = 16 << 20;
 constexpr char kVariablePrefix[] = "HULLD_";
 
@@ -85,7 +85,7 @@ constexpr SizeUnit kSizeUnits[] = {{"", 1},
                                    {"MiB", 1 << 20},
                                    {"GiB", 1 << 30}};
 
-// Returns the bytes of a size such as "512MiB".
+// Parses a size such as "512MiB" into bytes.
 std::optional<uint64_t> ParseSize(const std::string& text) {
   uint64_t number = 0;
   const char* const end = text.data() + text.size();
@@ -182,8 +182,8 @@ class Parser {
     return settings;
   }
 
-  // INVALID_ARGUMENT, naming the file and the line: not TOML, an unknown key, or a value that is no
-  // text, number, or boolean.
+  // INVALID_ARGUMENT, naming the file and the line: not TOML, an unknown key, or a value that is
+  // not a string, number, or boolean.
   absl::StatusOr<std::vector<Setting>> FromFile(const std::string& path) const {
     const toml::parse_result table = toml::parse_file(path);
     if (!table) {
@@ -210,7 +210,7 @@ class Parser {
         return absl::InvalidArgumentError(
             absl::StrCat(where, "the value of ", key, " is not a string, number, or boolean"));
       }
-      // An empty text is the default, as in variables.
+      // As in variables, an empty string means the default.
       const std::string text = ValueText(value);
       if (!text.empty()) settings.push_back({absl::StrCat("--", key, "=", text), where});
     }
@@ -322,7 +322,7 @@ class Parser {
         ->check(CLI::Range(0, 1024));
     AddStore();
     AddSeconds("drain-timeout", config_.drain_timeout,
-               "Time that running calls may take after SIGTERM or SIGINT");
+               "Time for running calls to finish after SIGTERM or SIGINT");
     AddObservation();
     Add("log-level", config_.log_level, "Minimum level of logged messages")
         ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
@@ -332,7 +332,8 @@ class Parser {
 
   void AddStore() {
     Add("store", config_.store,
-        "Store of hulls: on disk, in a PostgreSQL database, or in memory until the server ends")
+        "Where to store hulls: on disk, in a PostgreSQL database, or in memory until the server "
+        "exits")
         ->check(CLI::IsMember({"rocksdb", "postgres", "memory"}));
     Add("data-dir", config_.data_dir,
         "Directory of --store rocksdb; created if missing. Default: hulld in $XDG_STATE_HOME, or "
@@ -340,39 +341,39 @@ class Parser {
         "~/.local/state, or else ./hulld-data");
     Add("durability", config_.durability,
         "Acknowledge changes when they are on disk (sync), or when the operating system has them "
-        "(relaxed); a crash of the machine can then lose the last ones")
+        "(relaxed); a machine crash can then lose the most recent ones")
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
-        "File of the connection string of --store postgres, readable only by hulld");
+        "File with the connection string for --store postgres, readable only by hulld");
     Add("postgres-servers", config_.postgres_servers,
         "With --store postgres: one active server per database, with the rest on standby, or many "
         "active servers, all with this setting")
         ->check(CLI::IsMember({"one", "many"}));
     app_.add_flag("--take-over", config_.take_over,
-                  "With --store postgres: take the store from the active server, which then ends, "
-                  "instead of waiting for its end; only as a flag")
+                  "With --store postgres: replace the active server, which then exits, instead of "
+                  "waiting for it to exit; command line only")
         ->configurable(false);
   }
 
   void AddObservation() {
     Add("metrics-address", config_.metrics_address,
-        "Address of metrics for Prometheus over HTTP (/metrics): host:port; empty: none");
+        "Address that serves Prometheus metrics over HTTP (/metrics): host:port; empty: none");
     AddFlag("metrics-insecure", config_.metrics_insecure,
             "Allow --metrics-address on addresses that other machines can reach; metrics are "
             "neither encrypted nor authenticated");
     AddSeconds("slow-request", config_.limits.slow_request,
-               "Log requests that take longer; 0: none");
+               "Log requests that take longer than this; 0: none");
   }
 
   void AddGuard() {
     Add("tls-cert", config_.tls_cert,
-        "PEM file of the server's certificate chain; reloaded when it changes, as are the next "
+        "PEM file with the server's certificate chain; reloaded when it changes, as are the next "
         "three files");
-    Add("tls-key", config_.tls_key, "PEM file of its private key, readable only by hulld");
+    Add("tls-key", config_.tls_key, "PEM file with its private key, readable only by hulld");
     Add("tls-client-ca", config_.tls_client_ca,
-        "PEM file of the authorities of client certificates; clients then need one");
+        "PEM file with the authorities for client certificates; clients must then present one");
     Add("tokens-file", config_.tokens_file,
-        "File of the tokens that callers need, created by 'hullctl token new'");
+        "File of accepted tokens, created by 'hullctl token new'; every caller then needs one");
     app_.add_flag(
             "--check-config", check_,
             "Check the settings and the files that they name, print them, and exit with 0 or 2")
@@ -438,8 +439,8 @@ class Parser {
     AddLimit("max-batches-per-client", limits.max_batches_per_client,
              "Concurrent batches and scenes of one client");
     AddSeconds("max-request-time", limits.max_request_time,
-               "Time that one request may take; for streams of poses, per message; streams of "
-               "points are exempt; 0: unlimited");
+               "Maximum time for one request; for streams of poses, per message; streams of points "
+               "are exempt; 0: unlimited");
   }
 
   // CLI::Range alone would take -1 for the largest number.

@@ -20,12 +20,12 @@ namespace hulld::server {
 
 // Limits of calls and of the store. The error of a limit names its flag.
 struct Limits {
-  // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
-  // pairs at their defaults.
+  // Largest message accepted from a client. Fits max_points_per_chunk points and
+  // max_pairs_per_batch pairs at their defaults.
   uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
-  // Points that one hull can receive in total. Doubles count exactly up to the default, which no
-  // hull reaches.
+  // Points that one hull can receive in total. The default is the largest count that a double
+  // represents exactly; no hull reaches it.
   uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
@@ -34,7 +34,7 @@ struct Limits {
   uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
-  // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client takes.
+  // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client accepts.
   uint64_t max_pieces_per_body = 10'000;
   // Memory limit, in bytes, for hulls in memory, replacements in flight, points waiting to be built
   // or stored, and the placements, pairs, and answers of batches, scenes, and streams. Messages of
@@ -48,28 +48,28 @@ struct Limits {
   uint64_t max_connections = 4096;
   uint64_t max_connections_per_address = 512;
   // Running calls that need no token: reflection, and watches of health beyond the first of a
-  // connection. One client may have one in kAnonymousShare of them.
+  // connection. One client may use one in kAnonymousShare of them.
   uint64_t max_anonymous_calls = 64;
   static constexpr uint64_t kAnonymousShare = 8;
   // Running calls, including open streams; and running calls that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // One in this many slots of max_calls and of max_calls_per_client is reserved for single calls,
+  // One slot in this many of max_calls and of max_calls_per_client is reserved for single calls,
   // so that long calls cannot fill either.
   static constexpr uint64_t kKeptForSingleCalls = 4;
   // Running calls of one client, including open streams. Fewer than max_waiting_calls, so that no
   // single client can cause refusals of other clients. A client is a token or, without tokens, a
   // peer address.
   uint64_t max_calls_per_client = 512;
-  // Open calls of one client to AppendPoints, ReplaceHull, StreamCollisions, SaveBackup,
+  // Maximum open calls of one client to AppendPoints, ReplaceHull, StreamCollisions, SaveBackup,
   // reflection, and watches.
   uint64_t max_streams_per_client = 256;
   // Running calls of BatchCheckCollisions and FindCollisions, which take turns: in total, and of
   // one client.
   uint64_t max_concurrent_batches = 32;
   uint64_t max_batches_per_client = 16;
-  // The longest time per request, or per message of StreamCollisions and WatchCollisions;
-  // zero: unlimited.
+  // Maximum time per request, or per message of StreamCollisions and WatchCollisions; zero:
+  // unlimited.
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
   std::chrono::milliseconds slow_request{1000};
@@ -86,8 +86,7 @@ struct Config {
   std::string tls_cert;
   std::string tls_key;
   std::string tls_client_ca;
-  // File of the tokens that may call (server/access/token_table.h); empty: everyone who can connect
-  // may call.
+  // File of accepted tokens (server/access/token_table.h); empty: anyone who can connect may call.
   std::string tokens_file;
   // Threads that compute answers; 0: DefaultThreads() of resource_limits.h.
   int threads = 0;
@@ -130,15 +129,15 @@ struct Config {
   // Hulls per page of a list: the default, and the maximum.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
-  // Open calls of one connection; its client delays further calls. RFC 9113 (6.5.2) recommends no
-  // fewer, and each costs memory from its first header on.
+  // Maximum open calls per connection; the client delays further calls. RFC 9113 (6.5.2) recommends
+  // at least 100, and each call uses memory from its first header on.
   static constexpr int kCallsPerConnection = 100;
   // Time limit for the TLS handshake and the HTTP/2 settings.
   static constexpr std::chrono::milliseconds kHandshakeTimeout{10'000};
-  // Long replies are cut into messages of about this size.
+  // Long replies are split into messages of about this size.
   static constexpr size_t kReplyMessageBytes = 1 << 20;
   // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
-  // client takes: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
+  // client accepts: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
   static constexpr size_t kMaxFeatureVertices = 1 << 16;
   // Limits of one answer about bodies: certificates of pairs of pieces, and bytes, for the same
   // clients. A certificate of SEPARATED takes about 50 bytes, one of TOUCHING about 350.
@@ -148,7 +147,8 @@ struct Config {
   static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;
-  // Maximum points of an inline shape, whose hull is built within a call: some milliseconds.
+  // Maximum points of an inline shape, whose hull is built within a call: takes a few
+  // milliseconds.
   static constexpr size_t kMaxShapePoints = 4096;
 };
 

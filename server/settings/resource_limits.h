@@ -15,19 +15,19 @@ struct CpuLimit {
   // Quota of the control groups, in processors; infinity: no quota.
   double quota = std::numeric_limits<double>::infinity();
 
-  // Returns the number of threads that can run concurrently: the lesser of both, rounded up, at
-  // least 1.
+  // Returns the number of threads that can run concurrently: the smaller of the two values, rounded
+  // up, at least 1.
   int threads() const;
   // Returns a text for the log: "2; the control group grants 1.5 of 64 processors".
   std::string Describe() const;
 };
 
-// Reads both limits. The quota is the least one of the control group of this process and its
-// ancestors: cpu.max of version 2, the CFS quota of version 1. root: parent of /proc and
+// Reads both limits. The quota is the lowest among the control group of this process and its
+// ancestors: cpu.max in version 2, the CFS quota in version 1. root: parent of /proc and
 // /sys/fs/cgroup, for tests.
 CpuLimit ReadCpuLimit(const std::filesystem::path& root = "/");
 
-// Returns ReadCpuLimit().threads() as of the first call.
+// Returns ReadCpuLimit().threads(), computed at the first call.
 int DefaultThreads();
 
 // Returns the least memory limit of the control group of this process and its ancestors, in bytes,

@@ -13,7 +13,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "values are copied as they are");
 
-// Encoding of a body: numbers in binary, strings with their length first.
+// Encoding of a body: binary numbers and length-prefixed strings.
 class Writer {
  public:
   template <typename Number>
@@ -30,7 +30,7 @@ class Writer {
   std::string bytes_;
 };
 
-// Missing values read as zero or empty, and ok() is false from then on.
+// Missing values read as zero or empty, and make ok() false.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : rest_(bytes) {}

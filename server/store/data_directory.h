@@ -8,7 +8,7 @@ namespace hulld::server {
 
 inline std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
 
-// A directory of hulld alone, emptied at each start. Other files in the data directory are not
+// A directory for temporary files, emptied at each start. Other files in the data directory are not
 // touched.
 inline std::string ScratchDirectory(const std::string& data_dir) {
   return data_dir + "/hulld-scratch";

@@ -23,7 +23,7 @@ struct HullRecord {
 };
 
 // Layout of the stored vertices of a hull: a base, and a delta of the added vertices for each
-// change since. The hull is that of the base and all deltas.
+// change since. The hull is the convex hull of the base and all deltas.
 struct VertexLayout {
   // 0: no base.
   uint64_t base_revision = 0;

@@ -18,9 +18,9 @@
 
 namespace hulld::server {
 
-// Peer servers' changes to an ID.
+// Changes to an ID by peer servers.
 struct PeerChange {
-  // Revision of the latest change: that of the present hull or body, or the one at which it ended.
+  // Revision of the latest change: of the current hull or body, or of its end.
   uint64_t revision = 0;
   // Revision at which the latest incarnation ended; 0: none ended.
   uint64_t ended_at = 0;
@@ -28,10 +28,10 @@ struct PeerChange {
   // its kind.
   uint64_t former_began = 0;
   bool former_was_body = false;
-  // The present hull or body, if any. DATA_LOSS: it is damaged.
+  // The current hull or body, if any. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
-  // Points that turn the known version of the hull into the present one (LoadGrowth). None: the
+  // Points that grow the known version of the hull into the current one (LoadGrowth). None: the
   // hull must be read again.
   std::optional<std::vector<Vector>> growth;
 };
@@ -54,9 +54,9 @@ struct PeerChanges {
 
 // The commits of peer servers to the same store (Store::peers).
 //
-// With a feed, Store::Commit skips the changes of all IDs that are in the next result of
-// TakeChanges, since they were made from a stale state. LoadVertices and LoadSequence return
-// ABORTED for a hull that changed since.
+// With a feed, Store::Commit skips changes to every ID in the next result of TakeChanges, because
+// they are based on a stale state. LoadVertices and LoadSequence return ABORTED for a hull that
+// changed since.
 class PeerFeed {
  public:
   virtual ~PeerFeed() = default;
@@ -66,9 +66,10 @@ class PeerFeed {
   virtual absl::Status Fetch() = 0;
   // Sends the query of the next Fetch, which then returns the changes committed before this call.
   // Does not block, so any thread may call it. Fetch must follow before the next Commit or Recover.
-  // If the query cannot be sent, Fetch sends it.
+  // If the query cannot be sent now, Fetch sends it.
   virtual void StartFetch() {}
-  // Returns the peer changes that Commit and Fetch found since the last call, also if they failed.
+  // Returns the peer changes that Commit and Fetch have found since the last call, even if they
+  // failed.
   virtual PeerChanges TakeChanges() = 0;
   // Returns for each hull the points of its deltas between the two versions, in order; none if the
   // deltas are gone, for example after a new base, or cannot be read. Sends one query for all
@@ -77,8 +78,8 @@ class PeerFeed {
       std::span<const HullGrowth> hulls) {
     return std::vector<std::optional<std::vector<Vector>>>(hulls.size());
   }
-  // Registers a callback that runs, on any thread, soon after a peer server committed: a reason to
-  // fetch. Empty: none. Returns after the former callback has returned.
+  // Registers a callback that runs, on any thread, soon after a peer server commits: a hint to
+  // fetch. Empty: none. Blocks until the previous callback has returned.
   virtual void OnPeerCommit(std::function<void()> /*committed*/) {}
 };
 

@@ -1,4 +1,4 @@
-// Opening a store: directories, format, and recovery from the last run.
+// Opening a store: directories, format, and recovery after the previous run.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <rocksdb/cache.h>
@@ -105,10 +105,10 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.env = env_.get();
   options.create_if_missing = !options_.read_only;
   options.paranoid_checks = true;
-  // An incomplete record at the end of a log is dropped: it lies beyond the mark of the log, so it
-  // was not acknowledged. Any other mismatch of a checksum is refused. If power was lost during a
+  // An incomplete record at the end of a log is dropped: it is beyond the mark of the log, so it
+  // was not acknowledged. Any other checksum mismatch is an error. If power was lost during a
   // write, pages may have reached the disk out of order (with kSync, of the last record at most);
-  // an acknowledged record that was damaged since looks the same.
+  // an acknowledged record that was damaged later looks the same.
   options.wal_recovery_mode = options_.accept_loss
                                   ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
                                   : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
@@ -129,14 +129,14 @@ rocksdb::Options RocksDbStore::DbOptions() const {
 }
 
 // A commit is only as durable as the directory entries on its path. Existing directories are
-// synced, too: an earlier start may have been killed between making and syncing them. Some of these
-// may not be accessible, which is no error.
+// synced, too: an earlier start may have been killed between making and syncing them. Some of them
+// may be inaccessible, which is not an error.
 absl::Status RocksDbStore::MakeDirectories() {
   namespace fs = std::filesystem;
   std::error_code error;
   const fs::path database =
       fs::absolute(DatabaseDirectory(options_.data_dir), error).lexically_normal();
-  // Created by a start after the directories are durable.
+  // Created at startup after the directories are durable.
   if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
   const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
     return absl::UnavailableError(absl::StrCat("cannot create --data-dir ", options_.data_dir, ": ",
@@ -252,8 +252,8 @@ absl::Status RocksDbStore::DropLogsFrom(uint64_t number) {
   return status.ok() ? absl::OkStatus() : OpenError(status, options_.data_dir, false);
 }
 
-// A new store, one of an older hulld, and one with an accepted loss, which has its new ID by now,
-// get a new mark.
+// A new store, a store of an older hulld, and a store with an accepted loss, which already has its
+// new ID, get a new mark.
 absl::Status RocksDbStore::StartMark() {
   if (files_->keeps_mark()) return absl::OkStatus();
   const rocksdb::IOStatus started = files_->StartMark(LogMarkPath(options_.data_dir), revision_);
@@ -311,10 +311,10 @@ absl::Status RocksDbStore::InitializeMeta() {
 }
 
 // Runs before anything is served or committed. A store that may lack acknowledged changes gets a
-// new ID, because their revisions will be given to other changes: a restored backup, a store with
-// an accepted loss, and a relaxed store that was not closed. The new ID and the marks in the
+// new ID, because their revisions will be assigned to other changes: a restored backup, a store
+// with an accepted loss, and a relaxed store that was not closed. The new ID and the marks in the
 // database change atomically, and the mark in the directory is removed last, so that the next start
-// repeats an interrupted one.
+// repeats an interrupted change.
 absl::Status RocksDbStore::BeginRun() {
   std::error_code error;
   const std::string mark = RestoredMark(options_.data_dir);

@@ -1,4 +1,4 @@
-// Reading a store: single values, all hulls, a hull's vertices.
+// Reading from a store: single values, all hulls, a hull's vertices.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -41,7 +41,7 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
 }
 
 // Bypasses the block cache, where the blocks of a scan would evict each other before reuse. The
-// result may pin a part of the database until it was visited.
+// result may pin parts of the database until it has been visited.
 void RocksDbStore::FindValues(std::span<const std::string> keys,
                               const std::function<void(size_t, std::string_view)>& visit) {
   const std::shared_lock lock(db_mutex_);
@@ -176,7 +176,8 @@ absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* asse
 absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, VertexAssembly* assembly) {
   if (hull.layout.delta_count == 0) return absl::OkStatus();
   const uint64_t incarnation = hull.record.create_revision;
-  // A single delta usually came with the last change: reading one value costs half of a range scan.
+  // A single delta usually belongs to the last change: reading one value costs half as much as a
+  // range scan.
   if (hull.layout.delta_count == 1) {
     const absl::StatusOr<std::optional<std::string>> delta =
         Read(DeltaKey(incarnation, hull.record.revision));

@@ -1,4 +1,4 @@
-// Writing a store: commits, copies, and recovery from errors.
+// Writing to a store: commits, copies, and recovery from errors.
 #include "server/store/rocksdb_store.h"
 
 #include <absl/status/status.h>
@@ -39,10 +39,10 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
   return ReadError(status, "cannot read");
 }
 
-// Deletes values of incarnations that have no hull, if kLostKey says that there may be some: a hull
-// with a damaged record leaves them when it is deleted, because its incarnation is unknown. Nothing
-// is deleted while another record is damaged, since the values may belong to that hull. Cost, with
-// kLostKey: reads all records, and seeks once per incarnation.
+// Deletes values of incarnations that have no hull, if kLostKey is set: deleting a hull with a
+// damaged record leaves its values behind, because its incarnation is unknown. Nothing is deleted
+// while another record is damaged, since the values may belong to that hull. Cost, with kLostKey:
+// reads all records, and seeks once per incarnation.
 absl::Status RocksDbStore::DropLostIncarnations() {
   const absl::StatusOr<std::optional<std::string>> lost = Read(kLostKey);
   if (absl::IsUnavailable(lost.status())) return lost.status();
@@ -68,7 +68,7 @@ absl::Status RocksDbStore::DropLostIncarnations() {
       }
       it->Seek(end);
     }
-    // The next start tries again.
+    // The next start retries.
     if (!it->status().ok()) return absl::OkStatus();
   }
   batch.Delete(kLostKey);
@@ -97,7 +97,7 @@ absl::Status RocksDbStore::Commit(std::span<Change* const> changes) {
     return absl::OkStatus();
   }
   failure_ = WriteFailed(status);
-  // The log may hold the batch or a part of it, unsynced.
+  // The log may contain all or part of the batch, unsynced.
   const rocksdb::Status cut = files_->CutUncommitted();
   seen_failed_syncs_ = files_->failed_syncs();
   return cut.ok() ? failure_ : OutcomeUnknown(status, cut, options_.data_dir);
@@ -111,7 +111,7 @@ absl::Status RocksDbStore::CheckRoom(std::span<Change* const> changes) {
   return made.ok() ? absl::OkStatus() : WriteError(made, options_.data_dir);
 }
 
-// RocksDB would compact after more changes. If this fails, the disk stays full.
+// RocksDB itself would compact only after more changes. If this fails, the disk stays full.
 void RocksDbStore::Compact(std::span<Change* const> changes) {
   for (const Change* change : changes) {
     const uint64_t incarnation = change->hull.record.create_revision;
@@ -188,7 +188,7 @@ uint64_t RocksDbStore::CountStalls() const {
   return stalls;
 }
 
-// Gives up the reserve if the disk was full. Then only deletions succeed until it is back
+// Releases the reserve if the disk was full. Only deletions then succeed until it is restored
 // (CheckRoom).
 absl::Status RocksDbStore::Recover() {
   {

@@ -37,7 +37,7 @@ struct RocksDbOptions {
   std::chrono::milliseconds sync_interval{500};
   // Opens the store without changing anything. No other process may have it open.
   bool read_only = false;
-  // Opens a store with a damaged or incomplete log, without all changes after the first damaged
+  // Opens a store with a damaged or incomplete log, dropping all changes after the first damaged
   // record or incomplete log. These acknowledged changes are lost, and the store gets a new ID.
   bool accept_loss = false;
   // Also opens the destination of an unfinished migration.
@@ -58,13 +58,14 @@ struct RocksDbOptions {
 // identifies the damaged hull.
 class RocksDbStore : public Store {
  public:
-  // On a full disk the store is opened with the space of the reserve: for deletions if possible,
-  // otherwise for reads.
+  // On a full disk, the store is opened with the space of the reserve: for deletions if possible,
+  // otherwise read-only.
   //
   // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or a newer
   // hulld wrote it; DATA_LOSS: its log or its files are damaged or incomplete, and nothing was
-  // touched; NOT_FOUND: read_only, and there is none; RESOURCE_EXHAUSTED: the disk is full, and the
-  // store needs a new ID or does not exist yet; UNAVAILABLE: the file system refuses.
+  // changed; NOT_FOUND: read_only, and the store does not exist; RESOURCE_EXHAUSTED: the disk is
+  // full, and the store needs a new ID or does not exist yet; UNAVAILABLE: the file system returned
+  // an error.
   static absl::StatusOr<std::unique_ptr<RocksDbStore>> Open(RocksDbOptions options);
 
   ~RocksDbStore() override;
@@ -110,7 +111,7 @@ class RocksDbStore : public Store {
   rocksdb::Options DbOptions() const;
   absl::Status MakeDirectories();
   absl::Status OpenDb();
-  // Opens the database, with the space of the reserve if the disk is full.
+  // Opens the database, using the space of the reserve if the disk is full.
   absl::Status OpenDbInRoom();
   // Opens the database for reading, without its lock.
   rocksdb::Status OpenForReading();
@@ -119,11 +120,11 @@ class RocksDbStore : public Store {
   absl::Status CheckLogs();
   absl::Status DropLogsFrom(uint64_t number);
   absl::Status StartMark();
-  // Returns DISK_FULL if a change is no deletion and the reserve cannot be made.
+  // Returns DISK_FULL if a change is not a deletion and the reserve cannot be restored.
   absl::Status CheckRoom(std::span<Change* const> changes);
   // Frees the disk space of deleted hulls.
   void Compact(std::span<Change* const> changes);
-  // Counts a failed sync if one failed since the last count, else a failed write.
+  // Counts a failed sync if a sync failed since the last count, otherwise a failed write.
   void CountWriteFailure();
   // Counts the failure, and returns its error for the client.
   absl::Status WriteFailed(const rocksdb::Status& status);
@@ -159,7 +160,7 @@ class RocksDbStore : public Store {
   DiskReserve reserve_;
   // The database's lock if the store is read-only; otherwise RocksDB holds it.
   rocksdb::FileLock* lock_ = nullptr;
-  // Result of CheckLogs, which runs inside of RocksDB's Open.
+  // Result of CheckLogs, which runs inside RocksDB's Open.
   absl::Status logs_checked_;
   std::string id_;
   uint64_t revision_ = 0;

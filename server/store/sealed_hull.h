@@ -36,7 +36,7 @@ class VertexAssembly {
   bool wants_base_part() const { return vertices_.size() < hull_.layout.base_vertices; }
   // The number of the next part.
   uint32_t next_part() const { return next_part_; }
-  // value: without its checksum; or an error, which is returned.
+  // value: without its checksum, or an error, which is returned.
   absl::Status AddBasePart(const absl::StatusOr<std::string_view>& value);
   // Adds a delta in the same way. Requires: all parts of the base were added (checked by Finish).
   absl::Status AddDelta(uint64_t revision, const absl::StatusOr<std::string_view>& value);

@@ -34,7 +34,7 @@ struct WriterSequence {
   friend bool operator==(const WriterSequence&, const WriterSequence&) = default;
 };
 
-// Effect of a change on the stored vertices of its hull.
+// The effect of a change on the stored vertices of its hull.
 enum class VertexChange {
   kNone,
   // Appends Change::vertices as a delta.
@@ -116,7 +116,7 @@ struct StoreFailures {
   uint64_t read = 0;
 };
 
-// Use of the disk, and write stalls.
+// Disk usage and write stalls.
 struct StoreDisk {
   // Bytes of all files, including the log.
   uint64_t bytes = 0;
@@ -124,12 +124,12 @@ struct StoreDisk {
   // Free bytes of the disk, if known.
   std::optional<uint64_t> free_bytes;
   // Number of times that changes were slowed down or stopped since the store was opened
-  // (monotonic), and the present state.
+  // (monotonic), and the current state.
   uint64_t stalls = 0;
   bool is_stalled = false;
 };
 
-// Keeps committed changes for the registry. Reads may run on any thread.
+// Stores committed changes for the registry. Reads may run on any thread.
 class Store {
  public:
   virtual ~Store() = default;
@@ -182,24 +182,24 @@ class Store {
   // Totals at revision(), if finds_records(). Not concurrent with Commit.
   virtual StoreTotals totals() const { return {}; }
 
-  // Returns the writers of the hull in byte order of the IDs. FAILED_PRECONDITION: the store keeps
-  // nothing.
+  // Returns the writers of the hull in byte order of the IDs. FAILED_PRECONDITION: the store is in
+  // memory.
   virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& /*hull*/) {
     return absl::FailedPreconditionError("this store does not keep writers");
   }
 
   // Assigns revisions to a batch of changes and commits it atomically, before any reader sees it.
-  // Calls are sequential, in commit order. An error refuses the whole batch and leaves the store
-  // unchanged, also for a process that opens it after this one was killed. Exception: UNAVAILABLE
-  // with a message that the outcome is unknown. Then the next process may find the batch, until
-  // Recover succeeds. RESOURCE_EXHAUSTED: the disk is full; a batch of deletions alone may succeed.
+  // Calls are sequential, in commit order. On an error, the whole batch is refused and the store
+  // unchanged, even for a process that opens it after this one was killed. Exception: UNAVAILABLE
+  // with a message that the outcome is unknown. Until Recover succeeds, the next process may then
+  // find the batch. RESOURCE_EXHAUSTED: the disk is full; a batch of deletions alone may succeed.
   virtual absl::Status Commit(std::span<Change* const> changes) = 0;
   // Makes Commit possible again after an error, or returns the cause. Not concurrent with Commit.
   virtual absl::Status Recover() = 0;
 
   virtual StoreFailures failures() const { return {}; }
 
-  // None for a store without files. Cost: O(files), some 10 us each.
+  // None for a store without files. Cost: O(files), about 10 us each.
   virtual std::optional<StoreDisk> disk() const { return std::nullopt; }
 
   // Makes a consistent copy of the store at some revision during the call. Returns its directory,
@@ -215,7 +215,7 @@ class Store {
   virtual void OnEnded(std::function<void()> /*ended*/) {}
 
   // Returns true if the next change should write a new base instead of a delta of `new_vertices`:
-  // the deltas have outgrown the base. So all bases together take at most a few times the bytes of
+  // the deltas have outgrown the base. This limits the size of all bases to a few times the size of
   // all deltas. A stored delta costs kDeltaBytes in addition to its vertices.
   static bool WantsBase(const VertexLayout& layout, uint64_t new_vertices) {
     constexpr uint64_t kDeltaBytes = 64;

@@ -12,7 +12,8 @@ namespace hulld::server {
 
 namespace {
 
-// Returns true if the disk is full, even if only the text of the system's error shows it.
+// Returns true if the disk is full, even if that is known only from the text of the system's
+// error.
 bool SaysDiskFull(const rocksdb::Status& status) {
   const std::string cause = status.ToString();
   return status.IsNoSpace() || absl::StrContains(cause, std::strerror(ENOSPC)) ||

@@ -23,12 +23,12 @@ absl::Status ReadError(const rocksdb::Status& status, const std::string& what);
 // UNAVAILABLE: the database could not be reopened after an error, not even for reading.
 absl::Status CannotBeRead(const std::string& data_dir);
 // For a database that could not be opened. FAILED_PRECONDITION: another process has it open.
-// DATA_LOSS: it is damaged. NOT_FOUND: read_only, and there is none. RESOURCE_EXHAUSTED: the disk
-// is full. UNAVAILABLE: any other cause.
+// DATA_LOSS: it is damaged. NOT_FOUND: read_only, and the store does not exist.
+// RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE: any other cause.
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only);
-// True for the error that WriteError and OpenError make of a full disk.
+// True for the error that WriteError and OpenError return for a full disk.
 bool IsDiskFull(const absl::Status& status);
-// DATA_LOSS: the logs hold less than was acknowledged, up to this revision if it is known.
+// DATA_LOSS: the logs lack acknowledged changes, which reached this revision if it is known.
 // finding: names the file.
 absl::Status LogLost(const std::string& data_dir, const std::string& finding,
                      std::optional<uint64_t> revision);

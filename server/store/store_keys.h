@@ -50,7 +50,7 @@ inline constexpr char kBodyPrefix = 'p';
 // Vertices per part of a base: 768 KiB.
 inline constexpr size_t kBasePartVertices = 32768;
 
-// Returns the bytes of a number, the most significant first; and the number of such bytes.
+// Converts a number to bytes, most significant first, and back.
 template <typename T>
 std::string BigEndian(T number) {
   std::string bytes(sizeof(T), '\0');
@@ -66,7 +66,7 @@ std::string BodyKey(std::string_view body_id);
 // Lower bound of an incarnation's keys of one kind. IncarnationKey(prefix, incarnation + 1) is the
 // upper bound.
 std::string IncarnationKey(char prefix, uint64_t incarnation);
-// Returns the incarnation in any of the keys below.
+// Returns the incarnation in one of the keys below.
 uint64_t IncarnationOf(std::string_view key);
 std::string WriterKey(uint64_t incarnation, std::string_view writer_id);
 std::string BaseKey(uint64_t incarnation, uint64_t revision, uint32_t part);

@@ -62,7 +62,7 @@ absl::Status OtherStore(const Store& store) {
 absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
     const google::protobuf::Duration& message) {
   constexpr int64_t kNanosPerSecond = 1'000'000'000;
-  // Far longer than a server runs, and far from overflow.
+  // Far longer than any server runs, yet far from overflow.
   constexpr int64_t kMostSeconds = kNanosPerSecond;
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
     return absl::InvalidArgumentError(
@@ -162,8 +162,8 @@ absl::Status ValidateEnd(const Motion& motion) {
   if (!IsValidPose(motion.end)) return ValidatePose(motion.end);
   if (ValidateMotion(motion).ok()) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      "rotation is opposite to the rotation of pose, so that the rotation vanishes during the "
-      "motion; negate its components for the shorter path");
+      "rotation is opposite to the rotation of pose, so the interpolated quaternion passes through "
+      "zero; negate its components to take the shorter path");
 }
 
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,

@@ -28,8 +28,8 @@ namespace hulld::server {
 // three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points);
 
-// Adds the inline shape of these points. INVALID_ARGUMENT, as in "points[17].y is NaN": both point
-// fields are set, or the number of coordinates is not a multiple of three; CheckShape.
+// Adds the inline shape with these points. INVALID_ARGUMENT, as in "points[17].y is NaN": both
+// point fields are set, or the number of coordinates is not a multiple of three; CheckShape.
 absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes);
 // INVALID_ARGUMENT: no point, more than Config::kMaxShapePoints, or one that is not finite.
 absl::Status CheckShape(std::span<const Vector> points);

@@ -12,11 +12,12 @@ namespace {
 
 absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature* message) {
   if (feature.vertices.size() > Config::kMaxFeatureVertices) {
-    return WithReason(
-        absl::ResourceExhaustedError(absl::StrCat(
-            "the axis touches a feature of ", feature.vertices.size(), " vertices; a reply holds ",
-            Config::kMaxFeatureVertices, " at most; retry without the axis")),
-        v1::ERROR_REASON_FEATURE_TOO_LARGE, {{"limit", uint64_t{Config::kMaxFeatureVertices}}});
+    return WithReason(absl::ResourceExhaustedError(
+                          absl::StrCat("the axis touches a feature of ", feature.vertices.size(),
+                                       " vertices; a reply can hold at most ",
+                                       Config::kMaxFeatureVertices, "; retry without the axis")),
+                      v1::ERROR_REASON_FEATURE_TOO_LARGE,
+                      {{"limit", uint64_t{Config::kMaxFeatureVertices}}});
   }
   for (const uint32_t index : feature.vertices) {
     message->add_vertex_indices(index);

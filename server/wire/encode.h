@@ -48,7 +48,7 @@ void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, 
                             v1::PieceCertificate* message);
 void EncodeIntervals(const std::vector<SeparatedInterval>& intervals,
                      google::protobuf::RepeatedPtrField<v1::SeparatedInterval>* messages);
-// Encodes times and intervals; the certificate has a field elsewhere.
+// Encodes times and intervals; the certificate belongs to another field.
 void EncodeFirstContact(const FirstContact& contact, v1::FirstContact* message);
 void EncodeSeparation(const Separation& separation, v1::Separation* message);
 void EncodeWitness(const Witness& witness, v1::Witness* message);

@@ -24,7 +24,7 @@
 namespace hulld::server {
 
 // Ends a unary call (UnaryCall) with the result of `answer` after the registry satisfies the
-// request's freshness: immediately if it already does, otherwise on `pool`. answer: takes the
+// request's freshness: immediately if it already does, otherwise on `pool`. answer: receives the
 // staleness. is_quick: `answer` may run on gRPC's threads; otherwise it runs on `pool`.
 template <typename UnaryCall, typename Answer>
 void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answer,

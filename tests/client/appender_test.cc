@@ -90,7 +90,7 @@ TEST_F(AppenderTest, AWriterContinuesAfterItsLastSequence) {
   EXPECT_THAT(FirstCoordinates(), ElementsAre(1, 2, 3));
 }
 
-TEST_F(AppenderTest, WritersHaveNamesOfTheirOwnByDefault) {
+TEST_F(AppenderTest, WritersHaveDistinctNamesByDefault) {
   EXPECT_NE(Open()->writer_id(), Open()->writer_id());
 }
 
@@ -121,7 +121,7 @@ TEST_F(AppenderTest, BytesInFlightAreBoundedToo) {
   ASSERT_TRUE(appender->Finish().ok());
 }
 
-TEST_F(AppenderTest, ABrokenConnectionIsResumedWithoutLossOrRepetition) {
+TEST_F(AppenderTest, ABrokenConnectionIsResumedWithoutLossOrDuplication) {
   for (const bool lose_acks : {false, true}) {
     fake_.RemoveHull("a");
     StreamScript first;
@@ -142,7 +142,7 @@ TEST_F(AppenderTest, ABrokenConnectionIsResumedWithoutLossOrRepetition) {
   }
 }
 
-TEST_F(AppenderTest, AServerThatSaysWhenToComeAgainIsKeptTo) {
+TEST_F(AppenderTest, ARetryDelayFromTheServerIsHonored) {
   StreamScript script;
   script.break_after = 3;
   script.exhausted = true;
@@ -157,7 +157,7 @@ TEST_F(AppenderTest, AServerThatSaysWhenToComeAgainIsKeptTo) {
   EXPECT_THAT(waits_, ElementsAre(std::chrono::milliseconds(7777)));
 }
 
-TEST_F(AppenderTest, AServerThatIsExhaustedAndDoesNotSaySoEndsTheAppend) {
+TEST_F(AppenderTest, ResourceExhaustedWithoutARetryDelayEndsTheAppend) {
   StreamScript script;
   script.break_after = 3;
   script.exhausted = true;
@@ -170,7 +170,7 @@ TEST_F(AppenderTest, AServerThatIsExhaustedAndDoesNotSaySoEndsTheAppend) {
   EXPECT_TRUE(waits_.empty());
 }
 
-TEST_F(AppenderTest, AConnectionThatKeepsBreakingIsGivenUp) {
+TEST_F(AppenderTest, AConnectionThatKeepsBreakingIsAbandoned) {
   const grpc::Status down(grpc::StatusCode::UNAVAILABLE, "down");
   StreamScript script;
   script.break_after = 1;
@@ -185,7 +185,7 @@ TEST_F(AppenderTest, AConnectionThatKeepsBreakingIsGivenUp) {
   EXPECT_EQ(appender->Finish(), status);
 }
 
-TEST_F(AppenderTest, AnotherHullUnderTheSameNameIsNotContinued) {
+TEST_F(AppenderTest, ANewHullUnderTheSameNameIsNotContinued) {
   StreamScript script;
   script.break_after = 1;
   fake_.ScriptStreams({script});
@@ -216,7 +216,7 @@ TEST_F(AppenderTest, AVanishedHullIsNotRecreated) {
   EXPECT_THAT(Text(status), HasSubstr("was deleted while the connection was down"));
 }
 
-TEST_F(AppenderTest, ARefusedChunkIsReportedAndEarlierOnesStand) {
+TEST_F(AppenderTest, ARefusedChunkIsReportedAndEarlierOnesRemain) {
   StreamScript script;
   script.refuse_sequence = 3;
   fake_.ScriptStreams({script});
@@ -229,7 +229,7 @@ TEST_F(AppenderTest, ARefusedChunkIsReportedAndEarlierOnesStand) {
   EXPECT_EQ(fake_.calls("AppendPoints"), 1);
 }
 
-TEST_F(AppenderTest, AServerThatAcknowledgesNothingMeetsTheDeadline) {
+TEST_F(AppenderTest, AServerThatAcknowledgesNothingCausesADeadlineError) {
   StreamScript script;
   script.hold_acks = true;
   fake_.ScriptStreams({script});
@@ -240,7 +240,7 @@ TEST_F(AppenderTest, AServerThatAcknowledgesNothingMeetsTheDeadline) {
   fake_.Release();
 }
 
-TEST_F(AppenderTest, AServerThatDoesNotOpenMeetsTheDeadline) {
+TEST_F(AppenderTest, AServerThatDoesNotOpenTheStreamCausesADeadlineError) {
   fake_.Hang("AppendPoints");
   ClientOptions options;
   options.server = fake_.address();
@@ -257,7 +257,7 @@ TEST_F(AppenderTest, AMissingHullIsNotFound) {
   EXPECT_EQ(MetadataOf(status, "hull_id"), "nope");
 }
 
-TEST_F(AppenderTest, LeavingWithoutFinishEndsTheStream) {
+TEST_F(AppenderTest, DestructionWithoutFinishEndsTheStream) {
   auto appender = Open();
   ASSERT_TRUE(appender->Append(Block(1)).ok());
   appender = nullptr;

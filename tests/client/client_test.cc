@@ -41,7 +41,7 @@ TEST_F(ClientTest, ErrorsCarryTheServersCodeAndMessage) {
   EXPECT_EQ(MetadataOf(hull.status(), "hull_id"), "arm/3");
 }
 
-TEST_F(ClientTest, CallsThatAreSafeToRepeatAreRepeated) {
+TEST_F(ClientTest, SafeCallsAreRetried) {
   fake_.PutHull("a", {});
   const Client client = MakeClient();
   for (const char* method : {"GetHull", "ListHulls", "CheckCollision", "GetStatus", "CreateHull",
@@ -61,7 +61,7 @@ TEST_F(ClientTest, CallsThatAreSafeToRepeatAreRepeated) {
   }
 }
 
-TEST_F(ClientTest, CallsThatAreNotSafeToRepeatAreNotRepeated) {
+TEST_F(ClientTest, UnsafeCallsAreNotRetried) {
   fake_.PutHull("a", {});
   fake_.FailNext("DeleteHull", {unavailable_});
   fake_.FailNext("CreateHull", {unavailable_});
@@ -72,13 +72,13 @@ TEST_F(ClientTest, CallsThatAreNotSafeToRepeatAreNotRepeated) {
   EXPECT_EQ(fake_.calls("CreateHull"), 1);
 }
 
-TEST_F(ClientTest, RepeatingStopsAfterTheAttemptsAllowed) {
+TEST_F(ClientTest, RetriesStopAfterTheAllowedAttempts) {
   fake_.FailNext("GetStatus", std::vector<grpc::Status>(10, unavailable_));
   EXPECT_EQ(MakeClient().GetStatus().status(), absl::UnavailableError("draining"));
   EXPECT_EQ(fake_.calls("GetStatus"), 4);
 }
 
-TEST_F(ClientTest, AServerThatDoesNotAnswerMeetsTheDeadline) {
+TEST_F(ClientTest, AServerThatDoesNotAnswerCausesADeadlineError) {
   fake_.Hang("GetHull");
   const auto hull = MakeClient(std::chrono::milliseconds(50)).GetHull("a");
   EXPECT_TRUE(absl::IsDeadlineExceeded(hull.status())) << hull.status();
@@ -109,7 +109,7 @@ TEST_F(ClientTest, ListingFollowsPagesUpToTheLimit) {
   EXPECT_NE(limited->next_page_token(), "");
 }
 
-TEST_F(ClientTest, PagesThatMayBeStaleAreOfAtLeastTheRevisionOfTheFirst) {
+TEST_F(ClientTest, StalePagesHaveAtLeastTheRevisionOfTheFirst) {
   for (const char* id : {"a", "b", "c", "d", "e", "f", "g"}) fake_.PutHull(id, {});
   ClientOptions options = MakeClient().options();
   // Pages stay linearizable by default and with empty freshness options.
@@ -135,7 +135,7 @@ TEST_F(ClientTest, PagesThatMayBeStaleAreOfAtLeastTheRevisionOfTheFirst) {
   }
 }
 
-TEST_F(ClientTest, DeletingPassesTheRevisionOn) {
+TEST_F(ClientTest, DeleteForwardsTheRevision) {
   FakeHull hull;
   hull.revision = 7;
   fake_.PutHull("a", hull);
@@ -166,7 +166,7 @@ v1::GetHullMeshResponse Facets(const std::vector<uint32_t>& sizes,
   return part;
 }
 
-TEST_F(ClientTest, AMeshIsPutTogetherFromItsParts) {
+TEST_F(ClientTest, AMeshIsAssembledFromItsParts) {
   fake_.mesh_parts = {Header(3, 2), Vertices({0, 0, 0, 1, 0, 0}), Vertices({0, 1, 0}),
                       Facets({3}, {0, 1, 2}), Facets({3}, {2, 1, 0})};
   const auto mesh = MakeClient().GetHullMesh("a");
@@ -176,7 +176,7 @@ TEST_F(ClientTest, AMeshIsPutTogetherFromItsParts) {
   EXPECT_THAT(mesh->facet_indices, ElementsAre(0, 1, 2, 2, 1, 0));
 }
 
-TEST_F(ClientTest, AMeshThatContradictsItselfIsRefused) {
+TEST_F(ClientTest, AnInconsistentMeshIsRefused) {
   const Client client = MakeClient();
   const std::vector<double> xyz(9, 0.5);
   const std::vector<std::vector<v1::GetHullMeshResponse>> wrong = {

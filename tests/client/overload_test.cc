@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 class Overload : public server::ServerTest {};
 
-TEST_F(Overload, AClientComesAgainWhenTheServerSays) {
+TEST_F(Overload, AClientRetriesAfterTheServersDelay) {
   server::Config config = TestConfig();
   config.limits.max_streams_per_client = 1;
   Restart(config);
@@ -38,7 +38,7 @@ TEST_F(Overload, AClientComesAgainWhenTheServerSays) {
   EXPECT_THAT(waits, ElementsAre(milliseconds(1000)));
 }
 
-TEST_F(Overload, ARefusalThatWillNotPassIsNotTriedAgain) {
+TEST_F(Overload, APermanentRefusalIsNotRetried) {
   server::Config config = TestConfig();
   config.limits.max_hulls = 1;
   Restart(config);

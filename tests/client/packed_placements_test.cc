@@ -1,4 +1,4 @@
-// Packed placements are equivalent to a list of placements, in every call that takes them.
+// Packed placements are equivalent to a list of placements, in every call that accepts them.
 
 #include "client/packed_placements.h"
 
@@ -85,7 +85,7 @@ class Packed : public ServerTest {
   }
 };
 
-TEST_F(Packed, BatchesAnswerTheSame) {
+TEST_F(Packed, BatchesReturnTheSameAnswers) {
   v1::BatchCheckCollisionsRequest request;
   *request.mutable_placements() = SomePlacements();
   for (uint32_t a = 0; a < 40; ++a) {
@@ -122,7 +122,7 @@ TEST_F(Packed, BatchesAnswerTheSame) {
                                                v1::RELATION_OVERLAPPING}));
 }
 
-TEST_F(Packed, ScenesAnswerTheSame) {
+TEST_F(Packed, ScenesReturnTheSameAnswers) {
   v1::FindCollisionsRequest request;
   *request.mutable_placements() = SomePlacements();
   v1::FindCollisionsRequest packed;
@@ -148,7 +148,7 @@ TEST_F(Packed, ScenesAnswerTheSame) {
   EXPECT_EQ(pairs_of(packed), expected);
 }
 
-TEST_F(Packed, StreamsAnswerTheSame) {
+TEST_F(Packed, StreamsReturnTheSameAnswers) {
   v1::StreamCollisionsRequest request;
   v1::CollisionStreamOpen* const open = request.mutable_open();
   *open->mutable_placements() = SomePlacements();

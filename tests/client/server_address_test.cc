@@ -45,7 +45,7 @@ TEST(ServerAddress, ListsBecomeTargetNames) {
   EXPECT_EQ(TargetName("unix:/tmp/a,b"), "unix:/tmp/a,b");
 }
 
-TEST(ServerAddress, IsOfThisMachineWhereAllOfItIs) {
+TEST(ServerAddress, IsLocalIfAllAddressesAreLocal) {
   for (const char* here : {"127.0.0.1:50551", "127.1.2.3:1", "localhost:1", "[::1]:1", "unix:/s",
                            "127.0.0.1:1,127.0.0.1:2"}) {
     EXPECT_TRUE(IsLoopback(here)) << here;
@@ -104,7 +104,7 @@ TEST_F(SeveralServers, ShareTheCalls) {
   for (size_t i = 0; i < 3; ++i) EXPECT_EQ(CallsOf(i) - before[i], 10);
 }
 
-TEST_F(SeveralServers, AreLeftAloneWhileTheySayThatTheyDoNotServe) {
+TEST_F(SeveralServers, AreSkippedWhileTheyReportNotServing) {
   while (CallsOf(0) == 0) Call();
   servers_[0]->SetServing(false);
   CallUntilNoneReaches(0);
@@ -113,7 +113,7 @@ TEST_F(SeveralServers, AreLeftAloneWhileTheySayThatTheyDoNotServe) {
   while (CallsOf(0) == before) Call();
 }
 
-TEST_F(SeveralServers, AreNotMissedWhenTheyGo) {
+TEST_F(SeveralServers, CanStopWithoutFailedCalls) {
   while (CallsOf(0) == 0 || CallsOf(1) == 0) Call();
   servers_[0].reset();
   servers_[1].reset();

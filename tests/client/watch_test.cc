@@ -95,7 +95,7 @@ class Watches : public server::ServerTest {
   int clock_readings_ = 0;
 };
 
-TEST_F(Watches, OutliveARestartAsEverySafeCallDoes) {
+TEST_F(Watches, SurviveARestartLikeEverySafeCall) {
   Put("a", server::Cube());
   int waits = 0;
   options_.retry.wait = [&](std::chrono::milliseconds) {
@@ -130,7 +130,7 @@ TEST_F(Watches, WatchesOfHullsResume) {
 
 // The patience applies to a missing server, not to an idle one: it starts with the first failure,
 // so the clock is unused before that.
-TEST_F(Watches, QuietForLongGoOn) {
+TEST_F(Watches, LongQuietWatchesContinue) {
   UseOwnClock();
   const Client client(options_);
   Put("a", server::Cube());
@@ -157,7 +157,7 @@ TEST_F(Watches, QuietForLongGoOn) {
   EXPECT_GT(clock_readings_, 0);
 }
 
-TEST_F(Watches, WatchesOfAnUnreachableServerEndAfterTheirPatience) {
+TEST_F(Watches, WatchesOfAnUnreachableServerEndAfterTheirTimeout) {
   UseOwnClock();
   const Client client(options_);
   Put("a", server::Cube());

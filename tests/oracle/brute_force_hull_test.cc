@@ -57,7 +57,7 @@ TEST(BruteForceHull, CubeHasSixSquaresSeenFromOutside) {
                                        ElementsAre(2, 3, 7, 6), ElementsAre(4, 6, 7, 5)));
 }
 
-TEST(BruteForceHull, HoldsFromSubnormalsToHugeCoordinates) {
+TEST(BruteForceHull, WorksFromSubnormalsToHugeCoordinates) {
   const std::vector<Point> points = {{0, 0, 0},         {1e300, 0, 0}, {0, 1e300, 0},
                                      {0, 0, 1e-310},    {0, 0, -0.0},  {1e-310, 0, 0},
                                      {1e300, 1e300, 0}, {0, 0, 5e-324}};

@@ -79,7 +79,7 @@ TEST(BruteForceRelation, RotationsAreExactAndScaleFree) {
   EXPECT_EQ(Both(arm, {{2, std::nextafter(1, 2), 0, 0}, {}}, tip, {}), Relation::kSeparated);
 }
 
-TEST(BruteForceRelation, HoldsAcrossTheWholeExponentRange) {
+TEST(BruteForceRelation, WorksAcrossTheWholeExponentRange) {
   const std::vector<Point> big = Cube(1e300);
   const std::vector<Point> tiny = Cube(1e-310);
   EXPECT_EQ(Both(big, {}, tiny, {}), Relation::kOverlapping);

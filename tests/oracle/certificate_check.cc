@@ -90,7 +90,7 @@ std::string FaultOfRounded(const Certificate& certificate, Relation relation,
                            std::span<const Point> a, const Placement& X_WA,
                            std::span<const Point> b, const Placement& X_WB,
                            std::span<const double> radii) {
-  // Two more points of A show the scale of the integers: one unit of length along an axis, in the
+  // Two more points of A reveal the scale of the integers: one unit of length along an axis, in the
   // unit of the radii below.
   std::vector<double> lengths(radii.begin(), radii.end());
   for (const auto& points : {a, b}) {

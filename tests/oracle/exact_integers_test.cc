@@ -12,7 +12,7 @@
 namespace hulld::oracle {
 namespace exact_integers_test {
 
-TEST(ExactIntegers, DecompositionGivesTheDoubleBack) {
+TEST(ExactIntegers, DecompositionIsReversible) {
   std::mt19937_64 random(20240501);
   const double denormal = std::numeric_limits<double>::denorm_min();
   std::vector<double> values = {0.0,
@@ -47,7 +47,7 @@ TEST(ExactIntegers, OneCommonScaleKeepsRatios) {
   EXPECT_EQ(integers[3], 3);
 }
 
-TEST(ExactIntegers, TheScaleIsTheLeastThatGivesIntegers) {
+TEST(ExactIntegers, TheScaleIsTheSmallestThatYieldsIntegers) {
   EXPECT_EQ(ToIntegers(std::vector<double>{8, 24, -16}), (std::vector<Integer>{1, 3, -2}));
 }
 

@@ -142,7 +142,7 @@ TEST(Compatibility, TheRecordedContractOfV1StillHolds) {
 }
 
 // Tests the check: each of these changes breaks a line, an addition breaks none.
-TEST(Compatibility, ChangesAreFoundAndAdditionsAreNot) {
+TEST(Compatibility, IncompatibleChangesAreFoundAndAdditionsAreAccepted) {
   google::protobuf::FileDescriptorProto file;
   file.set_name("a.proto");
   file.set_syntax("proto3");

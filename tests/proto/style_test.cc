@@ -83,7 +83,7 @@ class ContractStyle : public testing::Test {
 
 // PACKAGE_DEFINED, PACKAGE_DIRECTORY_MATCH, PACKAGE_SAME_DIRECTORY, DIRECTORY_SAME_PACKAGE,
 // PACKAGE_LOWER_SNAKE_CASE, PACKAGE_VERSION_SUFFIX, FILE_LOWER_SNAKE_CASE, SYNTAX_SPECIFIED.
-TEST_F(ContractStyle, FilesLieWhereTheirPackageSays) {
+TEST_F(ContractStyle, FilePathsMatchTheirPackages) {
   for (const FileDescriptor* file : contract_.files()) {
     const std::filesystem::path path(file->name());
     EXPECT_EQ(file->package(), kPackage) << file->name();
@@ -150,7 +150,7 @@ TEST_F(ContractStyle, EnumValuesCarryTheirEnumAndStartUnspecified) {
 
 // SERVICE_PASCAL_CASE, SERVICE_SUFFIX, RPC_PASCAL_CASE, RPC_REQUEST_STANDARD_NAME,
 // RPC_RESPONSE_STANDARD_NAME, RPC_REQUEST_RESPONSE_UNIQUE.
-TEST_F(ContractStyle, EachRpcHasARequestAndAResponseOfItsOwn) {
+TEST_F(ContractStyle, EachRpcHasItsOwnRequestAndResponse) {
   ForEachService([](const ServiceDescriptor& service) {
     EXPECT_TRUE(IsPascal(service.name()));
     EXPECT_TRUE(Matches(service.name(), ".+Service")) << service.name();
@@ -177,7 +177,7 @@ TEST_F(ContractStyle, ServicesAndRpcsAreExplained) {
 }
 
 // The comment of a reason is its reference for clients, so it must state the code.
-TEST_F(ContractStyle, EveryErrorReasonSaysItsCode) {
+TEST_F(ContractStyle, EveryErrorReasonStatesItsCode) {
   const std::regex code(
       " (INVALID_ARGUMENT|NOT_FOUND|ALREADY_EXISTS|ABORTED|FAILED_PRECONDITION|"
       "DATA_LOSS|RESOURCE_EXHAUSTED|UNAVAILABLE|UNAUTHENTICATED|"
@@ -192,7 +192,7 @@ TEST_F(ContractStyle, EveryErrorReasonSaysItsCode) {
   EXPECT_GE(reasons, 15);
 }
 
-TEST_F(ContractStyle, LinesHoldAHundredCharactersAtMost) {
+TEST_F(ContractStyle, LinesHaveAtMost100Characters) {
   const std::filesystem::path root = SourceTree() / "proto";
   int lines = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {

@@ -155,7 +155,7 @@ TEST_F(Alerts, AFullDiskIsReported) {
   ExpectFiring({});
 }
 
-TEST_F(Alerts, ClientsThatRunIntoALimitAreReported) {
+TEST_F(Alerts, ClientsThatHitALimitAreReported) {
   Config config = AlertsConfig();
   config.limits.max_hulls = 1;
   Restart(config);

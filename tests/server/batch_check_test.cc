@@ -56,7 +56,7 @@ std::string FaultOfBatch(uint64_t invoked, uint64_t returned, std::vector<Seen> 
   return FaultOf({BatchAt(invoked, returned, std::move(all))});
 }
 
-TEST(BatchCheck, AcceptsStatesOfOneInstant) {
+TEST(BatchCheck, AcceptsStatesFromOneInstant) {
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 1), SeenAt("b", 1), SeenAt("c", 1)}), "");
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 2), SeenAt("b", 1), SeenAt("c", 1)}), "");
   EXPECT_EQ(FaultOfBatch(10, 40, {SeenAt("a", 2), SeenAt("b", 1), SeenAt("c", 2)}), "");
@@ -64,7 +64,7 @@ TEST(BatchCheck, AcceptsStatesOfOneInstant) {
 }
 
 // Each version existed during the call, but never both at the same time.
-TEST(BatchCheck, RefusesHullsThatNeverWereTogether) {
+TEST(BatchCheck, RefusesHullsThatNeverCoexisted) {
   EXPECT_NE(FaultOfBatch(10, 40, {SeenAt("a", 1), SeenAt("b", 1), SeenAt("c", 2)}), "");
   EXPECT_NE(FaultOfBatch(1, 40, {Missing("b"), SeenAt("a", 2)}), "");
   EXPECT_NE(FaultOfBatch(1, 40, {Missing("a"), SeenAt("c", 1)}), "");
@@ -76,7 +76,7 @@ TEST(BatchCheck, RefusesEarlierAndLaterStates) {
   EXPECT_NE(FaultOfBatch(33, 34, {Missing("b")}), "");
 }
 
-TEST(BatchCheck, RefusesAnotherRelationThanThatOfThePoints) {
+TEST(BatchCheck, RefusesARelationThatContradictsThePoints) {
   for (const PointSet touched : {0x0, 0x1, 0x2, 0x3}) {
     Seen seen = SeenAt("a", 1);
     seen.probed = 0x3;
@@ -93,7 +93,7 @@ TEST(BatchCheck, RefusesAnotherRelationThanThatOfThePoints) {
   }
 }
 
-TEST(BatchCheck, RefusesAnotherSize) {
+TEST(BatchCheck, RefusesAWrongSize) {
   for (const uint64_t size : {0, 1, 2}) {
     Seen hull = SeenAt("a", 1);
     hull.size = size;
@@ -110,7 +110,7 @@ TEST(BatchCheck, RefusesThatAnAnswerIsMissing) {
   EXPECT_NE(FaultOfBatch(10, 40, {seen}), "");
 }
 
-TEST(BatchCheck, APieceIsMissingOnlyWhereTheBodyHasIt) {
+TEST(BatchCheck, APieceCanBeMissingOnlyIfTheBodyContainsIt) {
   EXPECT_NE(FaultOfBatch(10, 40, {Missing("b", "c")}), "");
   Operation gone = Answered(Kind::kDelete, 35, 36, 3);
   gone.store_id = "c";

@@ -89,12 +89,12 @@ TEST(BodyCheck, AcceptsAnswersOfOneInstant) {
 }
 
 // Each version existed during the call, but never all at the same time.
-TEST(BodyCheck, RefusesHullsOfPiecesThatNeverWereTogether) {
+TEST(BodyCheck, RefusesHullsOfPiecesThatNeverCoexisted) {
   EXPECT_NE(FaultOf({AskAt(10, 40, 10, 1, 2, true)}), "");
   EXPECT_NE(FaultOf({AskAt(33, 40, 10, 2, 1, false)}), "");
 }
 
-TEST(BodyCheck, RefusesABodyAndAHullThatNeverWereTogether) {
+TEST(BodyCheck, RefusesABodyAndAHullThatNeverCoexisted) {
   const Operation put = PutAt(25, 26, 11, {"c", "a"});
   EXPECT_EQ(FaultOf({put, AskAt(10, 40, 10, 1, 1, true)}), "");
   EXPECT_NE(FaultOf({put, AskAt(10, 40, 11, 1, 1, true)}), "");
@@ -119,7 +119,7 @@ TEST(BodyCheck, RefusesARelationThatDoesNotFollowFromThePieces) {
   EXPECT_EQ(FaultOf({ask}), "");
 }
 
-TEST(BodyCheck, RefusesPiecesThatAreNotOfThatRevision) {
+TEST(BodyCheck, RefusesPiecesFromAnotherRevision) {
   EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"a"})}), "");
   EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"c", "a"})}), "");
   EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}), AskAt(10, 20, 11, 1, 1, true)}), "");
@@ -129,7 +129,7 @@ TEST(BodyCheck, RefusesPiecesThatAreNotOfThatRevision) {
   EXPECT_EQ(FaultOf({PutAt(7, 8, 11, {"a"}), ask}), "");
 }
 
-TEST(BodyCheck, APutKeepsTheIncarnationAndHoldsItsCondition) {
+TEST(BodyCheck, APutKeepsTheIncarnationAndChecksItsCondition) {
   EXPECT_EQ(FaultOf({PutAt(7, 8, 11, {"a"}), GetAt(9, 10, 11, {"a"})}), "");
   EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}, 11)}), "");
   EXPECT_NE(FaultOf({PutAt(7, 8, 9, {"a"})}), "");
@@ -169,7 +169,7 @@ TEST(BodyCheck, ExistingBodiesAreNotReportedMissing) {
   EXPECT_NE(JointLinearizabilityFault(operations), "");
 }
 
-TEST(BodyCheck, ARevisionThatWasAskedForIsSeen) {
+TEST(BodyCheck, ARequestedRevisionIsSeen) {
   Operation version = Answered(Kind::kProbe, 100, 101, 1);
   version.store_id = "c";
   version.max_staleness = std::nullopt;
@@ -194,7 +194,7 @@ TEST(BodyCheck, ARevisionThatWasAskedForIsSeen) {
 }
 
 // Changes of one store take effect in revision order.
-TEST(BodyCheck, RefusesAnOrderAgainstTheRevisionsOfAStore) {
+TEST(BodyCheck, RefusesAnOrderThatContradictsRevisions) {
   Operations operations = With({});
   operations["a"].push_back(ReplaceAt(41, 60, 5, kWith));
   operations["b"].push_back(PutAt(41, 60, 20, {"a"}));

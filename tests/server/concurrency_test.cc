@@ -152,7 +152,7 @@ TEST_F(Concurrency, BatchesOfHullsThatKeepChangingAnswerFromOneRevision) {
   }
 }
 
-TEST_F(Concurrency, DeletesInTheMidstOfWritesEndEveryStream) {
+TEST_F(Concurrency, DeletesDuringWritesEndEveryStream) {
   constexpr int kRounds = 15;
   for (int round = 0; round < kRounds; ++round) {
     Create("h");

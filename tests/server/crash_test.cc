@@ -279,12 +279,12 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
   };
   std::thread writer([&] {
     write();
-    // Releases the waiting thread, whatever the outcome.
+    // Releases the waiting thread, regardless of the outcome.
     sent = blocks.size();
     sent.notify_all();
   });
   for (int kill = 1; kill <= kills; ++kill) {
-    // After a number of chunks, not a time; all may be sent by the last kill.
+    // After a number of chunks rather than a time; all may have been sent by the last kill.
     const size_t enough =
         blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1);
     for (size_t now = sent; now < enough; now = sent) sent.wait(now);
@@ -297,7 +297,7 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
 
 // Clients disappear in the middle of a stream. Everything committed stays, and the next client with
 // the same writer ID continues from there.
-TEST_F(Interrupted, ClientsThatVanishLeaveWholeChunks) {
+TEST_F(Interrupted, DisconnectedClientsLeaveWholeChunks) {
   const std::vector<std::vector<Vector>> blocks = GrowingBall(60, 300);
   StartServer();
   std::mt19937_64 random(Seed());

@@ -163,7 +163,7 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   });
   EXPECT_THAT(std::string(broken.status().message()), HasSubstr("the file ends early"));
   EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
-  // A severed stream differs from one ended by its client only in the missing last message.
+  // A severed stream differs from one ended by its client only by the missing last message.
   grpc::ClientContext context;
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);
@@ -182,7 +182,7 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
 }
 
 // Their duration grows with the data, so the default deadline of other calls does not apply.
-TEST_F(DurableServer, ReplacingAndSavingHaveADeadlineOnlyWhereOneIsGiven) {
+TEST_F(DurableServer, ReplaceAndSaveHaveADeadlineOnlyIfRequested) {
   Put("h", Cube());
   // A deadline that has already passed.
   constexpr std::chrono::milliseconds kPassed = std::chrono::hours(-1);
@@ -215,7 +215,7 @@ TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
   EXPECT_EQ(again.opened().last_sequence(), 0);
 }
 
-TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
+TEST_F(DurableServer, ABackupBecomesASeparateStore) {
   Put("sphere", Sphere(300));
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/backup";
@@ -236,7 +236,7 @@ TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
   EXPECT_EQ(Get("sphere").header().store_id(), after.header().store_id());
 }
 
-TEST_F(DurableServer, ABackupHoldsBodies) {
+TEST_F(DurableServer, ABackupContainsBodies) {
   Put("cube", Cube());
   v1::PutBodyRequest put;
   put.set_body_id("two-cubes");
@@ -275,7 +275,7 @@ TEST_F(DurableServer, ABackupHoldsBodies) {
   EXPECT_EQ(after.body().SerializeAsString(), before.body().SerializeAsString());
 }
 
-TEST_F(DurableServer, ADamagedOrCutBackupIsRefused) {
+TEST_F(DurableServer, ADamagedOrTruncatedBackupIsRefused) {
   Put("sphere", Sphere(300));
   const std::string file = directory_ + "/backup";
   SaveBackup(file);
@@ -296,7 +296,7 @@ TEST_F(DurableServer, ADamagedOrCutBackupIsRefused) {
   }
 }
 
-TEST_F(DurableServer, ABackupIsRestoredWithinADirectoryThatIsThere) {
+TEST_F(DurableServer, ABackupIsRestoredIntoAnExistingDirectory) {
   Put("sphere", Sphere(300));
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/backup";
@@ -327,7 +327,7 @@ TEST_F(DurableServer, ABackupIsRestoredWithinADirectoryThatIsThere) {
   EXPECT_NE(Get("sphere").header().store_id(), before.header().store_id());
 }
 
-TEST_F(DurableServer, ARestoringThatFailsLeavesTheDirectoryEmpty) {
+TEST_F(DurableServer, AFailedRestoreLeavesTheDirectoryEmpty) {
   Put("sphere", Sphere(300));
   const std::string file = directory_ + "/backup";
   SaveBackup(file);

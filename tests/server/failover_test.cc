@@ -75,7 +75,7 @@ TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneIsKilled) {
 }
 
 // A writer and a reader, given both addresses, never learn which server is active.
-TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
+TEST_F(Failover, ClientsThatKnowBothServersContinue) {
   const std::string addresses[] = {UnusedAddress(), UnusedAddress()};
   std::unique_ptr<Process> active = Start({}, addresses[0]);
   EXPECT_NE(active->ReadLineWith("listening on "), "");
@@ -109,8 +109,8 @@ TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
   EXPECT_GE((*appender)->totals().reconnects, 1);
 }
 
-// The suspended process may resume at any later time: then it changes nothing and exits.
-TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneStandsStill) {
+// The suspended process may resume at any later time; it must then exit without changing anything.
+TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneHangs) {
   const std::unique_ptr<Process> active = Start();
   const auto former = Connect(*active);
   Put(*former, Cube());
@@ -147,7 +147,7 @@ TEST_F(Failover, AServerThatWaitsEndsCleanlyOnASignal) {
   EXPECT_EQ(active->Wait(), 0);
 }
 
-TEST_F(Failover, NoLineOfTheLogHoldsThePassword) {
+TEST_F(Failover, NoLogLineContainsThePassword) {
   const std::unique_ptr<Process> active = Start({"--log-level", "debug"});
   active->ReadLineWith("listening on ");
   active->Signal(SIGTERM);

@@ -117,7 +117,7 @@ TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
 
 // Waiting queries use no thread; cancelled ones release their resources although the store does not
 // answer.
-TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
+TEST_F(FreshReads, QueriesThatWaitForTheStoreEndWhenCancelled) {
   Append(0, "h", 1);
   const auto collisions = v1::CollisionService::NewStub(Connect(0));
   v1::CheckCollisionRequest pair;
@@ -140,7 +140,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
     EXPECT_TRUE(queue.Next(&tag, &ok));
     return static_cast<Call*>(tag);
   };
-  // One more than may run: the first to end is refused, and the rest wait.
+  // One more call than may run: the first to end is refused, and the rest wait.
   std::vector<Call> calls(kCallsPerClient + 1);
   for (Call& call : calls) ask(call);
   EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -177,7 +177,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
 }
 
 // Queries that wait without a thread count as those that wait for one.
-TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
+TEST_F(FreshReads, QueriesThatWaitForTheStoreAreBounded) {
   constexpr int kMost = 8;
   constexpr int kSent = 200;
   constexpr size_t kSurelyRefused = 40;

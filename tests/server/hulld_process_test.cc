@@ -67,7 +67,7 @@ TEST(HulldProgram, EveryThreadHasThePriorityOfTheProcess) {
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   const auto stub = v1::CollisionService::NewStub(
       grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
-  // After a batch, as threads may start lazily.
+  // After a batch, because threads may start lazily.
   grpc::ClientContext context;
   v1::BatchCheckCollisionsRequest request;
   request.add_placements()->set_hull_id("none");
@@ -88,7 +88,7 @@ TEST(HulldProgram, EveryThreadHasThePriorityOfTheProcess) {
   EXPECT_GT(threads, 4u);
 }
 
-TEST(HulldProgram, ATakenPortAndAWrongFlagEndItWithAnError) {
+TEST(HulldProgram, APortInUseAndAnInvalidFlagAreFatal) {
   Process first({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(first.ReadLineWith("listening on "));
   Process second({"--store", "memory", "--listen", address});
@@ -124,7 +124,7 @@ TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {
 
 // Calls of a client that knows both servers never fail during the drain, and soon use the second
 // server only.
-TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
+TEST(HulldProgram, ClientsOfADrainingServerMoveToAnother) {
   Process draining({"--store", "memory", "--listen", "127.0.0.1:0", "--drain-timeout", "600"});
   Process other({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(draining.ReadLineWith("listening on "));

@@ -150,7 +150,7 @@ TEST(LinearizabilityCheck, RefusesAChunkAppliedTwiceOrOutOfOrder) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1, "w", 2)}), "");
 }
 
-TEST(LinearizabilityCheck, RefusesARevisionThatFalls) {
+TEST(LinearizabilityCheck, RefusesADecreasingRevision) {
   EXPECT_NE(LinearizabilityFault(
                 {CreateAt(1, 2), AppendAt(3, 4, 5, 5, 1), AppendAt(5, 6, 4, 6, 2, "w", 2)}),
             "");
@@ -195,7 +195,7 @@ TEST(LinearizabilityCheck, RefusesAConditionThatDidNotHold) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
   conditional.if_revision = 2;
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
-  // A refusal of a condition that held is refused as well.
+  // Refusing a condition that held is a fault as well.
   conditional.outcome = Outcome::kAborted;
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
 }
@@ -207,7 +207,7 @@ std::vector<Operation> After(std::initializer_list<Operation> more) {
   return operations;
 }
 
-TEST(LinearizabilityCheck, AReplaceIsOneChangeWithCountsOfItsOwn) {
+TEST(LinearizabilityCheck, AReplaceIsOneChangeWithItsOwnCounts) {
   EXPECT_EQ(LinearizabilityFault(
                 After({ReplaceAt(5, 6, 3, 0xc0), MeshAt(7, 8, 3, 0xc0), GetAt(9, 10, 3, 3, 2)})),
             "");
@@ -247,7 +247,7 @@ TEST(LinearizabilityCheck, RefusesAReplaceThatWasLost) {
   EXPECT_NE(LinearizabilityFault(After({replace, AppendAt(7, 8, 4, 8, 3, "w", 2)})), "");
 }
 
-TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
+TEST(LinearizabilityCheck, RefusesAPartlyAppliedReplace) {
   const Operation replace = ReplaceAt(5, 8, 3, 0xc0);
   // New points are missing before or after the answer, or former ones remain.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(6, 7, 3, 0x40)})), "");
@@ -258,7 +258,7 @@ TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
   const Operation lost = Unanswered(replace);
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0x40)})), "");
   EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0xe0)})), "");
-  // The points are new, but the counts or the incarnation are not.
+  // The points are new, but the counts or the incarnation are old.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 3, 3)})),
             "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 1, 2)})),
@@ -326,7 +326,7 @@ TEST(LinearizabilityCheck, RefusesAReplaceWithTheRevisionOfAnotherChange) {
   EXPECT_THAT(HistoryFault(history), HasSubstr("revision 1 belongs to a change of a and to one"));
 }
 
-TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
+TEST(LinearizabilityCheck, RefusesDecreasingStoreRevisions) {
   HullHistory history;
   history.Record("a", CreateAt(1, 2));
   Operation late = AnsweredOf(Kind::kProbe, 3, 4, 1);
@@ -348,7 +348,7 @@ std::string FaultOf(const Operation& probe) {
   return LinearizabilityFault({CreateAt(1, 2), AppendAt(100, 102, 2, 5, 1), probe});
 }
 
-TEST(FreshnessCheck, ABoundedReadMayBeAnsweredFromAsLongAgoAsItSays) {
+TEST(FreshnessCheck, ABoundedReadMayBeAsStaleAsItsBound) {
   EXPECT_NE(FaultOf(PastProbe(0, 0, 1, false)), "");
   EXPECT_EQ(FaultOf(PastProbe(150, 98, 1, false)), "");
   EXPECT_EQ(FaultOf(PastProbe(150, 150, 1, false)), "");
@@ -365,12 +365,12 @@ TEST(FreshnessCheck, ABoundedReadMayBeAnsweredFromAsLongAgoAsItSays) {
   EXPECT_NE(FaultOf(too_early), "");
 }
 
-TEST(FreshnessCheck, RefusesAnAnswerThatIsStalerThanAskedFor) {
+TEST(FreshnessCheck, RefusesAnAnswerStalerThanRequested) {
   EXPECT_THAT(FaultOf(PastProbe(149, 150, 2, true)), HasSubstr("150 ns ago to one who wants"));
   EXPECT_EQ(FaultOf(PastProbe(std::nullopt, 150, 2, true)), "");
 }
 
-TEST(FreshnessCheck, ARevisionThatWasAskedForIsSeen) {
+TEST(FreshnessCheck, ARequestedRevisionIsSeen) {
   Operation probe = PastProbe(std::nullopt, 199, 1, false);
   probe.at_least_revision = 1;
   EXPECT_EQ(FaultOf(probe), "");
@@ -385,7 +385,7 @@ TEST(FreshnessCheck, ARevisionThatWasAskedForIsSeen) {
 }
 
 // The answer names a revision whose changes it lacks.
-TEST(FreshnessCheck, RefusesAnAnswerThatLacksAChangeOfItsOwnRevision) {
+TEST(FreshnessCheck, RefusesAnAnswerThatLacksAChangeUpToItsRevision) {
   Operation probe = PastProbe(150, 150, 1, false);
   probe.store_revision = 2;
   EXPECT_NE(FaultOf(probe), "");

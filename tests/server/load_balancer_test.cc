@@ -86,7 +86,7 @@ TEST_F(LoadBalancer, ConnectionsAreSpreadOverServingServers) {
 }
 
 // Streams on the draining server continue; later calls go to another server, and none fails.
-TEST_F(LoadBalancer, AServerThatDrainsIsLeft) {
+TEST_F(LoadBalancer, DrainingServersAreAvoided) {
   const Client client = Connect(address_);
   const std::string leaving = StoreOf(client);
   AppendOptions options;

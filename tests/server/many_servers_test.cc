@@ -55,7 +55,7 @@ class ManyServers : public ManyServersTest {
   }
 };
 
-TEST_F(ManyServers, ClientsThatGoFromOneToAnotherSeeOneStore) {
+TEST_F(ManyServers, ClientsThatSwitchServersSeeOneStore) {
   ForEachRun([this](uint64_t seed) {
     Begin();
     HullHistory history;
@@ -81,7 +81,7 @@ TEST_F(ManyServers, PeersContinueAfterOneIsKilled) {
 }
 
 // One store: at any freshness, all of an answer, including a list page, has one revision.
-TEST_F(ManyServers, BatchesStreamsAndListsAreOfOneRevisionOfTheStore) {
+TEST_F(ManyServers, BatchesStreamsAndListsReadOneRevisionOfTheStore) {
   size_t batches = 0;
   size_t whole = 0;
   uint64_t runs = 0;
@@ -124,7 +124,7 @@ TEST_F(ManyServers, AServerThatHungAppliesPeerChanges) {
 
 // Each server reaches the database through a network that loses a COMMIT or its answer, delivers
 // either after its connection is gone, or is down for a while. Pairs of clients share a writer ID.
-TEST_F(ManyServers, NothingIsLostBehindANetworkThatCuts) {
+TEST_F(ManyServers, NothingIsLostBehindAFailingNetwork) {
   constexpr int kFaults = 8;
   ForEachRun([this](uint64_t seed) {
     PostgresCluster& cluster = PostgresCluster::Shared();

@@ -31,7 +31,7 @@ Operations With(std::vector<Operation> pairs) {
   return operations;
 }
 
-TEST(PairCheck, AcceptsPairsThatWereThere) {
+TEST(PairCheck, AcceptsPairsThatCoexisted) {
   EXPECT_EQ(JointLinearizabilityFault(With({})), "");
   for (const auto& [a, b] : {std::pair<uint64_t, uint64_t>{1, 1}, {2, 1}, {2, 2}}) {
     EXPECT_EQ(JointLinearizabilityFault(With({PairAt(10, 40, a, b)})), "");
@@ -39,7 +39,7 @@ TEST(PairCheck, AcceptsPairsThatWereThere) {
 }
 
 // Each version existed during the call, but never both at the same time.
-TEST(PairCheck, RefusesAPairThatNeverWas) {
+TEST(PairCheck, RefusesAPairThatNeverCoexisted) {
   EXPECT_NE(JointLinearizabilityFault(With({PairAt(10, 40, 1, 2)})), "");
   // If both changes overlap, either may come first, but in the same order for all readers.
   Operations overlapping = With({});
@@ -50,7 +50,7 @@ TEST(PairCheck, RefusesAPairThatNeverWas) {
   EXPECT_NE(JointLinearizabilityFault(overlapping), "");
 }
 
-TEST(PairCheck, RefusesAPairOfThePastOrOfTheFuture) {
+TEST(PairCheck, RefusesAPairFromThePastOrTheFuture) {
   EXPECT_NE(JointLinearizabilityFault(With({PairAt(33, 34, 2, 1)})), "");
   EXPECT_NE(JointLinearizabilityFault(With({PairAt(23, 24, 2, 2)})), "");
   EXPECT_NE(JointLinearizabilityFault(With({PairAt(23, 24, 2, 1), PairAt(25, 26, 1, 1)})), "");

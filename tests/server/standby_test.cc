@@ -61,7 +61,7 @@ class Standby : public ManyServersTest {
 };
 
 // Acknowledged changes are on both databases.
-TEST_F(Standby, NothingAcknowledgedIsLostWhenItTakesThePlaceOfThePrimary) {
+TEST_F(Standby, NothingAcknowledgedIsLostWhenItReplacesThePrimary) {
   const uint64_t seed = NumberIn("HULLD_TEST_SEED", 0);
   const uint64_t failovers = NumberIn("HULLD_FAILOVERS", 1);
   HullHistory history;

@@ -1,7 +1,7 @@
 // LAS 1.0 to 1.4 (ASPRS, 2019), uncompressed: a binary header, then one record per point, which
 // starts with three 32-bit integers. A coordinate is integer * scale + offset over the reals, with
-// the doubles of the header, with a single rounding. Most readers also round the product, and may
-// err by a unit in the last place of the larger summand.
+// the doubles of the header, rounded once. Most readers also round the product, and may err by a
+// unit in the last place of the larger summand.
 #include <absl/strings/str_cat.h>
 
 #include <array>
@@ -24,7 +24,7 @@ constexpr uint16_t kRecordBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}
 struct Header {
   uint64_t first_point = 0;
   uint64_t point_count = 0;
-  // LAS 1.4; other records may follow the points.
+  // LAS 1.4 only: other records may follow the points.
   bool has_extended_count = false;
   uint64_t record_bytes = 0;
   std::array<double, 3> scale = {};
@@ -45,7 +45,7 @@ absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* byte
   bytes->resize(kHeader14Bytes);
   if (const uint16_t size = Load<uint16_t>(*bytes, 94); size < kHeader14Bytes) {
     return source->ErrorAtByte(
-        absl::StrCat("a header of LAS 1.4 takes ", kHeader14Bytes, " bytes, not ", size));
+        absl::StrCat("a LAS 1.4 header has ", kHeader14Bytes, " bytes, not ", size));
   }
   if (!source->Read(bytes->data() + kLasHeaderBytes, kHeader14Bytes - kLasHeaderBytes)) {
     return source->Truncated("within the header of LAS 1.4");
@@ -53,8 +53,8 @@ absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* byte
   const uint64_t count = Load<uint64_t>(*bytes, 247);
   if (header->point_count != 0 && header->point_count != count) {
     return source->ErrorAtByte(absl::StrCat("the header declares ", header->point_count,
-                                            " points in its old field and ", count,
-                                            " in that of LAS 1.4; the file is damaged"));
+                                            " points in its legacy field and ", count,
+                                            " in its LAS 1.4 field; the file is damaged"));
   }
   header->point_count = count;
   header->has_extended_count = true;
@@ -87,22 +87,22 @@ absl::Status ReadHeader(ByteSource* source, Header* header) {
   const int major = bytes[24];
   const int minor = bytes[25];
   if (major != 1 || minor > 4) {
-    return source->ErrorAtByte(
-        absl::StrCat("LAS ", major, ".", minor, " is not supported; known are 1.0 to 1.4"));
+    return source->ErrorAtByte(absl::StrCat(
+        "LAS ", major, ".", minor, " is not supported; supported versions are 1.0 to 1.4"));
   }
   const int format = bytes[104];
   if (format >= 64) {
     return source->ErrorAtByte(
-        "the points are compressed (LAZ); decompress the file first, as with laszip -i IN.laz -o "
-        "OUT.las");
+        "the points are compressed (LAZ); decompress the file first, for example with: laszip -i "
+        "IN.laz -o OUT.las");
   }
   header->record_bytes = Load<uint16_t>(bytes, 105);
   if (format > 10) {
     return source->ErrorAtByte(
-        absl::StrCat("point format ", format, " is unknown; known are 0 to 10"));
+        absl::StrCat("point format ", format, " is unknown; supported formats are 0 to 10"));
   }
   if (header->record_bytes < kRecordBytes[format]) {
-    return source->ErrorAtByte(absl::StrCat("a record of point format ", format, " takes ",
+    return source->ErrorAtByte(absl::StrCat("a record of point format ", format, " needs ",
                                             kRecordBytes[format], " bytes, not ",
                                             header->record_bytes));
   }

@@ -82,7 +82,7 @@ absl::Status ParseCount(const ByteSource& source, const std::vector<std::string_
                         std::optional<uint64_t>* count) {
   uint64_t value = 0;
   if (values.size() != 1 || !ParseUnsigned(values[0], &value)) {
-    return source.ErrorAtLine("one number is expected here");
+    return source.ErrorAtLine("expected a single number");
   }
   *count = value;
   return absl::OkStatus();
@@ -156,7 +156,7 @@ absl::Status MakeLayout(const ByteSource& source, const PcdHeader& header, bool 
     }
     layout->row += binary ? field.size * field.count : field.count;
     if (binary && field.name == "_") layout->padding += field.size * field.count;
-    if (layout->row > kMaxRowBytes) return source.ErrorAtLine("a point takes more than 1 MiB");
+    if (layout->row > kMaxRowBytes) return source.ErrorAtLine("a point is larger than 1 MiB");
   }
   if (found != std::array<bool, 3>{true, true, true}) {
     return source.ErrorAtLine("FIELDS must name x, y and z");
@@ -168,9 +168,9 @@ absl::Status PointCount(const ByteSource& source, const PcdHeader& header, uint6
   const bool has_size = header.width.has_value();
   uint64_t size = 0;
   if (has_size && __builtin_mul_overflow(*header.width, header.height.value_or(1), &size)) {
-    return source.ErrorAtLine("WIDTH times HEIGHT is beyond 2^64");
+    return source.ErrorAtLine("WIDTH times HEIGHT exceeds 2^64");
   }
-  if (!has_size && !header.points) return source.ErrorAtLine("the header gives no POINTS");
+  if (!has_size && !header.points) return source.ErrorAtLine("the header has no POINTS");
   *count = header.points.value_or(size);
   if (!has_size || *count == size) return absl::OkStatus();
   return source.ErrorAtLine(
@@ -203,10 +203,11 @@ absl::Status ReadAscii(ByteSource* source, const Layout& layout, uint64_t count,
         if (kind != NumberText::kNumber) return source->ErrorAtLine(NumberProblem(kind, token));
       }
     }
-    // Extra values mean that the columns are not those of the header.
+    // Extra values mean that the columns do not match the header.
     if (const std::string_view token = NextToken(&line); !token.empty()) {
-      return source->ErrorAtLine(absl::StrCat(Quoted(token), " is beyond the ", layout.row,
-                                              " values of a point that FIELDS and COUNT declare"));
+      return source->ErrorAtLine(absl::StrCat(Quoted(token),
+                                              " is one value too many; FIELDS and COUNT declare ",
+                                              layout.row, " per point"));
     }
     absl::Status status = points->AddScaled(xyz[0], xyz[1], xyz[2], error_at);
     if (!status.ok()) return status;
@@ -336,7 +337,7 @@ absl::Status ReadPcd(ByteSource* source, PointCollector* points) {
   const bool compressed = header.data == "binary_compressed";
   if (!ascii && !compressed && header.data != "binary") {
     return source->ErrorAtLine(absl::StrCat("DATA ", Quoted(header.data),
-                                            " is unknown; known are ascii, binary and "
+                                            " is unknown; supported are ascii, binary and "
                                             "binary_compressed"));
   }
   Layout layout;

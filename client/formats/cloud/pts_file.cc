@@ -1,5 +1,5 @@
-// PTS, Leica's text format: for each scan its number of points, then one line per point, x y z
-// [intensity [r g b]]. Files without the number are also common.
+// PTS, Leica's text format: each scan starts with its number of points, followed by one line per
+// point, x y z [intensity [r g b]]. Files without the number are also common.
 #include <absl/strings/str_cat.h>
 
 #include <optional>

@@ -8,9 +8,9 @@
 namespace hulld {
 namespace {
 
-// Adds the point of a line with commas or semicolons as separators. With semicolons, a comma is a
-// decimal mark, which no number may have here. White space within a number indicates decimal
-// commas: "1,5 2,5 3,5" is no row of four numbers.
+// Adds the point of a line with commas or semicolons as separators. With semicolons, a comma would
+// be a decimal mark, which is not supported. White space within a number indicates decimal commas:
+// "1,5 2,5 3,5" is not a row of four numbers.
 absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
                                PointCollector* points) {
   const char separator = line.find(';') != std::string_view::npos ? ';' : ',';

@@ -20,7 +20,8 @@ using google::protobuf::ListValue;
 using google::protobuf::Struct;
 using google::protobuf::Value;
 
-// True for extensions that affect only the appearance of surfaces, and for the implemented one.
+// True for extensions that affect only the appearance of surfaces, and for the one that is
+// implemented.
 bool IsKnownExtension(const std::string& name) {
   for (const char* prefix : {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
                              "KHR_lights_punctual", "KHR_mesh_quantization"}) {
@@ -136,7 +137,7 @@ void GltfDocument::ReadContainer() {
   }
 }
 
-// Returns the JSON chunk, and keeps the binary one.
+// Returns the JSON chunk, and stores the binary chunk.
 std::string GltfDocument::SplitGlb(const std::string& bytes) {
   const auto load = [&bytes](size_t at) {
     uint32_t value = 0;

@@ -17,9 +17,10 @@
 namespace hulld {
 
 // A glTF 2.0 document (Khronos, 2017; ISO/IEC 12113:2022): JSON that describes nodes, meshes, and
-// accessors into buffers, which lie in the JSON, beside it, or in one binary file (GLB) with it.
+// accessors into buffers. Buffers are embedded in the JSON, in separate files, or in one binary
+// file (GLB) with the JSON.
 //
-// The first error is kept; after it, results are empty or zero, and callers return.
+// Keeps the first error; after it, results are empty or zero, and callers return.
 class GltfDocument {
  public:
   // source: must outlive this.
@@ -31,7 +32,7 @@ class GltfDocument {
 
   const absl::Status& status() const { return status_; }
   bool ok() const { return status_.ok(); }
-  // Keep an error, unless there is an earlier one.
+  // Record an error unless an earlier one exists.
   void Fail(const std::string& message);
   void Keep(const absl::Status& status);
   void RefuseExtension(const std::string& name);

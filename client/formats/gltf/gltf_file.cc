@@ -25,7 +25,7 @@ using google::protobuf::Value;
 // A primitive of a mesh, placed by a node.
 struct Primitive {
   std::string node;
-  // The node's number, or that of the mesh if the file has no nodes.
+  // The node's index, or the mesh's index if the file has no nodes.
   size_t number = 0;
   TriangleMesh mesh;
   // True if the vertices are floats of the file, not transformed.
@@ -65,7 +65,7 @@ class GltfWalk {
     return triangles;
   }
 
-  // Adds the displacements of morph targets, each times its weight.
+  // Adds the weighted displacements of the morph targets.
   void Morph(const Struct& object, const std::vector<double>& weights, Primitive* primitive) {
     const auto& targets = document_.ListOf(object, "targets").values();
     const size_t count = std::min(weights.size(), static_cast<size_t>(targets.size()));
@@ -88,8 +88,8 @@ class GltfWalk {
     }
   }
 
-  // Moves each vertex by the weighted mean of its joints' transforms, as they stand in the file.
-  // Returns false if the primitive has no joints.
+  // Moves each vertex by the weighted mean of its joints' transforms in the file's pose. Returns
+  // false if the primitive has no joints.
   bool Bend(const Struct& attributes, const std::vector<Affine>& joints, Primitive* primitive) {
     auto& vertices = primitive->mesh.vertices;
     std::vector<std::array<double, 3>> sums(vertices.size());
@@ -186,7 +186,7 @@ class GltfWalk {
     vertices_ += vertices.size();
     Morph(object, weights, primitive);
     const auto skin = document_.IntegerOf(node, "skin");
-    // The joints alone place a mesh with a skin.
+    // A mesh with a skin is placed by the joints alone.
     if (ok() && skin && Bend(attributes, JointsOf(*skin), primitive)) {
       if (ok()) document_.Keep(visit_(*primitive));
       return;

@@ -162,7 +162,7 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
                 "Only if the body is at this revision; 0: only if it does not exist");
   put.SetExamples(
       {{"", "hullctl body put bracket plate rib@0,0.05,0 rib@0,-0.05,0"},
-       {"Turned by a quarter about z", "hullctl body put bracket plate rib@1,0,0,1,0,0,0"},
+       {"Rotated by 90 degrees about z", "hullctl body put bracket plate rib@1,0,0,1,0,0,0"},
        {"With a margin", "hullctl body put bracket plate:0.002 rib@0,0.05,0:0.002"},
        {"A copy", "hullctl body get bracket --output json | hullctl body put copy --pieces -"}});
   OnGiven(put, invocation, arguments, PutBody);
@@ -177,7 +177,7 @@ void AddBodyCommand(Command program, Invocation* invocation) {
   const auto arguments = std::make_shared<BodyArguments>();
   body.SetDetails(
       "A body is a list of pieces, hulls at fixed poses, under one ID. Bodies and hulls share one\n"
-      "name space: 'check', 'batch', 'scene', 'stream', 'watch' and 'view' take either. The\n"
+      "namespace: 'check', 'batch', 'scene', 'stream', 'watch' and 'view' accept either. The\n"
       "relation of two bodies is the strongest over all pairs of pieces. A query uses the current\n"
       "version of each piece's hull.");
   AddPut(body, invocation, arguments);
@@ -194,7 +194,7 @@ void AddBodyCommand(Command program, Invocation* invocation) {
   AddFreshnessOptions(list, invocation);
   list.SetExamples({{"", "hullctl body list cell-3/"}});
   OnGiven(list, invocation, arguments, ListBodies);
-  Command remove = body.AddCommand("delete", "Remove a body; its hulls stay");
+  Command remove = body.AddCommand("delete", "Delete a body; its hulls are kept");
   AddName(remove, arguments);
   remove.AddFlag("--if-exists", &arguments->if_exists, "Succeed if the body does not exist");
   AddIfRevision(remove, arguments, "Only if the body is at this revision");

@@ -49,7 +49,7 @@ absl::Status ReadPieces(const std::string& path, Pieces* pieces) {
   std::string_view line;
   while ((*source)->ReadLine(&line)) text.append(line).append("\n");
   if (absl::Status s = (*source)->status(); !s.ok()) return s;
-  // The output of 'body get', or just its pieces.
+  // Either the output of 'body get', or just its pieces.
   v1::GetBodyResponse body;
   if (absl::Status s = ParseJson(text, UnknownFields::kRefuse, &body); !s.ok()) {
     return absl::InvalidArgumentError(absl::StrCat((*source)->name(), ": ", s.message()));

@@ -25,7 +25,8 @@ absl::Status ReadPieces(const std::string& path, Pieces* pieces);
 // Returns the numbers of a pose; missing parts are the identity.
 RigidPose NumbersOf(const v1::Pose& pose);
 
-// Returns a pose in the form of ParsePose, in the fewest numbers; empty for the identity.
+// Returns a pose in the form of ParsePose, with as few numbers as possible; empty for the
+// identity.
 std::string PoseText(const v1::Pose& pose);
 
 }  // namespace hulld

@@ -24,7 +24,7 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text);
 // nearest double.
 absl::StatusOr<v1::Pose> ParsePose(const std::string& text);
 
-// Makes a pose of 3 or 7 numbers.
+// Creates a pose from 3 or 7 numbers.
 absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers);
 
 // Moves a placement to `end`, on the shorter of the two paths between the rotations. Without a

@@ -76,7 +76,7 @@ Option& Option::OneOf(const std::vector<std::string>& values) {
           value = known;
           return "";
         }
-        return absl::StrCat(Quoted(value), " is none of ", absl::StrJoin(values, ", "),
+        return absl::StrCat(Quoted(value), " is not one of ", absl::StrJoin(values, ", "),
                             Suggestion(value, values));
       },
       ""));

@@ -15,7 +15,7 @@
 #include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/help/command_description.h"
 
-// CLI11 parses. Only command.cc includes its header, which takes 20 s to compile.
+// A wrapper of CLI11. Only command.cc includes CLI11's header, which takes 20 s to compile.
 namespace CLI {
 class App;
 class Option;
@@ -57,7 +57,7 @@ class Option {
 // Variables that receive values must outlive the parsing.
 class Command {
  public:
-  // Lists commands added from here on under this heading in the help.
+  // Lists commands added after this call under this heading in the help.
   void BeginGroup(const std::string& title);
   // Adds a subcommand. Options of this command are also accepted after it.
   Command AddCommand(const std::string& name, const std::string& help);

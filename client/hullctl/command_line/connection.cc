@@ -17,7 +17,7 @@ namespace {
 
 constexpr char kContextVariable[] = "HULLCTL_CONTEXT";
 
-// The context in force without --context: its name and the source of that name.
+// The context used without --context: its name and the source of that name.
 struct NamedContext {
   std::string name;
   std::string source;
@@ -67,7 +67,7 @@ void AddConnectionOptions(Command command, Invocation* invocation) {
       .Completes(ValueKind::kContext)
       .Variable(kContextVariable);
   command.AddFlag("--local", &invocation->local,
-                  "Start a server for this command, in memory, and end it afterwards");
+                  "Run the command against a temporary in-memory server");
   for (const ConnectionSetting& setting : kConnectionSettings) {
     const std::string name = setting.name;
     const std::string option = name == "server" ? "-s,--server" : "--" + name;

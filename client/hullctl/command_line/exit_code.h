@@ -13,7 +13,7 @@ enum class ExitCode {
   kUsage = 2,
   // No answer: the server is unreachable, is draining, or did not answer in time.
   kUnreachable = 3,
-  // Some of many items failed; the rest succeeded.
+  // Some items of a batch failed; the rest succeeded.
   kSomeFailed = 4,
   // A certificate does not prove its answer.
   kInvalidCertificate = 5,
@@ -32,7 +32,7 @@ inline constexpr char kExitCodeHelp[] =
     "  4  some items of a batch failed\n"
     "  5  a certificate does not prove its answer\n"
     "  6  a certificate cannot be checked: its hulls changed or were deleted, or the answer has\n"
-    "     none; a file that is no record of an answer gives 2\n";
+    "     none; a file that is not a record of an answer exits with 2\n";
 
 }  // namespace hulld
 

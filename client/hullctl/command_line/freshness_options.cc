@@ -54,8 +54,8 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           [invocation](const std::string& text) {
             return TakeBound(text, FreshnessOf(invocation));
           },
-          "Accept answers this stale, such as 200ms, from several servers over one store (default: "
-          "every acknowledged change)")
+          "Accept answers up to this stale, such as 200ms, from several servers over one store "
+          "(default: answers include every acknowledged change)")
       .ValueName("TIME");
   command
       .AddParsed(

@@ -15,7 +15,8 @@ namespace {
 constexpr uint64_t kSignal = 1;
 constexpr uint64_t kEnd = uint64_t{1} << 32;
 
-// Event descriptor. The signal handler, which may call few functions, adds to its counter.
+// Event descriptor. The signal handler, which may call only a few functions, increments its
+// counter.
 std::atomic<int> event = -1;
 std::atomic<bool> arrived = false;
 
@@ -45,7 +46,7 @@ Interrupt::Interrupt(std::function<void()> on_interrupt) {
   });
   struct sigaction action = {};
   action.sa_handler = HandleSignal;
-  // The second signal has its previous action.
+  // Restores the previous action for the second signal.
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, &before_int_);
   sigaction(SIGTERM, &action, &before_term_);

@@ -45,9 +45,9 @@ struct Invocation {
   std::string context;
   // True if the command uses a server.
   bool needs_server = true;
-  // True: a server of its own, which ends with the command.
+  // True: uses a temporary server that ends with the command.
   bool local = false;
-  // The settings in force with their sources, then the values derived from them. See
+  // The effective settings with their sources, then the values derived from them. See
   // ResolveConnection.
   std::map<std::string, ChosenSetting> connection;
   std::string server = kDefaultServer;

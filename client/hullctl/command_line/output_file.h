@@ -9,8 +9,8 @@
 
 namespace hulld {
 
-// Lets `write` fill the file `path`, or `standard` if the path is empty or "-". INVALID_ARGUMENT if
-// the file cannot be opened or not fully written.
+// Calls `write` with the file `path`, or with `standard` if the path is empty or "-".
+// INVALID_ARGUMENT if the file cannot be opened or not fully written.
 absl::Status WriteOutput(const std::string& path, std::ostream& standard,
                          const std::function<void(std::ostream&)>& write);
 

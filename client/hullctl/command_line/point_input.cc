@@ -13,8 +13,9 @@ void AddPointInput(Command command, PointInput* input) {
   command.AddTexts("FILE", &input->files, "Files with points; - is standard input").Required();
   command.AddFlag("--skip-nonfinite", &input->skip_nonfinite,
                   "Skip and count points with a coordinate that is NaN or infinite");
-  command.AddFlag("--skip-zero", &input->skip_zero,
-                  "Skip and count points at exactly (0, 0, 0), the holes of depth cameras");
+  command.AddFlag(
+      "--skip-zero", &input->skip_zero,
+      "Skip and count points at exactly (0, 0, 0), which depth cameras write for missing data");
   command
       .AddText("--format", &input->format,
                "Format of the files (default: by extension; standard input: xyz)")

@@ -14,7 +14,7 @@ void AddWantedOptions(Command command, QueryDetails* details) {
       "Show the separating or touching axis and its features");
   command.AddFlag(
       "--report", [wanted] { wanted->set_analysis(true); },
-      "Show time, sizes, axes tested, and the axis that separates");
+      "Show time, sizes, axes tested, and the separating axis");
   command.AddFlag(
       "--certificate", [wanted] { wanted->set_certificate(true); },
       "Show the certificate of the relation: a direction, vertex pairs");
@@ -31,8 +31,8 @@ void AddWantedOptions(Command command, QueryDetails* details) {
       "Show a point of each hull at which the separation is attained");
   command.AddFlag(
       "--normal", [wanted] { wanted->set_normal(true); },
-      "Show the direction in which the hulls are nearest or deepest, with its angle's bound");
-  command.AddLength("--clearance", "Show if the separation is at most this",
+      "Show the direction in which the separation is attained, with a bound on its angle");
+  command.AddLength("--clearance", "Show whether the separation is at most this",
                     [wanted](double length) { wanted->set_clearance(length); });
   command.AddLength(
       "--tolerance",
@@ -44,7 +44,7 @@ void AddQueryOptions(Command command, QueryDetails* details) {
   AddWantedOptions(command, details);
   command.AddFlag(
       "--textbook", [details] { details->method = v1::METHOD_TEXTBOOK_SAT; },
-      "Use the textbook's separating-axis test instead of the certified search");
+      "Use the textbook separating-axis test instead of the certified search");
   command.AddFlag(
       "--verify",
       [details] {

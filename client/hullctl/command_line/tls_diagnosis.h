@@ -9,8 +9,8 @@ namespace hulld {
 
 // Explains why a connection to `server` (host:port) with this security fails, with a remedy; empty
 // if TLS is not the cause. gRPC does not distinguish an expired certificate from an unknown
-// authority, or a server without TLS from a dead one, so this performs a handshake of its own.
-// Takes a few seconds at most.
+// authority, or a server without TLS from a dead one, so this performs its own handshake. Takes a
+// few seconds at most.
 std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& security);
 
 }  // namespace hulld

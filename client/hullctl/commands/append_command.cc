@@ -78,13 +78,13 @@ class FileAppender {
     if (!created_.has_value()) return absl::OkStatus();
     const absl::Status status =
         client_.DeleteHull(arguments_.hull_id, created_->create_revision()).status();
-    // Points that were committed without an acknowledgement keep the hull.
+    // The hull is kept if points were committed without an acknowledgement.
     return absl::IsAborted(status) || absl::IsNotFound(status) ? absl::OkStatus() : status;
   }
 
   // Null before the first points.
   const Appender* appender() const { return appender_.get(); }
-  // Counts of the skipped points alone.
+  // Counts of the skipped points only.
   const ReadCounts& skipped() const { return skipped_; }
   uint64_t resumed_points() const { return resumed_points_; }
 
@@ -220,7 +220,7 @@ Swell SwellOfFiles(const Invocation& run, const AppendArguments& arguments,
   const auto mesh = MeshOf(plan);
   if (!mesh.has_value()) return {};
   const auto swell = SwellOf(run.MakeClient(), arguments.hull_id, points, *mesh);
-  // The points are appended; a hull that cannot be read afterwards is no failure of the append.
+  // The points are appended; failing to read the hull afterwards does not fail the append.
   return swell.ok() ? *swell : Swell{};
 }
 

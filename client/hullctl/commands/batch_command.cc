@@ -323,7 +323,8 @@ void AddBatchCommand(Command program, Invocation* invocation) {
   command.SetDetails(kSceneFileHelp);
   command.SetExamples(
       {{"", "hullctl batch scene.yaml"},
-       {"Only what collides, proven", "hullctl batch scene.yaml --colliding --verify"},
+       {"Only colliding pairs, with verified certificates",
+        "hullctl batch scene.yaml --colliding --verify"},
        {"As messages of the contract, one per line", "hullctl batch scene.yaml --output json"}});
   command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
 }

@@ -31,7 +31,7 @@ struct CastArguments {
   std::string prefix;
 };
 
-// A hull that the ray meets.
+// A hull that the ray hits.
 struct Hit {
   std::string hull_id;
   double time = 0;
@@ -53,7 +53,7 @@ Triple NumbersOf(const v1::SeparatedInterval& interval) {
         interval.has_end_direction() ? interval.end_direction() : interval.direction();
     return {n.x(), n.y(), n.z()};
   }
-  // A double holds 308 digits.
+  // The range of a double is 308 digits.
   constexpr size_t kMostDigits = 300;
   const v1::IntegerDirection& n = interval.integer_direction();
   const size_t longest = std::max({n.x().size(), n.y().size(), n.z().size()});
@@ -91,7 +91,7 @@ class Ray {
     return point;
   }
 
-  // A scene of the ray, and then these hulls.
+  // A scene with the ray first, then these hulls.
   v1::FindCollisionsRequest RequestFor(const v1::ListHullsResponse& list) const {
     v1::FindCollisionsRequest request;
     request.mutable_wanted()->set_certificate(true);
@@ -197,7 +197,7 @@ ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
   const Ray ray(arguments);
   if (!ray.HasFiniteEnd()) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "ORIGIN + DIRECTION is beyond the largest double; shorten the ray"));
+        "ORIGIN + DIRECTION exceeds the largest double; shorten the ray"));
   }
   const Client client = run.MakeClient();
   const auto list = client.ListAllHulls(arguments.prefix);

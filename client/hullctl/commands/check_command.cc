@@ -33,7 +33,7 @@ struct PairArguments {
   // End poses of motions, as parsed.
   std::optional<v1::Pose> to_a;
   std::optional<v1::Pose> to_b;
-  // A file with points that takes the place of B.
+  // A file with points that replaces B.
   std::string points;
 };
 
@@ -41,7 +41,7 @@ std::string VersionText(const v1::HullVersion& hull) {
   return hull.hull_id() + "  (revision " + std::to_string(hull.revision()) + ")";
 }
 
-// Names the hull or body of a side, or its file.
+// Returns the name of the hull, body, or file of a side.
 std::string SideText(const v1::Placement& placement, const v1::HullVersion& hull,
                      const std::string& argument) {
   if (!placement.has_points()) return VersionText(hull);
@@ -198,13 +198,13 @@ void PrintAnswer(const Invocation& run, const PairArguments& arguments,
   }
 }
 
-// Makes an ID or a file the shape of a placement.
+// Sets the shape of a placement from an ID or a file.
 absl::Status SetSide(const Invocation& run, const std::string& argument, v1::Placement* placement) {
   placement->set_hull_id(argument);
   return IsShapeFile(argument) ? SetShape(run, argument, placement) : absl::OkStatus();
 }
 
-// INVALID_ARGUMENT: an option that only a pair takes, beside --points.
+// INVALID_ARGUMENT: an option that applies only to pairs is combined with --points.
 absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
   const v1::Wanted& wanted = arguments.details.wanted;
   const std::pair<bool, const char*> given[] = {
@@ -360,15 +360,16 @@ void AddCheckCommand(Command program, Invocation* invocation) {
           "the record to standard output, in place of the answer")
       .ValueName("FILE");
   command.SetDetails(
-      "The hull of a file is sent with the query and never stored; formats are those of 'hullctl\n"
+      "The hull of a file is sent with the query and never stored; the formats are those of "
+      "'hullctl\n"
       "append'. A file without an extension needs a path, such as ./part. Lengths are in the unit\n"
       "of the points. For a body ('hullctl body --help'), the answer names the deciding pieces,\n"
       "and its certificate has one part for each pair of pieces that bounding boxes do not\n"
-      "decide; --output json shows them. --textbook takes no bodies and no radii.\n"
+      "decide; --output json shows them. --textbook supports neither bodies nor radii.\n"
       "\n"
       "--to-a and --to-b give a motion, from time 0 to time 1, with quaternion and translation\n"
       "linear in time. Of the two quaternions of the end rotation, hullctl picks the one with the\n"
-      "shorter path. The relation holds over all times, and contact is never missed.");
+      "shorter path. The relation covers all times, and contact is never missed.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

@@ -86,7 +86,7 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
       continue;
     }
     worst = run.Fail(response.status());
-    // Without a server or a permission, the remaining hulls would fail alike.
+    // Without a server or permission, the remaining hulls would fail in the same way.
     const bool own = gone || absl::IsAborted(response.status());
     if (!own) break;
   }
@@ -104,16 +104,16 @@ ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
     return usage("give the IDs of the hulls to delete, or --prefix, but not both");
   }
   if (arguments.if_revision && arguments.hull_ids.size() != 1) {
-    return usage("--if-revision takes exactly one hull");
+    return usage("--if-revision requires exactly one hull");
   }
   if (arguments.has_prefix && arguments.prefix.empty()) {
-    return usage("refusing to delete every hull of the server: --prefix is empty");
+    return usage("refusing to delete all hulls on the server: --prefix is empty");
   }
   const Client client = run.MakeClient();
   const auto targets = Choose(client, arguments);
   if (!targets.ok()) return run.Fail(targets.status());
   if (targets->empty()) {
-    run.err << "hullctl: no hull starts with " << Quoted(arguments.prefix) << "\n";
+    run.err << "hullctl: no hull ID starts with " << Quoted(arguments.prefix) << "\n";
     return ExitCode::kDone;
   }
   const auto confirmed = IsConfirmed(run, arguments, *targets);

@@ -66,7 +66,7 @@ class SceneRun {
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
       if (scene_.HullOf(a) == nullptr || scene_.HullOf(b) == nullptr) {
-        return absl::InternalError("the answer names a placement that does not exist");
+        return absl::InternalError("the answer refers to a placement that does not exist");
       }
       if (!run_.json()) Print(a, b, RowAt(part.columns(), i), cause);
     }

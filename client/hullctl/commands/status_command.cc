@@ -97,7 +97,8 @@ void AddStatusCommand(Command program, Invocation* invocation) {
 }
 
 void AddHealthCommand(Command program, Invocation* invocation) {
-  Command health = program.AddCommand("health", "Show if the server is serving; needs no token");
+  Command health =
+      program.AddCommand("health", "Show whether the server is serving; needs no token");
   health.SetDetails("Exits with 0 only if it is.");
   health.SetExamples({{"Wait for a server in a script", "until hullctl health; do sleep 1; done"}});
   health.OnGiven([=] { invocation->action = [=] { return Health(*invocation); }; });

@@ -57,7 +57,7 @@ class StreamRun {
     }
     for (const uint32_t pair : answer->pairs()) {
       if (pair < pairs_.size() / 2) continue;
-      return absl::InternalError("the answer names a pair that does not exist");
+      return absl::InternalError("the answer refers to a pair that does not exist");
     }
     if (run_.json()) {
       run_.out << MessageJson(*answer) << "\n" << std::flush;

@@ -44,7 +44,7 @@ absl::StatusOr<std::string> RandomToken() {
                       absl::WebSafeBase64Escape(absl::string_view(bytes.data(), bytes.size())));
 }
 
-// Writes a new file: it overwrites no token, and no other process has it open.
+// Creates a new file, so that no token is overwritten and no other process has it open.
 absl::Status WriteTokenFile(const std::string& path, const std::string& token) {
   const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (fd < 0) {

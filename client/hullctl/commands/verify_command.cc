@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// A question and its answer.
+// A query and its answer.
 struct RecordedAnswer {
   v1::CheckCollisionRequest request;
   v1::CheckCollisionResponse response;

@@ -223,8 +223,8 @@ class Viewing {
     return description.ok() ? PutAll(program_.client, *description) : absl::OkStatus();
   }
 
-  // Takes the shape from the file. Its hull is registered on the server of --local; any other
-  // server receives its vertices with each query.
+  // Reads the shape from the file. With --local, the hull is registered on the local server; any
+  // other server receives its vertices with each query.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
     auto shape = ReadShape(path);
     if (!shape.ok()) return shape.status();
@@ -258,7 +258,7 @@ class Viewing {
                                                      kMaxShapePoints, "; use --local"));
     }
     shape->hull = std::make_shared<const HullMesh>(*std::move(hull));
-    // As `hullctl check` takes it.
+    // In the form accepted by `hullctl check`.
     const bool is_path = path.starts_with('.') || path.starts_with('/');
     shape->hull_name = Printable(absl::StrCat(is_path ? "" : "./", path));
     return absl::OkStatus();
@@ -363,7 +363,7 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
                            return IsFile(thing) && !IsScene(thing);
                          }));
   if (!is_temporary || run.local) return Viewing(run, arguments).Run();
-  // All hulls are temporary: a server of its own keeps them.
+  // All hulls are temporary: a private server stores them.
   const auto server = LocalServer::Start();
   if (!server.ok()) return run.FailUsage(server.status());
   Invocation local = run;

@@ -48,7 +48,8 @@ inline constexpr ConnectionSetting kConnectionSettings[] = {
      "Allow sending the token unencrypted to other machines"},
 };
 
-// A token itself. Only the environment gives it, as all users of the machine can see arguments.
+// The token itself. It comes only from the environment, because all users of the machine can see
+// arguments.
 inline constexpr char kTokenSetting[] = "token";
 inline constexpr char kTokenVariable[] = "HULLD_TOKEN";
 

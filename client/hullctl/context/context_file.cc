@@ -25,7 +25,7 @@ namespace {
 using google::protobuf::Struct;
 using google::protobuf::Value;
 
-// Maximum size of a context file; a larger one is no context file.
+// Maximum size of a context file; a larger file is not a context file.
 constexpr size_t kMostContextBytes = size_t{1} << 20;
 
 absl::Status Damaged(const std::string& path, const std::string& what) {

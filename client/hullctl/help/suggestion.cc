@@ -27,7 +27,7 @@ size_t EditDistance(const std::string& a, const std::string& b) {
   return distance[a.size()][b.size()];
 }
 
-// Empty if none is near.
+// Empty if no word is close.
 std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
   const std::string letters = absl::AsciiStrToLower(word);
   const size_t first = letters.find_first_not_of('-');

@@ -16,7 +16,7 @@ class LatencyHistogram {
 
   uint64_t count() const { return count_; }
   std::chrono::nanoseconds max() const { return max_; }
-  // Returns the latency not exceeded by this share, 0 to 1, of all; 0 if empty.
+  // Returns the latency that this share, 0 to 1, of all requests does not exceed; 0 if empty.
   std::chrono::nanoseconds Percentile(double share) const;
 
   // A range of latencies: from <= latency < to.

@@ -25,8 +25,8 @@ struct LoadPlan {
   // its answer (closed loop).
   //
   // With a rate (open loop), request i is due at i / rate and its latency counts from then, even if
-  // a client sends it late. So a stalled server cannot hide its latency (coordinated omission,
-  // Tene).
+  // a client sends it late. This way, a stalled server cannot hide its latency (coordinated
+  // omission, Tene).
   std::optional<double> rate;
 };
 

@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-// Distinct requests of a client, used in turn and made before the clock starts.
+// Number of distinct requests per client, created before the clock starts and used in turn.
 constexpr size_t kDistinctRequests = 256;
 // Maximum number of placements per batch: a scene with parts that meet repeatedly.
 constexpr uint64_t kMostPlacements = 256;

@@ -37,9 +37,9 @@ struct CloudOptions {
 };
 
 // Passes `count` points to `take`: uniform in the ball, on the sphere, or in the cube; or the first
-// points, x fastest, of the smallest cubic lattice with at least that many. The same on every
-// platform for the same options, as it uses only operations that IEEE 754 rounds correctly. Points
-// of the sphere lie on it up to rounding.
+// points, x fastest, of the smallest cubic lattice with at least that many. The points are the same
+// on every platform for the same options, because only operations that IEEE 754 rounds correctly
+// are used. Points of the sphere lie on it up to rounding.
 void GenerateCloud(const CloudOptions& options,
                    const std::function<void(const std::array<double, 3>&)>& take);
 

@@ -17,7 +17,7 @@
 namespace hulld {
 namespace {
 
-// Ends the reading of a file with more distinct points than an inline shape takes.
+// Stops reading a file with more distinct points than an inline shape may have.
 absl::Status TooManyPoints() { return absl::OutOfRangeError("too many points"); }
 
 // Reads the distinct points of a file.
@@ -36,7 +36,7 @@ absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* poin
   };
   const absl::Status read = ReadPoints(request, receive).status();
   if (!read.ok() || !points->xyz().empty()) return read;
-  return absl::InvalidArgumentError(absl::StrCat(request.path, ": the file holds no point"));
+  return absl::InvalidArgumentError(absl::StrCat(request.path, ": the file contains no points"));
 }
 
 using Feed = std::function<absl::Status(const Client::PointSink& sink)>;
@@ -111,7 +111,7 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
   if (absl::IsOutOfRange(read)) {
     points.Clear();
     if (run.local) {
-      // The whole path, so that files of different folders differ.
+      // The full path, to distinguish files in different folders.
       const std::string id = HullSegment(request.path);
       const absl::Status status = Register(run.MakeClient(), id, FeedOf(request));
       if (!status.ok()) return status;

@@ -17,18 +17,18 @@ namespace hulld {
 // the extension of a format of points, or a path that no ID can be ("./part", "/tmp/part.stl").
 bool IsShapeFile(const std::string& argument);
 
-// Makes the hull of all points of a file the shape of the placement. Up to kMaxShapePoints distinct
-// points are sent as they are. A file with more is read by a server of hullctl's own, and the
-// vertices of its hull are sent; with --local, the hull is registered on that server instead.
+// Sets the shape of the placement to the hull of all points of a file. Up to kMaxShapePoints
+// distinct points are sent unchanged. For a file with more, a private server builds the hull, and
+// its vertices are sent; with --local, the hull is registered on that server instead.
 // INVALID_ARGUMENT: the file cannot be read; its hull has more than kMaxShapePoints vertices.
 // Errors of the local server.
 absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placement* placement);
 
-// Returns the hull of all finite points of a file, built by a server of hullctl's own. Errors as
-// above, whatever the number of vertices.
+// Returns the hull of all finite points of a file, built by a private server. Errors as above,
+// regardless of the number of vertices.
 absl::StatusOr<HullMesh> HullOfFile(const std::string& path);
 
-// Returns the hull of each shape, built by a server of hullctl's own. Errors of that server.
+// Returns the hull of each shape, built by a private server. Errors of that server.
 absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes);
 
 // Limit of the server (Placement.points).

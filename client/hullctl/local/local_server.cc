@@ -53,7 +53,7 @@ absl::StatusOr<std::string> FindServer() {
       "hulld is neither next to hullctl nor on the PATH; install it, or set HULLD_BINARY");
 }
 
-// The environment without settings of hulld, which are not for this server.
+// The environment without hulld's settings, which are not meant for this server.
 std::vector<char*> EnvironmentWithoutSettings() {
   std::vector<char*> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -63,8 +63,8 @@ std::vector<char*> EnvironmentWithoutSettings() {
   return variables;
 }
 
-// Reads a log to its end. Sets `start` at the line that says where the server listens, or at the
-// end to the last line.
+// Reads a log to its end. Sets `start` to the line with the address of the server or, failing that,
+// to the last line.
 void ReadLog(int log, std::promise<std::pair<bool, std::string>> start) {
   FILE* const lines = fdopen(log, "r");
   char* line = nullptr;
@@ -117,7 +117,7 @@ absl::StatusOr<int> LocalServer::Spawn(const std::string& program) {
   posix_spawn_file_actions_adddup2(&files, input[0], STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&files, log[1], STDOUT_FILENO);
   posix_spawn_file_actions_adddup2(&files, log[1], STDERR_FILENO);
-  // A session of its own: Ctrl-C in the terminal ends hullctl, which then ends the server.
+  // A separate session: Ctrl-C in the terminal ends hullctl, which then ends the server.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);

@@ -11,12 +11,12 @@
 namespace hulld {
 
 // A hulld process that keeps hulls in memory and listens on a unix socket in a folder that no other
-// user can enter. Both exist as long as this object, and end with this process however it ends,
-// SIGKILL included.
+// user can enter. Both exist as long as this object, and end with this process, even on SIGKILL.
 class LocalServer {
  public:
-  // Returns when the server listens. The program is $HULLD_BINARY, or hulld beside hullctl or on
-  // the PATH. NOT_FOUND: there is none. INTERNAL: it did not start, with its last message.
+  // Starts the server, and returns when it is listening. The program is $HULLD_BINARY, or hulld
+  // next to hullctl or on the PATH. NOT_FOUND: the program does not exist. INTERNAL: it did not
+  // start; the error has its last message.
   static absl::StatusOr<std::unique_ptr<LocalServer>> Start();
   // Ends the server, and returns when it has ended.
   ~LocalServer();
@@ -29,14 +29,14 @@ class LocalServer {
  private:
   LocalServer() = default;
 
-  // Starts the keeper in a new folder. Returns the end of the pipe that has the server's log.
+  // Starts the keeper in a new folder. Returns the read end of the pipe with the server's log.
   absl::StatusOr<int> Spawn(const std::string& program);
 
   std::string address_;
   // A shell that runs the server, and ends it and removes the folder at the end of its input.
   pid_t keeper_ = 0;
   int keeper_input_ = -1;
-  // Reads the log to its end, so that the server never waits for a reader.
+  // Reads the log to its end, so that the server never blocks on a full pipe.
   std::thread log_reader_;
 };
 

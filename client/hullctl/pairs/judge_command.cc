@@ -90,7 +90,7 @@ struct WrongAnswer {
   Judgement judgement;
 };
 
-// Judges a table: asks about all pairs, then proves the wrong answers, worst first.
+// Judges a table: queries all pairs, then proves the wrong answers, worst first.
 class JudgeRun {
  public:
   JudgeRun(const Invocation& run, const std::vector<JudgedAnswer>& answers,
@@ -133,7 +133,7 @@ class JudgeRun {
  private:
   using Answers = std::span<const JudgedAnswer* const>;
 
-  // Asks about answers that all move, or all rest.
+  // Queries pairs that are all in motion or all at rest.
   absl::Status AskAll(Answers answers) {
     for (size_t begin = 0; begin < answers.size(); begin += kAnswersPerCall) {
       const Answers part =
@@ -174,8 +174,8 @@ class JudgeRun {
       ++failed_;
       bar_.Clear();
       run_.err << "hullctl: line " << answer.line << ": "
-               << (is_open ? "the motion is so near to a graze that neither contact nor separation "
-                             "is proven"
+               << (is_open ? "the motion is so close to grazing that neither contact nor "
+                             "separation is proven"
                            : *problem)
                << "\n";
       return;
@@ -188,8 +188,8 @@ class JudgeRun {
     if (!judgement.faults.empty()) wrong_.push_back({&answer, std::move(judgement)});
   }
 
-  // Asks again, with a certificate and the nearest double of the separation, and prints the wrong
-  // answer.
+  // Queries again with a certificate, and with the separation as the nearest double, and prints the
+  // wrong answer.
   absl::Status Prove(const WrongAnswer& wrong) {
     const bool moves = wrong.answer->moves;
     v1::CheckCollisionRequest request;
@@ -372,7 +372,7 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
                     [data = arguments.get()](double time) { data->allowed.time_error = time; });
   command
       .AddText("--plot", &arguments->plot_file,
-               "Plot time and error of the program beside those of hulld, as SVG, with gnuplot")
+               "Plot time and error of the program next to those of hulld, as SVG, with gnuplot")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   AddFreshnessOptions(command, invocation);
@@ -385,11 +385,11 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
       "  relation                SEPARATED, TOUCHING, or OVERLAPPING\n"
       "  colliding               0 or 1, of a program that does not distinguish touching from "
       "overlapping\n"
-      "  distance                0 or more; a negative one is minus a depth\n"
+      "  distance                0 or more; a negative value is minus a depth\n"
       "  depth                   0 or more\n"
       "  contact_time            time of the first contact of a motion, 0 to 1\n"
       "  us                      microseconds of the answer, for --plot\n"
-      "An empty cell is no answer. Other columns are ignored, with a note. Wrong answers are\n"
+      "An empty cell means no answer. Other columns are ignored, with a note. Wrong answers are\n"
       "printed worst first, each with the exact relation, the separation, and the check of its\n"
       "certificate by hullctl's own exact arithmetic; with --output json, each line is a record\n"
       "for 'hullctl verify'. Exits with 1 if an answer is wrong.");

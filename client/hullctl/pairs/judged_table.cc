@@ -28,7 +28,7 @@ absl::StatusOr<double> NumberOf(std::string_view cell) {
   const NumberText kind = ParseDouble(cell, &number);
   if (kind != NumberText::kNumber) return absl::InvalidArgumentError(NumberProblem(kind, cell));
   if (std::isnan(number)) {
-    return absl::InvalidArgumentError("nan is no answer; leave the cell empty");
+    return absl::InvalidArgumentError("nan is not an answer; leave the cell empty");
   }
   return number;
 }
@@ -194,7 +194,7 @@ class TableReader {
       const char* const name = side == 0 ? "a" : "b";
       if (answer.names[side].empty()) {
         return absl::InvalidArgumentError(
-            absl::StrCat(name, " is empty; it takes an ID or a file"));
+            absl::StrCat(name, " is empty; it must be an ID or a file"));
       }
       absl::Status rotates = CheckRotation(answer.poses[side], name);
       if (!rotates.ok()) return rotates;
@@ -203,7 +203,7 @@ class TableReader {
     }
     if (answer.moves && (answer.distance || answer.depth)) {
       return absl::InvalidArgumentError(
-          "distance and depth apply only to a pair at rest; leave them empty for a motion");
+          "distance and depth apply only to pairs at rest; leave them empty for a motion");
     }
     if (!answer.moves && answer.contact_time) {
       return absl::InvalidArgumentError(
@@ -275,7 +275,7 @@ Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double m
   Judgement judgement;
   const v1::FirstContact& truth = *row.first_contact;
   const bool touches = truth.has_contact_time();
-  // A program may say so in several columns; any that says otherwise is wrong.
+  // A program may give its answer in several columns; each must be right.
   const bool says_contact =
       answer.contact_time || answer.colliding.value_or(false) ||
       answer.relation.value_or(v1::RELATION_SEPARATED) != v1::RELATION_SEPARATED;
@@ -321,7 +321,7 @@ absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& pat
   }
   if (absl::Status status = (*source)->status(); !status.ok()) return status;
   if (!answers.empty()) return answers;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": the table holds no answers"));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": the table contains no answers"));
 }
 
 const char* FaultName(Fault fault) {

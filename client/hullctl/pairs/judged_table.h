@@ -14,7 +14,7 @@
 
 namespace hulld {
 
-// An answer of another program.
+// An answer from another program.
 struct JudgedAnswer {
   uint64_t line = 0;
   // IDs of hulls or bodies, or files with points.
@@ -24,8 +24,8 @@ struct JudgedAnswer {
   // True if the pair moves; then its poses at the end.
   bool moves = false;
   std::array<std::array<double, 7>, 2> end_poses;
-  // The answer, as far as it is given. Relation: TOUCHING and OVERLAPPING are one if the program
-  // only says that the hulls collide.
+  // The parts of the answer that the program gave. Relation: TOUCHING and OVERLAPPING count as the
+  // same if the program reports only a collision.
   std::optional<bool> colliding;
   std::optional<v1::Relation> relation;
   std::optional<double> distance;
@@ -46,11 +46,11 @@ absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& pat
                                                           std::vector<std::string>* ignored);
 
 enum class Fault {
-  // Separated hulls are said to collide.
+  // Separated hulls are reported as colliding.
   kFalseContact,
-  // Overlapping hulls are said to be separated.
+  // Overlapping hulls are reported as separated.
   kMiss,
-  // Another relation is said of touching hulls, or touching is said of overlapping ones.
+  // Touching hulls are reported with another relation, or overlapping hulls as touching.
   kTouching,
   // The distance or the depth is wrong.
   kDistance,
@@ -64,13 +64,13 @@ const char* FaultName(Fault fault);
 
 struct Judgement {
   std::vector<Fault> faults;
-  // The length by which the answer is wrong, or the time for pairs in motion; 0 if it mistakes a
-  // touching pair.
+  // The length by which the answer is wrong, or the time for pairs in motion; 0 if it only
+  // misjudges a touching pair.
   double error = 0;
-  // |answer - separation| of a distance, and of a depth; 0 if none is given.
+  // |answer - separation| of a distance, and of a depth; 0 if the answer has none.
   double distance_error = 0;
   double depth_error = 0;
-  // The distance of a time of contact from the proven bracket; 0 inside.
+  // The distance of a contact time from the proven bracket; 0 inside.
   double time_error = 0;
 };
 
@@ -82,8 +82,8 @@ struct Allowed {
 
 // Judges an answer by the relation and separation, or the first contact, of `row`. A negative
 // distance is minus a depth. A distance or depth is wrong if its error exceeds allowed.error for
-// certain, by the proven bound. Of a motion, TOUCHING and OVERLAPPING are one, and no contact
-// counts as one at the end. Requires a proven answer: not WITHIN_TOLERANCE.
+// certain, by the proven bound. For a motion, TOUCHING and OVERLAPPING count as the same, and no
+// contact counts as a contact at the end. Requires a proven answer: not WITHIN_TOLERANCE.
 Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, const Allowed& allowed);
 
 }  // namespace hulld

@@ -51,7 +51,7 @@ class PointCheck {
     if (!read.ok()) return run_.FailUsage(read.status());
     if (read->points == 0) {
       return run_.FailUsage(
-          absl::InvalidArgumentError(absl::StrCat(file.path, ": the file holds no point")));
+          absl::InvalidArgumentError(absl::StrCat(file.path, ": the file contains no points")));
     }
     if (!run_.json() && !run_.names()) PrintTotals();
     if (failed_ == 0) return ExitCode::kDone;
@@ -60,8 +60,8 @@ class PointCheck {
   }
 
  private:
-  // Returns a request about no point: the hull, and the shape of a point, which is the origin. A
-  // point is that shape at a translation, which is exact.
+  // Returns a request without points: the hull, and the shape of a point, which is the origin. Each
+  // point is that shape at an exact translation.
   static v1::BatchCheckCollisionsRequest RequestFor(const v1::Placement& hull,
                                                     const v1::Wanted& wanted) {
     v1::BatchCheckCollisionsRequest request;

@@ -14,7 +14,7 @@ struct TradePoint {
   double error = 0;
 };
 
-// A program beside the server at several accuracies.
+// A program compared with the server at several accuracies.
 struct TradePlot {
   // Microseconds of each answer of the program; not empty.
   std::vector<double> times;

@@ -17,7 +17,7 @@
 namespace hulld {
 namespace {
 
-// Maximum number of listed uncovered triangles, farthest first.
+// Default maximum number of listed uncovered triangles, farthest first.
 constexpr uint64_t kDefaultLimit = 10;
 
 struct CoverArguments {
@@ -46,7 +46,7 @@ class PieceFetcher {
       if (piece.radius() > 0) {
         return absl::InvalidArgumentError(
             absl::StrCat("body ", Quoted(word), ": piece ", i,
-                         " has a radius; 'cover' takes only hulls without one"));
+                         " has a radius; 'cover' supports only hulls without one"));
       }
       const absl::Status taken = AddHull(piece.hull_id(), NumbersOf(piece.pose()));
       if (absl::IsNotFound(taken)) {
@@ -65,7 +65,7 @@ class PieceFetcher {
     const auto list = client_.ListAllHulls(prefix);
     if (!list.ok()) return list.status();
     if (list->hulls().empty()) {
-      return absl::NotFoundError(absl::StrCat("no hull starts with ", Quoted(prefix)));
+      return absl::NotFoundError(absl::StrCat("no hull ID starts with ", Quoted(prefix)));
     }
     for (const v1::HullInfo& hull : list->hulls()) {
       if (absl::Status added = AddHull(hull.hull_id(), kNoMotion); !added.ok()) return added;
@@ -175,7 +175,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
 
 void AddCoverCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CoverArguments>();
-  Command command = program.AddCommand("cover", "Check if hulls or a body enclose a mesh");
+  Command command = program.AddCommand("cover", "Check whether hulls or a body enclose a mesh");
   command
       .AddTexts("ID", &arguments->words,
                 "IDs of hulls or bodies, then the mesh (obj, off, stl, gltf, dae)")

@@ -57,7 +57,7 @@ absl::StatusOr<AppendTotals> Send(const Client& client, const NamedPart& named, 
   return (*stream)->totals();
 }
 
-// Returns the body of the parts as it is before the append; without an ID if it does not exist.
+// Returns the body of the parts as it was before the append; without an ID if it does not exist.
 // ALREADY_EXISTS: a hull has its ID. NOT_FOUND: it does not exist, and `create` is false.
 absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::string& id,
                                              bool create) {
@@ -75,8 +75,8 @@ absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::st
       "body ", Quoted(id), " not found; pass --create to create it and the hulls of its parts"));
 }
 
-// Returns the body with the parts: existing pieces stay, missing parts are added after them, at the
-// identity. Nullopt if none is missing.
+// Returns the body with the parts: keeps existing pieces, and adds missing parts after them at the
+// identity pose. Nullopt if no part is missing.
 std::optional<v1::PutBodyRequest> Extended(const v1::GetBodyResponse& body, const std::string& id,
                                            const std::vector<NamedPart>& parts) {
   v1::PutBodyRequest request;

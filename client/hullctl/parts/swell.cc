@@ -38,7 +38,7 @@ std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
     const bool has_mesh = IsMeshFormat(file.format) && named.ok() && *named == file.format;
     if (!is_file || !has_mesh || bytes > kMostSwellBytes) return std::nullopt;
     auto mesh = ReadMesh(file.path);
-    // The points were read, so broken faces are no error.
+    // The points were read, so broken faces are not an error.
     if (!mesh.ok()) return std::nullopt;
     const auto first = static_cast<uint32_t>(all.vertices.size());
     all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());

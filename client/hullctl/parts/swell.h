@@ -15,10 +15,11 @@ namespace hulld {
 // Minimum volume ratio at which a hull is reported as a poor fit for its mesh.
 inline constexpr double kSwellToWarn = 1.5;
 
-// Returns "1.07 times the mesh", or a text that no comparison is possible. ratio: see VolumeRatio.
+// Returns "1.07 times the mesh", or the reason why no comparison is possible. ratio: see
+// VolumeRatio.
 std::string SwellText(std::optional<double> ratio);
 
-// Warns if the hull is so much larger than the mesh that it fits it poorly.
+// Warns if the hull is so much larger than the mesh that it is a poor fit.
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio);
 
 // Returns the meshes of all files as one. Nullopt if a file has none (not IsMeshFormat, an input
@@ -27,8 +28,8 @@ void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optiona
 std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files);
 
 // The volume of the hull divided by that of the mesh (see VolumeRatio). `text` is empty if the
-// ratio is meaningless: the hull has received more points than `points`, so it also has points of
-// another origin.
+// ratio is meaningless: the hull has received more points than `points`, so it also has points from
+// elsewhere.
 struct Swell {
   std::string text;
   std::optional<double> ratio;

@@ -27,17 +27,17 @@ struct AnswerRow {
   std::optional<v1::Witness> witness;
   std::optional<v1::Normal> normal;
   std::optional<bool> within_clearance;
-  // For a pair in motion that has an answer; holds intervals if a certificate was requested.
+  // For a pair in motion that has an answer; has intervals if a certificate was requested.
   std::optional<v1::FirstContact> first_contact;
   // The deciding pieces of bodies, -1 if none decided; absent without bodies.
   std::optional<std::pair<int32_t, int32_t>> pieces;
 };
 
-// Returns true if each column is empty or holds `count` entries.
+// Returns true if each column is empty or has `count` entries.
 bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 
-// Returns row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked, as
-// callers check AreParallel for all rows together.
+// Returns row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked,
+// because callers check AreParallel for all rows together.
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
 // Returns the row for people, separated by tabs, the relation first. Pieces are shown by name, or

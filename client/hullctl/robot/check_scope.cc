@@ -19,7 +19,7 @@ CheckScope MakeCheckScope(const RobotModel& model, const Surroundings& around,
     scope.hulls.add_hull_ids(id);
     scope.radii.push_back(radius);
   };
-  // All parts have IDs, or none has. Inline shapes count from the number of all IDs on.
+  // Either all parts have IDs, or none has. Inline shapes are numbered after all IDs.
   auto next_shape = static_cast<uint32_t>(around.hulls.size());
   for (const RobotPart& part : model.parts) {
     if (!part.hull_id.empty()) {

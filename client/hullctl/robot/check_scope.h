@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// Hulls and bodies on the server that stand around a robot.
+// Hulls and bodies on the server that surround a robot.
 struct Surroundings {
   std::vector<std::string> hulls;
   std::vector<double> radii;
@@ -37,9 +37,9 @@ struct CheckScope {
 CheckScope MakeCheckScope(const RobotModel& model, const Surroundings& around,
                           std::vector<uint32_t> pairs);
 
-// Removes the pairs that --ignore excludes. ignored: "NAME,NAME" each, of a link, a part, or a
-// placement; names: those of the parts, then of the surroundings; pairs: two of these each.
-// INVALID_ARGUMENT: an entry excludes no pair.
+// Removes the pairs that --ignore excludes. ignored: entries "NAME,NAME", where a name is that of a
+// link, a part, or a placement; names: of the parts, then of the surroundings; pairs: two indices
+// into names each. INVALID_ARGUMENT: an entry excludes no pair.
 absl::Status RemoveIgnored(const std::vector<std::string>& ignored, const RobotModel& model,
                            const std::vector<std::string>& names, std::vector<uint32_t>* pairs);
 

@@ -10,12 +10,12 @@
 namespace hulld {
 namespace {
 
-// Searches of a call of Check, and spans of a batch: enough to amortize the round trip.
+// Searches per call of Check, and spans per batch: enough to amortize the round trip.
 constexpr size_t kMostSearches = 4096;
 constexpr size_t kMostSpans = 4096;
 constexpr size_t kMostWaypoints = 1024;
-// Spans of one search in a batch. More save rounds where bounds are wide, but are wasted where a
-// contact comes first.
+// Spans of one search in a batch. More would save rounds where bounds are wide, but be wasted where
+// a contact comes first.
 constexpr size_t kSpansPerSearch = 8;
 // The search visits spans of at most 2 rad one by one.
 constexpr double kMostTurnOfSegment = 4096;
@@ -109,7 +109,7 @@ absl::Status ContinuousCheck::AddSegments(std::span<const std::vector<double>> w
 
 absl::Status ContinuousCheck::RunRound(std::vector<Search>* searches) {
   poses_.clear();
-  // A contact makes the later searches of its pair needless.
+  // A contact makes the later searches of its pair unnecessary.
   std::vector<size_t> first_contact(is_closed_.size(), segments_.size());
   for (const Search& search : *searches) {
     if (search.contact_time.has_value() || !search.problem.empty()) {

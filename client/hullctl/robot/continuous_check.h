@@ -40,9 +40,9 @@ class ContinuousCheck {
     double resolution = 0;
   };
 
-  // The end of a search between two waypoints before a pair was proven free to the end.
+  // The result of a search between two waypoints that did not prove a pair free to the end.
   struct Event {
-    // Index of the waypoint before, from 0.
+    // Index of the preceding waypoint, from 0.
     uint64_t waypoint = 0;
     size_t pair = 0;
     // At contact_time; unspecified if undecided, or with a problem.
@@ -50,7 +50,7 @@ class ContinuousCheck {
     // The pair is separated (proven), by more than the clearance, at all times before this one. 0
     // and 1 are the waypoints.
     double separated_until = 0;
-    // Absent: not decided within the resolution, unless there is a problem.
+    // Absent: undecided within the resolution, or `problem` is set.
     std::optional<double> contact_time;
     // Reason for a missing answer; empty otherwise.
     std::string problem;
@@ -99,7 +99,7 @@ class ContinuousCheck {
     std::string problem = {};
     bool is_done = false;
   };
-  // A span of a search, and the answer about it.
+  // A span of a search, and its answer.
   struct Asked {
     Search* search = nullptr;
     Span span;
@@ -112,8 +112,8 @@ class ContinuousCheck {
   absl::Status AskMotions(std::vector<Asked>* asked);
   // Checks poses at times of searches.
   absl::Status AskPoses(const std::vector<std::pair<Search*, double>>& times);
-  // Replaces the asked spans, at the front of the search, by their halves that are not proven free.
-  // Adds the times at which poses have to be checked.
+  // Replaces the queried spans, at the front of the search, with their halves that are not proven
+  // free. Adds the times at which poses must be checked.
   void Divide(std::span<const Asked> asked, Search* search,
               std::vector<std::pair<Search*, double>>* times);
   void Close(Search* search);

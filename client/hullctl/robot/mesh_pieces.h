@@ -29,14 +29,14 @@ struct MeshPiece {
 };
 
 // Returns true if the mesh is closed and no vertex is outside of the plane of a triangle by more
-// than a thousandth of the mesh size, as decompositions round their vertices. Meshes of more than
-// 4096 vertices, which no decomposition writes, count as not convex. Cost: vertices times
+// than a thousandth of the mesh size, because decompositions round their vertices. Meshes of more
+// than 4096 vertices, which no decomposition produces, count as not convex. Cost: vertices times
 // triangles.
 bool IsConvexPart(const TriangleMesh& mesh);
 
 // Returns the pieces of the mesh in `file`, each coordinate (a double) times its factor of the
-// scale, with a single rounding. A format without triangles gives one piece. INVALID_ARGUMENT names
-// the file and its defect.
+// scale, rounded once. A format without triangles yields one piece. INVALID_ARGUMENT names the
+// file and its defect.
 absl::StatusOr<std::vector<MeshPiece>> MeshPieces(const CollisionShape& shape,
                                                   const std::string& file, MeshSplit split);
 

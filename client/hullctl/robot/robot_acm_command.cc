@@ -46,7 +46,7 @@ std::vector<double> RandomValues(const Robot& robot, Xoshiro256* random) {
 }
 
 // Returns the pairs of links with a planar or floating joint between them. Their relative motion is
-// unbounded, so no sample is evidence about them.
+// unbounded, so samples are not evidence for them.
 std::set<LinkPair> LoosePairs(const Robot& robot) {
   // The topmost ancestor of each link without such a joint in between.
   std::vector<int> top;
@@ -69,7 +69,7 @@ std::set<LinkPair> LoosePairs(const Robot& robot) {
 // Number of samples in which the shapes of two links collided.
 struct Tally {
   uint64_t colliding = 0;
-  // The last counted sample, so that several shapes of a link count once.
+  // The last counted sample, so that a link with several shapes counts once.
   uint64_t last = ~uint64_t{0};
 };
 

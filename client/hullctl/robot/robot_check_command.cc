@@ -135,7 +135,7 @@ class RobotCheck {
     v1::Relation relation;
   };
   std::optional<Contact> first_;
-  // With --continuous: the first contact, and the pairs in contact and not decided.
+  // With --continuous: the first contact, and the pairs in contact and undecided.
   std::optional<ContinuousCheck::Event> first_event_;
   std::set<size_t> contacts_;
   std::set<size_t> undecided_;

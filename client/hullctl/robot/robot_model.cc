@@ -110,7 +110,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
   return absl::OkStatus();
 }
 
-// Warns if the hull of a part is so much larger than its mesh that it fits it poorly.
+// Warns if the hull of a part is so much larger than its mesh that it is a poor fit.
 void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullMesh& hull) {
   const std::optional<double> ratio = VolumeRatio(hull, part.mesh);
   if (ratio.value_or(1) < kSwellToWarn) return;
@@ -131,7 +131,7 @@ absl::Status RegisterPart(const Client& client, const RobotPart& part, const std
       .status();
 }
 
-// Drops repeated points, of which a list of triangles has many.
+// Drops repeated points, which are frequent in a list of triangles.
 void KeepDistinctPoints(std::vector<double>* xyz) {
   std::set<std::array<double, 3>> known;
   size_t kept = 0;
@@ -142,7 +142,7 @@ void KeepDistinctPoints(std::vector<double>* xyz) {
   xyz->resize(kept);
 }
 
-// A server of hullctl's own, started by the first hull that needs it.
+// A private server, started by the first hull that needs it.
 class HullBuilder {
  public:
   absl::StatusOr<HullMesh> Build(const RobotPart& part) {
@@ -164,7 +164,7 @@ class HullBuilder {
   std::optional<Client> client_;
 };
 
-// Makes the hull of a mesh an inline shape.
+// Turns the hull of a mesh into an inline shape.
 absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, RobotPart* part) {
   KeepDistinctPoints(&part->hull.xyz);
   const bool is_small = part->hull.xyz.size() <= 3 * kMaxShapePoints;

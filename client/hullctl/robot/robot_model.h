@@ -23,7 +23,7 @@ struct RobotArguments {
   std::string urdf;
   // NAME=DIR each.
   std::vector<std::string> packages;
-  // Division of meshes into pieces: "names", "components", or "none"; empty: automatic.
+  // How meshes are split into pieces: "names", "components", or "none"; empty: automatic.
   std::string split;
   // ID prefix under which the hulls of the links are kept; empty: they are sent with each query.
   std::string prefix;
@@ -66,10 +66,10 @@ struct RobotModel {
 absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments);
 
 // Prepares the hulls of all parts for queries. With a prefix, registers them under it and sets
-// their IDs; replaces existing hulls. Likewise with --local, without a prefix. Otherwise makes them
-// inline shapes: a server of hullctl's own reduces a mesh to the vertices of its hull. Warns of
-// each hull that is much larger than its mesh (kSwellToWarn). INVALID_ARGUMENT: a hull has more
-// vertices than an inline shape takes. Errors of the servers; without a local server, a mesh of few
+// their IDs; replaces existing hulls. With --local, does the same without a prefix. Otherwise makes
+// them inline shapes: a private server reduces a mesh to the vertices of its hull. Warns of each
+// hull that is much larger than its mesh (kSwellToWarn). INVALID_ARGUMENT: a hull has more vertices
+// than an inline shape may have. Errors of the servers; without a local server, a mesh of few
 // points is sent as it is.
 absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments,
                           const Client& client, RobotModel* model);

@@ -126,7 +126,7 @@ void PlaceParts(const RobotModel& model, ViewScene* scene) {
   }
 }
 
-// Appends the placements of a scene file, which stand still.
+// Appends the placements of a scene file, which are at rest.
 absl::Status AddSurroundings(const std::string& path, ViewScene* scene) {
   ViewScene around;
   const absl::Status read = AddSceneFile(path, &around);
@@ -145,8 +145,8 @@ absl::Status AddSurroundings(const std::string& path, ViewScene* scene) {
   return absl::OkStatus();
 }
 
-// Names the pairs of 'hullctl robot check': of parts of different links, except for links in
-// `left_out`, and of a part and a placement of the surroundings.
+// Lists the pairs of 'hullctl robot check': pairs of parts of different links, except for links in
+// `left_out`, and pairs of a part and a placement of the surroundings.
 absl::Status NamePairs(const RobotModel& model, const std::set<LinkPair>& left_out,
                        const std::vector<std::string>& ignored, ViewScene* scene) {
   std::vector<uint32_t> pairs = model.PairsWithout(left_out);
@@ -175,7 +175,7 @@ absl::Status RegisterParts(TemporaryHulls* temporary, RobotModel* model) {
   return absl::OkStatus();
 }
 
-// Asks about every waypoint.
+// Queries every waypoint.
 absl::Status FindContacts(const Client& client, ViewScene* scene) {
   std::vector<ViewObject> objects = scene->objects;
   for (uint32_t i = 0; i < scene->joints.waypoints.size(); ++i) {

@@ -23,7 +23,8 @@ using Waypoint = std::vector<double>;
 // The waypoints of a file of joint values or, without a file, one from --joint.
 class WaypointSource {
  public:
-  // joint_values: NAME=VALUE each; the others have their rest values. Both must outlive the source.
+  // joint_values: entries NAME=VALUE; other variables have their rest values. Both must outlive
+  // the source.
   WaypointSource(const Robot& robot, const std::vector<std::string>& joint_values)
       : robot_(robot), joint_values_(joint_values) {}
 
@@ -47,7 +48,7 @@ class WaypointSource {
   std::unique_ptr<ByteSource> source_;
   std::optional<WaypointReader> reader_;
   bool given_was_read_ = false;
-  // The first waypoints; they show if there is more than one.
+  // The first waypoints, which show whether there is more than one.
   std::deque<Waypoint> pending_;
   bool has_many_ = false;
   // Lines of the waypoints read from the file.

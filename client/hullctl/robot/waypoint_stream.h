@@ -45,7 +45,8 @@ class WaypointStream {
   absl::StatusOr<v1::StreamCollisionsResponse> Update(size_t count,
                                                       const std::vector<double>& poses);
   absl::Status Take(const v1::StreamCollisionsResponse& answer, size_t count);
-  // Returns the placement of an object on a lane, of so many. The fixed objects follow all parts.
+  // Returns the index of an object's placement on a lane, given the number of lanes. The fixed
+  // objects follow all parts.
   uint32_t PlacementOf(uint32_t lane, uint32_t object, size_t lanes) const;
   std::string ProblemOf(uint32_t lane, size_t pair) const;
 

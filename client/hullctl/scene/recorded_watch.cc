@@ -21,7 +21,7 @@ void Keep(const Message& message, RecordedWatch* watch) {
   watch->messages.push_back(MessageJson(message));
 }
 
-// Adds the message of a line. INVALID_ARGUMENT: it is not of the same type as the ones before.
+// Adds the message of a line. INVALID_ARGUMENT: it is not of the same type as the previous ones.
 absl::Status AddLine(const std::string& line, bool is_first, RecordedWatch* watch) {
   v1::WatchCollisionsResponse of_pairs;
   v1::WatchHullsResponse of_hulls;

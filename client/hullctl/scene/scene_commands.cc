@@ -42,7 +42,7 @@ constexpr char kYamlHelp[] =
     "max_error, tolerance. `scale` converts coordinates of files to meters, rounded once.\n"
     "Relative file names start at the folder of the scene file.\n";
 
-// Deletes only the listed revision, if it was listed.
+// If the item was listed, deletes only the listed revision.
 absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& kept) {
   if (kept.is_body) {
     const auto deleted = client.DeleteBody(kept.id, kept.revision);
@@ -53,7 +53,7 @@ absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& 
 }
 
 // Returns OK if the user confirms the deletion at the terminal, or if `targets` is empty.
-// INVALID_ARGUMENT: no terminal, or the answer was no; `unless` states the consequence.
+// INVALID_ARGUMENT: no terminal, or the answer was no; `unless` describes the consequence.
 absl::Status Confirm(const Invocation& run, const std::vector<Kept>& targets,
                      const std::string& unless) {
   if (targets.empty()) return absl::OkStatus();
@@ -85,7 +85,7 @@ class SceneSync {
 
   // Prints the differences, and applies them if `changes`. `prune`: deletes strangers (see
   // Strangers), after a confirmation unless `yes`. Strangers that appear or change during the run
-  // stay.
+  // are kept.
   ExitCode Run(bool changes, bool prune, bool yes) {
     const auto strangers = Strangers(client_, scene_);
     if (!strangers.ok()) return run_.Fail(strangers.status());

@@ -19,7 +19,7 @@ struct HullDefinition {
   std::string name;
   // Including the prefix.
   std::string hull_id;
-  // Path that can be opened: relative names are already resolved against the folder of the scene
+  // Path that can be opened: relative names have been resolved against the folder of the scene
   // file.
   std::string file;
   LengthScale scale;

@@ -18,8 +18,8 @@
 namespace hulld {
 namespace {
 
-// Scans an object in JSON or flow style of YAML incrementally to find its end and the names of its
-// own members. The parser validates it.
+// Scans an object in JSON or YAML flow style incrementally to find its end and the names of its
+// direct members. The parser validates it.
 class ObjectScanner {
  public:
   void Take(std::string_view piece) {
@@ -209,7 +209,7 @@ absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first,
 }
 
 // Returns the YAML that replaces a line of the former line format, "place NAME HULL [POSE]",
-// "pair NAME NAME", or "all". Empty if the line is none.
+// "pair NAME NAME", or "all". Empty for any other line.
 std::string YamlForLine(std::string_view line) {
   std::vector<std::string> words;
   std::string_view rest = line.substr(0, line.find('#'));
@@ -351,7 +351,7 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
     return problem(
         absl::StrCat("groups holds ", request.groups_size(), " groups for ", n, " placements"));
   }
-  // A pair has at least one mover; its lower index is one if either is.
+  // A pair needs at least one mover; if it has one, its lower index is a mover.
   const uint64_t movers = request.has_movers() ? std::min<uint64_t>(request.movers(), n) : n;
   const std::string too_many =
       absl::StrCat("more than ", kMostPairs,
@@ -376,7 +376,7 @@ absl::Status RefuseUpdates(ByteSource* source, const std::string& command) {
   for (std::string_view line; source->ReadLine(&line);) {
     if (Trim(line).empty()) continue;
     return source->ErrorAtLine(absl::StrCat(
-        "'hullctl ", command, "' takes no updates after the scene; use 'hullctl stream'"));
+        "'hullctl ", command, "' does not accept updates after the scene; use 'hullctl stream'"));
   }
   return source->status();
 }

@@ -15,12 +15,12 @@
 
 namespace hulld {
 
-// Placement of the bodies that a YAML scene defines.
+// How the bodies defined by a YAML scene are placed.
 enum class BodyForm {
   // As bodies of the server, created by 'hullctl scene apply'; poses compose exactly.
   kWhole,
   // As the hulls of their pieces, named NAME/PIECE, at poses composed in floating point: for
-  // TEXTBOOK_SAT, which takes only hulls.
+  // TEXTBOOK_SAT, which supports only hulls.
   kPieces
 };
 
@@ -45,8 +45,8 @@ struct Scene {
   // Returns the hull of a placement, empty for an inline shape; null if the placement does not
   // exist.
   const std::string* HullOf(uint32_t placement) const;
-  // Returns a placement, in either form. Requires HullOf(placement) != nullptr; unchecked, as
-  // ReadScene and PairsOf ensure it.
+  // Returns a placement, in either form. Requires HullOf(placement) != nullptr (unchecked:
+  // ReadScene and PairsOf ensure it).
   v1::Placement PlacementOf(uint32_t placement) const;
   // Returns the placement's name, or its index and hull, as in "0:spider" or "1:points".
   std::string NameOf(uint32_t placement) const;
@@ -75,8 +75,8 @@ inline constexpr char kSceneFileHelp[] =
     "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]},\n"
     "   \"groups\":[0,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}";
 
-// Reads the scene at the start of the source, and no further: an object in braces to the end of the
-// line of its last brace, other YAML to the end. INVALID_ARGUMENT "NAME:LINE: message",
+// Reads only the scene at the start of the source: an object in braces up to the end of the line
+// with its last brace, any other YAML up to the end. INVALID_ARGUMENT "NAME:LINE: message",
 // "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for a request of several lines. A file
 // of the former line format is refused with its YAML equivalent. Opens none of the files named in a
 // YAML scene; 'hullctl scene apply' does.

@@ -53,7 +53,8 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     return absl::InvalidArgumentError(absl::StrCat(
         name, ": more than ", kMostSceneBytes, " bytes; write a larger scene as packedPlacements"));
   }
-  // Parses at most two documents: for text such as "," yaml-cpp 0.7 finds documents without end.
+  // Parses at most two documents: for text such as ",", yaml-cpp 0.7 never stops finding
+  // documents.
   YAML::Node root;
   int documents = 0;
   DocumentStart last;
@@ -123,12 +124,12 @@ absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(
 
 absl::StatusOr<std::string> YamlReader::Text(const YAML::Node& node, const std::string& key) const {
   if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
-  return ErrorAt(node, absl::StrCat(key, " takes a string"));
+  return ErrorAt(node, absl::StrCat(key, " must be a string"));
 }
 
 absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::string& key) const {
   double number = 0;
-  if (!node.IsScalar()) return ErrorAt(node, absl::StrCat(key, " takes a number"));
+  if (!node.IsScalar()) return ErrorAt(node, absl::StrCat(key, " must be a number"));
   const NumberText kind = ParseDouble(node.Scalar(), &number);
   if (kind != NumberText::kNumber) {
     return ErrorAt(node, absl::StrCat(key, ": ", NumberProblem(kind, node.Scalar())));
@@ -142,14 +143,14 @@ absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::str
 absl::StatusOr<bool> YamlReader::Truth(const YAML::Node& node, const std::string& key) const {
   if (node.IsScalar() && node.Scalar() == "true") return true;
   if (node.IsScalar() && node.Scalar() == "false") return false;
-  return ErrorAt(node, absl::StrCat(key, " takes true or false"));
+  return ErrorAt(node, absl::StrCat(key, " must be true or false"));
 }
 
 absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
                                                         const std::string& key,
                                                         const std::vector<size_t>& counts) const {
   if (!node.IsSequence()) {
-    return ErrorAt(node, absl::StrCat(key, " takes a list of numbers, as in [0, 0, 1]"));
+    return ErrorAt(node, absl::StrCat(key, " must be a list of numbers, as in [0, 0, 1]"));
   }
   std::vector<double> numbers;
   for (const YAML::Node& entry : node) {
@@ -160,13 +161,13 @@ absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
   if (counts.empty() || std::find(counts.begin(), counts.end(), numbers.size()) != counts.end()) {
     return numbers;
   }
-  return ErrorAt(node, absl::StrCat(key, " takes ", absl::StrJoin(counts, " or "), " numbers, got ",
-                                    numbers.size()));
+  return ErrorAt(node, absl::StrCat(key, " must have ", absl::StrJoin(counts, " or "),
+                                    " numbers, got ", numbers.size()));
 }
 
 absl::StatusOr<std::vector<std::string>> YamlReader::Texts(const YAML::Node& node,
                                                            const std::string& key) const {
-  if (!node.IsSequence()) return ErrorAt(node, absl::StrCat(key, " takes a list, as in [a, b]"));
+  if (!node.IsSequence()) return ErrorAt(node, absl::StrCat(key, " must be a list, as in [a, b]"));
   std::vector<std::string> texts;
   for (const YAML::Node& entry : node) {
     auto text = Text(entry, key);

@@ -129,7 +129,7 @@ class SceneParser {
       if (!taken.ok()) return taken;
     }
     if (sources != 1) {
-      return yaml_.ErrorAt(node, absl::StrCat(what, " takes exactly one of file, points, and box"));
+      return yaml_.ErrorAt(node, absl::StrCat(what, " needs exactly one of file, points, and box"));
     }
     if (scaled && hull->file.empty()) {
       return yaml_.ErrorAt(node, absl::StrCat(what, ": scale needs a file"));
@@ -142,7 +142,7 @@ class SceneParser {
     const auto size = yaml_.Numbers(node, "box", {3});
     if (!size.ok()) return size.status();
     for (const double edge : *size) {
-      if (edge < 0) return yaml_.ErrorAt(node, "box takes edges >= 0");
+      if (edge < 0) return yaml_.ErrorAt(node, "box edges must be at least 0");
     }
     for (int corner = 0; corner < 8; ++corner) {
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -155,7 +155,7 @@ class SceneParser {
 
   absl::Status TakePoints(const YAML::Node& node, HullDefinition* hull) const {
     if (!node.IsSequence() || node.size() == 0) {
-      return yaml_.ErrorAt(node, "points takes a list of points, as in [[0, 0, 0], [1, 0, 0]]");
+      return yaml_.ErrorAt(node, "points must be a list of points, as in [[0, 0, 0], [1, 0, 0]]");
     }
     for (const YAML::Node& point : node) {
       const auto xyz = yaml_.Numbers(point, "a point", {3});
@@ -195,7 +195,7 @@ class SceneParser {
       }
     }
     if (rotations > 1) {
-      return yaml_.ErrorAt(node, key_of_pose + " takes rpy or a quaternion, not both");
+      return yaml_.ErrorAt(node, key_of_pose + " may have rpy or a quaternion, not both");
     }
     return CheckedPose(node, key_of_pose, pose);
   }
@@ -260,9 +260,10 @@ class SceneParser {
       body.name = name;
       body.body_id = scene_.prefix + name;
       if (!value.IsSequence() || value.size() == 0) {
-        return yaml_.ErrorAt(value, absl::StrCat("body ", Quoted(name),
-                                                 " takes a list of pieces, {hull: NAME, at: POSE} "
-                                                 "each"));
+        return yaml_.ErrorAt(value,
+                             absl::StrCat("body ", Quoted(name),
+                                          " must be a list of pieces, {hull: NAME, at: POSE} "
+                                          "each"));
       }
       std::set<std::string> taken;
       for (const YAML::Node& piece : value) {
@@ -293,7 +294,8 @@ class SceneParser {
         piece.radius = *radius;
         continue;
       }
-      if (!piece.hull_id.empty()) return yaml_.ErrorAt(value, what + " takes hull or id, not both");
+      if (!piece.hull_id.empty())
+        return yaml_.ErrorAt(value, what + " may have hull or id, not both");
       auto id = key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id");
       if (!id.ok()) return id.status();
       piece.name = value.Scalar();
@@ -374,7 +376,7 @@ class SceneParser {
       placement->hull_id = *std::move(id);
     }
     if (objects != 1) {
-      return yaml_.ErrorAt(node, what + " takes exactly one of hull, body, and id");
+      return yaml_.ErrorAt(node, what + " needs exactly one of hull, body, and id");
     }
     if (!to.has_value()) return absl::OkStatus();
     const auto end = EndOf(*to, placement->X_WO);
@@ -405,14 +407,14 @@ class SceneParser {
                                                     const std::string& key) const {
     auto names = yaml_.Texts(node, key);
     if (names.ok() && names->size() != 2) {
-      return yaml_.ErrorAt(node, absl::StrCat(key, " takes pairs of names, as in [[a, b]]"));
+      return yaml_.ErrorAt(node, absl::StrCat(key, " must be pairs of names, as in [[a, b]]"));
     }
     return names;
   }
 
   absl::Status TakeIgnored(const YAML::Node& node) {
     if (!node.IsSequence()) {
-      return yaml_.ErrorAt(node, "ignore takes a list of pairs, as in [[a, b]]");
+      return yaml_.ErrorAt(node, "ignore must be a list of pairs, as in [[a, b]]");
     }
     for (const YAML::Node& entry : node) {
       auto names = TwoNames(entry, "ignore");
@@ -451,7 +453,7 @@ class SceneParser {
 
   absl::Status TakePairs(const YAML::Node& node) {
     if (!node.IsSequence()) {
-      return yaml_.ErrorAt(node, "pairs takes a list of pairs, as in [[a, b]]");
+      return yaml_.ErrorAt(node, "pairs must be a list of pairs, as in [[a, b]]");
     }
     scene_.pairs.emplace();
     for (const YAML::Node& entry : node) {

@@ -105,14 +105,14 @@ class SceneAnswer {
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
       if (a >= objects_.size() || b >= objects_.size()) {
-        return absl::InternalError("the answer names a placement that does not exist");
+        return absl::InternalError("the answer refers to a placement that does not exist");
       }
       AddPair(a, b, part.columns().relations(i));
     }
     return absl::OkStatus();
   }
 
-  // Takes the rows of named pairs that collide, and counts them.
+  // Keeps and counts the rows of named pairs that collide.
   absl::Status Take(const v1::BatchCheckCollisionsResponse& part,
                     const std::vector<uint32_t>& pairs) {
     TakeHead(part);
@@ -194,7 +194,7 @@ v1::Placement PlacementOf(const ViewObject& object) {
   return placement;
 }
 
-// As PlacementOf, from the start of a motion to its end.
+// Like PlacementOf, from the start of a motion to its end.
 v1::Placement MotionOf(const ViewObject& object) {
   v1::Placement placement = PlacementOf(object);
   if (!object.motion) return placement;
@@ -214,7 +214,7 @@ v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint3
   return PackPlacements(placements);
 }
 
-// Asks about the named pairs, or about all that the rules select.
+// Queries the named pairs, or all that the rules select.
 absl::StatusOr<SceneAnswer> AskScene(const Client& client, const v1::FindCollisionsRequest& rules,
                                      const std::optional<std::vector<uint32_t>>& pairs,
                                      const std::vector<ViewObject>& objects, double tolerance) {
@@ -351,7 +351,7 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   question_.objects = scene.objects;
   question_.rules = scene.rules;
   question_.pairs = scene.pairs;
-  // The page asks after it receives the scene.
+  // The page sends a query after it receives the scene.
   asked_ = false;
 }
 

@@ -16,21 +16,22 @@
 
 namespace hulld {
 
-// Answers the questions of a page on its own thread. Questions that arrive while one is in flight
-// are merged, and the latest poses win: the pointer moves faster than answers arrive. Thread-safe.
+// Answers the queries of a page on its own thread. Queries that arrive while one is in flight are
+// merged, and the latest poses win, because the pointer moves faster than answers arrive.
+// Thread-safe.
 class AnswerFeed {
  public:
   AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page);
   // Waits for the answer in flight.
   ~AnswerFeed();
 
-  // Switches to another scene, by number; drops objects and questions.
+  // Switches to another scene, by number; drops objects and queries.
   void Show(const ViewScene& scene, uint64_t number);
   // Ignored if they belong to another scene.
   void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
   // Ignored if it belongs to another scene.
   void Ask(const ViewQuestion& question);
-  // Answers the last question again, as a hull changed.
+  // Answers the last query again because a hull changed.
   void HullsChanged();
 
  private:
@@ -69,12 +70,12 @@ class AnswerFeed {
   bool streamed_certificate_ = false;
   v1::HullVersion streamed_version_a_;
   v1::HullVersion streamed_version_b_;
-  // The pair and the request of the last question about a motion; empty if there was none.
+  // The pair and the request of the last query about a motion; empty if there was none.
   std::string asked_motion_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by the mutex, as all members below.
+  // Guarded by the mutex, like all members below.
   Question question_;
   uint64_t scene_ = 0;
   bool asked_ = false;

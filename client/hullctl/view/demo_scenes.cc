@@ -39,10 +39,11 @@ v1::PointBlock GrowthOf(int step) {
 
 absl::Status SendGrowth(const Client::PointSink& sink) { return sink(GrowthOf(1)); }
 
-// Returns the pose that turns a copy of a hull by half a turn about the vertical line through its
-// vertex of largest x, moved by `shift` of the distance toward the mean of its vertices. With
-// shift 0 the two share exactly that vertex, and the plane of constant x through it separates the
-// rest. Doubling a coordinate and half a turn round nothing, so the contact is exact.
+// Returns the pose that rotates a copy of a hull by half a turn about the vertical line through its
+// vertex of largest x, moved by the fraction `shift` of the distance toward the mean of its
+// vertices. With shift 0, both share exactly that vertex, and the plane of constant x through it
+// separates the rest. Neither doubling a coordinate nor half a turn is rounded, so the contact is
+// exact.
 Pose7 TurnedAbout(const HullMesh& hull, double shift) {
   double sum_x = 0;
   double sum_y = 0;
@@ -119,7 +120,8 @@ ViewScene TwoCopies(const std::string& title, const std::string& note, const std
 ViewScene CubeScene(const std::string& cube) {
   ViewScene scene;
   scene.title = "Cubes that share a face, an edge, a corner";
-  scene.note = "Touching is exact: move one by the smallest double, and it is apart or overlaps.";
+  scene.note =
+      "Touching is exact: move one by the smallest possible step, and they separate or overlap.";
   scene.objects = {{"cube", cube, -1, kIdentityPose},
                    {"shares a face", cube, -1, MovedBy(2, 0, 0)},
                    {"shares an edge", cube, -1, MovedBy(-2, 2, 0)},
@@ -166,8 +168,8 @@ absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, Temp
   std::vector<ViewScene> scenes = {
       TwoCopies("Two Spiders, far apart", "Drag one: the answer follows.", "Spider", spider,
                 spider_shape, MovedBy(200, 0, 0)),
-      TwoCopies("Two Spiders that overlap", "Their meshes hardly meet; the hulls do.", "Spider",
-                spider, spider_shape, MovedBy(100, 5, 0)),
+      TwoCopies("Two Spiders that overlap", "Their meshes barely touch, but their hulls overlap.",
+                "Spider", spider, spider_shape, MovedBy(100, 5, 0)),
       TwoCopies("Two Spiders that share one vertex", "They touch in exactly one point.", "Spider",
                 spider, spider_shape, spider_touches),
       TwoCopies("Two Wusons that share one vertex", "They touch in exactly one point.", "Wuson",

@@ -49,7 +49,7 @@ class EditQueue {
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Applies the pending edits: a user who closes the page still wants them.
+  // Applies the pending edits, because a user who closes the page still wants them.
   ~EditFeed();
   EditFeed(const EditFeed&) = delete;
   EditFeed& operator=(const EditFeed&) = delete;

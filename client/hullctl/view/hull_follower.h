@@ -14,14 +14,14 @@
 
 namespace hulld {
 
-// Follows changes of hulls on its own thread until destroyed. After a watch ends because its server
-// is lost for long, another one resumes from its position. If a watch restarts from scratch, hulls
-// deleted in between are reported as DELETED.
+// Follows changes of hulls on its own thread until destroyed. When a watch ends because its server
+// has been unreachable for too long, another one resumes from its position. If a watch restarts
+// from scratch, hulls deleted in between are reported as DELETED.
 class HullFollower {
  public:
   // `synced`: the initial state is complete.
   using Receiver = std::function<void(const v1::HullEvent& event, bool synced)>;
-  // Receives the reason why hulls are not followed at present. Recovery is not reported.
+  // Receives the reason why hulls are currently not followed. Recovery is not reported.
   using Complaint = std::function<void(const std::string& message)>;
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,

@@ -68,7 +68,7 @@ PageSession::~PageSession() = default;
 void PageSession::OnMessage(std::string_view json) {
   auto message = ParsePageMessage(json);
   if (!message.ok()) {
-    page_->SendText(ProblemMessage(absl::StrCat("The bridge cannot read a message of the page: ",
+    page_->SendText(ProblemMessage(absl::StrCat("The bridge cannot read a message from the page: ",
                                                 message.status().message())));
     return;
   }

@@ -72,9 +72,9 @@ class PageSession final : public PageHandler {
   const ViewScene* shown_ = nullptr;
   // Request of the last follower.
   v1::WatchHullsRequest watched_;
-  // Declared last, as their threads use the other members. The last one follows the current scene;
-  // earlier ones are cancelled. The bridge's thread must not wait for them, as they may wait for it
-  // to send.
+  // Declared last because their threads use the other members. The last one follows the current
+  // scene; earlier ones are cancelled. The bridge's thread must not wait for them because they may
+  // wait for it to send.
   std::vector<std::unique_ptr<HullFollower>> followers_;
 };
 

@@ -17,7 +17,7 @@ constexpr size_t kPrefixBytes = 6;
 }  // namespace
 
 TemporaryHulls::~TemporaryHulls() {
-  // Ignores errors: no caller can handle them, and later runs do not depend on these hulls.
+  // Ignores errors because no caller can handle them, and later runs do not depend on these hulls.
   for (const std::string& id : ids_) static_cast<void>(client_.DeleteHull(id));
 }
 

@@ -24,7 +24,8 @@ X_WC = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, CAMERA_HEIGHT], [0, 0
 
 
 def render() -> npt.NDArray[np.float32]:
-    """Depth along the camera's z axis in meters: HEIGHT x WIDTH, NaN where nothing is measured."""
+    """Depth along the camera's z axis in meters: HEIGHT x WIDTH, NaN for pixels without a
+    measurement."""
     u, v = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     rays_C = np.stack([(u - WIDTH / 2) / FOCAL, (v - HEIGHT / 2) / FOCAL, np.ones(u.shape)], -1)
     rays = rays_C @ X_WC[:3, :3].T / EGG_RADII
@@ -60,14 +61,14 @@ def main() -> None:
         print(f"egg: {egg.points} points, {egg.vertex_count} vertices")
         client.append_points("gripper", box((0.02, 0.08, 0.01)), create=True)
 
-        # One question: how far is it from here, exactly enough to plan with?
+        # A single query: how far away is it, accurately enough for planning?
         above = client.check_collision(
             ("gripper", (0.02, -0.01, 0.2)), "egg", separation=True, witness=True
         )
         assert above.separation is not None
         print(f"at 0.2 m: {above.relation.name}, {above.separation.value:.4f} m apart")
 
-        # Many questions: lower it by a millimeter each time, and stop when it touches.
+        # Many queries: lower it by a millimeter each time, and stop when it touches.
         heights = np.arange(0.2, 0.0, -0.001)
         with client.stream_collisions(["gripper", "egg"], [(0, 1)], clearance=0.002) as stream:
             for height in heights:

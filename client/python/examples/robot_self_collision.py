@@ -3,8 +3,7 @@
     python robot_self_collision.py [URDF [SRDF]] [--samples N]
 
 Random configurations are checked in one call. Without a URDF, the robot is an arm of two links on a
-base. The SRDF names the pairs of links that are not checked; without one, these are the adjacent
-links.
+base. The SRDF lists the pairs of links to skip; without one, adjacent links are skipped.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""The gain of a tolerance: time against answers that are left open.
+"""The benefit of a tolerance: time against the share of undecided answers.
 
     python trade_plot.py [PICTURE]
 
-Pairs of balls of radius 1 are near contact, as parts at rest on each other are: apart or overlapping
-by 1e-17 to 1e-3, equally many in each decade. With tolerance 0 every relation is exact. With more,
-pairs that are nearer than the tolerance may be WITHIN_TOLERANCE, which is never wrong. Draws
+Pairs of balls of radius 1 are near contact, like parts resting on each other: apart or overlapping
+by 1e-17 to 1e-3, equally many in each decade. With tolerance 0 every relation is exact. With a
+larger one, pairs closer than the tolerance may be WITHIN_TOLERANCE, which is never wrong. Draws
 PICTURE if matplotlib is installed, and always prints a table. The times depend on the load of the
 machine.
 """
@@ -31,7 +31,7 @@ def measure(client: hulld.Client) -> list[tuple[float, float, int]]:
         "ball", points / np.linalg.norm(points, axis=1)[:, np.newaxis], create=True
     )
 
-    # Turned at random, then moved along the shortest way until the gap is left.
+    # Rotated at random, then moved along the shortest direction until only the gap remains.
     poses = np.concatenate([rng.normal(size=(2 * PAIRS, 4)), np.zeros((2 * PAIRS, 3))], axis=1)
     poses[1::2, 4] = 3
     pairs = np.arange(2 * PAIRS).reshape(-1, 2)
@@ -56,7 +56,7 @@ def measure(client: hulld.Client) -> list[tuple[float, float, int]]:
 
 
 def draw(rows: list[tuple[float, float, int]], path: str) -> None:
-    """ImportError: there is no matplotlib."""
+    """ImportError: matplotlib is not installed."""
     importlib.import_module("matplotlib").use("Agg")
     pyplot = importlib.import_module("matplotlib.pyplot")
     figure, time_axis = pyplot.subplots()

@@ -22,12 +22,12 @@ from hulld.retry import RetryPolicy
 
 class Appender:
     """A stream of chunks into one hull, with a bounded number in flight. If the connection breaks,
-    or the server ends the stream and says when to retry, it reconnects as the same writer, asks for
-    the last committed sequence, and sends the missing chunks, so that each is applied once. It
-    stops if the hull or the store was replaced: acknowledged points would be missing there.
+    or the server ends the stream with a retry hint, it reconnects as the same writer, reads the
+    last committed sequence, and sends the missing chunks, so that each is applied exactly once. It
+    fails if the hull or the store was replaced, because acknowledged points would be missing.
 
-    For one thread. A context manager: it waits for all acknowledgements at the end, and cancels
-    unacknowledged chunks if it is left by an exception. Made by Client.open_append.
+    Not thread-safe. A context manager: waits for all acknowledgements at the end, and cancels
+    unacknowledged chunks if an exception leaves the block. Created by Client.open_append.
     """
 
     def __init__(
@@ -45,13 +45,14 @@ class Appender:
         self._timeout = timeout
         self._failed: HulldError | None = None
         self._connection: Duplex | None = None
-        # Since the last acknowledgement; None: the connection has not failed since.
+        # Time of the first failure since the last acknowledgement; None if the connection has not
+        # failed.
         self._attempts: Attempts | None = None
         self._ensure_open()  # sync only
 
     @property
     def opened(self) -> Opened:
-        """The server's answer to the opening: the hull, and this writer's last committed
+        """The server's answer to the opening message: the hull, and this writer's last committed
         sequence."""
         if self._state.opened is None:
             raise RuntimeError("the stream is not open yet; enter it, or await open()")
@@ -68,7 +69,7 @@ class Appender:
         return self._state.totals()
 
     def _ensure_open(self) -> Opened:
-        """Opens the stream, unless it is open."""
+        """Opens the stream if it is not open."""
         if self._failed is not None:
             raise self._failed
         if self._connection is None:
@@ -95,10 +96,10 @@ class Appender:
     ) -> None:
         """Queues points, in chunks of about chunk_bytes; waits while too much is in flight.
 
-        points: n x 3, as in hulld.as_points; doubles and floats travel unchanged. A chunk is
-        applied wholly or not at all. if_revision: applied only if the hull is at this revision (0:
-        it was made by this stream, and is empty); then all points must fit one chunk, as the first
-        changes the revision.
+        points: n x 3, as in hulld.as_points; doubles and floats are sent unchanged. A chunk is
+        applied entirely or not at all. if_revision: applies the chunk only if the hull is at this
+        revision (0: it was created by this stream and is empty); all points must then fit in one
+        chunk, because the first chunk changes the revision.
 
         ValueError, before anything is sent: not points; several chunks with if_revision.
         HulldError: the error that ended the stream, which may be about an earlier chunk; every
@@ -119,12 +120,12 @@ class Appender:
             while connection.receive(self._timeout) is not None:
                 pass
         except (UnavailableError, TimeoutError):
-            # Everything is acknowledged: a server that drains, or is gone, loses nothing.
+            # Everything is acknowledged, so a draining or lost server loses nothing.
             connection.cancel()
         return self._state.totals()
 
     def cancel(self) -> None:
-        """Ends the stream. Unacknowledged chunks may be applied or not."""
+        """Ends the stream. Unacknowledged chunks may or may not be applied."""
         if self._failed is None:
             self._fail(FailedPreconditionError("the append stream was cancelled"))
 
@@ -156,7 +157,7 @@ class Appender:
         return error
 
     def _connect(self) -> bytes:
-        """Opens a connection. Returns the server's answer to the opening."""
+        """Opens a connection. Returns the server's answer to the opening message."""
         # The old stream ends first, so that the server sees one stream per writer.
         if self._connection is not None:
             self._connection.cancel()

@@ -1,5 +1,5 @@
-"""Checks of arguments. Each raises ValueError or TypeError that names the argument, so that nothing
-wrong is sent."""
+"""Argument checks. Each raises a ValueError or TypeError that names the argument, before anything
+is sent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
 _MOST_ID_CHARACTERS = 256
 _MOST_UINT32 = 2**32 - 1
 _MOST_UINT64 = 2**64 - 1
-#: The smallest power of two beyond which doubles skip integers.
+#: The power of two beyond which doubles cannot represent all integers.
 _EXACT_INTEGERS = 2.0**53
 
 
@@ -26,7 +26,7 @@ def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = Tr
     if isinstance(value, np.ndarray) and value.ndim == 0 and not _holds_masked(value):
         value = value[()]
     if not _is_real(value):
-        raise TypeError(f"{name} is {value!r}; it takes a number")
+        raise TypeError(f"{name} is {value!r}; it must be a number")
     if isinstance(value, np.integer):
         value = int(value)
     try:
@@ -34,7 +34,7 @@ def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = Tr
     except OverflowError:
         double = math.inf
     if math.isnan(double) or (finite and math.isinf(double) and double == value):
-        raise ValueError(f"{name} is {value}; it takes a finite number")
+        raise ValueError(f"{name} is {value}; it must be finite")
     if double != value:
         raise ValueError(
             f"{name} is {value}, which no double holds exactly; convert it explicitly, as with "
@@ -50,7 +50,7 @@ def _is_real(value: Any) -> bool:
 
 
 def length(value: Any, name: str) -> float:
-    """A length of at least 0, which may be infinite."""
+    """A length of at least 0, possibly infinite."""
     return number(value, name, least=0, finite=False)
 
 
@@ -64,18 +64,18 @@ def seconds(value: Any, name: str = "timeout") -> float | None:
         return None
     duration = number(value, name, least=0)
     if duration > threading.TIMEOUT_MAX:
-        raise ValueError(f"{name} is {value} s; for an unbounded wait, pass None")
+        raise ValueError(f"{name} is {value} s; pass None to wait without a limit")
     return duration
 
 
 def count(value: Any, name: str, *, least: int = 0, most: int = _MOST_UINT32) -> int:
     """An integer from `least` to `most`."""
     if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} is {value!r}; it takes an integer")
+        raise TypeError(f"{name} is {value!r}; it must be an integer")
     try:
         integer = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name} is {value!r}; it takes an integer") from None
+        raise TypeError(f"{name} is {value!r}; it must be an integer") from None
     if not least <= integer <= most:
         raise ValueError(f"{name} is {integer}; it must be from {least} to {most}")
     return integer
@@ -93,7 +93,7 @@ def revision(value: Any, name: str = "if_revision") -> int | None:
 def text(value: Any, name: str, *, least: int = 0) -> str:
     """A string of at least `least` characters, and no longer than an ID."""
     if not isinstance(value, str):
-        raise TypeError(f"{name} is {value!r}; it takes a string")
+        raise TypeError(f"{name} is {value!r}; it must be a string")
     if len(value) < least:
         raise ValueError(f"{name} is empty")
     if len(value) > _MOST_ID_CHARACTERS:
@@ -113,10 +113,10 @@ def hull_id(value: Any, name: str = "hull_id") -> str:
 
 
 def as_array(values: Any, name: str) -> npt.NDArray[Any]:
-    """`values` as an array that holds the same numbers.
+    """`values` as an array of the same numbers.
 
     ValueError: masked elements; rows of different lengths; a list of numbers that no array type
-    holds exactly. TypeError: an array of objects that are not numbers.
+    represents exactly. TypeError: an array of objects that are not numbers.
     """
     if _holds_masked(values):
         raise ValueError(
@@ -133,7 +133,7 @@ def as_array(values: Any, name: str) -> npt.NDArray[Any]:
         raise ValueError(f"{name} has rows of different lengths") from None
     if array.dtype.kind == "O":
         return _doubles_of(array, name)
-    # numpy makes doubles of lists that mix integers and floats, and rounds the integers.
+    # numpy converts lists that mix integers and floats to doubles, and rounds the integers.
     mixed = array.dtype.kind == "f" and not isinstance(values, np.ndarray)
     if mixed and (np.abs(array) >= _EXACT_INTEGERS).any() and not hasattr(values, "__array__"):
         return _doubles_of(np.asarray(values, object), name)
@@ -163,15 +163,15 @@ def _doubles_of(array: npt.NDArray[Any], name: str) -> npt.NDArray[np.float64]:
             raise TypeError(
                 f"{name}{place(at)} is {value!r}, not a number; pass an array of floats"
             )
-        # The caller judges infinities and NaN.
+        # The caller checks for infinities and NaN.
         finite = not isinstance(value, (float, np.floating)) or math.isfinite(value)
         doubles[at] = number(value, name + place(at)) if finite else value
     return doubles
 
 
 def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
-    """Converts to float64 or float32. ValueError names a number that no double holds. TypeError:
-    not numbers."""
+    """Converts to float64 or float32. ValueError names a number that is not exactly a double.
+    TypeError: not numbers."""
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size in (4, 8):
         # The wire is little-endian.
@@ -181,11 +181,11 @@ def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
     if kind not in "iuf":
         raise TypeError(f"{name} holds {array.dtype}, not numbers")
     doubles = array.astype(np.float64)
-    # Compared in the type given: a comparison as doubles would round both sides.
+    # Compares in the original type: a comparison as doubles would round both sides.
     with np.errstate(invalid="ignore"):
         same = doubles.astype(array.dtype) == array
     if kind in "iu":
-        # Beyond the type's range the conversion back means nothing.
+        # Beyond the type's range, the conversion back is meaningless.
         same &= doubles < 2.0 ** (8 * size - (kind == "i"))
     if kind == "f":
         same |= np.isnan(array)
@@ -199,5 +199,5 @@ def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
 
 
 def place(at: tuple[int, ...]) -> str:
-    """An index as it is written behind a name, as in [3][1]."""
+    """An index in the form that follows a name, as in [3][1]."""
     return "".join(f"[{index}]" for index in at)

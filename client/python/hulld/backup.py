@@ -33,7 +33,7 @@ class BackupWriter:
     and CRC-32. The file gets its final name only when it is complete and on disk; otherwise it is
     removed. A context manager.
 
-    OSError: the file cannot be written. ValueError: a part is damaged or out of place.
+    OSError: the file cannot be written. ValueError: a part is damaged or out of order.
     """
 
     def __init__(self, path: PathLike) -> None:

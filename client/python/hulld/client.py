@@ -66,27 +66,27 @@ DEFAULT_IN_FLIGHT_CHUNKS = 64
 
 
 class Client(ClientBase):
-    """A connection to hulld, opened by the first call. Any thread may use it. A context manager
-    that closes it.
+    """A connection to hulld, opened by the first call. Thread-safe. As a context manager, it closes
+    the connection.
 
-    server: HOST:PORT, with 50551 as the default port; several servers over one store, which are
-    called in turn, as "10.0.0.1:50551,10.0.0.2:50551" or "dns:///hulls.example:50551"; or any other
-    target name of gRPC, as "unix:/run/hulld.sock". timeout: seconds for each call, its retries
-    included; None: unbounded. Each method can override it. For appenders and collision streams
-    it bounds each wait, for watches the search for a lost server. retry: see RetryPolicy. tls:
+    server: HOST:PORT, with 50551 as the default port; several servers over one store, called in
+    turn, such as "10.0.0.1:50551,10.0.0.2:50551" or "dns:///hulls.example:50551"; or any other gRPC
+    target name, such as "unix:/run/hulld.sock". timeout: seconds for each call, including retries;
+    None: unbounded. Each method can override it. For appenders and collision streams, it bounds
+    each wait; for watches, the time to reconnect to a lost server. retry: see RetryPolicy. tls:
     encrypts. token: sent with each call, and never unencrypted to another machine unless `insecure`
     allows it.
 
-    freshness, of reads: how fresh the answer must be if several servers serve one store (see
-    Freshness); None: it holds everything acknowledged before the call.
+    freshness: required freshness of reads if several servers serve one store (see Freshness); None:
+    an answer includes everything acknowledged before the call.
 
     Calls raise HulldError (see hulld.errors) if the server refuses them or cannot be reached, and
     ValueError or TypeError if an argument is wrong, before anything is sent. All are safe to repeat
-    but delete_hull, delete_body, create_hull without if_absent, put_body with if_revision,
-    replace_hull, save_backup, and collision streams; these are sent once.
-    Numbers are never changed in transit: the server receives the doubles of an array, and answers
-    hold the doubles that it sent. orthogonality_tolerance, of calls that take poses: the largest
-    entry of R Rᵀ - I that a matrix may have; matrices of float32 need 1e-6.
+    except delete_hull, delete_body, create_hull without if_absent, put_body with if_revision,
+    replace_hull, save_backup, and collision streams; these are sent only once. Numbers are never
+    changed in transit: the server receives the doubles of an array, and answers contain the doubles
+    that it sent. orthogonality_tolerance, in calls with poses: the largest entry of R Rᵀ - I that
+    is accepted in a matrix; float32 matrices need 1e-6.
 
     A process that is forked while a client is open cannot make any calls.
     """
@@ -117,8 +117,8 @@ class Client(ClientBase):
     def create_hull(
         self, hull_id: str, *, if_absent: bool = False, timeout: float | None = None
     ) -> CreatedHull:
-        """Registers an empty hull. if_absent: an existing one is returned unchanged, which makes
-        the call safe to repeat.
+        """Registers an empty hull. if_absent: returns an existing hull unchanged, which makes the
+        call safe to repeat.
 
         AlreadyExistsError: the hull exists. ResourceExhaustedError: the server is full.
         """
@@ -138,12 +138,12 @@ class Client(ClientBase):
         """Adds points to a hull, and returns when they are committed.
 
         points: n x 3, the caller's length unit; or an iterator of such arrays, which are sent as
-        they arrive. float64 and float32 are sent unchanged. All must be finite, and none masked.
-        create: creates the hull if it does not exist. writer_id: names the writer and continues its
-        numbering of chunks. if_revision: appends only if the hull is at this revision; then all
-        points must fit one chunk of chunk_bytes. A lost connection is reopened, and each chunk is
-        applied once, wholly or not at all. If this raises, earlier chunks remain committed: see
-        Appender for how many.
+        they arrive. float64 and float32 are sent unchanged. All numbers must be finite and
+        unmasked. create: creates the hull if it does not exist. writer_id: names the writer and
+        continues its numbering of chunks. if_revision: appends only if the hull is at this
+        revision; all points must then fit in one chunk of chunk_bytes. A lost connection is
+        reopened, and each chunk is applied exactly once, entirely or not at all. If this raises,
+        earlier chunks remain committed: use Appender to find out how many.
 
         ValueError: not points. NotFoundError: no such hull. AbortedError: if_revision does not
         match.
@@ -168,8 +168,8 @@ class Client(ClientBase):
         max_in_flight_chunks: int = DEFAULT_IN_FLIGHT_CHUNKS,
         timeout: float | None = None,
     ) -> Appender:
-        """Opens a stream of chunks into a hull. Unacknowledged chunks are kept to be resent;
-        `append` waits while they reach either bound. For a named writer, `opened.last_sequence` is
+        """Opens a stream of chunks into a hull. Unacknowledged chunks are kept for resending;
+        `append` waits while either bound is reached. For a named writer, `opened.last_sequence` is
         the number of its committed chunks. NotFoundError: no such hull, without `create`."""
         state = AppendState(hull_id, writer_id, create, max_in_flight_bytes, max_in_flight_chunks)
         seconds = self._seconds(timeout)
@@ -186,9 +186,9 @@ class Client(ClientBase):
         chunk_bytes: int = DEFAULT_CHUNK_BYTES,
         timeout: float | None = None,
     ) -> ReplacedHull:
-        """Replaces a hull with that of the points, atomically for all readers. points, create: as
-        in append_points; if an iterator raises, nothing is changed.
-        Unbounded in time unless `timeout` is given; not retried.
+        """Replaces a hull with the hull of the points, atomically for all readers. points, create:
+        as in append_points; if an iterator raises, nothing is changed. Unbounded in time unless
+        `timeout` is given; not retried.
 
         NotFoundError: no such hull. AbortedError: if_revision (0: no hull) does not match at the
         end.
@@ -230,10 +230,10 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hull:
-        """Sizes, counts, and box of a hull. audit: the server also checks it by code independent of
-        the builder. facets: False leaves out the counts of edges and facets, which need the
-        canonical hull. properties: True adds volume, area, centroid, and inertia tensor.
-        NotFoundError: no such hull.
+        """Sizes, counts, and box of a hull. audit: the server also checks the hull with code
+        independent of the builder. facets: False omits the counts of edges and facets, which
+        require the canonical hull. properties: True adds volume, area, centroid, and inertia
+        tensor. NotFoundError: no such hull.
         """
         call = requests.get_hull(hull_id, audit, facets, properties, self._viewer)
         return self._unary(call, timeout, freshness)
@@ -248,13 +248,13 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> HullMesh:
-        """The canonical vertices and facets of a hull; with `side` a simpler hull inside it, or one
-        that encloses it, exactly.
+        """The canonical vertices and facets of a hull; with `side`, a simpler hull that is exactly
+        inside it or encloses it.
 
         max_vertices: never exceeded; at least the dimension plus one inside, 8 outside. max_error:
-        in the caller's length unit; met if the server finds a hull within both, otherwise see the
-        mesh's `error`. `side` needs one of the two. InvalidArgumentError: a bound that cannot be
-        met. NotFoundError: no such hull.
+        in the caller's length unit; met if the server finds a hull within both limits; otherwise
+        check the mesh's `error`. `side` requires at least one of them. InvalidArgumentError: a
+        bound that cannot be met. NotFoundError: no such hull.
         """
         call = requests.get_hull_mesh(hull_id, side, max_vertices, max_error)
         return self._whole(call, lambda: MeshAssembly(self._viewer), timeout, freshness)
@@ -282,8 +282,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[HullInfo]:
-        """The hulls with the ID prefix `prefix`, in byte order of their IDs; fetched page by page.
-        A hull present throughout appears exactly once. `timeout` is for each page."""
+        """The hulls with the ID prefix `prefix`, in byte order of their IDs, fetched page by page.
+        A hull that exists throughout appears exactly once. `timeout` applies to each page."""
         token = ""
         while True:
             page = self._unary(requests.list_hulls(prefix, page_size, token), timeout, freshness)
@@ -296,7 +296,7 @@ class Client(ClientBase):
     def delete_hull(
         self, hull_id: str, *, if_revision: int | None = None, timeout: float | None = None
     ) -> Header:
-        """Removes a hull. Not retried: a repeated delete could remove a new hull of the same ID.
+        """Deletes a hull. Not retried: a repeated delete could remove a new hull with the same ID.
 
         NotFoundError: no such hull. AbortedError: if_revision does not match.
         """
@@ -312,8 +312,8 @@ class Client(ClientBase):
         timeout: float | None = None,
     ) -> HullWatch:
         """Reports hulls as they are created, changed, and deleted: all with the ID prefix `prefix`,
-        or one by its ID. bodies: reports bodies, too. after: resumes another watch of the same
-        hulls, at its `position`. timeout: of the search for a lost server."""
+        or a single one by its ID. bodies: also reports bodies. after: resumes another watch of the
+        same hulls at its `position`. timeout: time to reconnect to a lost server."""
         return HullWatch(
             lambda call: self._start(call, None),
             lambda position: requests.watch_hulls(prefix, hull_id, bodies, position),
@@ -333,15 +333,16 @@ class Client(ClientBase):
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         timeout: float | None = None,
     ) -> ReplacedBody:
-        """Creates a body, or replaces all of its pieces, at once for all readers.
+        """Creates a body, or replaces all of its pieces, atomically for all readers.
 
-        pieces: hulls at poses in the frame of the body, as placements elsewhere; a hull need not
-        exist yet, and each query uses its current state. Placements name a body by its ID, like a
-        hull. if_revision: put only if the body is at this revision; 0: only if it does not exist;
-        such a call is not retried.
+        pieces: hulls at poses in the frame of the body, in the form of placements; a hull need not
+        exist yet, and each query uses its current state. A placement refers to a body by its ID,
+        like a hull. if_revision: puts the body only if it is at this revision (0: only if it does
+        not exist); such a call is not retried.
 
         ValueError: no piece. AlreadyExistsError: a hull has the ID. AbortedError: if_revision does
-        not match. ResourceExhaustedError: more pieces, or hulls and bodies, than the server takes.
+        not match. ResourceExhaustedError: more pieces, or hulls and bodies, than the server
+        allows.
         """
         packed = Placements.of(pieces, orthogonality_tolerance=orthogonality_tolerance)
         return self._unary(requests.put_body(body_id, packed, if_revision), timeout)
@@ -360,7 +361,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[BodyInfo]:
-        """The bodies with the ID prefix `prefix`, without their pieces; as list_hulls."""
+        """The bodies with the ID prefix `prefix`, without their pieces; otherwise as
+        list_hulls."""
         token = ""
         while True:
             page = self._unary(requests.list_bodies(prefix, page_size, token), timeout, freshness)
@@ -373,7 +375,7 @@ class Client(ClientBase):
     def delete_body(
         self, body_id: str, *, if_revision: int | None = None, timeout: float | None = None
     ) -> Header:
-        """Removes a body; the hulls of its pieces stay. Not retried, as delete_hull.
+        """Deletes a body; the hulls of its pieces are kept. Not retried, like delete_hull.
 
         NotFoundError: no such body. AbortedError: if_revision does not match.
         """
@@ -406,22 +408,22 @@ class Client(ClientBase):
     ) -> Collision:
         """The relation of a pair: exact, for the doubles given.
 
-        a, b: an ID, the points of an inline shape (n x 3), either of them at a pose as in (ID,
-        pose), or hulld.Placement; a pose is 4 x 4, a quaternion and a translation, or a
-        translation. Nothing beyond the relation is computed unless asked for:
-        axis (any separating or touching axis and the features on it), separation (the distance, or
-        minus the penetration depth, with a proven bound, at most max_error), witness (a point of
-        each hull that attain it), normal (the direction in which they attain it), clearance (true
-        if the separation is at most this; exact), certificate (the proof of the relation), analysis
-        (time, sizes, axes tested). tolerance: allows WITHIN_TOLERANCE if |separation| is at most
-        this; faster, never wrong. Lengths are in the caller's unit.
+        a, b: an ID, or the points of an inline shape (n x 3); either of them with a pose, as in
+        (ID, pose); or a hulld.Placement. A pose is a 4 x 4 matrix, a quaternion and a translation,
+        or a translation. Nothing beyond the relation is computed unless requested: axis (a
+        separating or touching axis and the features on it), separation (the distance, or minus the
+        penetration depth, with a proven bound of at most max_error), witness (a point of each hull
+        at which the separation is attained), normal (the direction in which it is attained),
+        clearance (whether the separation is at most this; exact), certificate (the proof of the
+        relation), analysis (time, sizes, axes tested). tolerance: allows WITHIN_TOLERANCE if
+        |separation| is at most this; faster, never wrong. Lengths are in the caller's unit.
 
         to_a, to_b: end poses of motions (hulld.Placement); the answer then has first_contact, and
-        takes none of the options above but certificate. max_time_error: the largest width of its
-        bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating motion is
-        at most this.
+        of the options above only certificate is allowed. max_time_error: the maximum width of its
+        bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating motion
+        is at most this.
 
-        NotFoundError: no such hull. InvalidArgumentError: options that exclude each other.
+        NotFoundError: no such hull. InvalidArgumentError: incompatible options.
         """
         wanted = Wanted(
             axis,
@@ -466,9 +468,10 @@ class Client(ClientBase):
         """The relations of many pairs, in parallel (BatchCheckCollisions).
 
         placements: hulld.Placements, or a list of placements as in check_collision. pairs: m x 2
-        indices of placements; None: all pairs. The rest as in check_collision; if a placement has
-        an end pose, the answers have contact_times and separated_until. A pair without an answer
-        does not fail the call: its relation is UNSPECIFIED, and Batch.problem has the reason.
+        indices of placements; None: all pairs. Other arguments are as in check_collision; if a
+        placement has an end pose, the answers have contact_times and separated_until. A pair
+        without an answer does not fail the call: its relation is UNSPECIFIED, and Batch.problem
+        returns the reason.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
@@ -509,7 +512,7 @@ class Client(ClientBase):
         timeout: float | None = None,
     ) -> Iterator[BatchPart]:
         """Yields the answers in parts, as they arrive: ascending ranges that cover every pair
-        exactly. Retried only until the first part."""
+        exactly once. Retried only before the first part."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(
@@ -544,9 +547,9 @@ class Client(ClientBase):
 
         points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: the
         pose of the hull in the world. separation, max_error: as in check_collision; the separation
-        is the distance of a point outside, and minus the depth of a point inside. A point where two
-        pieces of a body meet is on the boundary. The points are sent in as few calls as the
-        server's limits allow. Each call uses the current version of the hull, and has its own
+        is the distance of a point outside, or minus the depth of a point inside. A point where two
+        pieces of a body meet counts as on the boundary. The points are sent in as few calls as the
+        server's limits permit. Each call uses the current version of the hull and has its own
         `timeout`.
 
         NotFoundError: no such hull.
@@ -580,15 +583,15 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hits:
-        """The hits of rays: exact, grazes included, unless a placement has a radius or rotates. A
-        ray is a point that moves from its origin to origin + direction, rounded, so a direction has
-        the length of its ray.
+        """The hits of rays: exact, including grazes, unless a placement has a radius or rotates. A
+        ray is a point that moves from its origin to origin + direction (rounded), so the length of
+        the direction is that of the ray.
 
-        origins, directions: n x 3, or one of them 3 for all rays. placements: as in
-        check_collisions; the pieces of a body must have its frame. Pairs far apart are skipped in
-        groups, as in find_collisions.
+        origins, directions: n x 3; either may have shape (3,), for all rays. placements: as in
+        check_collisions; the pieces of a body must be at the identity pose. Pairs far apart are
+        skipped in groups, as in find_collisions.
 
-        HulldError: a placement has no answer, such as a hull that does not exist.
+        HulldError: a placement has no answer, for example because its hull does not exist.
         """
         targets = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         starts, ends = ray_ends(origins, directions)
@@ -633,17 +636,18 @@ class Client(ClientBase):
         """The pairs of a scene that collide, or are within a clearance or tolerance. Pairs far
         apart are excluded in groups.
 
-        groups: the group of each placement; with ignore_same_group, pairs within a group are left
-        out, and so are pairs of two groups that ignored_group_pairs (k x 2) names. movers: only
-        pairs with at least one of the first `movers` placements. The rest as in check_collisions;
-        with a clearance, all pairs within it are found. limit: at most this many pairs, those of
-        the least separation, in ascending order, with their separations; without a clearance,
-        among all pairs. The totals still count every pair within the clearance. Pairs without an
-        answer follow, at most as many. first_only: only the pairs in motion that may be the first
-        to touch, in ascending order of separated_until; none if no pair touches. The totals then
-        count these pairs only. max_time_error and resolution apply to each pair in motion, as in
-        check_collision. every_piece: a row for each pair of pieces that is found; the column
-        `pieces` distinguishes the rows of two bodies.
+        groups: the group of each placement; with ignore_same_group, pairs within a group are
+        skipped, and so are pairs between two groups listed in ignored_group_pairs (k x 2). movers:
+        only pairs with at least one of the first `movers` placements. Other arguments are as in
+        check_collisions; with a clearance, all pairs within it are found. limit: returns only the
+        pairs of least separation, at most this many, in ascending order, with their separations;
+        without a clearance, chosen from all pairs. The totals still count every pair within the
+        clearance. Pairs without an answer follow, at most the same number. first_only: returns only
+        the pairs in motion that may be the first to touch, in ascending order of separated_until;
+        none if no pair touches. The totals then count these pairs only. max_time_error and
+        resolution apply to each pair in motion, as in check_collision. every_piece: returns a row
+        for each pair of pieces that is found; the column `pieces` distinguishes the rows of two
+        bodies.
         """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
@@ -690,8 +694,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[ScenePart]:
-        """Yields the answers in parts, as pairs are found, in ascending order. The last part holds
-        the totals. Retried only until the first part."""
+        """Yields the answers in parts, as pairs are found, in ascending order. The last part
+        contains the totals. Retried only before the first part."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(
@@ -731,8 +735,8 @@ class Client(ClientBase):
         timeout: float | None = None,
     ) -> CollisionStream:
         """Opens a stream of pose changes, and answers every pair once. only_changes: answers to
-        updates hold only pairs with another relation. orthogonality_tolerance: of all updates,
-        too. timeout: for each answer. The rest as in check_collisions."""
+        updates contain only pairs whose relation changed. orthogonality_tolerance: also applies to
+        all updates. timeout: for each answer. Other arguments are as in check_collisions."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(
@@ -764,9 +768,9 @@ class Client(ClientBase):
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
         timeout: float | None = None,
     ) -> CollisionWatch:
-        """Reports when pairs start and stop colliding, or being within a clearance, because poses
-        or hulls change. pairs: m x 2 indices of placements; None: a scene, with groups and movers
-        as in find_collisions. orthogonality_tolerance: of all updates, too."""
+        """Reports when pairs start and stop colliding, or being within a clearance, as poses and
+        hulls change. pairs: m x 2 indices of placements; None: a scene, with groups and movers as
+        in find_collisions. orthogonality_tolerance: also applies to all updates."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = None if pairs is None else as_pairs(pairs, len(packed))
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)

@@ -1,4 +1,4 @@
-"""The connection of a client, and its calls: bounded in time, and retried."""
+"""The connection of a client and its calls, with timeouts and retries."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEFAULT_TIMEOUT = 30.0
 
 
 class Assembly(Protocol[R]):
-    """The parts of an answer, put together. ValueError: they contradict each other."""
+    """Assembles the parts of an answer. ValueError: they are inconsistent."""
 
     def add(self, data: bytes) -> None:
         ...
@@ -59,8 +59,8 @@ class ClientBase:
 
     @property
     def channel(self) -> Any:
-        """gRPC's channel, for the generated stubs in hulld.v1; opened if it is not yet. Calls
-        through it carry no token."""
+        """gRPC's channel, for the generated stubs in hulld.v1; opened if necessary. Calls through
+        it carry no token."""
         return self._channel.get()
 
     def close(self) -> None:
@@ -85,7 +85,7 @@ class ClientBase:
         return self._timeout if timeout is None else arguments.seconds(timeout)
 
     def _start(self, call: Call[Any], timeout: float | None) -> Any:
-        """Starts a call with a stream of answers."""
+        """Starts a call with a streamed answer."""
         method = self._channel.call("unary_stream", call.method)
         return method(call.request, timeout=timeout, metadata=self._connection.metadata())
 
@@ -104,7 +104,7 @@ class ClientBase:
     def _parts(
         self, call: Call[T], timeout: float | None, freshness: Freshness | None = None
     ) -> Iterator[T]:
-        """The decoded messages of an answer. Retried only until the first message."""
+        """The decoded messages of an answer. Retried only before the first message."""
         call = as_fresh(call, freshness)
         attempts = Attempts(self._retry, call.safe_to_repeat, timeout)
         received = False
@@ -130,7 +130,7 @@ class ClientBase:
         timeout: float | None,
         freshness: Freshness | None,
     ) -> R:
-        """The messages of an answer, put together. Retried from the start."""
+        """The assembled messages of an answer. Retried from the start."""
         call = as_fresh(call, freshness)
         attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
         while True:

@@ -1,4 +1,4 @@
-"""Asks repeatedly while poses change."""
+"""Repeated queries while poses change."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ Update = tuple[npt.ArrayLike, PosesLike]
 
 
 class CollisionStream:
-    """One StreamCollisions call, step by step: poses are sent, and the relations of the pairs that
-    they change are received. The server keeps the witness of each pair and tries it first at the
-    next poses, so that small motions cost little.
+    """One StreamCollisions call, step by step: the client sends poses, and receives the relations
+    of the affected pairs. The server keeps the witness of each pair and tries it first at the next
+    poses, so that small motions cost little.
 
-    Never retried: the server's state ends with the stream. For one thread. A context manager, which
-    ends the call. Made by Client.stream_collisions.
+    Never retried, because the server's state ends with the stream. Not thread-safe. A context
+    manager that ends the call. Created by Client.stream_collisions.
     """
 
     def __init__(
@@ -64,13 +64,13 @@ class CollisionStream:
 
     @property
     def opened(self) -> StreamAnswer:
-        """The answer to the opening: every pair, at the first poses."""
+        """The answer to the opening message: every pair, at the first poses."""
         if self._opened is None:
             raise RuntimeError("the stream is not open yet; enter it, or await open()")
         return self._opened
 
     def _ensure_open(self) -> StreamAnswer:
-        """Opens the stream, unless it is open. Returns the answer to the opening."""
+        """Opens the stream if it is not open. Returns the answer to the opening message."""
         if self._opened is None:
             self._opened = self._ask(self._opening)
         return self._opened
@@ -79,21 +79,22 @@ class CollisionStream:
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
         """Moves placements. Answers every pair of a moved placement; with only_changes, every pair
-        with another relation.
+        whose relation changed.
 
-        placements: k indices into those of the stream, each at most once. poses: the new pose of
-        each: k x 7, k x 4 x 4, or k x 3. refresh_hulls: looks every hull up again first; a hull
-        that changed counts as moved.
+        placements: k indices into the placements of the stream, each at most once. poses: the new
+        pose of each: k x 7, k x 4 x 4, or k x 3. refresh_hulls: first resolves every hull again; a
+        hull that changed counts as moved.
 
-        ValueError, before anything is sent, and the stream goes on: an index out of range; poses
-        that are none, or not k. HulldError: the stream has ended; every later call raises it again.
+        ValueError, before anything is sent; the stream remains usable: an index out of range,
+        malformed poses, or not k of them. HulldError: the stream has ended; every later call raises
+        the error again.
         """
         moved = check_update(placements, poses, self._placements, self._orthogonality_tolerance)
         self._ensure_open()
         return self._ask(update_stream(*moved, refresh_hulls))
 
     def refresh(self) -> StreamAnswer:
-        """Looks every hull up again, and answers the pairs of changed hulls."""
+        """Resolves every hull again, and answers the pairs of changed hulls."""
         self._ensure_open()
         return self._ask(update_stream(np.empty(0, np.uint32), np.empty((0, 7)), True))
 

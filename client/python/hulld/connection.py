@@ -13,11 +13,11 @@ from typing import Any, Union
 
 DEFAULT_PORT = 50551
 DEFAULT_SERVER = f"127.0.0.1:{DEFAULT_PORT}"
-#: For several servers: round robin among all that serve.
+#: For several servers: round robin among all that are serving.
 _SPREAD_CALLS = json.dumps(
     {"loadBalancingConfig": [{"round_robin": {}}], "healthCheckConfig": {"serviceName": ""}}
 )
-#: Replies of hulld have about 1 MiB. This bounds the memory that a faulty server can claim.
+#: Replies of hulld are about 1 MiB. This limit bounds the memory that a faulty server can claim.
 _MAX_RECEIVE_BYTES = 64 << 20
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -25,11 +25,11 @@ PathLike = Union[str, "os.PathLike[str]"]
 
 @dataclass(frozen=True)
 class Tls:
-    """Encrypts the connection. Files are PEM, read when the client is made.
+    """Encrypts the connection. Files are PEM, read when the client is created.
 
-    ca_cert: the authorities that may have signed the server's certificate; None: the system's.
-    cert, key: the client's certificate and its key, for mutual TLS. server_name: the name in the
-    server's certificate, if it differs from that in the address.
+    ca_cert: the authorities that may sign the server's certificate; None: the system's. cert, key:
+    the client's certificate and its key, for mutual TLS. server_name: the name in the server's
+    certificate, if it differs from the address.
     """
 
     ca_cert: PathLike | None = None
@@ -46,8 +46,8 @@ class Tls:
 
 @dataclass(frozen=True)
 class Connection:
-    """The settings of a channel. ValueError: a malformed address or token, or a token that would
-    travel unencrypted to another machine."""
+    """The settings of a channel. ValueError: a malformed address or token, or a token that would be
+    sent unencrypted to another machine."""
 
     server: str = DEFAULT_SERVER
     tls: Tls | None = None
@@ -88,8 +88,8 @@ class Connection:
         options: list[tuple[str, Any]] = [
             ("grpc.max_receive_message_length", _MAX_RECEIVE_BYTES),
             ("grpc.max_send_message_length", -1),
-            # A retry finds a restarted server within a second. gRPC resolves the name again before
-            # it reconnects, addresses included, by default at most every 30 s.
+            # Lets a retry reach a restarted server within a second. By default, gRPC resolves the
+            # name, even an IP address, at most every 30 s before it reconnects.
             ("grpc.dns_min_time_between_resolutions_ms", 100),
             ("grpc.initial_reconnect_backoff_ms", 50),
             # The time for one connection attempt, TLS handshake included.
@@ -99,14 +99,14 @@ class Connection:
         if _is_list(self.server) or self.server.startswith("dns:///"):
             options.append(("grpc.service_config", _SPREAD_CALLS))
         if is_loopback(self.server):
-            # gRPC would use the proxy of the environment even for this machine.
+            # By default, gRPC uses the environment's proxy even for this machine.
             options.append(("grpc.enable_http_proxy", 0))
         if self.tls is not None and self.tls.server_name:
             options.append(("grpc.ssl_target_name_override", self.tls.server_name))
         return options
 
     def pem_files(self) -> tuple[bytes | None, bytes | None, bytes | None] | None:
-        """The contents of ca_cert, key, and cert, as gRPC's ssl_channel_credentials takes them;
+        """The contents of ca_cert, key, and cert, in the order of gRPC's ssl_channel_credentials;
         None without TLS. OSError: a file cannot be read."""
         if self.tls is None:
             return None
@@ -118,9 +118,9 @@ class Connection:
 
 
 def _with_port(server: Any) -> str:
-    """The address with DEFAULT_PORT if it names none. TypeError, ValueError: not an address."""
+    """The address, with DEFAULT_PORT if it has no port. TypeError, ValueError: not an address."""
     if not isinstance(server, str):
-        raise TypeError(f'server is {server!r}; it takes a string such as "{DEFAULT_SERVER}"')
+        raise TypeError(f'server is {server!r}; it must be a string such as "{DEFAULT_SERVER}"')
     if _is_list(server) or re.match(r"(unix|unix-abstract|ipv4|ipv6|vsock):|\w+:///", server):
         return server
     if _address(f"[{server}]") is not None:
@@ -128,12 +128,12 @@ def _with_port(server: Any) -> str:
     # A name or IPv4 address, or an IPv6 address in brackets; then a port.
     parts = re.fullmatch(r"([\w.-]+|\[[0-9A-Fa-f:.%\w]+\])(?::(\d{1,5}))?", server)
     if parts is None or (parts[2] is not None and not 1 <= int(parts[2]) <= 65535):
-        raise ValueError(f'server is {server!r}; it takes HOST:PORT, such as "{DEFAULT_SERVER}"')
+        raise ValueError(f'server is {server!r}; it must be HOST:PORT, such as "{DEFAULT_SERVER}"')
     return server if parts[2] else f"{server}:{DEFAULT_PORT}"
 
 
 def is_loopback(server: str) -> bool:
-    """True if every server named is on this machine; False for DNS names but localhost."""
+    """True if every listed server is on this machine; False for DNS names other than localhost."""
     return server.startswith("unix:") or all(
         _is_loopback_host(one.rpartition(":")[0]) for one in server.split(",")
     )
@@ -154,8 +154,8 @@ def _ip_version(servers: str) -> int:
         address = _address(host)
         if address is None:
             raise ValueError(
-                f"{host!r} is a name, and a list takes IP addresses; several servers may also "
-                "have one name in DNS, as in dns:///hulls.example:50551"
+                f"{host!r} is a name, but a list must contain IP addresses; alternatively, give "
+                "several servers one DNS name, as in dns:///hulls.example:50551"
             )
         versions.add(address.version)
     if len(versions) > 1:
@@ -179,10 +179,10 @@ def _is_loopback_host(host: str) -> bool:
 
 
 def read_token_file(path: PathLike) -> str:
-    """The token in a file, as `hullctl token new --token-out` writes it.
+    """The token in a file written by `hullctl token new --token-out`.
 
-    ValueError: other users can read the file, or it holds no token. OSError: it cannot be read. No
-    error repeats its text.
+    ValueError: other users can read the file, or it contains no token. OSError: it cannot be read.
+    Errors never quote the token.
     """
     info = os.stat(path)
     if stat.S_ISREG(info.st_mode) and info.st_mode & 0o077:
@@ -192,7 +192,7 @@ def read_token_file(path: PathLike) -> str:
     words = pathlib.Path(path).read_text(encoding="ascii", errors="replace").split()
     if len(words) != 1:
         raise ValueError(
-            f"{os.fspath(path)}: not a file of one token, as 'hullctl token new --token-out' "
-            "writes it"
+            f"{os.fspath(path)}: it must contain exactly one token, as written by 'hullctl token "
+            "new --token-out'"
         )
     return words[0]

@@ -41,13 +41,13 @@ _ERROR_INFO = "google.rpc.ErrorInfo"
 
 
 class HulldError(Exception):
-    """A failed call. Programs read the class or `code`, `reason`, and `metadata`; the text is for
-    people and may change.
+    """A failed call. Programs should use the class, or `code`, `reason`, and `metadata`; the text
+    is for people and may change.
 
-    code: gRPC's status, as in "NOT_FOUND". message: the problem, and the remedy. reason: the name
+    code: gRPC's status, as in "NOT_FOUND". message: the problem and its remedy. reason: the name
     in proto/hulld/v1/error.proto, as in "HULL_NOT_FOUND"; None for errors of gRPC itself. metadata:
-    details of the reason, as in {"hull_id": "arm"}. request_id: of the call in the server's log,
-    or None. retry_after: the seconds to wait before a retry, if the server allows one; else None.
+    details of the reason, as in {"hull_id": "arm"}. request_id: of the call in the server's log, or
+    None. retry_after: the seconds to wait before a retry, if the server allows one; else None.
     """
 
     code = "UNKNOWN"
@@ -129,27 +129,28 @@ class PermissionDeniedError(HulldError):
 
 
 class ResourceExhaustedError(HulldError):
-    """A limit is exceeded; metadata["flag"] names it. With retry_after: only for now."""
+    """A limit is exceeded; metadata["flag"] names it. Temporary if retry_after is set."""
 
     code = "RESOURCE_EXHAUSTED"
 
 
 class FailedPreconditionError(HulldError):
-    """The hull was deleted or replaced while a stream was open, a chunk is missing, the store
-    keeps nothing to save, the client is closed, or the process was forked with an open client."""
+    """The hull was deleted or replaced while a stream was open, a chunk is missing, the store is in
+    memory and cannot be saved, the client is closed, or the process was forked with an open
+    client."""
 
     code = "FAILED_PRECONDITION"
 
 
 class AbortedError(HulldError):
-    """The hull is not at the revision that the request expects; metadata["current_revision"] is its
+    """The hull is not at the revision required by the request; metadata["current_revision"] is its
     revision."""
 
     code = "ABORTED"
 
 
 class UnimplementedError(HulldError):
-    """The server does not know the call."""
+    """The server does not implement the call."""
 
     code = "UNIMPLEMENTED"
 
@@ -210,7 +211,7 @@ def error_class(code: str) -> type[HulldError]:
 
 
 def read_answer(read: Callable[[D], T], data: D) -> T:
-    """Reads data of the server. InternalError: it is malformed, or contradicts itself."""
+    """Reads data from the server. InternalError: the data is malformed or inconsistent."""
     try:
         return read(data)
     except HulldError:
@@ -250,7 +251,7 @@ def _error_info(details: Any) -> tuple[str | None, dict[str, str]]:
             if detail.type_url.endswith("/" + _ERROR_INFO):
                 info.ParseFromString(detail.value)
     except DecodeError:
-        # The status stands without malformed details.
+        # Keeps the status if the details are malformed.
         return None, {}
     if info.domain != "hulld":
         return None, {}

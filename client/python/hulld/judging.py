@@ -1,4 +1,4 @@
-"""Judges the answers of another program by exact ones."""
+"""Judges another program's answers against exact ones."""
 
 from __future__ import annotations
 
@@ -34,23 +34,23 @@ _COLUMNS = ("a", "b", "poses_a", "poses_b", "end_poses_a", "end_poses_b", *_ANSW
 class Fault(IntEnum):
     """A defect of an answer."""
 
-    #: Separated hulls are said to collide.
+    #: Separated hulls are reported as colliding.
     FALSE_CONTACT = 0
-    #: Overlapping hulls are said to be separated.
+    #: Overlapping hulls are reported as separated.
     MISS = 1
-    #: Another relation is said of touching hulls, or touching is said of overlapping ones.
+    #: Touching hulls are reported with another relation, or overlapping hulls as touching.
     TOUCHING_MISTAKEN = 2
     DISTANCE = 3
     DEPTH = 4
-    #: The time of the first contact is outside of the proven bracket.
+    #: The time of the first contact is outside the proven bracket.
     TIME = 5
 
 
 @dataclass(frozen=True)
 class WrongAnswer:
-    """A wrong answer. row: of the table, from 0. error: the largest length by which it is wrong, of
-    a motion the time; 0 if touching hulls are mistaken. answer: the exact one; its certificate was
-    verified."""
+    """A wrong answer. row: of the table, from 0. error: the largest length by which it is wrong, or
+    for a motion the time; 0 if only touching hulls were misjudged. answer: the exact answer; its
+    certificate was verified."""
 
     row: int
     faults: tuple[Fault, ...]
@@ -70,9 +70,9 @@ class WrongAnswer:
 @dataclass(frozen=True, repr=False)
 class Judged:
     """The result of judge. wrong: worst first. counts: wrong answers by fault; an answer may have
-    several. failed: by row, why there is no exact answer. distance_errors, depth_errors: n, the
-    absolute errors; NaN where none was given. time_errors: n, how far times of contact are outside
-    of the proven brackets."""
+    several. failed: by row, the reason for a missing exact answer. distance_errors, depth_errors:
+    n, the absolute errors; NaN where the table has no value. time_errors: n, the distances of
+    contact times from the proven brackets."""
 
     answers: int
     wrong: Sequence[WrongAnswer]
@@ -114,7 +114,7 @@ class _Table:
     contact_times: npt.NDArray[np.float64]
 
     def parts(self, rows: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
-        """Splits rows into those of a call each, all at rest or all in motion."""
+        """Splits rows into groups for one call each, all at rest or all in motion."""
         for moves in (False, True):
             kind = rows[self.moves[rows] == moves]
             for first in range(0, len(kind), _ROWS_PER_CALL):
@@ -140,12 +140,12 @@ def judge(
     poses_a, poses_b (as in pack_poses; default: identity), end_poses_a, end_poses_b (of motions;
     default: the poses), and at least one of relation (SEPARATED, TOUCHING, OVERLAPPING, or
     hulld.Relation), colliding (boolean), distance (negative: minus a depth), depth, and
-    contact_time (0 to 1, of a motion), NaN or empty where there is no answer. Or the path of a .npz
-    file with these arrays, or of a CSV file as `hullctl judge` reads it. hulls: points, n x 3, by
-    name. max_error: a distance or depth is wrong if its error exceeds this for certain, by the
-    proven bound; 0: as exact as that. max_time_error: how far a time of contact may be outside of
-    the proven bracket. client: None: a private server, which knows no IDs. timeout: of each
-    call.
+    contact_time (0 to 1, for a motion), with NaN or an empty entry for a missing answer.
+    Alternatively, the path of an .npz file with these arrays, or of a CSV file in the format of
+    `hullctl judge`. hulls: points, n x 3, by name. max_error: a distance or depth is wrong if its
+    error certainly exceeds this, given the proven bound; 0: as exact as the bound. max_time_error:
+    how far a contact time may be outside the proven bracket. client: None: a private server, which
+    has no hulls. timeout: of each call.
 
     ValueError: the table is malformed. VerificationError: a certificate does not prove the server's
     answer.
@@ -174,7 +174,7 @@ def _read(path: str | os.PathLike[str]) -> dict[str, Any]:
     with open(path, newline="", encoding="utf-8") as file:
         lines = [line for line in file if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
-        raise ValueError(f"{os.fspath(path)}: the table holds no answers")
+        raise ValueError(f"{os.fspath(path)}: the table contains no answers")
     dialect = next((mark for mark in ";\t," if mark in lines[0]), ",")
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=dialect)]
     header = [name.lower() for name in rows[0]]
@@ -190,7 +190,7 @@ def _read(path: str | os.PathLike[str]) -> dict[str, Any]:
         pose[:, 0] = f"{side}_qw" not in cells
         columns[f"poses_{side}"] = _read_poses(os.fspath(path), cells, side, pose, empty=0.0)
         end = _read_poses(os.fspath(path), cells, f"{side}_to", pose.copy(), empty=math.nan)
-        # A cell that is not given is that of the start.
+        # A missing cell is the same as at the start.
         columns[f"end_poses_{side}"] = np.where(np.isnan(end), pose, end)
     return columns
 
@@ -241,10 +241,10 @@ def _as_table(columns: Mapping[str, Any], orthogonality_tolerance: float) -> _Ta
     moves = ((starts[0] != ends[0]) | (starts[1] != ends[1])).any(axis=1)
     times = _lengths(columns.get("contact_time"), count, "contact_time", 0.0)
     _refuse(times > 1, "contact_time[{}] is above 1, the end of the motion")
-    _refuse(~np.isnan(times) & ~moves, "contact_time[{}] is that of no motion; give an end pose")
+    _refuse(~np.isnan(times) & ~moves, "contact_time[{}] requires a motion; pass an end pose")
     for name in ("distance", "depth"):
         given = ~np.isnan(_lengths(columns.get(name), count, name, -math.inf))
-        _refuse(given & moves, name + "[{}] is that of a motion; only pairs at rest have one")
+        _refuse(given & moves, name + "[{}] is set for a motion; only pairs at rest have one")
     return _Table(
         ([str(name) for name in columns["a"]], [str(name) for name in columns["b"]]),
         starts,
@@ -316,7 +316,7 @@ def _booleans(values: Any, count: int) -> npt.NDArray[np.float64]:
 
 
 class _Asking:
-    """Asks about rows of a table."""
+    """Queries the rows of a table."""
 
     def __init__(
         self, client: Client, table: _Table, hulls: Mapping[str, PointsLike], timeout: float | None
@@ -343,7 +343,7 @@ class _Asking:
         )
 
     def ask(self, rows: npt.NDArray[np.int64], prove: bool = False) -> Batch:
-        """prove: with certificates, and separations that are the nearest doubles."""
+        """prove: requests certificates, and separations rounded to the nearest double."""
         first = np.arange(len(rows))
         rests = not self._table.moves[rows].any()
         return self.client.check_collisions(
@@ -432,7 +432,7 @@ def _failed(
 def _judge_motions(
     table: _Table, rows: npt.NDArray[np.int64], batch: Batch, max_error: float
 ) -> _Findings:
-    """TOUCHING and OVERLAPPING are one; no contact counts as one at the end."""
+    """TOUCHING and OVERLAPPING count as the same; no contact counts as a contact at the end."""
     truth = batch.answers.relations
     until, contact = batch.answers.separated_until, batch.answers.contact_times
     assert until is not None and contact is not None
@@ -469,7 +469,7 @@ def _judge_motions(
 def _collect(
     asking: _Asking, table: _Table, found: Sequence[_Findings], limits: tuple[float, float]
 ) -> Judged:
-    """Asks for the certificates of the wrong answers, and verifies them."""
+    """Requests the certificates of the wrong answers, and verifies them."""
     order = np.argsort(np.concatenate([np.empty(0, np.int64), *(part.rows for part in found)]))
 
     def all_of(values: Sequence[npt.NDArray[Any]], none: npt.NDArray[Any]) -> npt.NDArray[Any]:

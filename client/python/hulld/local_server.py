@@ -1,4 +1,4 @@
-"""A server for a script or a test, which ends with it."""
+"""A server for a script or a test that ends with the process."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ if TYPE_CHECKING:
     from hulld.aio import AsyncClient
 
 _LISTENING = re.compile(r"listening on (\S+)")
-#: The last lines of the server's log that are kept.
+#: Number of lines kept from the end of the server's log.
 _LINES = 200
 _START_SECONDS = 60.0
-#: The hulls of check() that are kept for further calls.
+#: Number of hulls of check() kept for later calls.
 _MOST_SHAPES = 64
 _STOP_SECONDS = 10.0
-# Its input is a pipe from us: it ends when we end, however that happens, and takes the server
-# along, and its folder, $0.
+# Its input is a pipe from this process: when this process ends in any way, the script ends, stops
+# the server, and removes its folder, $0.
 _KEEPER = """
 "$@" 3<&- </dev/null & child=$!
 trap 'kill "$child" 2>/dev/null' TERM
@@ -50,11 +50,12 @@ exit "$code"
 
 class LocalServer:
     """A hulld process on a socket of its own, in a directory that no other user can enter. It runs
-    from `start` to `stop`, and ends with this process in any case. A context manager.
+    from `start` to `stop`, and always ends with this process. A context manager.
 
-    data_dir: keeps the hulls on disk there; None: in memory, until it ends. options: more flags of
-    hulld, as in ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, else the PATH, else
-    a build in the checkout around the working directory. FileNotFoundError: it is not found.
+    data_dir: keeps the hulls there on disk; None: in memory, until the server ends. options:
+    further flags of hulld, as in ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, or
+    else the PATH, or else a build in the checkout around the working directory. FileNotFoundError:
+    the program is not found.
     """
 
     def __init__(
@@ -76,21 +77,22 @@ class LocalServer:
 
     @property
     def address(self) -> str:
-        """For Client, hullctl and any other client on this machine. Requires that it runs."""
+        """The address, for Client, hullctl, and any other client on this machine. Requires a
+        running server."""
         if not self._address:
             raise RuntimeError(
-                "the server does not run; call start(), or use it as a context manager"
+                "the server is not running; call start(), or use it as a context manager"
             )
         return self._address
 
     @property
     def log(self) -> list[str]:
-        """The last lines that it logged."""
+        """The last lines that the server logged."""
         return list(self._log)
 
     def start(self) -> LocalServer:
-        """Returns when the server listens. RuntimeError: it ended instead; the message has its
-        output."""
+        """Starts the server, and returns when it is listening. RuntimeError: the server ended
+        instead; the message contains its output."""
         if self._process is not None:
             return self
         folder = tempfile.mkdtemp(prefix="hulld-")
@@ -109,11 +111,12 @@ class LocalServer:
             *store,
             *self._options,
         ]
-        # Settings of the caller's own server are not meant for this one.
+        # Settings for the caller's own server do not apply to this one.
         environment = {
             name: value for name, value in os.environ.items() if not name.startswith("HULLD_")
         }
-        # A session of its own: Ctrl-C in a terminal is for the script, which then ends the server.
+        # A separate session, so that Ctrl-C in a terminal reaches only the script, which then ends
+        # the server.
         self._process = subprocess.Popen(
             ["sh", "-c", "exec 3<&0; " + _KEEPER, folder, *command],
             stdin=subprocess.PIPE,
@@ -130,7 +133,7 @@ class LocalServer:
         if not self._listening.wait(_START_SECONDS) or not self._address:
             self.stop()
             raise RuntimeError(
-                "hulld did not start: " + ("\n".join(self._log) or "it said nothing")
+                "hulld did not start: " + ("\n".join(self._log) or "it printed nothing")
             )
         return self
 
@@ -144,12 +147,12 @@ class LocalServer:
         self._listening.set()
 
     def stop(self) -> None:
-        """Ends it, and returns when it has ended."""
+        """Ends the server, and returns when it has ended."""
         process, self._process = self._process, None
         if process is None:
             return
         assert process.stdin is not None and process.stdout is not None and self._reader is not None
-        # Both, as a copy of this process may hold the pipe, too.
+        # Both, because a copy of this process may also hold the pipe.
         process.stdin.close()
         process.terminate()
         try:
@@ -232,17 +235,17 @@ def local(
         with hulld.local() as client:
             ...
 
-    The arguments are those of LocalServer; further ones are for the client, such as timeout. The
-    server ends with the context, and its hulls with it unless data_dir keeps them. `async with`
-    gives an AsyncClient.
+    The arguments are those of LocalServer; others, such as timeout, are passed to the client. The
+    server ends with the context, and its hulls are lost unless data_dir is set. `async with` gives
+    an AsyncClient.
     """
     return Local(LocalServer(data_dir=data_dir, options=options, binary=binary), client)
 
 
 @functools.cache
 def _shared() -> tuple[Client, threading.Lock, collections.OrderedDict[str, None]]:
-    """The client of a server in memory that ends with this process; a lock for check(), and the IDs
-    of its hulls, the oldest first."""
+    """The client of an in-memory server that ends with this process; the lock of check(), and the
+    IDs of its hulls, oldest first."""
     return Client(LocalServer().start().address), threading.Lock(), collections.OrderedDict()
 
 
@@ -250,7 +253,7 @@ _starting = threading.Lock()
 
 
 def shared_client() -> Client:
-    """The client of a server in memory that all of this process shares. It starts at the first
+    """The client of an in-memory server shared by the whole process. It starts at the first
     call."""
     with _starting:
         return _shared()[0]
@@ -271,8 +274,9 @@ def check(
         hulld.check(points_a, points_b, separation=True).separation.value
 
     a, b: n x 3 points, or objects with `vertices` or `points`, as in append_points. radius_a,
-    radius_b: as in Placement; one point with a radius is a sphere. query: the keyword arguments of Client.check_collision. A server in memory answers; it starts at the first
-    call, ends with this process, and keeps the latest 64 point sets.
+    radius_b: as in Placement; one point with a radius is a sphere. query: the keyword arguments of
+    Client.check_collision. An in-memory server answers; it starts at the first call, ends with this
+    process, and keeps the latest 64 point sets.
     """
     points = [as_points(a, "a"), as_points(b, "b")]
     client = shared_client()

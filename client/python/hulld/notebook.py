@@ -1,7 +1,7 @@
 """Answers in notebooks: a table, and the viewer's page if hullctl is found.
 
-The page is 1.1 MB, all but some kilobytes of it the same for every answer. The first cell of a
-process carries this part, compressed; the frames of all cells are filled from there.
+The page is 1.1 MB, of which all but a few kilobytes are the same for every answer. The first cell
+of a process contains this common part, compressed; the frames of all cells are filled from there.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _carriers: dict[str, str | None] = {}
 
 
 class Viewer:
-    """Asks `hullctl view --html` for a page. It gets server, TLS and token as the client has them;
-    the token travels in the environment, where no list of processes shows it."""
+    """Asks `hullctl view --html` for a page. It uses the client's server, TLS settings, and token;
+    the token is passed in the environment, so that no process list shows it."""
 
     def __init__(self, connection: Connection | None, missing: str = "") -> None:
         self._connection = connection
@@ -59,7 +59,7 @@ class Viewer:
 
     @classmethod
     def absent(cls, why: str) -> Viewer:
-        """One that shows tables only."""
+        """A viewer that shows only tables."""
         return cls(None, why)
 
     def html(
@@ -68,8 +68,8 @@ class Viewer:
         shown: Placements | Sequence[str],
         pairs: Sequence[tuple[int, int]] = (),
     ) -> str:
-        """A table of `rows`, without None, and the page of `shown`, IDs or placements, or the
-        reason for its absence. Never raises: a notebook would show the error in place of the
+        """A table of the `rows` that are not None, and the page for `shown` (IDs or placements), or
+        the reason why it is missing. Never raises: a notebook would show the error instead of the
         answer."""
         body = "".join(
             f"<tr><th style='text-align:left'>{html.escape(str(name))}</th><td "
@@ -143,16 +143,18 @@ class Viewer:
 
 
 def _frame_of(page: str) -> str:
-    """A frame of its own, so that the page's script reaches nothing of the notebook; and what fills
-    it."""
+    """A separate frame, so that the page's script cannot access the notebook, and the script that
+    fills it."""
     before, start, rest = page.partition(_START)
     recording, end, after = rest.partition(_END)
     if not end:
-        raise ValueError("this hullctl writes pages of another form; use that of the same version")
+        raise ValueError(
+            "this hullctl writes pages in a different format; use the hullctl of the same version"
+        )
     shell = gzip.compress((before + start + _MARK + end + after).encode(), mtime=0)
     key = hashlib.blake2b(shell, digest_size=8).hexdigest()
     carrier = ""
-    # A cell that runs again replaces its output.
+    # Running a cell again replaces its output.
     if key not in _carriers or _carriers[key] == (_cell() or ""):
         _carriers[key] = _cell()
         carrier = f"<div hidden id='hulld-{key}'>{base64.b64encode(shell).decode()}</div>"
@@ -167,7 +169,7 @@ def _frame_of(page: str) -> str:
 
 
 def _cell() -> str | None:
-    """The ID of the notebook's cell that runs; None: unknown."""
+    """The ID of the running notebook cell; None if unknown."""
     try:
         return str(sys.modules["IPython"].get_ipython().get_parent()["metadata"]["cellId"])
     except (AttributeError, KeyError, TypeError):
@@ -175,7 +177,7 @@ def _cell() -> str | None:
 
 
 def scene_json(placements: Placements, pairs: Sequence[tuple[int, int]]) -> str:
-    """A scene as hullctl reads it. Numbers read back as the same doubles."""
+    """A scene in the format of hullctl. Numbers read back as the same doubles."""
 
     def pose(numbers: list[float]) -> dict[str, dict[str, float]]:
         return {

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 def find_program(name: str) -> pathlib.Path:
     """Finds a program: by HULLD_BINARY (for hulld) or HULLCTL_BINARY, then in the directory of
     HULLD_BINARY, on the PATH, or in the newest build of the hulld checkout around the working
-    directory or this package. FileNotFoundError lists these places."""
+    directory or this package. FileNotFoundError lists the searched locations."""
     variable = f"{name.upper()}_BINARY"
     named = os.environ.get(variable)
     if named:
@@ -39,7 +39,7 @@ def find_program(name: str) -> pathlib.Path:
 
 
 def _checkouts() -> Iterator[pathlib.Path]:
-    """The trees of hulld's sources above the working directory and above this file."""
+    """The hulld source trees above the working directory and above this file."""
     for start in (pathlib.Path.cwd(), pathlib.Path(__file__).resolve().parent):
         for folder in (start, *start.parents):
             if (folder / "proto/hulld/v1/hull.proto").is_file():

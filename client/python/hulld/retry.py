@@ -10,13 +10,13 @@ from hulld.errors import HulldError, ResourceExhaustedError, UnavailableError
 
 @dataclass(frozen=True)
 class RetryPolicy:
-    """Calls that are safe to repeat are retried after UNAVAILABLE (the server was not reached, or
-    is draining), and if it is overloaded and says when to retry. They are retried until their
-    timeout has passed, so that a call outlives a restart of the server. Waits double from
-    initial_backoff to max_backoff, in seconds, and are at least as long as the server asks.
+    """Calls that are safe to repeat are retried after UNAVAILABLE (the server is unreachable or
+    draining), and if the server is overloaded and sends a retry hint. Retries continue until the
+    timeout, so that a call outlives a server restart. The backoff doubles from initial_backoff to
+    max_backoff, in seconds, and is at least the server's hint.
     """
 
-    #: In all; 1 turns retries off, None leaves only the timeout.
+    #: Total attempts; 1 disables retries; with None, only the timeout applies.
     max_attempts: int | None = None
     initial_backoff: float = 0.1
     max_backoff: float = 2.0
@@ -29,8 +29,8 @@ class RetryPolicy:
 
     def wait_after(self, failures: int, error: HulldError, remaining: float | None) -> float | None:
         """The seconds to wait after `failures` >= 1 failed attempts, the last of which ended with
-        `error`; None: give up, because it may not be retried, the attempts are used up, or the wait
-        would pass the deadline, `remaining` seconds away.
+        `error`; None: give up, because the error does not permit a retry, the attempts are
+        exhausted, or the wait would pass the deadline, `remaining` seconds away.
         """
         if not may_retry(error):
             return None

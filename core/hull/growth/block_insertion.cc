@@ -28,7 +28,7 @@ constexpr double kFineMapFineness = 5.6;
 constexpr double kWalksPerSurvivor = 0.6;
 
 // Share of duplicates in a sample above which the rest of the block is inserted in rounds, whose
-// order makes neighbors share memory.
+// order places neighbors close in memory.
 constexpr double kMostDuplicates = 0.875;
 
 // One call of InsertBlock.
@@ -174,7 +174,7 @@ class BlockInsertion {
       const std::span<const Vector> points = points_.subspan(range.first, range.end - range.first);
       indices_.clear();
       surface_.directions()->AppendSurvivors(points, indices_, poll_);
-      // Gathered while they are in the cache.
+      // Gathered while the points are in the cache.
       for (const uint32_t i : indices_) {
         if (!IsDone(range.first + i)) survivors.push_back(points[i]);
       }
@@ -192,8 +192,8 @@ class BlockInsertion {
     return survivors;
   }
 
-  // Inserts in rounds the points that conflict lists gave up, and the points that no sample
-  // contained.
+  // Inserts, in rounds, the points that the conflict lists abandoned and the points that were in no
+  // sample.
   bool InsertRounds() {
     surface_.BeginInsertions(vertices_);
     if (stride_before_ != 1) AppendSample(1, rest_);
@@ -203,7 +203,7 @@ class BlockInsertion {
   Surface& surface_;
   VertexTable& vertices_;
   std::span<const Vector> points_;
-  // Indices of points to skip; few.
+  // Indices of the few points to skip.
   std::vector<uint32_t> done_;
   StopPoll& poll_;
   // The stride of the previous sample; 0 if there is none.

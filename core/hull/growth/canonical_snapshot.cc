@@ -29,8 +29,8 @@ void Sort(std::span<Ranked> vertices) {
 
 // Sorts into canonical order. If the poll stopped, the result is meaningless.
 //
-// The x of most hulls are spread out, so as many slices across x as there are vertices leave few
-// vertices in each, and comparisons are needed only within a slice. The slice of an x is a
+// The x coordinates of most hulls are spread out. With as many slices across x as vertices, each
+// slice has few vertices, and comparisons are needed only within a slice. The slice of an x is a
 // composition of rounded monotonic operations, so slices are in order for any rounding.
 std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) {
   // A range with a length that overflows or is zero is not sliced.
@@ -73,7 +73,7 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) 
   return sorted;
 }
 
-// The canonical order of vertices: index_of[id] is the place of vertex `id` in `points`.
+// The canonical order of vertices: index_of[id] is the index of vertex `id` in `points`.
 struct Ranking {
   std::vector<Vector> points;
   std::vector<uint32_t> index_of;
@@ -111,8 +111,8 @@ struct Faces {
 //
 // An edge between facets is traversed once in each direction, each time with another facet to the
 // left. It is recorded at its lower vertex, together with the facet to the left if it is the first
-// edge of that facet. The few edges recorded at a vertex are sorted by their higher vertex. Edges
-// and facets then come out in canonical order, because the second vertex alone distinguishes a
+// edge of that facet. The few edges recorded at a vertex are sorted by their higher vertex. This
+// yields edges and facets in canonical order, because the second vertex alone distinguishes a
 // facet from the other facets that start at the same vertex.
 class FaceCollector {
  public:

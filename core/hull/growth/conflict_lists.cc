@@ -10,7 +10,7 @@ namespace {
 
 // Poll steps for one insertion, which also moves the points of the lists that it changes.
 constexpr uint64_t kStepsPerInsertion = 4;
-// Number of insertions after which it is clear if most points are inside.
+// Number of insertions after which it is clear whether most points are inside.
 constexpr size_t kTrialInsertions = 24;
 // Average moves of a point above which another order of insertion is better. Observed: at most 8
 // for clouds and meshes with most points inside.
@@ -41,7 +41,7 @@ void ConflictLists::Take(std::span<const Vector> points, std::span<const Triangl
   CountTaken(points);
   sample_size_ = sample_size;
   std::vector<TriangleId> targets;
-  // Place among the targets, from 1, by triangle.
+  // Position among the targets, from 1, by triangle.
   std::vector<uint32_t> place(surface_.id_bound(), 0);
   counts_.assign(1, 0);
   for (const TriangleId id : seen) {
@@ -82,8 +82,8 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
   return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
 }
 
-// True if most points are outside, judged after the first insertions. These add far points, so most
-// of a cloud is inside by then, or never will be.
+// True if most points are outside, judged after the first insertions. These add far points, so if
+// most of a cloud is not inside by then, it never will be.
 bool ConflictLists::IsMostlyOutside(size_t insertions) {
   if (insertions != kTrialInsertions) return false;
   return 8 * (waiting_ + insertions) > 7 * sample_size_;
@@ -213,8 +213,8 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
     const uint32_t count = counts_[k + 1];
     const size_t blocks = BlocksFor(count);
     cursors_[k + 1] = end_ * PointBlock::kSize;
-    // Branch-free, because it is unpredictable if a target gets points: an empty list fills a free
-    // block.
+    // Branch-free because it is unpredictable whether a target gets points: an empty list fills a
+    // free block.
     HULLD_DCHECK(end_ + blocks < capacity_);
     lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
     *queued = targets[k];
@@ -234,7 +234,7 @@ void ConflictLists::Reserve(size_t blocks) {
   size_t kept = 0;
   for (const List& list : lists_) kept += BlocksFor(list.count);
   for (const List& list : sources_) kept += BlocksFor(list.count);
-  // More room makes moves of all blocks rarer; most of it is never touched.
+  // Spare room makes moves of all blocks rarer; most of it is never touched.
   capacity_ = 4 * (kept + blocks);
   // Lists store block numbers in 32 bits.
   HULLD_CHECK(capacity_ <= UINT32_MAX);

@@ -29,8 +29,8 @@ class ConflictLists {
     kDone,
     // The poll stopped.
     kStopped,
-    // The points are moved so often, or so many of them are outside, that another order of
-    // insertion is faster; see TakeRest.
+    // Points are moved so often, or so many are outside, that another order of insertion is faster;
+    // see TakeRest.
     kGaveUp
   };
 
@@ -39,10 +39,10 @@ class ConflictLists {
   ConflictLists(Surface& surface, VertexTable& vertices, StopPoll& poll)
       : surface_(surface), vertices_(vertices), poll_(poll) {}
 
-  // Takes points at any location; points inside are counted and dropped. Requires: no pending
-  // points. Cost: one test per point and triangle of the surface.
+  // Accepts points at any location; counts and drops points inside. Requires: no pending points.
+  // Cost: one test per point and triangle of the surface.
   void Take(std::span<const Vector> points);
-  // Takes the points outside of a sample of sample_size points; points[i] sees seen[i] strictly.
+  // Accepts the outside points of a sample of sample_size points; points[i] sees seen[i] strictly.
   // Requires: no pending points.
   void Take(std::span<const Vector> points, std::span<const TriangleId> seen, size_t sample_size);
 
@@ -92,11 +92,11 @@ class ConflictLists {
   // Triangles that have had a list, in the order of processing.
   ScratchList<TriangleId> queue_;
   size_t next_in_queue_ = 0;
-  // Number of points in lists, of points taken, and of moves of a point.
+  // Numbers of points in lists, of points accepted, and of moves of points.
   size_t waiting_ = 0;
   size_t taken_ = 0;
   size_t moved_ = 0;
-  // Number of points of the last sample, including those that were not taken.
+  // Number of points of the last sample, including points that were not accepted.
   size_t sample_size_ = 0;
   // Largest absolute coordinate of a point.
   double size_ = 0;

@@ -28,7 +28,7 @@ namespace {
 constexpr size_t kInsertionsPerPoll = 256;
 // Number of points sampled, up to a factor of two, to find some that are extreme along the axes.
 constexpr size_t kExtremesSample = 4096;
-// Number of points from which on the order of insertion matters.
+// Number of points at which the order of insertion starts to matter.
 constexpr size_t kWorthOrdering = 128;
 
 // Branch-free except for the loop, so that the compiler vectorizes it.
@@ -62,7 +62,7 @@ std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
   Vector highest = points[0];
   for (size_t i = 0; i < points.size(); i += stride) {
     const Vector& p = points[i];
-    // One branch that is rarely taken, rather than six.
+    // One rarely taken branch instead of six.
     const auto is_new = [&](int k) { return int{p[k] < lowest[k]} | int{p[k] > highest[k]}; };
     if ((is_new(0) | is_new(1) | is_new(2)) == 0) continue;
     for (int k = 0; k < 3; ++k) {

@@ -18,7 +18,7 @@ namespace hulld {
 // Classification of a block's points. received = outside + duplicate + inside.
 struct PointCounts {
   uint64_t received = 0;
-  // Points that became vertices and are vertices of the hull after the block.
+  // Points that became vertices and still are after the block.
   uint64_t outside = 0;
   // Points equal to a vertex of the hull after the block, beyond the first.
   uint64_t duplicate = 0;
@@ -37,11 +37,11 @@ struct PointCounts {
 
 // Limits of a call of HullBuilder::Add.
 struct AddLimits {
-  // The most vertices of the hull after the block.
+  // Maximum number of vertices of the hull after the block.
   size_t max_vertices = std::numeric_limits<size_t>::max();
   // Polled within each block of more than one point, about every millisecond; true ends the call
-  // with CANCELLED. May be empty. A single insertion is not interrupted: it takes some 50 ns for
-  // each triangle removed or created.
+  // with CANCELLED. May be empty. A single insertion is not interrupted: it takes about 50 ns per
+  // triangle removed or created.
   std::function<bool()> should_stop;
 };
 
@@ -61,10 +61,10 @@ class HullBuilder {
   ~HullBuilder();
 
   // Adds a block: all of it, or nothing if the result is an error. points: n x 3, the caller's
-  // length unit. -0 is stored as +0. If the limits may end the call, a journal of the previous
-  // state of each changed triangle and vertex allows it to be undone. Errors: INVALID_ARGUMENT
-  // "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED if the hull would exceed
-  // limits.max_vertices; CANCELLED if limits.should_stop returned true.
+  // length unit. -0 is stored as +0. If the limits may end the call, a journal records the previous
+  // state of each changed triangle and vertex, so that the call can be undone. Errors:
+  // INVALID_ARGUMENT "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED if the hull would
+  // exceed limits.max_vertices; CANCELLED if limits.should_stop returned true.
   absl::StatusOr<PointCounts> Add(std::span<const Vector> points, const AddLimits& limits = {});
 
   int dimension() const;
@@ -89,8 +89,8 @@ class HullBuilder {
   // to check that no single point stalls.
   uint64_t housekeeping_steps() const;
 
-  // Returns the canonical snapshot of all points added so far. Cost: O(V log V), usually O(V): a
-  // quarter to four tenths of the cost of adding points that all are vertices.
+  // Returns the canonical snapshot of all points added so far. Cost: O(V log V), usually O(V): 25
+  // to 40 % of the cost of adding the points if all are vertices.
   Hull Snapshot() const;
   // Cancellable Snapshot. CANCELLED: should_stop, which may be empty, returned true. It is polled
   // every 1024 vertices and triangles, in several passes.

@@ -17,7 +17,7 @@ constexpr size_t kFirstRound = 64;
 constexpr double kRoundMapFineness = 2.8;
 constexpr double kRoundWalksPerPoint = 0.2;
 
-// Odd, and far from any power of two: consecutive numbers get distant ranks.
+// Odd and far from any power of two, so that consecutive numbers get distant ranks.
 constexpr uint32_t kMultiplier = 0x9E3779B1u;
 
 // Returns the inverse of an odd number modulo 2^32, by Newton's iteration: each step doubles the
@@ -47,7 +47,7 @@ constexpr int kGridBits = 14;
 constexpr int kPlaceBits = 3 + 2 * kGridBits;
 static_assert(kPlaceBits <= 32);
 
-// The result is unsorted if the poll stops.
+// Leaves the result unsorted if the poll stops.
 void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch, StopPoll& poll) {
   constexpr size_t kWorthRadix = 2048;
   if (keys.size() < kWorthRadix) {

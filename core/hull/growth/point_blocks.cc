@@ -10,7 +10,7 @@ namespace {
 using Lanes = double __attribute__((vector_size(32)));
 using Mask = int64_t __attribute__((vector_size(32)));
 
-// One body for both instruction sets. Not contracted to FMA, so both round alike.
+// One body for both instruction sets. Not contracted to FMA, so both round identically.
 __attribute__((always_inline)) inline bool MatchPlanesBody(
     std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
     int64_t* matches) {
@@ -59,7 +59,7 @@ __attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock*
 }
 #endif
 
-// Finds the best of each lane, then the best lane, the first of equal ones.
+// Finds the best point of each lane, then the best lane; the first one wins ties.
 __attribute__((always_inline)) inline size_t FarthestAlongBody(std::span<const PointBlock> blocks,
                                                                size_t count,
                                                                const Vector& direction) {

@@ -23,8 +23,8 @@ struct PointBlock {
     y[i] = p.y();
     z[i] = p.z();
   }
-  // Component by component: compilers copy a whole object by a string instruction, which takes
-  // longer to start than this entire function.
+  // Copies component by component: compilers copy a whole object with a string instruction, which
+  // takes longer to start than this entire function.
   void Fill(const Vector& p) {
     for (size_t i = 0; i < kSize; ++i) Set(i, p);
   }
@@ -35,7 +35,7 @@ inline size_t BlocksFor(size_t points) {
 }
 
 // A plane in floating point: points with normal . p - offset > bound are certainly above it, points
-// with less than -bound certainly below. An infinite bound leaves all points uncertain.
+// with less than -bound are certainly below. An infinite bound leaves all points uncertain.
 struct PlaneWithBound {
   double normal[3];
   double offset;

@@ -53,7 +53,7 @@ void PolygonBoundary::InsertVertex(VertexTable& vertices, VertexId id) {
   if (is_below) Extend(vertices, lower_, +1, id);
   const bool is_above = IsBeyond(vertices, upper_, -1, vertices[id]);
   if (is_above) Extend(vertices, upper_, -1, id);
-  // Otherwise the vertex would be on no chain.
+  // Otherwise the vertex would not be on any chain.
   HULLD_CHECK(is_below || is_above);
 }
 

@@ -26,8 +26,8 @@ constexpr int kMostAttempts = 18;
 // angle between the mean and a normal. It limits the distance if they differ widely, as at the tip
 // of a needle.
 constexpr double kLeastCosine = 0.05;
-// Vertices of the full hull per check. As many, spread over all vertices, are checked first: most
-// failing hulls fail early.
+// Vertices of the full hull per check. The same number, spread over all vertices, is checked first
+// because most failing hulls fail early.
 constexpr size_t kVerticesPerCheck = 1024;
 
 Vector MeanOf(std::span<const Vector> points) {
@@ -92,7 +92,7 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside, double mo
       push[v] = std::max(push[v], gaps[k] / cosine);
     }
   }
-  // Without this, most time would be spent on enclosures of too large an error.
+  // Without this check, most of the time would be spent on enclosures with too large an error.
   const double enough = scale_.LengthToUnit(most_error);
   for (size_t v = 0; v < points.size(); ++v) {
     if (poll_.Step()) return std::nullopt;

@@ -15,8 +15,8 @@
 namespace hulld {
 namespace {
 
-// Moves of all vertices in an attempt, and attempts. **Observed**: twice as many of either gain
-// less than 2 % of the vertices.
+// Number of moves of all vertices per attempt, and number of attempts. **Observed**: doubling
+// either saves less than 2 % of the vertices.
 constexpr int kMoves = 4;
 constexpr int kAttempts = 3;
 
@@ -31,8 +31,9 @@ class Spreading {
         poll_(poll),
         support_(hull, unit_points, poll) {}
 
-  // Returns a better choice than the given one: near enough with fewer vertices, or nearer. Returns
-  // nothing if it finds none or the poll stopped. least: vertices that the choice starts with.
+  // Returns a choice better than the given one: close enough with fewer vertices, or closer.
+  // Returns nothing if it finds none or the poll stopped. least: vertices that the choice starts
+  // with.
   std::optional<VertexChoice> Improve(const VertexChoice& choice, double max_error,
                                       size_t least) const {
     const size_t count = choice.vertices.size();
@@ -73,7 +74,7 @@ std::optional<std::vector<uint32_t>> Spreading::Move(std::span<const uint32_t> c
   std::vector<Vector> points;
   points.reserve(places.size());
   for (const uint32_t place : places) points.push_back(unit_points_[place]);
-  // By vertex of the whole hull.
+  // Indexed by vertex of the whole hull.
   std::vector<Vector> normals(unit_points_.size(), Vector::Zero());
   for (size_t f = 0; f < inside->facet_count(); ++f) {
     if (poll_.Step()) return std::nullopt;

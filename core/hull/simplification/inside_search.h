@@ -14,16 +14,16 @@ namespace hulld {
 // + 1 and at most the hull's. If the poll stopped, the result is meaningless.
 //
 // Chooses farthest first. For a solid, then spreads seven eighths of these vertices more evenly and
-// continues farthest first from there, up to three times while that gains. Returns the best choice,
-// so the result is never worse than farthest first alone. Cost: **observed** two to six times
-// farthest first.
+// continues farthest first from there, up to three times while that helps. Returns the best
+// choice, so the result is never worse than farthest first alone. Cost: **observed** two to six
+// times farthest first.
 //
 // Vertices are spread by moving all of them together, several times, each to where their hull would
 // have the most volume if the rest stayed: farthest along the sum of the area normals of
 // its facets. This turns the irregular triangles of farthest first into nearly equilateral ones, as
 // far as curvature permits, and these have the least error for their area. Source: Chen and Xu
-// 2004, Optimal Delaunay Triangulations, for the place of most volume; Lloyd 1982, Least Squares
-// Quantization in PCM, for moving all at once.
+// 2004, Optimal Delaunay Triangulations, for the position of maximum volume; Lloyd 1982, Least
+// Squares Quantization in PCM, for moving all at once.
 VertexChoice ChooseInside(const Hull& hull, double max_error, size_t most, StopPoll& poll);
 
 }  // namespace hulld

@@ -77,8 +77,8 @@ class OutsideSearch {
     return target_.max_error > 0 && hull.error <= target_.max_error;
   }
 
-  // Orders hulls within max_error before all other hulls, and among them by fewer vertices; other
-  // hulls by less error.
+  // Orders hulls within max_error before all other hulls, and orders the former by number of
+  // vertices, the latter by error.
   bool IsBetter(const SimplifiedHull& a, const SimplifiedHull& b) const {
     if (Reaches(a) != Reaches(b)) return Reaches(a);
     const size_t count_a = a.hull.vertices().size();
@@ -111,7 +111,7 @@ class OutsideSearch {
   size_t CornersPerVertex() const { return hull_.dimension() == 2 ? 2 : 1; }
 
   // Pushing a vertex errs by at least the distance it is pushed, about the error of the inside
-  // hull. The search starts there, continues in steps, and returns by halves.
+  // hull. The search starts there, continues in steps, and then bisects.
   void Search() {
     const size_t worthwhile = best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
     const size_t most = worthwhile / CornersPerVertex();

@@ -51,7 +51,7 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
 // inside simplification pushed outwards, or a box. With max_error, it is the hull with the fewest
 // vertices found within both limits; otherwise, or if there is none, the hull with the least error.
 // Never has more vertices than the hull itself. Errors: as for SimplifyInside, but at least 8
-// vertices must be permitted. Cost: one order of farthest first, and some ten hulls of its first
+// vertices must be permitted. Cost: one farthest-first order, and about ten hulls of its first
 // vertices.
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target);
 

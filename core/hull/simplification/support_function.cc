@@ -13,16 +13,17 @@ namespace hulld {
 namespace {
 
 constexpr uint32_t kLeafVertices = 8;
-// Number of vertices partitioned in about the time of a poll step.
+// Number of vertices partitioned in the time of about one poll step.
 constexpr uint32_t kVerticesPerStep = 256;
-// The most edges of a vertex to climb along.
+// Maximum degree of a vertex to climb from.
 constexpr size_t kMostNeighbors = 64;
-// The most vertices to climb to, so that a path around a long edge of small facets is not walked to
-// its end.
+// Maximum number of vertices to climb to, so that a path around a long edge of small facets is not
+// walked to its end.
 constexpr int kMostClimbs = 256;
-// The most support points for one distance. Each lowers the bound, which is valid after any number.
+// Maximum number of support points for one distance. Each lowers the bound, which is valid after
+// any number of them.
 constexpr int kMostSupportPoints = 32;
-// Relative gap between bound and distance that does not justify another support point.
+// Relative gap between bound and distance below which another support point is not worth its cost.
 constexpr double kRelativeEnough = 1e-9;
 
 double ReachOf(const Vector& low, const Vector& high, const Vector& direction) {

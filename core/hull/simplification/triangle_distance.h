@@ -5,7 +5,7 @@
 
 namespace hulld {
 
-// The distance of a point from a triangle: an upper bound, usually within some units in the last
+// The distance of a point from a triangle: an upper bound, usually within a few units in the last
 // place; and the approximate nearest point.
 struct TriangleDistance {
   double bound;
@@ -13,8 +13,8 @@ struct TriangleDistance {
 };
 
 // Returns the distance from p to the triangle a, b, c, which may be degenerate. **Proven** for
-// coordinates of at most 2^1000 in magnitude, even if each errs by 2^-1075 from scaling. Cost: some
-// 30 ns.
+// coordinates of at most 2^1000 in magnitude, even if each errs by 2^-1075 from scaling. Cost: ~30
+// ns.
 TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vector& c,
                                     const Vector& p);
 

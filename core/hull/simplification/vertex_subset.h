@@ -31,7 +31,7 @@ class VertexSubset {
   // this object may only be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
   // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane or
-  // the poll stopped. Cost: that of as many choices, for an order that is about farthest first.
+  // the poll stopped. Cost: as that many choices, for an order that is roughly farthest first.
   static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
                                                   std::span<const Vector> points,
                                                   std::span<const Vector> unit_points,
@@ -61,7 +61,7 @@ class VertexSubset {
     // The farthest vertex of the list.
     uint32_t farthest = kNone;
   };
-  // Stale if the vertex has another distance now.
+  // Stale if the vertex's distance has changed since.
   struct Entry {
     double distance;
     uint32_t point;

@@ -63,7 +63,7 @@ class ChunkedVector {
   }
 
   void push_back(const T& value) {
-    // May be an element that moves.
+    // A copy, because `value` may be an element that moves.
     const T copy = value;  // NOLINT(performance-unnecessary-copy-initialization)
     Mutable(Extend()) = copy;
   }

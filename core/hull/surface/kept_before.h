@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// Journal data other than the old values of elements. Takes only a pointer while there is no
-// journal, the usual state of a hull.
+// Journal data other than the old values of elements. Costs only a pointer while no journal exists,
+// the usual state of a hull.
 template <typename T>
 class KeptBefore {
  public:

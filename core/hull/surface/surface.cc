@@ -107,7 +107,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
   const VertexId apex = vertices.Add(point);
   JoinHorizon(vertices, apex);
   ++joined_;
-  // Grown here rather than on demand, so that no insertion pays for many.
+  // Grown here rather than on demand, so that no single insertion pays the cost of many.
   while (place_of_vertex_.size() < vertices.id_bound()) place_of_vertex_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
@@ -162,7 +162,7 @@ void Surface::Undo() {
   joined_ = before_->joined;
   last_ = before_->last;
   if (before_->has_new_directions) directions_ = std::move(before_->directions);
-  // A measurement of a larger surface is not valid for this one; it restarts soon.
+  // A measurement of a larger surface is not valid for this one; measuring restarts soon.
   measuring_.reset();
   if (before_->was_measuring) next_update_ = alive_;
   if (mark_ < before_->mark) ResetMarks();
@@ -298,9 +298,9 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
   }
 }
 
-// CollectRegion for points for which doubles are certain of all signs, with the horizon in no
-// order. Returns false if they are not certain. Branch-free, because visibility is unpredictable:
-// each neighbor is written to both lists, and then one list counts it.
+// CollectRegion for points whose signs are all certain in doubles; the horizon is unordered.
+// Returns false if a sign is uncertain. Branch-free, because visibility is unpredictable: each
+// neighbor is written to both lists, and then one list counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
   // Local copies: for the compiler, the stores below might alias the originals.
@@ -354,7 +354,7 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
   if (!CollectFlatStars(vertices, point, size)) return;
   const uint32_t seen = mark_;
   for (const TriangleId id : flat_stars_) triangles_.Mutable(id).mark = seen;
-  // Marks rarely wrap around. Resets them in advance, so that this mark differs from the next.
+  // Marks rarely wrap around. Resets them early, so that this mark differs from the next.
   if (mark_ == kLastMark) {
     ResetMarks();
     return CollectRegion(vertices, first, point, size);

@@ -108,7 +108,7 @@ class Surface {
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
   }
-  // Returns true if doubles prove IsSeenFrom; false if they are uncertain.
+  // Returns true if floating point proves IsSeenFrom; false if it is uncertain.
   bool IsCertainlySeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     const SurfaceTriangle& t = triangles_[id];
     return t.normal.dot(point) - t.offset >
@@ -151,7 +151,7 @@ class Surface {
   // The map of directions, for selecting and ordering insertions; null if no interior point is
   // known.
   const DirectionMap* directions() const { return directions_ ? &*directions_ : nullptr; }
-  // True if an interior point is known and no scale is extreme.
+  // True if an interior point is known and no magnitude is extreme.
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
@@ -334,7 +334,7 @@ class Surface {
     uint32_t mark;
     TriangleId last;
     bool was_measuring;
-    // The map saved when it was replaced: the new map would reject too much after an undo.
+    // The map that was replaced: the new map would reject too much after an undo.
     bool has_new_directions = false;
     std::optional<DirectionMap> directions;
   };

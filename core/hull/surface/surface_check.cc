@@ -99,7 +99,7 @@ const char* FindDefect(const Surface& surface, const VertexTable& vertices,
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex) {
   if (const char* defect = FindDefect(surface, vertices, star)) return defect;
-  // In any order, they turn about the new vertex exactly once.
+  // The triangles, in any order, turn about the new vertex exactly once.
   TriangleId next = star[0];
   for (size_t k = 0; k < star.size(); ++k) {
     if (k > 0 && next == star[0]) return "the new triangles form more than one ring";

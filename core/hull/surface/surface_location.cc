@@ -15,7 +15,8 @@
 namespace hulld {
 namespace {
 
-// The most rounds of aiming at the surface, each at a plane nearer than the last; more do not pay.
+// Maximum number of rounds of aiming at the surface, each at a plane nearer than the previous one;
+// more do not pay off.
 constexpr int kMostRounds = 64;
 
 // A smaller surface is faster to walk across than to measure.
@@ -27,7 +28,7 @@ constexpr size_t kStepsBeforeChance = 16;
 // Corners of a map measured per insertion: a map is complete long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
-// Returns the cells per side of a map for this many triangles: some triangles to a cell, fewer if
+// Returns the cells per side of a map for this many triangles: a few triangles per cell, fewer if
 // the map rejects many points than if it only supplies starts of walks.
 int ResolutionFor(size_t triangles, bool rejects) {
   const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
@@ -88,7 +89,7 @@ double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
 
 // Crosses edges that have the point on their far side. The ray from the interior point through the
 // point meets the plane of the next triangle no later, and sooner unless both are coplanar. A walk
-// can therefore cycle only among coplanar triangles, and leaves the cycle after it starts to choose
+// can therefore cycle only among coplanar triangles, and leaves the cycle when it starts to choose
 // at random. Unknown if the walk exceeds the length expected for the surface.
 Surface::Location Surface::Walk(const VertexTable& vertices, const Vector& point, double size,
                                 TriangleId start, uint64_t& steps) const {
@@ -185,13 +186,13 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
   return inside ? std::optional<Vector>(mean) : std::nullopt;
 }
 
-// At extreme scales integers decide every sign, and a map costs more than it saves.
+// At extreme magnitudes, integers decide every sign, and a map costs more than it saves.
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                             double walks_per_point, StopPoll& poll) {
   if (!directions_ || !IsWorthMeasuring()) return false;
-  // Six faces, and some two walks to measure a corner.
+  // Six faces, and about two walks to measure a corner.
   const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
   const double useful = fineness * ResolutionFor(alive_, true);
   const int wanted = static_cast<int>(std::min({affordable, useful, 256.0})) & ~1;
@@ -293,7 +294,7 @@ void Surface::BeginInsertions(const VertexTable& vertices) {
 }
 
 void Surface::FinishInsertions(const VertexTable& vertices) {
-  // From here on, a map that was refined for a large block takes more memory than it saves time.
+  // Beyond this point, a map refined for a large block is not worth its memory.
   while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
   }
   // Sets a center now. Measuring waits for further insertions, because a hull at rest would keep an

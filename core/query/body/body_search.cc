@@ -297,7 +297,7 @@ absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   if (options_->clearance) result.answer.within_clearance = within_clearance_;
   if (!result.answer.separation || relation_ == Relation::kTouching) return result;
   Separation& separation = *result.answer.separation;
-  // Another pair with lower bounds may be the least one.
+  // Another pair with smaller bounds may have the least separation.
   const double bound = std::max(separation.value - least_low_, least_high_ - separation.value);
   if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
   return result;

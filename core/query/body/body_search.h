@@ -20,7 +20,7 @@
 
 namespace hulld {
 
-// Details of an answer about bodies that an answer about hulls lacks.
+// The details that an answer about bodies has beyond an answer about hulls.
 struct PiecesAnswer {
   // The deciding pair. None if only the relation was requested and no pair collides or is within
   // the clearance, or if either body is empty.
@@ -48,10 +48,10 @@ struct BodyCounts {
 //
 // The search descends two box trees simultaneously, nearest boxes first. If only the relation and
 // the clearance are requested, it stops when both are known, and names the pair that settled the
-// relation or, if no pair collides, the clearance. While one is unknown, it excludes all pairs that
-// cannot change that one, so it visits no more boxes and pairs than a search for the separation.
-// If further details are requested, it names the pair with the least separation. Swapping A and B
-// mirrors the answer, and the named pair does not depend on threads.
+// relation or, if no pair collides, the clearance. While only one of them is unknown, it skips all
+// pairs that cannot change it, so it never visits more boxes and pairs than a search for the
+// separation. If further details are requested, it names the pair with the least separation.
+// Swapping A and B mirrors the answer, and the named pair does not depend on threads.
 //
 // Certificates do not count among these details. If requested, the certificates of pieces that
 // prove the relation are found after the relation is known.
@@ -120,7 +120,7 @@ class BodySearch {
   const PlacedBody* x_;
   const PlacedBody* y_;
   const QueryOptions* options_;
-  // Options for each pair. Without details, the clearance is removed after a pair meets it.
+  // Options for each pair. Without details, the clearance is dropped once a pair is within it.
   QueryOptions each_;
   bool wants_least_;
   double limit_ = 0;

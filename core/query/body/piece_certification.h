@@ -29,7 +29,7 @@ struct PieceCertificate {
 // A's piece, then B's. OVERLAPPING: one certificate, for the deciding pair. TOUCHING and SEPARATED:
 // one for each pair, except pairs of pieces with disjoint exact bounding boxes along the world
 // axes: a verifier can compute these boxes from vertices and poses. The boxes here are rounded
-// outwards, so a few pairs may be certified without need.
+// outwards, so a few pairs may be certified unnecessarily.
 //
 // Cost: six support points for each piece, O(log n) boxes for each piece of A, and the exact
 // relation of each certified pair.

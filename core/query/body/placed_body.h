@@ -65,8 +65,9 @@ struct PiecePair {
   friend bool operator==(const PiecePair&, const PiecePair&) = default;
 };
 
-// Returns a box (world frame) that certainly contains all pieces; larger than the least such box if
-// the body is rotated. Covers all of space beyond the range of doubles; empty if all pieces are.
+// Returns a box (world frame) that certainly contains all pieces; larger than the smallest such box
+// if the body is rotated. Covers all of space beyond the range of doubles; empty if all pieces
+// are.
 Box BoundingBox(const PlacedBody& placed);
 
 }  // namespace hulld

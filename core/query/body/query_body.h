@@ -22,7 +22,7 @@ struct BodyPiece {
   double radius = 0;
 };
 
-// A box for each piece, in the body's frame, and a tree of these boxes. Holds no reference to the
+// A box for each piece, in the body's frame, and a tree of these boxes. Keeps no reference to the
 // hulls, so it remains valid as long as their points do not change. Immutable.
 class PieceBoxes {
  public:

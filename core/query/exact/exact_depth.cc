@@ -22,7 +22,8 @@
 namespace hulld {
 namespace {
 
-// The most seed vertices inserted, each in O(facets): the last ones, which are nearest. A choice.
+// Maximum number of seed vertices inserted, each in O(facets): the last ones, which are nearest. A
+// choice.
 constexpr size_t kMostSeeds = 1024;
 
 // The plane n.w = offset of a facet, n outward. `key` is its signed distance from the origin in
@@ -89,7 +90,7 @@ class ExactExpansion {
     return CompareDistance(f, g) < 0;
   }
 
-  // The order of the heap. Its front is the nearest facet, the first of several.
+  // The order of the heap. Its front is the nearest facet, the first one in a tie.
   struct IsLater {
     const ExactExpansion& expansion;
     bool operator()(uint32_t f, uint32_t g) const {
@@ -228,7 +229,7 @@ class ExactExpansion {
     std::make_heap(heap_.begin(), heap_.end(), IsLater{*this});
   }
 
-  // Returns the first of the facets at the least signed distance.
+  // Returns the facet with the least signed distance, the first one in a tie.
   uint32_t Nearest() {
     while (!surface_.facets()[heap_.front()].alive) {
       std::pop_heap(heap_.begin(), heap_.end(), IsLater{*this});

@@ -13,9 +13,10 @@
 namespace hulld {
 namespace {
 
-// Most bits of a component: four squares, and sums of products of that size, stay below 2^123.
+// Maximum bits of a component: four squares, and sums of products of that size, stay below 2^123.
 constexpr int kMostQuaternionBits = 60;
-// Most bits of two norms together: their product, and sums of three such, stay below 2^123.
+// Maximum bits of two norms together: their product, and sums of three such products, stay below
+// 2^123.
 constexpr int kMostNormBits = 120;
 
 int BitWidth(Int128 magnitude) {
@@ -45,8 +46,7 @@ bool FindSigns(const std::array<double, 4>& q, std::array<int64_t, 4>& signs) {
 }
 
 // Divides by the least non-zero component if it divides all of them. A greatest common divisor
-// would find more factors, at the price of many divisions; common powers of two are left to the
-// caller.
+// would find more factors but costs many divisions. Leaves common powers of two to the caller.
 void DivideByLeast(std::array<int64_t, 4>& q) {
   int64_t least = INT64_MAX;
   for (const int64_t c : q) {
@@ -60,7 +60,7 @@ void DivideByLeast(std::array<int64_t, 4>& q) {
   for (int64_t& c : q) c /= least;
 }
 
-// Computes the matrix and norm of a quaternion in numbers that hold them.
+// Computes the matrix and norm of a quaternion in integers wide enough for them.
 template <typename Number>
 void SetRotation(const std::array<int64_t, 4>& q, SmallRotation& rotation) {
   const Number w = q[0];
@@ -85,7 +85,7 @@ void SetRotation(const std::array<int64_t, 4>& q, SmallRotation& rotation) {
   }
 }
 
-// Returns the bits of a hull's own coordinates after rotation, in the pair's unit.
+// Returns the number of bits of a hull's own coordinates after rotation, in the pair's unit.
 int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
   // |R p| = N |p| <= N sqrt(3) times the largest component.
   return norm_bits + (side.exponent - exponent) + side.own_bits + 1;

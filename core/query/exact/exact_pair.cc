@@ -158,7 +158,7 @@ ExactPair::ExactPair(const FloatPair& filter, const std::function<bool()>& shoul
   const int shift_exponent =
       TranslationExponent(filter.a(), TranslationExponent(filter.b(), kAboveAllExponents));
   const int common = std::min({exponent_a, exponent_b, shift_exponent});
-  // A common norm need not be multiplied in twice.
+  // A common norm is multiplied in only once.
   const bool same_norm = R_A.norm_squared == R_B.norm_squared;
   const Integer factor_a = same_norm ? Integer(1) : R_B.norm_squared;
   const Integer factor_b = same_norm ? Integer(1) : R_A.norm_squared;

@@ -30,7 +30,7 @@ struct ExactSearchResult {
 
 // The integers of an exact search. The answer is the same for all widths, axis and pairs included.
 enum class ExactWidth {
-  kNarrowest,  // the narrowest that certainly hold every number of the search
+  kNarrowest,  // the narrowest width that certainly fits every number of the search
   k1Word,      // coordinates of 55 bits
   k2Words,     // of 119
   k3Words,     // of 183

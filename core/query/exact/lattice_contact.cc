@@ -12,8 +12,8 @@
 namespace hulld {
 namespace {
 
-// A direction within this of a coordinate axis, relative to its length, stands for the axis. Not
-// tuned; any value is correct.
+// A direction within this distance of a coordinate axis, relative to its length, is replaced by the
+// axis. Not tuned; any value is correct.
 constexpr double kAxisTilt = 0x1p-30;
 
 // Returns true if the rotation permutes the axes, up to signs, and its matrix is exact. With one,
@@ -48,8 +48,8 @@ bool IsOnLattice(const FloatPair& pair) {
   return true;
 }
 
-// Returns true if the origin is in the triangle, which is in a plane through the origin. False for
-// collinear corners.
+// Returns true if the triangle contains the origin. False for collinear corners. Requires: the
+// origin in the triangle's plane.
 bool HoldsOrigin(const Vector& p, const Vector& q, const Vector& r, CoordinatePlane plane) {
   const Vector origin = Vector::Zero();
   const auto [least, most] =
@@ -78,7 +78,8 @@ bool TouchesAcross(const FloatPair& pair, const Vector& n) {
   return most_a == least_b;
 }
 
-// Finds the contact of a vertex of each along a direction, which rounding may have tilted.
+// Finds a contact between a vertex of A and a vertex of B along a direction that rounding may have
+// tilted.
 std::optional<LatticeContact> AtVertex(const FloatPair& pair, const VertexPair& at, Vector n) {
   if (!IsZero(pair.Difference(at))) return std::nullopt;
   Eigen::Index axis = 0;

@@ -21,8 +21,9 @@ struct LatticeContact {
 // Proves in doubles, without rounding, that the hulls touch where a floating-point search ended.
 // Requires a pair on a lattice: hulls turned by quarter or third turns, with coordinates and a
 // difference of translations that are multiples of a power of two, at most 2^51 times as large. The
-// contact is a vertex of each, alone along the axis, or its plane is across a coordinate axis.
-// Returns nothing for other pairs and contacts. Cost: a fifth of SearchExactly's.
+// contact is either between two vertices, each the only farthest one along the axis, or in a plane
+// perpendicular to a coordinate axis. Returns nothing for other pairs and contacts. Cost: a fifth
+// of SearchExactly's.
 std::optional<LatticeContact> FindLatticeContact(const FloatPair& pair,
                                                  const FloatSearchResult& end);
 

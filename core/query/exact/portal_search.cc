@@ -251,7 +251,7 @@ int PortalSearch<Pair>::SignOfAdvance(Direction& n, const Point& p, const Point&
   return Sign(Dot(n.exact(), Coordinates(Exact(w) - Exact(p))));
 }
 
-// Floating point leaves few candidates, usually one; among several, exact values decide.
+// Floating point leaves few candidates, usually one; exact values decide among several.
 template <typename Pair>
 typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   ++directions_tried_;

@@ -186,7 +186,7 @@ class WidePair {
       return kept[i];
     }
 
-    // An empty `candidates` stands for all vertices.
+    // An empty `candidates` means all vertices.
     uint32_t Farthest(const Direction& n, std::span<const uint32_t> candidates, ScanPoll& poll) {
       if (candidates.size() == 1) return candidates[0];
       uint32_t best = candidates.empty() ? 0 : candidates[0];
@@ -259,7 +259,7 @@ class WidePair {
   };
 
   // Returns the candidates of a large hull that floating point cannot exclude. For a small hull,
-  // returns an empty list, which stands for all vertices.
+  // returns an empty list, which means all vertices.
   template <typename Candidates>
   std::span<const uint32_t> CandidatesOf(const Side& side, const Direction& n,
                                          Candidates candidates) const {

@@ -29,8 +29,8 @@ class ExpandingSurface {
   bool HasManyDead() const {
     return facets_.size() >= kLeastCompacted && dead_ > facets_.size() / 2;
   }
-  // Drops dead facets and keeps the order of live ones. Returns the new index of each facet, kGone
-  // if dropped. Cost: O(facets), so amortized O(1) for each facet created.
+  // Removes dead facets and preserves the order of live ones. Returns the new index of each facet,
+  // kGone if dropped. Cost: O(facets), so amortized O(1) for each facet created.
   static constexpr uint32_t kGone = UINT32_MAX;
   std::vector<uint32_t> Compact() {
     std::vector<uint32_t> places(facets_.size(), kGone);

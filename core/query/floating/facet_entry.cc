@@ -20,7 +20,8 @@ using Facet = std::array<VertexPair, 3>;
 using Lanes = double __attribute__((vector_size(32)));
 
 // A vector in double-double arithmetic: DoubleDouble's operations on each component, with the same
-// error bounds. Everything is inlined, so that it is compiled for the registers of FindCrossing.
+// error bounds. Everything is inlined, so that it is compiled for the instruction set of
+// FindCrossing.
 struct LongVector {
   Lanes high;
   Lanes low;
@@ -137,9 +138,9 @@ struct LongRotation {
   }
 };
 
-// True if the facet has three different pairs of only four vertices. Its vertices of A then have
-// one value along its normal, as do those of B. Moves a pair that shares a vertex with both other
-// pairs to the front.
+// True if the facet has three different pairs of only four vertices. All of its vertices of A then
+// have the same value along its normal, and so do its vertices of B. Moves a pair that shares a
+// vertex with both other pairs to the front.
 bool IsOfFourVertices(Facet& facet) {
   const auto shares = [](VertexPair p, VertexPair q) { return (p.a == q.a) != (p.b == q.b); };
   for (int i = 0; i < 3; ++i) {
@@ -168,7 +169,7 @@ bool CrossesInside(const FloatPair& start, const RelativePath& path,
   return least > bound || most < -bound;
 }
 
-// True if all vertices that may be farthest are of the facet.
+// True if all vertices that may be farthest belong to the facet.
 template <typename VertexOf>
 bool AreOfFacet(std::span<const uint32_t> candidates, const Facet& facet, VertexOf vertex_of) {
   return std::ranges::all_of(candidates, [&](uint32_t candidate) {

@@ -19,14 +19,14 @@
 namespace hulld {
 namespace {
 
-// Least height of a vertex above a facet, relative to the pair's size, that removes the facet. Far
-// below the default error, far above rounding: flat parts of A - B are not cut into slivers.
+// Minimum height of a vertex above a facet, relative to the pair's size, that removes the facet.
+// Far below the default error, far above rounding: flat parts of A - B are not cut into slivers.
 constexpr double kRelativeVisibility = 0x1p-46;
 // Reserved capacity. Observed: links of a robot's arm need 15 vertices.
 constexpr size_t kUsualVertices = 32;
 constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
-// Number of corners up to which a lookup scans.
+// Maximum number of corners that a lookup scans.
 constexpr size_t kMostScanned = 64;
 
 using Corner = MinkowskiVertex<PlainVector>;

@@ -37,7 +37,7 @@ std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
     buffer.many = placed.query_hull().Candidates(n_own, error, slack);
     return buffer.many;
   }
-  // Small hulls are scanned here, because a list needs an allocation.
+  // Small hulls are scanned here because a list needs an allocation.
   std::array<double, CandidateBuffer::kMostFew> values;
   double largest = -INFINITY;
   for (size_t i = 0; i < vertices.size(); ++i) {

@@ -301,8 +301,8 @@ class FloatSearch {
     if (progress) {
       const PlainVector w = pair_.Difference(farthest.pair);
       simplex_.Add(w, farthest.pair);
-      // The direction of a vertex this near to the origin is dominated by rounding, and it cannot
-      // show anything that is certain only beyond the same bound.
+      // The direction of a vertex this close to the origin is dominated by rounding, and no certain
+      // conclusion can follow from it.
       at_corner = LargestComponent(w) <= kMinkowskiErrorFactor * pair_.size();
       if (at_corner) {
         simplex_.KeepNewest();

@@ -11,13 +11,13 @@
 namespace hulld {
 namespace {
 
-// Most support vertices of a cast. More occur only if rounding hinders it. A choice.
+// Maximum number of support vertices of a cast. More occur only if rounding hinders it. A choice.
 constexpr int kMostSteps = 96;
 // Share of the time up to a plane that its interval leaves open, more than rounding takes. A
 // choice.
 constexpr double kOpenShare = 0x1p-40;
-// Share of another point in the point that casts start from, so that symmetric hulls which move
-// along their symmetry are no special case. A choice.
+// Weight of another point in the point that casts start from, so that symmetric hulls that move
+// along their symmetry axis are not a special case. A choice.
 constexpr double kOffCenter = 0x1p-5;
 
 // A lower bound of the gap along a unit direction, at time 0 and changing with time.

@@ -17,7 +17,7 @@ struct RelativePath {
   // Requires: neither hull turns.
   RelativePath(const FloatPair& start, const Motion& X_WA, const Motion& X_WB);
 
-  // That of B relative to A; each component errs by at most 2 u times `length`.
+  // The displacement of B relative to A; each component errs by at most 2 u times `length`.
   Vector displacement;
   // The sum of the largest components of both displacements.
   double length;

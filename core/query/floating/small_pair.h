@@ -18,7 +18,7 @@ namespace hulld {
 // of A - B is a difference of two known vertices. The farthest vertex is found without a branch,
 // because it is unpredictable.
 //
-// kMostVertices: the most vertices of either hull; more would need bounds of their own
+// kMostVertices: the maximum number of vertices of either hull; more would need separate bounds
 // (kSupportErrorFactor). Positions have the same bits as in FloatPair. Everything is inlined, so
 // that it is compiled for the registers of the calling search.
 template <uint32_t kMostVertices>

@@ -18,7 +18,7 @@ constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 // overlaps (relation/ of tests/bench/queries/query_benchmark).
 constexpr uint32_t kCoarseSide = 2;
 constexpr uint32_t kFineSide = 8;
-// A word has one bit for each cell of a face.
+// Each word has one bit for each cell of a face.
 static_assert(kFineSide * kFineSide <= 64);
 uint32_t SideFor(size_t vertices) { return vertices < 24 ? kCoarseSide : kFineSide; }
 // With more cells than this along a side, the gauge is computed only at every other corner.
@@ -27,7 +27,7 @@ constexpr uint32_t kMostGaugedCells = 4;
 // Trial points on a ray, relative to the length of the ray within the hull.
 constexpr double kShrink[] = {1 - 0x1p-22, 1 - 0x1p-16, 1 - 0x1p-10};
 // A portal is as good as a facet if the hull exceeds its plane by less than this, relative to its
-// distance: the bounds between corners are no tighter.
+// distance, because the bounds between corners are no tighter.
 constexpr double kLeastGain = 0x1p-8;
 // Far more than needed. Observed on 64 to 10000 points of a sphere, even with a gain of 2^-26: one
 // step to find a portal, and 5 to 13 to refine it.
@@ -41,7 +41,7 @@ constexpr double kMostTilt = 0.7;
 float RoundedUp(double value) {
   const auto rounded = static_cast<float>(value);
   if (!(static_cast<double>(rounded) < value)) return rounded;
-  // The next positive number has the next bit pattern.
+  // The next larger positive double has the next bit pattern.
   return rounded > 0 ? std::bit_cast<float>(std::bit_cast<uint32_t>(rounded) + 1)
                      : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
@@ -352,7 +352,7 @@ void CenterBounds::MakeSupport(uint32_t corner) const {
     const double reach = map_->support->Farthest(n).value - n.dot(map_->center);
     corners[twin].support = RoundedUp((reach + margin) * per_unit_);
   }
-  // Other threads may be reading a twin that has been computed.
+  // Other threads may be reading a computed corner with the same direction.
   if (std::isnan(corners[corner].support)) corners[corner].support = corners[twin].support;
 }
 

@@ -47,8 +47,8 @@ class CenterBounds {
   // Bounds for the hull of the points about a center. A flat hull (`dimension` below 3) has none.
   // The gauge is unknown unless the center is certainly strictly inside. max_abs: the largest
   // absolute coordinate of the points. The points and the support map must outlive the bounds and
-  // must not move. Cost: O(V) comparisons; the first computed cell takes some 100 support points
-  // more, and each of 24 or 384 cells some 25.
+  // must not move. Cost: O(V) comparisons; the first computed cell takes about 100 more support
+  // points, and each of 24 or 384 cells about 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
                const SupportMap& support, Making making);
   CenterBounds(const Hull& hull, const SupportMap& support)
@@ -89,7 +89,7 @@ class CenterBounds {
   }
 
  private:
-  // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
+  // Cells along a side of a face. Observed: guessing a normal from fewer does not pay off.
   static constexpr uint32_t kLeastFineSide = 4;
   // Values for directions with largest component 1: the support function in units, and the gauge
   // per unit.
@@ -111,7 +111,7 @@ class CenterBounds {
     std::array<std::atomic<uint64_t>, 6> cells = {};
     // In the same layout: set if the next look computes the cell.
     std::array<std::atomic<uint64_t>, 6> awaited = {};
-    // Held by the thread that computes a cell.
+    // Held while a thread computes a cell.
     std::mutex mutex;
     // (side + 1)^2 for each of the six faces; empty before the first cell is computed.
     std::vector<Corner> corners;

@@ -62,7 +62,7 @@ void HullBase::Measure() {
     const Vector& p = points_[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (p[axis] < points_[extremes[axis]][axis]) extremes[axis] = i;
-      // The last of several equal points is taken, so that the center of a box is its middle.
+      // Takes the last of several equal points, so that the center of a box is its middle.
       if (p[axis] >= points_[extremes[axis + 3]][axis]) extremes[axis + 3] = i;
     }
     exponent_ = LowestBitExponent(p, exponent_);

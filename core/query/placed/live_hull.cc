@@ -76,7 +76,7 @@ LiveHull::LiveHull(const LiveHull& other, const Mark& mark) : LiveHull() {
                 CopyOf(parts->tail.get(), 0, tail_count, parts->base->center())});
 }
 
-// Makes all points so far a base to be scanned.
+// Turns all points so far into a base to be scanned.
 void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
   for (const Vector& p : points) {
     next.low_ = next.low_.cwiseMin(p);

@@ -9,10 +9,10 @@
 namespace hulld {
 
 // A Vector for latency-bound code, chains of dependent operations: three doubles that stay in
-// registers. Eigen writes a vector of three as a pair and a single, and may read it in another
-// grouping. A read that straddles two writes probably waits until both have left the processor's
-// store buffer. Observed: a search takes a quarter less time, together with compiling the sources
-// that use this without packing of scalars.
+// registers. Eigen writes a vector of three as a pair and a single double, and may read it in a
+// different grouping. A read that spans two writes probably waits until both have left the
+// processor's store buffer. Observed: a search takes a quarter less time, together with compiling
+// the sources that use this without packing of scalars.
 struct PlainVector {
   double x = 0;
   double y = 0;

@@ -54,7 +54,7 @@ SupportPoint QueryHull::FartherInGrowth(const PlainVector& n, SupportPoint found
   }
   if (growth_->tail_count > 0) consider(parts.tail->Farthest(growth_->tail_count, n));
   if (growth_->scans > 0) {
-    // Batches the updates: incrementing a counter shared by all threads is expensive.
+    // Batches the updates because incrementing a counter shared by all threads is expensive.
     constexpr uint32_t kBetween = 16;
     thread_local uint32_t questions = 0;
     if (++questions % kBetween == 0) {

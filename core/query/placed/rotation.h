@@ -7,8 +7,8 @@
 namespace hulld {
 
 // Matrix products in registers, with every product and sum rounded separately. Eigen's own products
-// use fused operations where the processor has them, whatever the compiler flags, so results would
-// differ between processors.
+// use fused operations where the processor has them, regardless of the compiler flags, so results
+// would differ between processors.
 
 // Returns R p.
 inline Vector Product(const Eigen::Matrix3d& R, const PlainVector& p) {

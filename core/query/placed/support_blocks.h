@@ -30,14 +30,14 @@ struct SupportPoint {
   double value = 0;
 };
 
-// Returns the value of a point along n, with the same bits in every place that computes it.
+// Returns the value of a point along n, with the same bits wherever it is computed.
 inline double SupportValue(const PlainVector& n, double x, double y, double z) {
   return (n.x * x + n.y * y) + n.z * z;
 }
 
 // Returns the first of the points with the largest computed value, among the first `count` points.
 // Does not read later points, which another thread may be writing. Requires: 0 < count <= number of
-// points. Cost: 0.3 ns a point with AVX2.
+// points. Cost: 0.3 ns per point with AVX2.
 SupportPoint FarthestOf(std::span<const SupportBlock> blocks, size_t count, const PlainVector& n);
 
 }  // namespace hulld

@@ -23,8 +23,8 @@ constexpr double kCellsPerPoint = 2;
 constexpr size_t kMostListed = 12;
 // Lists of at most this many points are compared pairwise.
 constexpr size_t kMostCompared = 16;
-// Least width of a cell; far wider than kCellMargin. Observed: points this near to a common plane
-// come from rounding, and a list of them is as good as a finer division.
+// Minimum width of a cell; far wider than kCellMargin. Observed: points this close to a common
+// plane come from rounding, and a list of them is as good as a finer division.
 constexpr double kLeastWidth = 0x1p-22;
 // Cells per point beyond which no further cell is divided.
 constexpr size_t kMostCellsPerPoint = 8;
@@ -33,14 +33,14 @@ constexpr size_t kMostCellsPerPoint = 8;
 // average for points all over a surface. The bound is for points along curves, where the number
 // doubles with every second division of a square.
 constexpr double kMostCopies = 64;
-// Sets of up to this many points get lists throughout: as the number of copies grows with the
-// square root of the number of points, a tree saves nothing.
+// Sets of up to this many points get only lists: because the number of copies grows with the square
+// root of the number of points, a tree saves nothing.
 constexpr size_t kMostWithoutTree = 4096;
 // Fraction of candidates among all points beyond which scanning all is faster than sorting the
 // candidates.
 constexpr size_t kPointsPerCandidate = 16;
-// Sets with coordinates beyond these are scanned: products might overflow, or underflow with
-// effect.
+// Sets with coordinates beyond these limits are scanned: products might overflow or underflow
+// significantly.
 constexpr double kLargestCoordinate = 0x1p900;
 constexpr double kLeastExtent = 0x1p-800;
 
@@ -56,8 +56,8 @@ using Lanes = double __attribute__((vector_size(32)));
   lanes = lanes > -lanes ? lanes : -lanes;
 }
 
-// Returns powers of two that make the extents of the points about equal: the size along each axis
-// relative to the largest, at least 2^-10.
+// Returns powers of two that make the extents of the points roughly equal: the size along each
+// axis relative to the largest, at least 2^-10.
 Vector ScaleOf(const Vector& extents) {
   constexpr int kLeast = -10;
   int exponents[3];
@@ -394,13 +394,13 @@ class SupportMap::Filling {
     FillFiltered(inner, quarters, all, depth + 1, copies);
   }
 
-  // Drops every point that another point leads all over the square.
+  // Drops every point that another point leads everywhere on the square.
   void CompareEach(FacePoints& found, const Square& square) const {
     for (size_t p = found.size; p-- > 0;) {
       for (size_t q = 0; q < found.size; ++q) {
         if (p == q || LeadOf(found, p, q, square) > -bound_) continue;
         const size_t last = --found.size;
-        // Points before p keep their places.
+        // Points before p keep their positions.
         for (size_t k = p; k < last; ++k) {
           found.a[k] = found.a[k + 1];
           found.b[k] = found.b[k + 1];

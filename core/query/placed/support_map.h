@@ -33,8 +33,8 @@ namespace hulld {
 //
 // For points along a curve, as in a polygon, a prism or a cone, each cell may list many points
 // however small it is: all lists together would take about V^1.5. A square is therefore left
-// without a list if its parts would list points too often; directions there are looked up in a tree
-// of boxes (SupportTree).
+// without a list if its parts would list points too often; a tree of boxes (SupportTree) then
+// answers directions in that square.
 //
 // The set need not be convex: points inside its hull are listed in few cells or in none, and flat
 // sets need no special case. Squares are widened by kCellMargin, so that a list also contains every
@@ -48,13 +48,13 @@ class SupportMap {
 
   SupportMap() = default;
   // `points` must outlive the map. Cost: O(V log V) time and O(V) memory for every set; O(V) time
-  // for small sets. **Observed** 0.3 to 1.1 us a point for 64 to 1000000 points of round shapes.
-  // should_stop, which may be empty, is polled every few milliseconds; after it returned true, the
+  // for small sets. **Observed** 0.3 to 1.1 us per point for 64 to 1000000 points of round shapes.
+  // should_stop, which may be empty, is polled every few milliseconds; after it returns true, the
   // map is stopped() and not usable.
   explicit SupportMap(std::span<const Vector> points,
                       const std::function<bool()>& should_stop = {});
   explicit SupportMap(const Hull& hull) : SupportMap(hull.vertices()) {}
-  // Builds a map that gives the same answers at O(V) each, without preparation.
+  // Builds a map that returns the same answers at O(V) each, without preparation.
   static SupportMap ForScanning(std::span<const Vector> points);
 
   using Support = SupportPoint;
@@ -143,11 +143,11 @@ class SupportMap {
   double below_side_ = 0;
 };
 
-// Zero and overflowing directions also get a place.
+// Zero and overflowing directions also map to a cell.
 inline SupportMap::Place SupportMap::PlaceOf(const PlainVector& n) const {
   const OnCube on_cube(n.x * scale_.x, n.y * scale_.y, n.z * scale_.z);
   const double factor = half_ / on_cube.largest();
-  // In this form, NaN becomes a number.
+  // Written so that NaN becomes a number.
   const auto place = [&](double component) {
     double x = component * factor + half_;
     x = x < below_side_ ? x : below_side_;

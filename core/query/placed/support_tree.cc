@@ -34,7 +34,7 @@ void SupportTree::Build(std::span<const Vector> points, uint32_t first, uint32_t
     int axis = 0;
     (high - low).maxCoeff(&axis);
     const uint32_t middle = first + (end - first) / 2;
-    // A total order, so that every standard library divides the points alike.
+    // A total order, so that every standard library divides the points in the same way.
     std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
                      [&](uint32_t a, uint32_t b) {
                        return std::pair(points[a][axis], a) < std::pair(points[b][axis], b);

@@ -24,11 +24,11 @@ namespace {
 constexpr uint64_t kCandidatesPerWindow = 16384;
 constexpr uint32_t kFirstPlacements = 16;
 constexpr uint32_t kMostPlacements = 1024;
-// Pairs per task of a thread: some microseconds of work.
+// Pairs per task of a thread: a few microseconds of work.
 constexpr size_t kPairsPerTask = 64;
 // Tree nodes visited between two polls.
 constexpr uint64_t kNodesPerPoll = 1024;
-// Beyond this many candidates, one bit for each placement takes less memory.
+// Beyond this many candidates, a bit set of all placements takes less memory.
 constexpr size_t kMostListed = 1024;
 constexpr size_t kWordBits = 64;
 

@@ -69,9 +69,9 @@ struct SceneTotals {
 // thread-safe.
 class SceneSearch {
  public:
-  // Both arguments must outlive this object; bodies, if any, are one for each placement. Computes
-  // boxes on options.threads. INVALID_ARGUMENT: `groups` is not empty and does not have one entry
-  // per placement. CANCELLED: should_stop returned true. Cost: O(n log n).
+  // Both arguments must outlive this object; `bodies`, if any, has one entry for each placement.
+  // Computes boxes on options.threads. INVALID_ARGUMENT: `groups` is not empty and does not have
+  // one entry per placement. CANCELLED: should_stop returned true. Cost: O(n log n).
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
   // Takes precomputed boxes: BoundingBox of each placement, at rest; otherwise MovingBoxOf. The
@@ -84,7 +84,7 @@ class SceneSearch {
 
   // Pairs selected by the groups and movers.
   uint64_t pairs() const { return pairs_; }
-  // Number of placements with candidates of their own: all, or the movers.
+  // Number of placements for which candidates are listed: all, or the movers.
   uint32_t size() const { return size_; }
 
   // Returns the answer of a candidate, with the requested details if the pair is found. `of_body`:
@@ -192,14 +192,14 @@ class SceneCandidates {
   size_t next_ = 0;
 };
 
-// The most answers that FindCollisions buffers. A choice: three or four MiB with certificates, and
-// enough for many threads.
+// Maximum number of answers that FindCollisions buffers. A choice: three to four MiB with
+// certificates, and enough for many threads.
 inline constexpr size_t kMostEmittedAnswers = 4096;
 
 // Finds all colliding pairs of placements. A tree of bounding boxes yields the pairs with
 // intersecting boxes, and each of these is answered like CheckCollision. Calls `emit` on the
 // calling thread, in ascending order of (a, b); neither the answers nor their order depend on the
-// number of threads. `emit` may block, which holds the search back. At most kMostEmittedAnswers
+// number of threads. `emit` may block, which throttles the search. At most kMostEmittedAnswers
 // answers are buffered, for any number of collisions. INVALID_ARGUMENT: `groups` is not empty and
 // does not have one entry per placement. CANCELLED: should_stop returned true; answers emitted
 // before remain valid. Cost: O(n log n) plus the candidates.

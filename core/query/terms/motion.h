@@ -24,7 +24,7 @@ struct Motion {
 bool IsTranslation(const Motion& motion);
 
 // Returns OK, or INVALID_ARGUMENT: a pose fails ValidatePose, with "end." before the name of a
-// field of the end; or q(t) vanishes at some t, which is so if and only if q1 = -s q0 for a
+// field of the end; or q(t) vanishes at some t, which happens if and only if q1 = -s q0 for a
 // positive s. Exact.
 absl::Status ValidateMotion(const Motion& motion);
 

@@ -44,7 +44,7 @@ struct PairCache {
   VertexPair pairs[4];
   Boxed<RelativePose> touching;
 
-  // Drops everything that holds only for the same hulls. Call when a hull is replaced; the axis
+  // Drops everything that is valid only for the same hulls. Call when a hull is replaced; the axis
   // remains a good guess.
   void ForgetHulls() {
     pair_count = 0;

@@ -142,7 +142,7 @@ PoseProduct::PoseProduct(const Motion& motion, double time, const Pose& X_BP)
   const double reach = X_BP.t.cwiseAbs().maxCoeff();
   const double size = (x0.cwiseAbs().maxCoeff() + x1.cwiseAbs().maxCoeff()) + reach;
   if (!(size <= kProductMaxTranslation)) {
-    // Any value in range: only exact arithmetic will use this pose.
+    // Any value in range will do: only exact arithmetic uses this pose.
     X_WB_.t = (x0 / 2 + x1 / 2).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
     rounded_.t = X_WB_.t;
     translation_error_ = std::numeric_limits<double>::infinity();
@@ -177,7 +177,7 @@ PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP
 
   const double size = t_B.cwiseAbs().maxCoeff() + t_P.cwiseAbs().maxCoeff();
   if (!(size <= kProductMaxTranslation)) {
-    // Any value in range: only exact arithmetic will use this pose.
+    // Any value in range will do: only exact arithmetic uses this pose.
     rounded_.t = (t_B / 4 + t_P / 4).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
     translation_error_ = std::numeric_limits<double>::infinity();
     return;

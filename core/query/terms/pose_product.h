@@ -10,8 +10,8 @@ namespace hulld {
 // X_WP = X_WB X_BP, the pose of a piece P of a body B in the world: p_W = R(q_B) (R(q_P) p_P /
 // |q_P|^2 + t_P) / |q_B|^2 + t_B over the reals for the given doubles. The product is rational, and
 // in general no pose of doubles represents it. Exact arithmetic uses the two factors; floating
-// point uses a rounding with a known error. A factor X_WB(t), a motion at a time, is no pose of
-// doubles either, and is treated alike.
+// point uses a rounding with a known error. A factor X_WB(t), a motion at a time, is not a pose of
+// doubles either, and is treated in the same way.
 class PoseProduct {
  public:
   // Requires: both poses valid (ValidatePose). Cost: about 100 ns, less if one has no rotation.

@@ -55,9 +55,9 @@ absl::Status ValidateOptions(const QueryOptions& options, const OptionNames& nam
   if (options.tolerance == 0) return absl::OkStatus();
   const char* const exact = ExactOption(options, names);
   if (exact == nullptr) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat(names.tolerance, " is ", options.tolerance, ", but ", exact,
-                   " needs the exact relation; leave out one of them"));
+  return absl::InvalidArgumentError(absl::StrCat(names.tolerance, " is ", options.tolerance,
+                                                 ", but ", exact,
+                                                 " needs the exact relation; omit one of them"));
 }
 
 }  // namespace hulld

@@ -15,8 +15,7 @@ namespace hulld {
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
 // The largest bound of the angle of a normal, in radians. Floating point meets it inside facets,
-// and if the hulls are about as far apart as they are large; otherwise exact arithmetic finds the
-// normal.
+// and for hulls about as far apart as they are large; otherwise exact arithmetic finds the normal.
 inline constexpr double kMaxNormalAngle = 1e-6;
 
 enum class Method : uint8_t { kCertifiedSearch, kTextbookSat };
@@ -41,12 +40,12 @@ struct QueryOptions {
   // witness, normal, clearance or certificate, or with the textbook method, which need the exact
   // relation (ValidateOptions).
   double tolerance = 0;
-  // Textbook only: the most candidate axes; more are refused.
+  // Textbook only: maximum number of candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
-  // The most memory of the exact search for a depth, in bytes; more is refused. A search may need
-  // some 10 KB for each vertex near the deepest contact, as in a disc pierced at its center.
+  // Maximum memory of the exact search for a depth, in bytes; more is refused. A search may need
+  // about 10 KB for each vertex near the deepest contact, as in a disc pierced at its center.
   uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
-  // Bodies only: the most certificates of pieces; more are refused.
+  // Bodies only: maximum number of certificates of pieces; more are refused.
   uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
   // Polled in long loops, possibly from several threads; true ends the query with CANCELLED. May be
   // empty.
@@ -63,8 +62,8 @@ struct QueryOptions {
   // True if an answer names vertices or facets by index, or depends on a hull's canonical snapshot
   // in another way. A version of a LiveHull is then not sufficient.
   bool WantsCanonical() const { return method == Method::kTextbookSat || WantsDetails(); }
-  // True if the search may stop as soon as it knows the relation, the cheapest kind of query. The
-  // only place that decides this.
+  // True if the search may stop as soon as it knows the relation, the cheapest kind of query. This
+  // is the only place that decides this.
   bool WantsRelationOnly() const {
     return method == Method::kCertifiedSearch && !WantsDetails() && !clearance.has_value();
   }

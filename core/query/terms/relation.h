@@ -11,7 +11,7 @@ enum class Relation : uint8_t {
   kSeparated,        // no common point
   kTouching,         // 0 is on the boundary of A - B
   kOverlapping,      // 0 is interior to A - B
-  kWithinTolerance,  // |separation| <= QueryOptions::tolerance; neither colliding nor not
+  kWithinTolerance,  // |separation| <= QueryOptions::tolerance; collision undecided
 };
 
 }  // namespace hulld

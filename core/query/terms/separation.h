@@ -18,7 +18,7 @@ struct Separation {
   double bound = 0;
 };
 
-// A separation or none, as std::optional, without memory for a flag: no separation is NaN.
+// An optional separation without memory for a flag: NaN means none.
 class OptionalSeparation {
  public:
   OptionalSeparation() = default;

@@ -119,8 +119,8 @@ absl::Status LivePairs::SelectPair(uint32_t a, uint32_t b) {
   const auto [place, is_new] = numbers_.emplace(KeyOf(low, high), 0);
   if (is_new) {
     if (numbers_.size() > max_pairs_) {
-      return LimitExceeded("the scene holds too many pairs whose bounding boxes meet", max_pairs_,
-                           "max-pairs-per-batch");
+      return LimitExceeded("too many pairs of the scene have intersecting bounding boxes",
+                           max_pairs_, "max-pairs-per-batch");
     }
     place->second = Add(low, high);
   }

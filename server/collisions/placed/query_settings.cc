@@ -86,8 +86,9 @@ absl::Status ValidateForMotions(const QueryOptions& options) {
   };
   for (const auto& [is_set, name] : excluded) {
     if (!is_set) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        name, " excludes end_pose; ask for the first contact alone, then at its pose"));
+    return absl::InvalidArgumentError(absl::StrCat(name,
+                                                   " cannot be combined with end_pose; query the "
+                                                   "first contact, then query again at its pose"));
   }
   return absl::OkStatus();
 }
@@ -111,12 +112,12 @@ absl::Status NameLimit(const absl::Status& status, const QueryOptions& options) 
 }
 
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit) {
-  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                        "the certificates of ", certificates,
-                        " pairs of pieces and the bodies' other data exceed the ", limit,
-                        " bytes of a reply; use bodies of fewer pieces, or ask without "
-                        "certificates")),
-                    v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the certificates of ", certificates,
+          " pairs of pieces and the bodies' other data exceed the limit of a reply, ", limit,
+          " bytes; use bodies with fewer pieces, or do not request certificates")),
+      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
 }
 
 }  // namespace hulld::server

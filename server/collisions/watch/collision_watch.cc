@@ -102,7 +102,7 @@ void CollisionWatch::TakeMessage() {
 
 absl::Status CollisionWatch::HandleMessage() {
   const absl::Status in_order = CheckOrder(
-      request(), is_open_, "open came twice; other placements or pairs need another watch");
+      request(), is_open_, "open was sent twice; start a new watch for other placements or pairs");
   if (!in_order.ok()) return in_order;
   if (request().has_open()) return Prefixed("open: ", HandleOpen(*request().mutable_open()));
   ++messages_;
@@ -132,8 +132,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
                           open.ignore_same_group() || open.has_movers();
   if (open.pairs_size() > 0 && has_groups) {
     return absl::InvalidArgumentError(
-        "pairs are set, and groups or movers too; name the pairs, or say which of all to leave "
-        "out");
+        "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
   absl::Status valid =
       ValidatePairs(open.pairs(), table->size(), limits.max_pairs_per_batch, "the watch");

@@ -396,9 +396,9 @@ std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", i
 
 absl::Status Gone(const std::string& id, const char* how) {
   return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          QuotedHull(id), " was ", how,
-          " while points were streamed into it; start a new stream and send all points again")),
+      absl::FailedPreconditionError(absl::StrCat(QuotedHull(id), " was ", how,
+                                                 " while points were being streamed into it; start "
+                                                 "a new stream and send all points again")),
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 

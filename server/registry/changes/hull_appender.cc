@@ -46,10 +46,9 @@ absl::Status GoneWhileStreaming(const RegisteredHull& hull) {
 absl::Status Superseded() { return absl::AbortedError("a peer server changed the hull first"); }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
-  return LimitExceeded(
-      absl::StrCat(QuotedHull(hull.record.hull_id), " was written by ", hull.writer_count,
-                   " writers, so append under an earlier writer_id"),
-      limit, "max-writers-per-hull");
+  return LimitExceeded(absl::StrCat(QuotedHull(hull.record.hull_id), " has ", hull.writer_count,
+                                    " writers; append with one of their writer_ids"),
+                       limit, "max-writers-per-hull");
 }
 
 absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const Limits& limits) {
@@ -58,8 +57,8 @@ absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const
       chunk.points.size() <= limits.max_points_per_hull - received) {
     return absl::OkStatus();
   }
-  return LimitExceeded(absl::StrCat(QuotedHull(record.hull_id), " has taken ", received,
-                                    " points, and ", chunk.points.size(), " more came"),
+  return LimitExceeded(absl::StrCat(QuotedHull(record.hull_id), " has received ", received,
+                                    " points, and the chunk has ", chunk.points.size(), " more"),
                        limits.max_points_per_hull, "max-points-per-hull");
 }
 

@@ -41,8 +41,8 @@ absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
   const uint64_t expected = PointCount(stored);
   if (points->size() != expected || expected < stored.record.vertex_count) {
     return DamagedHull(
-        id, absl::StrCat("it has ", points->size(), " points of ", expected,
-                         ", and its record says ", stored.record.vertex_count, " vertices"));
+        id, absl::StrCat("it has ", points->size(), " of ", expected,
+                         " points, and its record says ", stored.record.vertex_count, " vertices"));
   }
   if (!std::ranges::all_of(*points, [](const Vector& point) { return point.allFinite(); })) {
     return DamagedHull(id, "one of its points is not finite");
@@ -117,7 +117,7 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
   }
   if (!added.ok()) return DamagedHull(record.hull_id, std::string(added.status().message()));
   return DamagedHull(record.hull_id,
-                     absl::StrCat("its points make a hull of dimension ", builder->dimension(),
+                     absl::StrCat("its points form a hull of dimension ", builder->dimension(),
                                   " with ", builder->vertex_count(), " vertices, not ",
                                   record.dimension, " with ", record.vertex_count));
 }

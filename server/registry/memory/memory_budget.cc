@@ -139,10 +139,10 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
   const std::string what =
       use == MemoryUse::kReading
           ? absl::StrCat(
-                "readers hold ", now.reading_bytes,
+                "readers use ", now.reading_bytes,
                 " bytes of memory for hulls in use, streams, and watches, more than their share")
           : absl::StrCat(
-                "writers hold ", now.writing_bytes,
+                "writers use ", now.writing_bytes,
                 " bytes of memory for changing hulls and points in flight, more than their share");
   return Overloaded(what, share(use), "memory-limit", kRetry);
 }

@@ -111,9 +111,9 @@ absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   const uint64_t share = state_.memory.share(MemoryUse::kReading);
   // A retry does not help a read that holds most of the memory itself.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
-    return LimitExceeded(absl::StrCat("the hulls that the call names take ", bytes,
-                                      " bytes of memory so far; with other calls that exceeds the "
-                                      "readers' share; request fewer hulls per call"),
+    return LimitExceeded(absl::StrCat("the hulls named by the call use ", bytes,
+                                      " bytes of memory so far, which, together with other calls, "
+                                      "exceeds the readers' share; request fewer hulls per call"),
                          share, "memory-limit");
   }
   return state_.memory.Check(locked, MemoryUse::kReading);

@@ -24,8 +24,8 @@ constexpr size_t kMostThreads = 2;
 // The store reported an older revision than `asked_at`, its revision before the query.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
   return absl::UnavailableError(absl::StrCat(
-      "the store answers as of revision ", found, ", and was at ", asked_at,
-      " before: it was restored to an earlier state, or another database is answering"));
+      "the store is at revision ", found, " but was at ", asked_at,
+      " earlier: it was restored to an earlier state, or another database is answering"));
 }
 
 absl::Status IsAhead(uint64_t found, uint64_t known) {

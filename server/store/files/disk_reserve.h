@@ -9,7 +9,7 @@
 
 namespace hulld::server {
 
-// A file that reserves disk space, which is released when the disk is full. Not thread-safe.
+// A file that reserves disk space, to be released when the disk is full. Not thread-safe.
 class DiskReserve {
  public:
   // files must outlive this.
@@ -19,7 +19,7 @@ class DiskReserve {
   // Creates the file if it is missing. On error, no file exists. Cost: one allocation of the file
   // system, or writing `bytes` if it does not support allocation.
   rocksdb::IOStatus Ensure();
-  // Returns true if there was a file.
+  // Deletes the file. Returns true if it existed.
   bool Release();
   // True from a successful Ensure until Release.
   bool is_made() const { return is_made_; }

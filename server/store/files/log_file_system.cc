@@ -76,7 +76,7 @@ class LogFileSystem::Log : public File {
   IOStatus CutTo(uint64_t size) {
     is_cut_ = true;
     IOStatus cut = FSWritableFileOwnerWrapper::Truncate(size, IOOptions(), nullptr);
-    // Calls the base class, because Sync of this class refuses after a cut.
+    // Calls the base class because this class's Sync fails after a cut.
     // NOLINTNEXTLINE(bugprone-parent-virtual-call)
     if (cut.ok()) cut = FSWritableFileOwnerWrapper::Sync(IOOptions(), nullptr);
     return cut;
@@ -85,7 +85,7 @@ class LogFileSystem::Log : public File {
  private:
   static IOStatus AlreadyCut() { return IOStatus::IOError("the log was truncated after an error"); }
 
-  // A failed call may have written any part of this; none of it gets committed.
+  // A failed call may have written any part of the data; none of it will be committed.
   IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
     const std::lock_guard lock(system_.mutex_);
     LogMark::Synced& written = system_.logs_[name_].written;
@@ -184,7 +184,7 @@ IOStatus LogFileSystem::CutUncommitted() {
   return IOStatus::OK();
 }
 
-// Cuts a closed log.
+// Truncates a closed log.
 IOStatus LogFileSystem::Cut(const std::string& name, const LogState& log) {
   std::unique_ptr<rocksdb::FSWritableFile> file;
   IOStatus cut = ReopenWritableFile(name, rocksdb::FileOptions(), &file, nullptr);

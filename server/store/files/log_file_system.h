@@ -16,43 +16,44 @@
 
 namespace hulld::server {
 
-// A file system that knows the committed part of each of RocksDB's write-ahead logs.
+// A file system that tracks the committed part of each of RocksDB's write-ahead logs.
 //
-// After a failed write the rest of the log can be cut off: a refused change must not appear when
-// the log is read again. A log that is cut while RocksDB has it open takes no more writes.
+// After a failed write, the uncommitted rest of the log can be cut off: a refused change must not
+// appear when the log is replayed. A log that is cut while RocksDB has it open accepts no more
+// writes.
 //
-// A mark (log_mark.h) records the committed part that is on disk, so that a start detects a log
-// that lost some of it. The mark costs one write of 512 bytes to the page cache for each commit,
-// and no sync: it is synced in the background and before a log is deleted.
+// A mark (log_mark.h) records the committed part that is on disk, so that the next start detects a
+// log that lost some of it. The mark costs one write of 512 bytes to the page cache for each
+// commit, and no sync: it is synced in the background and before a log is deleted.
 //
 // Hides the free space of the disk from RocksDB, which would otherwise resume after an error and
 // write to a failed log.
 class LogFileSystem : public rocksdb::FileSystemWrapper {
  public:
-  // directory: that of the logs. Copies of logs elsewhere are ordinary files.
+  // directory: contains the logs. Copies of logs elsewhere are ordinary files.
   LogFileSystem(const std::shared_ptr<rocksdb::FileSystem>& base, std::string directory)
       : FileSystemWrapper(base), directory_(std::move(directory)) {}
   const char* Name() const override { return "LogFileSystem"; }
 
-  // Sets the callback that runs whenever the database's lock was taken, before any other operation;
-  // its error releases the lock. Call before the first lock.
+  // Sets the callback that runs each time the database's lock is acquired, before any other
+  // operation; if it fails, the lock is released. Call before the first lock.
   void OnLocked(std::function<rocksdb::IOStatus()> locked) { locked_ = std::move(locked); }
 
-  // Keeps the mark in the file of this path from now on. `mark` is the file's current content.
+  // Keeps the mark in the existing file at this path. mark: the file's current content.
   rocksdb::IOStatus ResumeMark(const std::string& path, LogMark mark);
   // Keeps the mark in a new file, which replaces any other. Requires: all committed bytes are on
   // disk.
   rocksdb::IOStatus StartMark(const std::string& path, uint64_t revision);
   bool keeps_mark() const;
 
-  // Everything written to the logs so far is committed. is_synced: it is on disk as well, up to
-  // this revision of the store.
+  // Records that everything written to the logs so far is committed. is_synced: it is also on disk,
+  // up to this revision of the store.
   void Commit(uint64_t revision, bool is_synced);
-  // Puts the mark on disk if it changed since.
+  // Syncs the mark to disk if it changed since the last sync.
   rocksdb::IOStatus SyncMark();
 
-  // Syncs of files and directories that failed so far. RocksDB refuses writes after one in the
-  // background, too.
+  // Number of failed syncs of files and directories. RocksDB refuses writes after any of them, even
+  // one in the background.
   uint64_t failed_syncs() const { return failed_syncs_.load(std::memory_order_relaxed); }
   // Truncates all uncommitted bytes and syncs the logs. Requires: no concurrent writes to the logs
   // (unchecked: RocksDbStore, the only caller, holds its log_mutex_ or has closed the database). On

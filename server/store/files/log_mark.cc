@@ -20,7 +20,7 @@ using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
 // A slot: generation, revision, number of logs; number, size and CRC-32 of each; zeros; and the
-// CRC-32 of all that. It fills one sector, which disks write as a whole.
+// CRC-32 of all of these. It fills one sector, which disks write as a whole.
 constexpr size_t kSlotWords = 64;
 using Slot = std::array<uint64_t, kSlotWords>;
 static_assert(sizeof(Slot) == 512);
@@ -43,7 +43,7 @@ uint64_t ChecksumOf(const Slot& slot) {
   return Crc32(0, Bytes(slot).substr(0, sizeof(Slot) - sizeof(uint64_t)));
 }
 
-// Encodes the newest logs if the slot does not hold all. RocksDB keeps one to three.
+// Encodes only the newest logs if the slot cannot hold all of them. RocksDB keeps one to three.
 Slot Encode(const LogMark& mark, uint64_t generation) {
   const size_t count = std::min(mark.logs.size(), kMostLogs);
   Slot slot = {generation, mark.revision, count};
@@ -98,7 +98,7 @@ absl::StatusOr<std::optional<Decoded>> ReadNewest(rocksdb::FileSystem& files,
   return newest;
 }
 
-// Returns the difference; empty if the log holds these bytes.
+// Returns a description of the difference; empty if the log starts with these bytes.
 absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::string& path,
                                     const LogMark::Synced& synced) {
   const std::string name = std::filesystem::path(path).filename();
@@ -126,7 +126,7 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
     crc32 = Crc32(crc32, {read.data(), read.size()});
   }
   if (crc32 == synced.crc32) return std::string();
-  return absl::StrCat("the log ", name, " does not hold what was written to it");
+  return absl::StrCat("the contents of the log ", name, " differ from what was written");
 }
 
 // Renamed only after it is complete and on disk.

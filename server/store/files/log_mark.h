@@ -38,12 +38,12 @@ rocksdb::IOStatus SyncDirectory(rocksdb::FileSystem& files, const std::string& d
 
 // "000012.log" in `directory`, as RocksDB names it.
 std::string LogPath(const std::string& directory, uint64_t number);
-// Returns the number in such a name; nullopt for another file.
+// Parses such a name; nullopt for any other file.
 std::optional<uint64_t> LogNumber(const std::string& path);
 
-// Returns the first log in `directory` that is missing, is shorter than `mark` says, or differs in
-// these bytes, with the finding; none if there is no such log. UNAVAILABLE: a log cannot be read.
-// Cost: reads all bytes of the mark.
+// Returns the first log in `directory` that contradicts `mark`, with the finding: it is missing,
+// too short, or has different bytes. None if all logs match. UNAVAILABLE: a log cannot be read.
+// Cost: reads all bytes covered by the mark.
 struct LostLog {
   uint64_t number = 0;
   std::string finding;
@@ -56,11 +56,12 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
 // is intact after a power failure, and a full disk does not prevent writing.
 class LogMarkFile {
  public:
-  // None if there is no file. DATA_LOSS: it holds no mark. UNAVAILABLE: it cannot be read.
+  // Reads the mark; none if the file does not exist. DATA_LOSS: the file contains no mark.
+  // UNAVAILABLE: it cannot be read.
   static absl::StatusOr<std::optional<LogMark>> Read(rocksdb::FileSystem& files,
                                                      const std::string& path);
-  // Opens the file for writing, and makes it first, on disk, if it does not exist or `replace` is
-  // true. Its mark is then `mark`, which an existing file must hold.
+  // Opens the file for writing. Creates it durably, with `mark`, if it does not exist or `replace`
+  // is true. Requires: an existing file that is kept contains `mark`.
   static rocksdb::IOStatus Open(rocksdb::FileSystem& files, const std::string& path,
                                 const LogMark& mark, bool replace,
                                 std::unique_ptr<LogMarkFile>* result);

@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A database holds one store, so the channel's name need not identify it.
+// A database contains one store, so the channel's name need not identify it.
 constexpr char kListen[] = "LISTEN hulld_batches";
 constexpr char kNotify[] = "NOTIFY hulld_batches";
 constexpr std::chrono::milliseconds kForEver{-1};
@@ -78,7 +78,7 @@ void BatchNotices::Run() {
   }
 }
 
-// Listens and sends until the session is lost, or the thread must end.
+// Listens and sends until the session is lost or the thread must end.
 absl::Status BatchNotices::Serve() {
   absl::StatusOr<std::unique_ptr<Session>> opened = open_();
   if (!opened.ok()) return opened.status();
@@ -91,7 +91,7 @@ absl::Status BatchNotices::Serve() {
   Hear(*last);
   Clock::time_point next = Clock::now();
   while (true) {
-    // Cleared before the conditions are checked: later events wake the thread again.
+    // Cleared before the conditions are checked, so later events wake the thread again.
     ClearWake();
     if (ending_) return absl::OkStatus();
     const uint64_t batch = to_send_;
@@ -112,7 +112,7 @@ absl::Status BatchNotices::Serve() {
 }
 
 void BatchNotices::Hear(uint64_t batch) {
-  // Notices of two servers may arrive in another order than their commits.
+  // Notices from two servers may arrive in a different order than their commits.
   last_heard_ = std::max(last_heard_.load(), batch);
   on_batch_(batch);
 }

@@ -41,8 +41,8 @@ class BatchNotices {
   static constexpr std::chrono::milliseconds kLeastPause{2};
 
   // open: creates the session. on_batch: receives, on the thread, the number of each committed
-  // batch, including this server's, and the last one whenever listening begins. fallback: text of
-  // the log for the behavior without notices.
+  // batch, including this server's, and the last one whenever listening begins. fallback: log text
+  // that describes the behavior without notices.
   BatchNotices(Opener open, std::chrono::milliseconds retry,
                std::function<void(uint64_t batch)> on_batch, std::string fallback);
   BatchNotices(const BatchNotices&) = delete;
@@ -75,7 +75,7 @@ class BatchNotices {
   std::atomic<uint64_t> to_send_ = 0;
   std::atomic<bool> is_listening_ = false;
   std::atomic<uint64_t> last_heard_ = 0;
-  // Used only by the thread: the last batch sent.
+  // Used only by the thread. The last batch sent.
   uint64_t sent_ = 0;
   std::thread thread_;
 };

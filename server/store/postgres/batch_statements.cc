@@ -19,7 +19,7 @@ constexpr size_t kMostStatementBytes = 16 << 20;
 
 // Rows of a hull after a batch.
 struct HullRows {
-  // Existing rows to delete: all of the hull's, or only its vertices.
+  // Existing rows to delete: all rows of the hull, or only its vertices.
   bool drops_all = false;
   bool drops_vertices = false;
   // The hull's last change; null before the first.

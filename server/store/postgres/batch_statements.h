@@ -14,8 +14,8 @@ namespace hulld::server {
 std::string PrepareBatchStatements();
 
 // Statements that apply a batch of changes to the tables, except the row of the store: deletions
-// first, then rows, each row once, however many changes of a hull there are. Cost: O(bytes of the
-// vertices that are kept).
+// first, then inserts, with each row written once, regardless of the number of changes to a hull.
+// Cost: O(bytes of the remaining vertices).
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes);
 
 // Change of the store's totals by a batch, modulo 2^64. The vertices of a hull that ended with a

@@ -10,7 +10,7 @@ namespace hulld::server {
 namespace {
 
 // Defaults for missing keywords. Times in seconds, TCP's in milliseconds; a choice: longer than a
-// network glitch, shorter than people's patience.
+// network glitch, shorter than an operator's patience.
 constexpr struct {
   const char* keyword;
   const char* value;

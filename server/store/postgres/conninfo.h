@@ -15,7 +15,7 @@ class Conninfo {
   // text: a connection string of libpq, keywords with values or a URI. Missing keywords get
   // defaults that bound the wait for an unreachable machine and select a writable server.
   // INVALID_ARGUMENT, without quoting the text: it is not a connection string, or a password in it
-  // ends early, so that its rest would be taken for a host or a database.
+  // ends early, so that its rest would be parsed as a host or a database.
   static absl::StatusOr<Conninfo> Parse(const std::string& text);
 
   // By keyword, for PQconnectdbParams.

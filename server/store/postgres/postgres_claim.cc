@@ -1,4 +1,4 @@
-// Claim of the active server, and its loss.
+// Claiming the store as the active server, and losing the claim.
 #include <absl/status/status.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -19,7 +19,7 @@ constexpr int kBeatsPerMeasure = 10;
 
 }  // namespace
 
-// Returns true if the tables exist. FAILED_PRECONDITION: a newer hulld made them.
+// Returns true if the tables exist. FAILED_PRECONDITION: a newer hulld created them.
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<bool> exists = HasTable(session, "hulld.store");
   if (!exists.ok() || !*exists) return exists;
@@ -74,7 +74,7 @@ void PostgresStore::Keep() {
       deaf_beats = is_deaf ? deaf_beats + 1 : 0;
       said_deaf = said_deaf && is_deaf;
     }
-    // Two beats without the expected notice are no accident.
+    // Two beats without the expected notice are not a coincidence.
     if (deaf_beats == 2 && !std::exchange(said_deaf, true)) {
       spdlog::warn(
           "no commit notices are arriving although the listening session is open; polling the "

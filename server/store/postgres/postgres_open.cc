@@ -1,4 +1,4 @@
-// Opening of the store: sessions, tables, and waiting for its turn.
+// Opening the store: sessions, tables, and waiting to become active.
 #include <absl/status/status.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
@@ -20,13 +20,13 @@ namespace {
 constexpr int kMostReaders = 8;
 constexpr int kLeastServerVersion = 140'000;
 constexpr char kLockNotAvailable[] = "55P03";
-// Pauses between the attempts of a server that waits for its turn.
+// Pauses between attempts to become the active server.
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
 constexpr std::chrono::milliseconds kLongestTurnPause{250};
 
-// hulld.store has one row. `revision`, and `batch`, the number of batches, are of the last
-// committed batch. `epoch` and `owner` are of the active server; a batch writes its own epoch as
-// `written_in`, and store_fence refuses it if the two differ. `relaxed`: true with
+// hulld.store has one row. `revision` and `batch`, the number of batches, belong to the last
+// committed batch. `epoch` and `owner` belong to the active server; a batch writes its own epoch
+// as `written_in`, and store_fence refuses it if the two differ. `relaxed`: true with
 // synchronous_commit = off, from the start of a server until its orderly end.
 //
 // `hulls`, `vertices` and `bodies` are the totals of the store.
@@ -89,8 +89,8 @@ constexpr char kTables[] = R"(
   ALTER TABLE hulld.bases ALTER COLUMN vertices SET STORAGE EXTERNAL;
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
 
-// Blocks all reads and writes of the store's row until the end. Servers of the former format also
-// lock the table first, so none of them waits for the row in between.
+// Blocks all reads and writes of the store's row until the transaction ends. Servers of the
+// previous format also lock the table first, so none of them is left waiting for the row.
 constexpr char kAddTotals[] = R"(
   BEGIN;
   LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE;
@@ -101,7 +101,7 @@ constexpr char kAddTotals[] = R"(
   ALTER TABLE IF EXISTS hulld.changes
     ADD COLUMN IF NOT EXISTS body_began bigint NOT NULL DEFAULT 0;)";
 
-// Hulls or bodies counted per statement: some 70 ms.
+// Hulls or bodies counted per statement, which takes about 70 ms.
 constexpr uint64_t kCountedAtOnce = 100'000;
 constexpr uint64_t kFormatThatCountsHulls = 3;
 // A record holds 8-byte little-endian numbers; the fourth is the number of vertices.
@@ -125,7 +125,7 @@ struct Counted {
   uint64_t vertices = 0;
 };
 
-// Counts in portions, so that no statement takes long. CANCELLED: should_stop returned true.
+// Counts in portions to keep each statement short. CANCELLED: should_stop returned true.
 absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
                                  const std::function<bool()>& should_stop) {
   Counted all;
@@ -145,8 +145,8 @@ absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
   return all;
 }
 
-// Settings of every session. The database aborts statements of a server that is gone, or that
-// stalls while it holds locks; the times are a choice, as in conninfo.cc, and shorter than
+// Settings of every session. The database aborts statements of a server that has disconnected, or
+// that stalls while it holds locks. The timeouts are a choice, as in conninfo.cc, and shorter than
 // PostgresOptions::answer_time. Every statement uses an index, even if its plan was made when the
 // table was small.
 constexpr char kSettings[] = R"(
@@ -229,14 +229,14 @@ constexpr char kPrepareReads[] = R"(
       SELECT writer_id, sequence FROM hulld.writers
       WHERE hull_id = $1 AND incarnation = $2 ORDER BY writer_id;)";
 
-// Machine and process for the operator; the rest makes the name unique.
+// Host and process identify the server to the operator; the random suffix makes the name unique.
 std::string OwnerName() {
   char host[256] = "";
   gethostname(host, sizeof host - 1);
   return absl::StrCat(host, " process ", getpid(), " ", RandomId());
 }
 
-// Returns the error for the person who starts a server: the failure and, if known, the remedy.
+// Returns the error shown at startup: the failure and, if known, the remedy.
 absl::Status OpenFailed(const absl::Status& status) {
   std::string advice;
   if (SqlState(status) == "42501") {
@@ -286,8 +286,8 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   return store;
 }
 
-// The connection has worked before, so a loss is treated as temporary: for example, sessions of
-// killed servers still exist, and the database refuses more.
+// The connection has worked before, so a failure is treated as temporary: for example, the database
+// may refuse more sessions while those of killed servers still exist.
 absl::Status PostgresStore::BeginPatiently() {
   const auto deadline = std::chrono::steady_clock::now() + options_.patience;
   // Begin must not run twice: the store would appear not to have been closed.
@@ -337,20 +337,20 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
                                   kPrepareReads, options_.shared ? PrepareFetch() : ""));
 }
 
-// The database ends this session, and thus this server's turn, after several missed beats.
+// The database ends this session, and with it this server's claim, after several missed beats.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
   const auto patience = 10 * options_.beat;
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET idle_session_timeout = ", patience.count()));
 }
 
-// Its transactions do not wait for the disk, because notices need not be durable.
+// Its transactions do not wait for the disk because notices need not be durable.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET synchronous_commit = off"));
 }
 
-// Retries while a starting server upgrades the tables of a former format, which locks out all other
+// Retries while a starting server upgrades tables of an older format, which locks out all other
 // servers: for minutes with hundreds of millions of hulls.
 absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::string& sql) const {
   for (bool is_first = true;; is_first = false) {
@@ -389,8 +389,8 @@ absl::Status PostgresStore::MakeSchema(Session& session) {
   return AddTotals(session);
 }
 
-// Adds the totals that tables of a former format lack. No server commits during this, and servers
-// that would not maintain the totals are locked out and end. Cost: 0.7 s for a million hulls.
+// Adds the totals that tables of an older format lack. Meanwhile no server can commit, and servers
+// that would not maintain the totals are locked out and exit. Cost: 0.7 s for a million hulls.
 absl::Status PostgresStore::AddTotals(Session& session) const {
   const absl::StatusOr<uint64_t> number = OnlyNumber(session.Run("SELECT format FROM hulld.store"));
   if (!number.ok()) return number.status();
@@ -429,7 +429,7 @@ absl::Status PostgresStore::AddTotals(Session& session) const {
   return status;
 }
 
-// Atomic: a server killed during this leaves all of the tables or none.
+// Atomic: a server killed in the middle leaves either all of the tables or none.
 absl::Status PostgresStore::MakeTables(Session& session) {
   const absl::StatusOr<bool> exists = CheckFormat(session);
   if (!exists.ok()) return exists.status();
@@ -495,7 +495,7 @@ absl::Status PostgresStore::WaitForTurn() {
     has_lock_ = locked.ok() && *locked;
     if (has_lock_) return absl::OkStatus();
     if (!locked.ok()) {
-      // Also waits for a database that restarts or fails over.
+      // Also waits while a database restarts or fails over.
       absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
       keeper_session_ = session.ok() ? *std::move(session) : nullptr;
     } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {

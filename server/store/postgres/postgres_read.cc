@@ -1,4 +1,4 @@
-// Reads of the store: records, the vertices of a hull, a sequence.
+// Reading from the store: records, vertices of a hull, a writer's sequence.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -14,7 +14,7 @@
 namespace hulld::server {
 namespace {
 
-// Rows per portion: some 100 bytes each, except bodies with many pieces.
+// Rows per portion: about 100 bytes each, except bodies with many pieces.
 constexpr uint32_t kRowsPerPortion = 4096;
 
 // Selects the deltas of a hull after one revision and up to another.
@@ -128,8 +128,8 @@ absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::str
   return FoundIn(*rows, "", SIZE_MAX);
 }
 
-// Requests one extra row to detect more. An impossible prefix may hold characters that the database
-// does not know, so the query then starts after all IDs.
+// Requests one extra row to detect whether more follow. A prefix that no ID can have may contain
+// characters that the database rejects; the query then starts after all IDs.
 absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefix,
                                                         const std::string& after, size_t most,
                                                         RecordKinds kinds) {
@@ -172,7 +172,7 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
   return WhyDamaged(hull, vertices.status());
 }
 
-// The data may be later than the requested versions, and then does not match them.
+// The data may be newer than the requested versions, and then does not match them.
 std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
     std::span<const HullGrowth> hulls) {
   std::vector<std::optional<std::vector<Vector>>> growth(hulls.size());

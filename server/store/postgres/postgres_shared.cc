@@ -1,4 +1,4 @@
-// Several active servers over one store: their commits, and following each other.
+// Several active servers over one store: commits, and changes by peer servers.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
@@ -17,20 +17,20 @@ namespace {
 
 // Key of the advisory lock for creating the tables.
 constexpr uint64_t kSchemaLock = 0x68756c6c65;
-// Number of batches with retained changes, for servers that have not read them yet; and the number
-// of batches between prunings of older ones.
+// Number of batches whose changes are retained for servers that have not read them yet, and number
+// of batches between prunings of older changes.
 constexpr uint64_t kKeptBatches = 1 << 16;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
-// Maximum number of changed IDs that a server applies together. This many took 0.2 s under the
-// registry's mutex (**observed**, with hulls created and deleted in between, at load 6). They form
-// one version for readers, so they cannot be applied in parts.
+// Maximum number of changed IDs that a server applies as one. Applying this many took 0.2 s under
+// the registry's mutex (**observed**, with hulls created and deleted in between, at load 6). They
+// form one version for readers, so they cannot be applied in parts.
 constexpr int kMostFollowed = 1 << 17;
 
 // hulld.changes lists the IDs changed by each batch, for peer servers: `revision` is the store's
 // after the last change of the ID in the batch; `ended_at` is the revision at which an incarnation
 // of it ended, or 0; `began` is the create_revision of the first one that ended if it was a hull,
 // `body_began` if it was a body. hulld.store.pruned: batches up to this one are no longer listed.
-// hulld.servers holds the last batch of each server, for a server that lost the answer to its
+// hulld.servers stores the last batch of each server, for a server that lost the answer to its
 // COMMIT.
 constexpr char kSharedTables[] = R"(
   BEGIN;
@@ -49,7 +49,7 @@ constexpr char kSharedTables[] = R"(
   ALTER TABLE hulld.store ADD COLUMN pruned bigint NOT NULL DEFAULT 0;
   COMMIT;)";
 
-// hulld_follow requests one ID more than the limit, its second parameter.
+// hulld_follow requests one ID more than the limit given by its second parameter.
 constexpr char kPrepareFetch[] = R"(
     PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
@@ -101,7 +101,7 @@ Statement FetchStatement(uint64_t batch) {
 }
 
 // Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
-// damaged hull; 1 then states that the hull existed, as peer servers need to know.
+// damaged hull; the value 1 then records that the hull existed, which peer servers need to know.
 uint64_t BeganOfEnded(const Change& change) {
   const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
   if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
@@ -144,7 +144,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
                          began.Take(), bodies_began.Take()}};
 }
 
-// Records the incarnation that ended first. rows: of hulld_follow.
+// Records the first incarnation that ended. rows: the result of hulld_follow.
 void NoteFormer(const Rows& rows, int row, PeerChange& change) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
@@ -181,7 +181,8 @@ absl::Status PostgresStore::MakeSharedSchema(Session& session) {
   return made;
 }
 
-// Makes this server one of the store's owners and fences off a server that was active alone before.
+// Makes this server one of the store's owners, and fences off a server that was previously the only
+// active one.
 absl::Status PostgresStore::Join() {
   if (absl::Status s = RenewWriter(); !s.ok()) return s;
   const absl::StatusOr<Rows> joined =
@@ -192,7 +193,7 @@ absl::Status PostgresStore::Join() {
         "the store was open with synchronous_commit = off and not shut down cleanly; start and "
         "stop one hulld with --postgres-servers one first, which gives the store a new ID");
   }
-  // Drops killed servers. A server that still asks for its last batch committed it recently.
+  // Drops killed servers. A server that may still query its last batch committed it recently.
   return writer_->Ask({.name = "hulld_drop_old_servers"}).status();
 }
 
@@ -202,8 +203,8 @@ void PostgresStore::Leave() {
   writer_->Ask({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();
 }
 
-// Ends this server if changes that it needs were pruned, if the store has another owner, or if it
-// went back.
+// Ends this server if changes that it needs were pruned, the store has another owner, or the store
+// went back to an earlier state.
 absl::Status PostgresStore::CheckStore(const Rows& rows) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
   if (rows.bigint(0, 2) != epoch()) {
@@ -286,7 +287,7 @@ absl::Status PostgresStore::Fetch() {
       "cannot read changes of peer servers from the database: ", rows.status().message()));
 }
 
-// Takes the turn before a batch is written, and reads the preceding changes of peer servers.
+// Takes the turn before writing a batch, and reads the preceding changes by peer servers.
 absl::Status PostgresStore::TakeTurn() {
   std::vector<Statement> turn;
   turn.push_back({.text = "BEGIN"});
@@ -325,7 +326,8 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batc
   return status;
 }
 
-// Published revisions will be assigned to other changes, so this is a different store now.
+// Revisions already seen by clients will be assigned to other changes, so this is now a different
+// store.
 void PostgresStore::GiveNewId() {
   went_back_ = false;
   const absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
@@ -336,9 +338,9 @@ void PostgresStore::GiveNewId() {
     spdlog::error("cannot assign a new ID to the store: {}", std::string(status.message()));
 }
 
-// Returns true if this server's batch was committed. Takes the turn: the transaction that held it
-// has ended then, and nothing of it can follow, because its COMMIT was sent before. Its sync covers
-// earlier commits.
+// Returns true if this server's batch was committed. Takes the turn first: by then the transaction
+// that held it has ended, and nothing of it can arrive later because its COMMIT was sent before.
+// The sync of this transaction covers earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   if (absl::Status s = RenewWriter(); !s.ok()) return s;
   std::vector<Statement> statements;
@@ -352,9 +354,9 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
 
-// Ends sessions that hold the turn and send nothing, for example of a server that stalls while it
-// sends a batch: PostgreSQL has timeouts between transactions and between batches of statements,
-// but not within these.
+// Ends sessions that hold the turn without sending anything, such as the session of a server that
+// stalls while sending a batch: PostgreSQL has timeouts between transactions and between batches of
+// statements, but not within a batch.
 absl::Status PostgresStore::EndStuckTurns() {
   return keeper_session_
       ->Run(absl::StrCat(
@@ -375,8 +377,9 @@ void PostgresStore::StartNotices() {
       absl::StrCat("the server polls it every ", options_.look.count(), " ms"));
 }
 
-// True if notices arrive. The keeper still polls the store with each beat. A batch found that way
-// but not announced by now means a lost notice: then it polls more often until a notice arrives.
+// True if notices arrive. The keeper still polls the store with each beat. A batch found by polling
+// but not announced by then means that a notice was lost; the keeper then polls more often until a
+// notice arrives.
 bool PostgresStore::HearsPeers() const {
   return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
 }
@@ -390,7 +393,7 @@ absl::Status PostgresStore::PollPeers() {
   return absl::OkStatus();
 }
 
-// Under the mutex, so that OnPeerCommit waits until the former callback is not running.
+// Called with the mutex held, so that OnPeerCommit blocks while the previous callback is running.
 void PostgresStore::NotifyPeerCommit() {
   const std::lock_guard lock(mutex_);
   if (on_peer_commit_) on_peer_commit_();

@@ -1,4 +1,4 @@
-// Writes of the store: commits, their outcome, and the end.
+// Writing to the store: commits, their outcome, and shutdown.
 #include "server/store/postgres/postgres_store.h"
 
 #include <absl/status/status.h>
@@ -54,7 +54,7 @@ PostgresStore::~PostgresStore() {
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
 
-// Its sync covers earlier commits. If it fails, the mark stays.
+// The sync of this statement covers earlier commits. If it fails, the mark stays.
 void PostgresStore::EndRelaxedRun() {
   if (writer_ == nullptr || !writer_->Run("SET synchronous_commit = on").ok()) return;
   writer_->Ask({.name = "hulld_close", .parameters = {EncodeBigint(epoch())}})
@@ -67,8 +67,8 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
   return status;
 }
 
-// Writes the revision, the batch number and the resulting totals, if the epoch is still this
-// server's.
+// Writes the revision, the batch number and the resulting totals, if this server's epoch is still
+// current.
 Statement PostgresStore::Fence(const Batch& batch) const {
   return {.name = "hulld_fence",
           .parameters = {EncodeBigint(batch.revision), EncodeBigint(batch.number),
@@ -82,7 +82,7 @@ absl::Status PostgresStore::Attempt(std::span<Change* const> changes, Batch* bat
   *batch = {batch_ + 1, NumberChanges(changes, revision_), AddedBy(changes)};
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
-  // First, so that a superseded server writes nothing.
+  // Runs first, so that a superseded server writes nothing.
   statements.push_back(Fence(*batch));
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
   return SendBatch(std::move(statements), *batch);
@@ -116,13 +116,13 @@ absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_poin
     if (options_.shared && ViolatedConstraint(outcome.status()) == "store_fence") {
       End(Superseded(""));
     }
-    // A server that is active alone finds the outcome even after its end.
+    // A server that is the only active one can determine the outcome even after it was superseded.
     if (options_.shared && !ended().ok()) return outcome;
     if (Clock::now() + pause >= deadline || EndsWithin(pause)) return outcome;
   }
 }
 
-// Waits; returns true if this server ends meanwhile.
+// Waits; returns true if this server ends during the wait.
 bool PostgresStore::EndsWithin(std::chrono::milliseconds pause) {
   std::unique_lock lock(mutex_);
   return wake_.wait_for(lock, pause, [this] { return ending_; });
@@ -139,7 +139,7 @@ void PostgresStore::Keep(const Batch& batch) {
 }
 
 // Raises the epoch in a new session. This waits for the batch's transaction to end if it has locked
-// the row, and fences it off if it has not reached that point. Its sync covers earlier commits.
+// the row, and fences it off otherwise. The sync covers earlier commits.
 absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   if (absl::Status s = RenewWriter(); !s.ok()) return s;
   const Statement reclaim = {.name = "hulld_reclaim", .parameters = {owner_}};
@@ -150,8 +150,9 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   epoch_ = claimed.bigint(0, 0);
   const uint64_t found = claimed.bigint(0, 1);
   if (found >= batch_) return found >= batch;
-  // The database lost acknowledged commits: an outage without sync, or a restore of an earlier
-  // state. It will assign their revisions to other changes, so this is a different store now.
+  // The database lost acknowledged commits through an outage without sync or a restore of an
+  // earlier state. It will assign their revisions to other changes, so this is now a different
+  // store.
   const absl::StatusOr<Rows> renamed =
       writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}});
   if (!renamed.ok()) return renamed.status();
@@ -183,7 +184,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   if (!unknown_.ok()) return unknown_;
   const Clock::time_point deadline = Clock::now() + options_.patience;
   for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
-    // The outcome of a former session is known.
+    // The outcome of the previous session is known.
     absl::Status status = writer_ == nullptr ? RenewWriter() : absl::OkStatus();
     Batch batch;
     if (status.ok()) {

@@ -26,7 +26,7 @@
 
 namespace hulld::server {
 
-// Pauses between attempts to reach the database: doubled from the first to the longest.
+// Pauses between attempts to reach the database: doubled from the first up to the longest.
 inline constexpr std::chrono::milliseconds kFirstRetryPause{10};
 inline constexpr std::chrono::milliseconds kLongestRetryPause{500};
 
@@ -36,11 +36,11 @@ struct PostgresOptions {
 
   // A connection string of libpq.
   std::string conninfo;
-  // Takes the store from the active server instead of waiting for its end.
+  // Replaces the active server instead of waiting for it to exit.
   bool take_over = false;
   // Also opens a store with an unfinished migration.
   bool migrating = false;
-  // Other servers may be active over the same database. Excludes take_over.
+  // Other servers may be active over the same database. Cannot be combined with take_over.
   bool shared = false;
   // Polled while this waits for the active server, waits for an upgrade of the tables by another
   // server, or upgrades them; may be empty.
@@ -50,10 +50,10 @@ struct PostgresOptions {
   // Maximum silence of the database while an answer is due. Longer than lock_time.
   std::chrono::milliseconds answer_time{30'000};
   // Time for a commit that lost its session to determine its outcome or to retry; also the time for
-  // Open to get the sessions after the first.
+  // Open to open the sessions after the first.
   std::chrono::milliseconds patience{10'000};
-  // Interval at which this server checks that it is still active. The database considers it gone
-  // ten intervals after its last check.
+  // Interval at which this server checks that it is still active. The database considers the server
+  // dead ten intervals after its last check.
   std::chrono::milliseconds beat{1000};
   // Shared: true if servers notify each other of their batches (BatchNotices).
   bool notices = true;
@@ -70,38 +70,38 @@ struct PostgresOptions {
 //
 // Unless shared, any number of servers may be started over one database; one is active, the rest
 // wait in Open. The active server holds an advisory lock in a dedicated session, which ends with
-// it, or soon after it stalls. That lock only decides the order. Safety comes from the epoch in the
-// row of the store, which each server raises when it becomes active: every transaction of a batch
-// writes its own epoch next to it, and a constraint of the table refuses a different one. So a
-// superseded server cannot commit anything, whatever it believes, and neither can packets that
-// arrive late.
+// it, or soon after it stalls. That lock only decides the order of servers. Safety comes from the
+// epoch in the row of the store, which each server raises when it becomes active: every transaction
+// of a batch writes its own epoch next to it, and a table constraint rejects a mismatch. So a
+// superseded server cannot commit anything, whether or not it knows that it was superseded, and
+// neither can packets that arrive late.
 //
 // A batch of changes is one transaction, sent in one message. If the session is lost before the
 // outcome is known, the store raises the epoch again in a new session. This waits for the
-// transaction if it is still running, and prevents its commit afterwards, so the number of batches
-// then shows if it was committed. No caller is answered before.
+// transaction if it is still running, and prevents a later commit, so the number of batches then
+// shows whether it was committed. No caller is answered before that.
 //
 // If shared, several servers are active concurrently (postgres_shared.cc). They share the advisory
-// lock and belong to one epoch, so that they and a server that is active alone exclude each other.
-// A transaction first takes the turn: it locks the store's row. It then reads the commits of peer
-// servers that this server has not seen, and numbers its revisions after theirs. Changes of IDs
-// that peer servers changed are left out, and retried by the registry. The committing server
-// notifies the rest (BatchNotices), which also poll. COMMIT is sent only by a session that holds
+// lock and belong to one epoch, so that they cannot run alongside a server that requires exclusive
+// access. A transaction first takes the turn: it locks the store's row. It then reads the commits
+// of peer servers that this server has not seen, and numbers its revisions after theirs. Changes to
+// IDs that peer servers changed are skipped, and the registry retries them. The committing server
+// notifies its peers (BatchNotices), which also poll. COMMIT is sent only by a session that holds
 // the turn, so none can arrive after the turn has passed on; a server that lost the answer looks
 // for its batch after it has the turn again.
 class PostgresStore : public Store, public PeerFeed {
  public:
   // Waits while another server is active, unless take_over. Creates the schema if it is missing.
-  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld made the schema, or
-  // the database is too old. CANCELLED: should_stop returned true. DATA_LOSS: the row of the store
-  // is missing. UNAVAILABLE: it cannot connect, or lacks a required permission.
+  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld created the schema,
+  // or the database is too old. CANCELLED: should_stop returned true. DATA_LOSS: the row of the
+  // store is missing. UNAVAILABLE: it cannot connect, or lacks a required permission.
   static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
 
   ~PostgresStore() override;
 
   std::string kind() const override { return "postgres"; }
   const std::string& id() const override { return id_; }
-  // Given by the value of synchronous_commit when this was opened, which the sessions keep.
+  // Determined by synchronous_commit when the store was opened; the sessions keep that value.
   Durability durability() const override { return durability_; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
@@ -142,7 +142,7 @@ class PostgresStore : public Store, public PeerFeed {
  private:
   // Owner of a shared store.
   static constexpr char kSeveralServers[] = "several servers";
-  // A batch as it will be if committed; number 0: none was sent.
+  // The state after the batch in flight, if it commits; number 0: no batch was sent.
   struct Batch {
     uint64_t number = 0;
     uint64_t revision = 0;
@@ -161,7 +161,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<std::unique_ptr<Session>> OpenKeeper() const;
   absl::StatusOr<std::unique_ptr<Session>> OpenListener() const;
 
-  // Opening, in this order.
+  // Steps of opening, in this order.
   absl::Status CheckServer(Session& session);
   absl::StatusOr<Rows> RunPatiently(Session& session, const std::string& sql) const;
   absl::Status WaitForTurn();
@@ -182,7 +182,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status Beat();
   absl::Status MeasureDisk();
   void End(const absl::Status& reason);
-  // Returns the reason why this is not the active server. owner: the active one, if known.
+  // Returns the reason that this is not the active server. owner: the active server, if known.
   static absl::Status Superseded(std::string_view owner);
   absl::Status ended() const;
 
@@ -241,7 +241,7 @@ class PostgresStore : public Store, public PeerFeed {
   std::string synchronous_commit_;
   std::atomic<uint64_t> epoch_ = 0;
 
-  // For Commit, Recover and the end, which never overlap.
+  // For Commit, Recover, and shutdown, which never overlap.
   std::unique_ptr<Session> writer_;
   // Number of committed batches, as far as is known.
   uint64_t batch_ = 0;

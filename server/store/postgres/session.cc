@@ -26,7 +26,7 @@ std::string PayloadOf(const absl::Status& status, const char* name) {
   return payload.has_value() ? std::string(*payload) : "";
 }
 
-// libpq ends its messages with a line feed, and some have several lines.
+// libpq's messages end with a newline, and some have several lines.
 std::string OneLine(const char* message) {
   return absl::StrReplaceAll(absl::StripAsciiWhitespace(message), {{"\n\t", " "}, {"\n", "; "}});
 }

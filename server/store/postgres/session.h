@@ -25,7 +25,7 @@ class Rows {
   explicit Rows(PGresult* result) : result_(result, PQclear) {}
 
   int count() const { return PQntuples(result_.get()); }
-  // Value as received: text after Run, binary after Ask.
+  // The value as received: text from Run, binary from Ask.
   std::string_view at(int row, int column) const {
     return {PQgetvalue(result_.get(), row, column),
             static_cast<size_t>(PQgetlength(result_.get(), row, column))};
@@ -36,17 +36,17 @@ class Rows {
   std::unique_ptr<PGresult, decltype(&PQclear)> result_;
 };
 
-// True if the session ended, or did not answer in time: its last operation may have happened, may
-// not have happened, or may still happen.
+// True if the session ended or did not answer in time: its last operation may or may not have taken
+// effect, or may still do so.
 bool IsLost(const absl::Status& status);
 // PostgreSQL's code of an error that it returned, as "42501"; otherwise empty.
 std::string SqlState(const absl::Status& status);
 // The constraint violated by a statement; otherwise empty.
 std::string ViolatedConstraint(const absl::Status& status);
 
-// A connection to PostgreSQL, used by one thread at any time. Errors are UNAVAILABLE, or
+// A connection to PostgreSQL, used by one thread at a time. Errors are UNAVAILABLE, or
 // RESOURCE_EXHAUSTED if PostgreSQL's disk is full. After a session is lost (IsLost), all later
-// operations fail likewise.
+// operations fail in the same way.
 class Session {
  public:
   // answer_time: maximum silence while an answer is due; the session is lost after it.
@@ -95,7 +95,7 @@ class Session {
   bool warned_ = false;
 };
 
-// Returns the number in the only row of a query about the store. DATA_LOSS: there is no such row.
+// Returns the number in the only row of a query about the store. DATA_LOSS: the row is missing.
 absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows);
 
 // Returns true if a table exists. name: as in "hulld.store".

@@ -13,12 +13,12 @@
 
 namespace hulld::server {
 
-// Sessions shared by threads, one user each. Thread-safe.
+// Sessions shared by threads; each is used by one thread at a time. Thread-safe.
 class SessionPool {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
-  // open: creates a session. most: maximum number of sessions; a thread waits if all are taken.
+  // open: creates a session. most: maximum number of sessions; a thread waits if all are in use.
   SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
 
   // Session::Ask on one of the sessions. If it was lost since its last use, for example by a

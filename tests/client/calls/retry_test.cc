@@ -22,7 +22,7 @@ RetryPolicy Recording(std::vector<milliseconds>* waits, int max_attempts) {
 
 Deadline Far() { return std::chrono::steady_clock::now() + std::chrono::hours(1); }
 
-TEST(Retry, UnavailableIsTriedAgainWithDoublingWaitsUpToACap) {
+TEST(Retry, UnavailableIsRetriedWithDoublingWaitsUpToACap) {
   std::vector<milliseconds> waits;
   int attempts = 0;
   const absl::Status status = CallWithRetries(Recording(&waits, 8), Far(), [&] {
@@ -58,7 +58,7 @@ TEST(Retry, EndsWithTheFirstOtherAnswer) {
   EXPECT_EQ(attempts, 3);
 }
 
-TEST(Retry, OtherErrorsAreNotTriedAgain) {
+TEST(Retry, OtherErrorsAreNotRetried) {
   for (const absl::StatusCode code :
        {absl::StatusCode::kDeadlineExceeded, absl::StatusCode::kInternal,
         absl::StatusCode::kResourceExhausted, absl::StatusCode::kNotFound,
@@ -77,7 +77,7 @@ TEST(Retry, OtherErrorsAreNotTriedAgain) {
   }
 }
 
-TEST(Retry, AWaitThatWouldPassTheDeadlineIsNotBegun) {
+TEST(Retry, AWaitBeyondTheDeadlineIsNotStarted) {
   std::vector<milliseconds> waits;
   int attempts = 0;
   const Deadline past = std::chrono::steady_clock::now();
@@ -89,7 +89,7 @@ TEST(Retry, AWaitThatWouldPassTheDeadlineIsNotBegun) {
   EXPECT_THAT(waits, IsEmpty());
 }
 
-TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
+TEST(Retry, UsesTheInjectedClock) {
   Deadline now;
   std::vector<milliseconds> waits;
   RetryPolicy policy = Recording(&waits, 100);
@@ -101,7 +101,7 @@ TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
   const Deadline deadline = now + milliseconds(800);
   EXPECT_TRUE(absl::IsUnavailable(
       CallWithRetries(policy, deadline, [] { return absl::UnavailableError(""); })));
-  // The third would end at or after the deadline, 700 ms in.
+  // The third would end at or after the deadline of 700 ms.
   EXPECT_THAT(waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400)));
   // Call deadlines use the wall clock, as gRPC requires: they denote the same time.
   const auto before = std::chrono::system_clock::now();
@@ -110,7 +110,7 @@ TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
   EXPECT_TRUE(before <= moment && moment <= after);
 }
 
-TEST(Retry, AServerThatSaysWhenIsAskedAgainThenAtTheEarliest) {
+TEST(Retry, ADelayFromTheServerIsAMinimum) {
   absl::Status full = absl::ResourceExhaustedError("full");
   full.SetPayload("grpc-retry-pushback-ms", absl::Cord("1500"));
   std::vector<milliseconds> waits;
@@ -122,7 +122,7 @@ TEST(Retry, AServerThatSaysWhenIsAskedAgainThenAtTheEarliest) {
   }
 }
 
-TEST(Retry, OneAttemptMeansNone) {
+TEST(Retry, OneAttemptMeansNoRetries) {
   std::vector<milliseconds> waits;
   EXPECT_FALSE(WaitBeforeRetry(Recording(&waits, 1), 1, Far()));
   EXPECT_THAT(waits, IsEmpty());

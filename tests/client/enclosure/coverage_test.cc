@@ -57,8 +57,8 @@ TEST(Coverage, TwoHalvesEncloseTheWhole) {
   EXPECT_GT(coverage.clipped, 0u);
 }
 
-// A box rotated by a third turn about the diagonal (1, 1, 1), and moved, takes its axes with it.
-TEST(Coverage, APieceStandsAtItsPose) {
+// The axes of a box rotate with it: a third turn about the diagonal (1, 1, 1), and a translation.
+TEST(Coverage, APieceIsPlacedAtItsPose) {
   const CoveringPiece turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
   EXPECT_TRUE(Cover({turned}, BoxMesh({10, 0, 0}, {13, 1, 2})).uncovered.empty());
   const Coverage coverage = Cover({turned}, BoxMesh({10, 0, 0}, {13.5, 1, 2}));
@@ -83,7 +83,7 @@ TEST(Coverage, APoseIsNotRounded) {
 
 // Two halves of a box, rotated and moved together, still meet without a gap; separated by the
 // smallest step, they do not.
-TEST(Coverage, PiecesThatMeetTurned) {
+TEST(Coverage, RotatedPiecesMayMeet) {
   const auto half = [](double from, double to, double shift) {
     return Placed(BoxHull({from, 0, 0}, {to, 1, 1}), {0.3, 0.5, -0.7, 0.11, 1 + shift, 2, 3});
   };
@@ -100,8 +100,8 @@ TEST(Coverage, PiecesThatMeetTurned) {
             1u);
 }
 
-// A gap of a unit in the last place is a gap.
-TEST(Coverage, TheNarrowestGapIsSeen) {
+// A gap of one unit in the last place counts as a gap.
+TEST(Coverage, TheNarrowestGapIsFound) {
   const double start = std::nextafter(0.7, 1);
   const Coverage coverage =
       Cover({BoxHull({0, 0, 0}, {0.7, 1, 1}), BoxHull({start, 0, 0}, {2, 1, 1})},
@@ -217,7 +217,7 @@ TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
   EXPECT_GT(open, 50);
 }
 
-TEST(Coverage, CoordinatesOfAnySizeAreExact) {
+TEST(Coverage, CoordinatesOfAnyMagnitudeAreExact) {
   const Coverage coverage =
       Cover({BoxHull({0, 0, 0}, {1e300, 1, 1e-300})}, BoxMesh({0, 0, 0}, {1e300, 1, 1e-300}));
   EXPECT_TRUE(coverage.uncovered.empty());

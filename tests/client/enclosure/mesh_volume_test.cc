@@ -26,7 +26,7 @@ TEST(MeshVolume, DirectionDoesNotMatter) {
 }
 
 // Formats such as STL give each triangle its own corners.
-TEST(MeshVolume, VerticesAtOnePlaceAreOne) {
+TEST(MeshVolume, VerticesAtTheSamePositionAreOne) {
   const TriangleMesh box = BoxMesh({0, 0, 0}, {1, 1, 1});
   TriangleMesh soup;
   for (const auto& triangle : box.triangles) {

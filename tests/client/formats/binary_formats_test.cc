@@ -157,7 +157,7 @@ TEST(PcdFile, BinaryMixedScalarsBecomeDoubles) {
   EXPECT_THAT(read.xyz(), ElementsAre(0.1, 2.5, -5));
 }
 
-TEST(PcdFile, BinaryOrganizedCloudsLoseTheirHolesWhenAskedTo) {
+TEST(PcdFile, BinaryOrganizedCloudsLoseTheirHolesIfRequested) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   Packer body;
   body.Add(nan).Add(nan).Add(nan).Add(1.0f).Add(2.0f).Add(3.0f);

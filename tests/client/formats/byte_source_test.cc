@@ -25,7 +25,7 @@ std::vector<std::string> Lines(const std::string& content) {
 
 using Strings = std::vector<std::string>;
 
-TEST(ByteSource, KnowsThreeKindsOfLineEnds) {
+TEST(ByteSource, SupportsThreeKindsOfLineEnds) {
   EXPECT_EQ(Lines("a\nb\n"), (Strings{"a", "b"}));
   EXPECT_EQ(Lines("a\r\nb\r\n"), (Strings{"a", "b"}));
   EXPECT_EQ(Lines("a\rb\r"), (Strings{"a", "b"}));
@@ -92,7 +92,7 @@ TEST(ByteSource, LinesMayCrossTheBuffer) {
   }
 }
 
-TEST(ByteSource, APipeThatDribblesReadsTheSame) {
+TEST(ByteSource, ASlowPipeReadsTheSame) {
   int ends[2];
   ASSERT_EQ(pipe(ends), 0);
   const std::string content = "ab\r\n\r\ncd\r\nlast";
@@ -108,7 +108,7 @@ TEST(ByteSource, APipeThatDribblesReadsTheSame) {
   EXPECT_EQ(lines, (Strings{"ab", "", "cd", "last"}));
 }
 
-TEST(ByteSource, ALineWithoutEndIsRefusedNotHeld) {
+TEST(ByteSource, AnEndlessLineIsRefusedWithoutBufferingIt) {
   const TempFile file("endless", std::string((16 << 20) + (1 << 20), 'x'));
   auto source = ByteSource::Open(file.path());
   std::string_view line;

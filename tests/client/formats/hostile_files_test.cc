@@ -72,7 +72,7 @@ TEST(HostileFiles, EveryPrefixOfAFileIsReadOrRefused) {
   EXPECT_GT(refused, 300);
 }
 
-TEST(HostileFiles, AnyByteChangedIsReadOrRefused) {
+TEST(HostileFiles, AnyChangedByteIsReadOrRefused) {
   std::mt19937 random(7);
   int refused = 0;
   for (const Sample& sample : Samples()) {
@@ -107,7 +107,7 @@ long PeakMemory() {
   return usage.ru_maxrss * 1024;
 }
 
-TEST(HostileFiles, DeclaredCountsCostNothing) {
+TEST(HostileFiles, DeclaredCountsAllocateNothing) {
   const std::string huge = "18446744073709551615";
   const std::string point(12, '\0');
   const long before = PeakMemory();
@@ -174,7 +174,7 @@ TEST(HostileFiles, ARowOfManyGigabytesIsRefused) {
                        "DATA binary\nxx",
                        PointFormat::kPcd)
                   .error(),
-              HasSubstr("WIDTH times HEIGHT is beyond 2^64"));
+              HasSubstr("WIDTH times HEIGHT exceeds 2^64"));
 }
 
 }  // namespace hostile_files_test

@@ -189,7 +189,7 @@ TEST(ScaledPoints, TextAndFloatsAreScaledByAxis) {
   EXPECT_FALSE(binary.all_float());
   options.scale[1] = Scale("1e300");
   EXPECT_THAT(ReadText("0 1e9 0\n", PointFormat::kXyz, options).error(),
-              HasSubstr("beyond the largest double"));
+              HasSubstr("exceeds the largest double"));
 }
 
 // As a URDF or COLLADA file may name it; recursion without end, formerly.

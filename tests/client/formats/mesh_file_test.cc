@@ -44,7 +44,7 @@ TEST(MeshFile, ObjFacesMayPrecedeTheirVertices) {
   EXPECT_EQ(parts->size(), 1u);
   const TempFile missing("b.obj", "f 1 2 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\n");
   EXPECT_THAT(Error(ReadMesh(missing.path())),
-              HasSubstr(":1: a face names vertex 4, but the file holds 3"));
+              HasSubstr(":1: a face names vertex 4, but the file has 3"));
   const TempFile cut("c.obj", "v 0 0 0\nv 1 0 0\\");
   EXPECT_THAT(Error(ReadMesh(cut.path())), HasSubstr("is it complete?"));
 }

@@ -32,7 +32,7 @@ TEST(MeshParts, ObjectsAndGroupsAreParts) {
   EXPECT_THAT(chair.triangles, ElementsAre(ElementsAre(0, 1, 2), ElementsAre(0, 2, 1)));
 }
 
-TEST(MeshParts, ComponentsHangTogetherAtCoordinates) {
+TEST(MeshParts, ComponentsAreConnectedAtEqualCoordinates) {
   // The third triangle has separate copies of the first one's vertices.
   const TempFile file("a.obj",
                       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 1 0 0\nv 2 0 0\n"

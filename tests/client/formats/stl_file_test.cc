@@ -72,14 +72,14 @@ TEST(StlText, NormalsAreNotRead) {
   }
 }
 
-TEST(StlText, HoldsSeveralSolids) {
+TEST(StlText, ReadsSeveralSolids) {
   ExpectFacets(
       "solid a\n" + Facet() + "endsolid a\nsolid b\nendsolid b\n\nsolid\n" + Facet() + "endsolid\n",
       2);
 }
 
 // Twelve corners of a tetrahedron, cut at each line.
-TEST(StlText, FilesCutAnywhereAreRefusedWithLineAndCount) {
+TEST(StlText, FilesTruncatedAnywhereAreRefusedWithLineAndCount) {
   const std::string whole = "solid t\n" + Facet() + Facet() + Facet() + Facet() + "endsolid t\n";
   int refused = 0;
   for (size_t end = 1; (end = whole.find('\n', end)) + 1 < whole.size(); ++end) {
@@ -151,7 +151,7 @@ TEST(BinaryStl, FewerOrMoreTrianglesThanDeclaredAreRefused) {
   }
 }
 
-TEST(BinaryStl, MeshIsThatOfThePoints) {
+TEST(BinaryStl, MeshHasTheSameCornersAsThePoints) {
   const TempFile file("a.stl", Binary(2, 2, "solid"));
   const auto mesh = ReadMesh(file.path());
   ASSERT_TRUE(mesh.ok()) << mesh.status();

@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-TEST(ObjFile, TakesEachVLineAndNothingElse) {
+TEST(ObjFile, ReadsEachVLineAndNothingElse) {
   const PointsRead read = ReadText(
       "# v 9 9 9\no thing\nv 1 2 3\nvn 5 5 5\nvt 0 1\n  v\t+4 -5e-1 .5 1.0\nv 7 8 9 0.1 0.2 0.3\n"
       "f 1 2 3\nvp 1 2 3\n",
@@ -40,15 +40,15 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
 TEST(ObjFile, FacesOfABrokenFileAreErrors) {
   const std::string vertices = "v 1 2 3\nv 4 5 6\n";
   EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
-            "FILE:4: a face names vertex 3, but the file holds 2");
+            "FILE:4: a face names vertex 3, but the file has 2");
   EXPECT_EQ(ReadText(vertices + "f 1 0 2\n", PointFormat::kObj).error(),
-            "FILE:3: \"0\" names no vertex; 2 came before");
+            "FILE:3: \"0\" is not a vertex; 2 precede this line");
   EXPECT_THAT(ReadText(vertices + "f -1 -3\n", PointFormat::kObj).error(),
-              HasSubstr("FILE:3: \"-3\" names no vertex"));
+              HasSubstr("FILE:3: \"-3\" is not a vertex"));
   EXPECT_EQ(ReadText(vertices + "f\n", PointFormat::kObj).error(),
             "FILE:3: a face names no vertex");
   EXPECT_EQ(ReadText("", PointFormat::kObj).error(),
-            "FILE: holds no vertex: no line starts with v; is it an OBJ file?");
+            "FILE: contains no vertices: no line starts with v; is it an OBJ file?");
 }
 
 // Of an OBJ file, lines with an unknown keyword are ignored: a block of zeros lost vertices.
@@ -87,7 +87,7 @@ TEST(XyzFile, HeadersOfCloudCompareAreComments) {
 }
 
 // Cut at the comment mark, the third coordinate would be 1.
-TEST(XyzFile, InfinitiesWithACommentMarkAreNotCut) {
+TEST(XyzFile, InfinitiesWithACommentMarkAreNotTruncated) {
   for (const PointFormat format : {PointFormat::kXyz, PointFormat::kPts}) {
     EXPECT_EQ(ReadText("1 2 3\n4 5 1.#INF\n", format).error(),
               "FILE:2: point 2 has z = infinity; skip such points with --skip-nonfinite");
@@ -113,7 +113,7 @@ TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
   EXPECT_THAT(error("1,5 2,5 3,5\n"),
               HasSubstr("FILE:1: \"1,5 2,5 3,5\" has white space and \",\" between its numbers"));
   EXPECT_THAT(error("1 2 3\n1,2,3 255 0 0\n"), HasSubstr("FILE:2:"));
-  EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("the decimal mark is a point"));
+  EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("use a point as the decimal mark"));
   EXPECT_THAT(error("x,y,z\n1,2,3\n"),
               HasSubstr("\"x\" is not a number; --format csv reads tables with a header"));
   EXPECT_THAT(error("1,,3\n"), HasSubstr("\"\" is not a number"));
@@ -135,7 +135,7 @@ TEST(XyzFile, ANumberTooLargeIsAnErrorEvenWhenNonFinitePointsAreSkipped) {
   ReadOptions options;
   options.skip_nonfinite = true;
   EXPECT_THAT(ReadText("1 2 3\n1 1e999 3\n", PointFormat::kXyz, options).error(),
-              HasSubstr("FILE:2: \"1e999\" is beyond the largest double"));
+              HasSubstr("FILE:2: \"1e999\" exceeds the largest double"));
 }
 
 TEST(XyzFile, NonFinitePointsAreErrorsThatNameFileAndPoint) {
@@ -155,7 +155,7 @@ TEST(XyzFile, NonFinitePointsCanBeSkippedAndCounted) {
   EXPECT_EQ(read.counts.points, 2u);
 }
 
-TEST(Blocks, HoldTheNumberOfPointsAskedFor) {
+TEST(Blocks, HaveTheRequestedNumberOfPoints) {
   ReadOptions options;
   options.points_per_block = 2;
   const PointsRead read =
@@ -174,7 +174,7 @@ TEST(Blocks, AreAboutOneMebibyteByDefault) {
   EXPECT_EQ(read.blocks[0].size(), (1u << 20) / 24);
 }
 
-TEST(Blocks, TheReceiversErrorEndsTheReading) {
+TEST(Blocks, AnErrorOfTheReceiverStopsReading) {
   const TempFile file("points", "1 2 3\n4 5 6\n7 8 9\n");
   ReadRequest request{file.path(), PointFormat::kXyz, {}, {}};
   request.options.points_per_block = 1;
@@ -197,7 +197,7 @@ TEST(CsvFile, FindsColumnsByTheHeader) {
   EXPECT_THAT(ReadText("//X,Y,Z,R\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
 
-TEST(CsvFile, KnowsSemicolonsTabsAndQuotes) {
+TEST(CsvFile, SupportsSemicolonsTabsAndQuotes) {
   EXPECT_THAT(ReadText("x;y;z\n1;2;3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("1\t2\t3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("name,x,y,z\n\"a,b\",1,2,3\n", PointFormat::kCsv).xyz(),
@@ -212,7 +212,7 @@ TEST(CsvFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("a,b,c\n1,2,3\n", PointFormat::kCsv).error(),
             "FILE:1: the header has no column \"x\"; it must name x, y and z");
   EXPECT_EQ(ReadText("1,5;2,5;3,5\n", PointFormat::kCsv).error(),
-            "FILE:1: \"1,5\" is not a number (the decimal mark is a point)");
+            "FILE:1: \"1,5\" is not a number (use a point as the decimal mark)");
   EXPECT_EQ(ReadText("1,,3\n", PointFormat::kCsv).error(), "FILE:1: \"\" is not a number");
 }
 
@@ -233,8 +233,8 @@ TEST(OffFile, FacesWithoutVerticesAreAnError) {
             "FILE:2: the file declares 1 faces, but no vertex");
 }
 
-// A count of vertices that is too small makes faces of the last ones.
-TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
+// If the vertex count is too small, the last vertices are parsed as faces.
+TEST(OffFile, CountsThatContradictTheFileAreErrors) {
   const std::string rows = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n3 0 1 3\n";
   const auto error = [&](const std::string& counts) {
     return ReadText("OFF\n" + counts + "\n" + rows, PointFormat::kOff).error();
@@ -243,7 +243,7 @@ TEST(OffFile, CountsThatDoNotFitTheFileAreErrors) {
   EXPECT_THAT(error("3 2 0"), HasSubstr("FILE:"));
   EXPECT_THAT(error("3 3 0"), HasSubstr("FILE:"));
   EXPECT_EQ(error("4 1 0"),
-            "FILE:8: the file goes on after 4 vertices and 1 face, the counts of its header");
+            "FILE:8: the file continues after 4 vertices and 1 face, the counts of its header");
   EXPECT_THAT(ReadText("OFF\n1 1 0\n1 2 3\n3 0 0 1\n", PointFormat::kOff).error(),
               HasSubstr("FILE:4: a face needs its number of corners"));
 }
@@ -295,7 +295,7 @@ TEST(PlyFile, AsciiErrorsNameFileAndLine) {
 }
 
 // RealSense Viewer writes a vertex and its color on two lines; other writers use one.
-TEST(PlyFile, AsciiValuesMayStandOnAnyLines) {
+TEST(PlyFile, AsciiValuesMayBeOnAnyLines) {
   const std::string head =
       "ply\r\nformat ascii 1.0\r\nelement vertex 2\r\nproperty float x\r\nproperty float y\r\n"
       "property float z\r\nproperty uchar red\r\nproperty uchar green\r\nelement face 1\r\n"
@@ -311,7 +311,7 @@ TEST(PlyFile, AsciiValuesMayStandOnAnyLines) {
 }
 
 // A surplus or missing value shifts all later ones: the points read are then wrong.
-TEST(PlyFile, AsciiFilesThatDoNotFitTheirHeaderAreErrors) {
+TEST(PlyFile, AsciiFilesThatContradictTheirHeaderAreErrors) {
   const auto error = [](const std::string& counts, const std::string& body) {
     return ReadText("ply\nformat ascii 1.0\n" + counts +
                         "property float x\nproperty float y\nproperty float z\nend_header\n" + body,
@@ -333,7 +333,7 @@ TEST(PlyFile, AsciiFilesThatDoNotFitTheirHeaderAreErrors) {
   EXPECT_EQ(error("element vertex 0\n", ""), "");
 }
 
-TEST(PlyFile, FilesCutWithinTheirFacesAreErrors) {
+TEST(PlyFile, FilesTruncatedWithinTheirFacesAreErrors) {
   const std::string head =
       std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n";
   EXPECT_THAT(ReadText(head, PointFormat::kPly).error(), HasSubstr("within the element face"));
@@ -363,14 +363,14 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText(std::string(kPcdHead) + "POINTS 1\nWIDTH 1\nDATA ascii\n0 1 2 3 0 0 0 8\n",
                      PointFormat::kPcd)
                 .error(),
-            "FILE:13: \"8\" is beyond the 7 values of a point that FIELDS and COUNT declare");
+            "FILE:13: \"8\" is one value too many; FIELDS and COUNT declare 7 per point");
   EXPECT_EQ(
       ReadText("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", PointFormat::kPcd)
           .error(),
       "FILE:5: FIELDS must name x, y and z");
 }
 
-TEST(Formats, AreKnownByExtensionInAnyCase) {
+TEST(Formats, AreRecognizedByExtensionInAnyCase) {
   EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
   EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
   EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
@@ -394,7 +394,7 @@ TEST(Formats, CompressedAndUtf16FilesAreRefusedAsSuch) {
   }
 }
 
-TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {
+TEST(Formats, EmptyFilesOfHeaderlessFormatsHaveNoPoints) {
   for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
     const PointsRead read = ReadText("", format);
     EXPECT_TRUE(read.status.ok()) << read.status;

@@ -36,7 +36,7 @@ TEST(TextNumber, IsTheNearestDouble) {
   EXPECT_EQ(Parsed("0." + std::string(400, '0') + "1e401"), 1.0);
 }
 
-TEST(TextNumber, TakesAPlusSignAndBareFractions) {
+TEST(TextNumber, AcceptsAPlusSignAndBareFractions) {
   EXPECT_EQ(Parsed("+1.5"), 1.5);
   EXPECT_EQ(Parsed("+.5"), 0.5);
   EXPECT_EQ(Parsed("-2."), -2.0);
@@ -67,10 +67,10 @@ TEST(TextNumber, TooLargeNumbersAreReported) {
   EXPECT_EQ(KindOf(std::string(400, '9')), NumberText::kTooLarge);
   EXPECT_EQ(KindOf(std::string(400, '9') + ".5"), NumberText::kTooLarge);
   EXPECT_EQ(NumberProblem(NumberText::kTooLarge, "1e999"),
-            "\"1e999\" is beyond the largest double, about 1.8e308; rescale the points");
+            "\"1e999\" exceeds the largest double, about 1.8e308; rescale the points");
 }
 
-TEST(TextNumber, ReadsNanAndInfinityAsSuch) {
+TEST(TextNumber, ReadsNanAndInfinity) {
   EXPECT_TRUE(std::isnan(Parsed("nan")));
   EXPECT_TRUE(std::isnan(Parsed("-NaN")));
   EXPECT_EQ(Parsed("inf"), HUGE_VAL);

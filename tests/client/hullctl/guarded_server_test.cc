@@ -96,7 +96,7 @@ TEST_F(GuardedServer, TheServerAcceptsTokensMadeByHullctl) {
   EXPECT_THAT(list.out, AllOf(HasSubstr("cell-1/a"), Not(HasSubstr("cell-10/a"))));
   const Ran denied = As("cell", {"get", "cell-10/a"});
   EXPECT_EQ(denied.code, 1);
-  EXPECT_THAT(denied.err, HasSubstr("is outside of \"cell-1/\""));
+  EXPECT_THAT(denied.err, HasSubstr("is outside the prefix \"cell-1/\""));
   const Ran role = As("view", {"delete", "cell-1/a"});
   EXPECT_EQ(role.code, 1);
   EXPECT_THAT(role.err, HasSubstr("token \"view\" has the role read-only"));
@@ -146,7 +146,7 @@ TEST_F(GuardedServer, TheTokenMayComeFromTheEnvironment) {
   EXPECT_THAT(wrong.err, AllOf(HasSubstr("unknown or no longer valid"), Not(HasSubstr("hunter2"))));
 }
 
-TEST_F(GuardedServer, AContextHoldsAllThatAServerWants) {
+TEST_F(GuardedServer, AContextStoresEverythingAServerRequires) {
   Restart(config_);
   ASSERT_EQ(setenv("XDG_CONFIG_HOME", (directory_ + "/config").c_str(), 1), 0);
   const Ran added = As("view", {"context", "add", "guarded"});
@@ -210,7 +210,7 @@ TEST_F(GuardedServer, AFailedConnectionSuggestsARemedy) {
   expect({"--ca-cert", authorities_}, "it does not use TLS");
 }
 
-TEST(ConnectionSecurity, ATokenDoesNotTravelUnencryptedToOtherMachines) {
+TEST(ConnectionSecurity, ATokenIsNotSentUnencryptedToOtherMachines) {
   ConnectionSecurity security;
   security.token = "secret";
   EXPECT_TRUE(ValidateSecurity(security, "127.0.0.1:1").ok());
@@ -226,7 +226,7 @@ TEST(ConnectionSecurity, ATokenDoesNotTravelUnencryptedToOtherMachines) {
   EXPECT_FALSE(ValidateSecurity(security, "127.0.0.1:1").ok());
 }
 
-TEST(ConnectionSecurity, TokenFilesAreOnesOwnAndHoldOneToken) {
+TEST(ConnectionSecurity, TokenFilesArePrivateAndContainOneToken) {
   const std::string path = ::testing::TempDir() + "/hulld_token_file_test";
   server::WriteSecret(path, "hulld_abc\n");
   EXPECT_EQ(*ReadTokenFile(path), "hulld_abc");

@@ -120,7 +120,7 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
                         "\"contactTime\":0.5}"));
   ran = Ask(with({"--separation"}));
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("wanted.separation excludes end_pose"));
+  EXPECT_THAT(ran.err, HasSubstr("wanted.separation cannot be combined with end_pose"));
 
   ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
@@ -195,7 +195,7 @@ TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
   EXPECT_EQ(Ask({"cast", "1,2", "8,0,0"}).code, 2);
   ran = Ask({"cast", "1e308,0,0", "1e308,0,0"});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION is beyond the largest double"));
+  EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION exceeds the largest double"));
   EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 
@@ -396,7 +396,7 @@ TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
   EXPECT_EQ(answers[2].columns().relations(0), v1::RELATION_SEPARATED);
 }
 
-TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
+TEST_F(HullctlQuestions, EachCommandAcceptsEachSceneFormat) {
   Put("cube", server::Cube());
   const TempFile yaml("yaml",
                       "place:\n  a: {id: cube}\n  b: {id: cube, at: [1, 0, 0]}\n"
@@ -537,7 +537,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   EXPECT_EQ(left.hulls_size(), 0);
 }
 
-TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
+TEST_F(HullctlQuestions, NonsensicalLoadOptionsAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests per second"));

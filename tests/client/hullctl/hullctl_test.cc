@@ -113,7 +113,7 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
   }
 }
 
-TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
+TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
   const auto error = [](const std::vector<std::string>& arguments) {
     const Ran ran = RunTool(arguments);
     EXPECT_EQ(ran.code, 2);
@@ -147,7 +147,7 @@ TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
   EXPECT_EQ(error({"list", "--servr=x:1"}),
             "hullctl: 'hullctl list' has no option \"--servr\"; did you mean \"--server\"?");
   EXPECT_EQ(error({"list", "--output", "jsn"}),
-            "hullctl: --output: \"jsn\" is none of table, wide, name, json; did you mean "
+            "hullctl: --output: \"jsn\" is not one of table, wide, name, json; did you mean "
             "\"json\"?");
   EXPECT_EQ(error({"list", "--limit"}), "hullctl: --limit needs a value: --limit N");
 }
@@ -320,7 +320,7 @@ TEST_F(HullctlTest, CheckShowsMeasuredValues) {
   EXPECT_FALSE(fake_.last_collision_request().wanted().has_clearance());
 }
 
-TEST_F(HullctlTest, ACollisionIsNoError) {
+TEST_F(HullctlTest, ACollisionIsNotAnError) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
   EXPECT_EQ(Ask({"check", "a", "b"}).code, 0);
 }
@@ -380,7 +380,7 @@ TEST_F(HullctlTest, LargeBatchesAreSplitIntoCompleteCalls) {
   EXPECT_EQ(fake_.batch_requests().back().placements_size(), 501);
 }
 
-TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
+TEST_F(HullctlTest, AnInconsistentBatchIsRefused) {
   const TempFile file("pairs",
                       "place: {a: {id: box}, b: {id: box}}\nask: {pairs: [[a, b], [b, a]]}\n");
   v1::BatchCheckCollisionsResponse late;
@@ -440,7 +440,7 @@ TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
   EXPECT_THAT(ran.err, HasSubstr("edge 3 is not convex"));
 }
 
-TEST_F(HullctlTest, StatusFailsWhenTheServerDoesNotServe) {
+TEST_F(HullctlTest, StatusFailsIfTheServerIsNotServing) {
   EXPECT_THAT(Ask({"status"}).out, HasSubstr("SERVING"));
   fake_.SetServing(false);
   const Ran ran = Ask({"status"});
@@ -479,7 +479,7 @@ TEST_F(HullctlTest, MeshWritesObjThatReadsBackExactly) {
   EXPECT_EQ(Ask({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
 }
 
-TEST_F(HullctlTest, CheckAsksAgainWhenAHullMovesOnBeforeItIsVerified) {
+TEST_F(HullctlTest, CheckQueriesAgainIfAHullChangesBeforeVerification) {
   fake_.mesh_parts = Tetrahedron();
   fake_.mesh_parts[0].mutable_header()->mutable_hull()->set_revision(7);
   v1::CheckCollisionResponse& answer = fake_.collision_answer;
@@ -529,7 +529,7 @@ TEST_F(HullctlTest, AFalseSimplificationIsNotWritten) {
   EXPECT_EQ(many.code, 5);
   EXPECT_EQ(many.out, "");
   EXPECT_THAT(many.err, HasSubstr("is invalid; nothing was written: the simplification "
-                                  "has 4 vertices; at most 3 were asked for"));
+                                  "has 4 vertices; at most 3 were requested"));
   const Ran whole = Ask({"mesh", "a", "--verify"});
   EXPECT_EQ(whole.code, 2);
   EXPECT_THAT(whole.err, HasSubstr("--max-vertices"));
@@ -554,7 +554,7 @@ TEST_F(HullctlTest, GenerateWritesTheSamePointsEachTime) {
             "-1 0 0\n-0.9 0 0\n-1 0.1 0\n");
 }
 
-TEST_F(HullctlTest, NamesStandAloneOnALine) {
+TEST_F(HullctlTest, NamesArePrintedOnePerLine) {
   const TempFile points("a.xyz", "1 2 3\n");
   const auto names = [this](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--output", "name", "--color", "always"});
@@ -573,7 +573,7 @@ TEST_F(HullctlTest, NamesStandAloneOnALine) {
   EXPECT_EQ(names({"delete", "b"}), "b\n");
 }
 
-TEST_F(HullctlTest, ColorsAreForTerminalsUnlessAskedFor) {
+TEST_F(HullctlTest, ColorsAreForTerminalsUnlessRequested) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
   constexpr char kPainted[] = "\x1b[31mOVERLAPPING\x1b[0m";
   EXPECT_THAT(Ask({"check", "a", "b"}).out, testing::Not(HasSubstr("\x1b")));

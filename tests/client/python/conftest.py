@@ -86,7 +86,7 @@ class Blocking:
 
 @pytest.fixture(params=["sync", "async"])
 def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
-    """Makes clients, of the synchronous and of the asynchronous kind, with the same surface."""
+    """Creates synchronous and asynchronous clients with the same interface."""
     clients: list[Any] = []
     loop = asyncio.new_event_loop() if request.param == "async" else None
     if loop is not None:
@@ -114,13 +114,13 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
 
 @pytest.fixture
 def either(connect: Callable[..., Any], server: hulld.LocalServer) -> Any:
-    """A client of the one server, of either kind."""
+    """A client of the shared server, of either kind."""
     return connect(server.address)
 
 
 @pytest.fixture
 def name(request: pytest.FixtureRequest) -> str:
-    """An ID of the test's own."""
+    """An ID unique to the test."""
     return "".join(c if c.isalnum() else "-" for c in request.node.name).strip("-")
 
 

@@ -1,4 +1,5 @@
-"""A server that fails on purpose, as a real one does when it is killed, busy or replaced."""
+"""A server that fails on purpose, in the ways of a real server that is killed, busy, or
+replaced."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ def refuse(
     metadata: dict[str, str] | None = None,
     pushback: str | None = None,
 ) -> None:
-    """Ends the call with the details that hulld gives."""
+    """Ends the call with error details in hulld's format."""
     trailing: list[tuple[str, Any]] = [("x-request-id", "fake-1")]
     if reason is not None:
         status = error_details_pb2.Status(code=code.value[0], message=message)
@@ -37,7 +38,7 @@ def refuse(
 
 
 class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusServiceServicer):
-    """Each call takes the next of `script`, a function of the context, before it is answered.
+    """Before it is answered, each call runs the next function of `script` with its context.
     Appended points are kept per chunk, so that a repeated chunk is recognized."""
 
     def __init__(self) -> None:
@@ -48,7 +49,7 @@ class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusService
         self.store_id = "store"
         self.create_revision = 1
         self.missing = False
-        # Called with each chunk; raises or aborts to fail before (or, with `after`, behind) it.
+        # Called with each chunk; raises or aborts to fail before it (with `after`: after it).
         self.before: Callable[[int, Any], None] = lambda sequence, context: None
         self.after: Callable[[int, Any], None] = lambda sequence, context: None
         self._server = grpc.server(concurrent.futures.ThreadPoolExecutor(8))

@@ -1,4 +1,4 @@
-"""Wrong arguments raise ValueError or TypeError that names them, before anything is sent."""
+"""Invalid arguments raise a ValueError or TypeError that names them, before anything is sent."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_scalars_of_anything_but_numbers_are_refused(silent: Any, value: Any) ->
         lambda: hulld.Pose((1, 0, 0, 0), (value, 0, 0)),
         lambda: silent.check_collision("a", "b", tolerance=value),
     ):
-        with pytest.raises(TypeError, match="it takes a number"):
+        with pytest.raises(TypeError, match="it must be a number"):
             call()
 
 
@@ -356,7 +356,7 @@ def test_an_address_without_a_port_gets_hullds(given: str, meant: str) -> None:
 )
 def test_what_is_no_address_is_refused(bad: Any) -> None:
     for kind in (hulld.Client, hulld.AsyncClient):
-        with pytest.raises((ValueError, TypeError), match="server is .* it takes"):
+        with pytest.raises((ValueError, TypeError), match="server is .* it must be"):
             kind(bad)
 
 

@@ -95,7 +95,7 @@ def test_a_hull_is_created_listed_and_deleted(either: Any, name: str) -> None:
 
 
 def test_doubles_come_back_bit_for_bit(either: Any, name: str, rng: np.random.Generator) -> None:
-    # Axis by axis of other magnitude, subnormals among them, so that every point is a vertex.
+    # The axes differ in magnitude, down to subnormals, so that every point is a vertex.
     points = np.concatenate([np.diag(s * np.array([5e-324, 1 / 3, 1e308])) for s in (1, -1)])
     put(either, name, points)
     vertices = either.get_hull_mesh(name).vertices

@@ -39,9 +39,9 @@ def test_packed_doubles_pass_as_they_are(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("shape", [(4,), (3, 4), (2, 5), (2, 3, 3)])
 def test_another_shape_is_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(ValueError, match="none of"):
+    with pytest.raises(ValueError, match="poses have the shape"):
         hulld.pack_poses(np.zeros(shape))
-    with pytest.raises(ValueError, match=r"poses\[1\]: a pose of shape"):
+    with pytest.raises(ValueError, match=r"poses\[1\]: a pose has the shape"):
         hulld.pack_poses([None, np.zeros(shape)])
 
 

@@ -74,7 +74,7 @@ TEST_F(PackagePath, OtherNamesAreFiles) {
   EXPECT_THAT(Resolve("b.stl"), HasSubstr("no such file"));
 }
 
-TEST_F(PackagePath, UrisMayHoldEscapes) {
+TEST_F(PackagePath, UrisMayContainEscapes) {
   const std::string file = Make("ws/src/arm_description/my part.stl");
   const std::string percent = Make("ws/src/arm_description/my%20tool.stl");
   EXPECT_EQ(Resolve("package://arm_description/my%20part.stl"), file);
@@ -82,7 +82,7 @@ TEST_F(PackagePath, UrisMayHoldEscapes) {
   EXPECT_EQ(Resolve("package://arm_description/my%20tool.stl"), percent);
 }
 
-TEST_F(PackagePath, RefusalSaysWhereItWasLookedFor) {
+TEST_F(PackagePath, ErrorsListTheSearchedFolders) {
   EXPECT_THAT(Resolve("package://tool/a.stl"),
               testing::AllOf(HasSubstr("no folder of the package \"tool\" holds a.stl"),
                              HasSubstr("--package tool=DIR"), HasSubstr(At("ws/src/tool"))));

@@ -89,9 +89,9 @@ TEST(ShapeHull, MeshIsScaled) {
   const TempFile fine("c.obj", "v 7 3 0.1\n");
   EXPECT_THAT(MeshHull(mesh, fine.path())->xyz, ElementsAre(0.007, 0.0762, 0.0001));
   mesh.scale = {scale("1e308"), scale("1"), scale("1")};
-  EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("beyond the largest"));
+  EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("exceeds the largest"));
   const TempFile empty("b.obj", "# nothing\n");
-  EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("holds no vertex"));
+  EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("contains no vertices"));
   EXPECT_THAT(MeshHull(mesh, "a.3mf").status().ToString(), HasSubstr("convert it"));
 }
 

@@ -111,7 +111,7 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
       {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
       {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
       {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},
-      {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> holds \"cone\""},
+      {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> contains \"cone\""},
       {{"<link name=\"upper\">", "<link>"}, "arm.urdf:12: <link> lacks name"},
       {{"<link name=\"upper\">", "<link name=\"base\">"},
        "arm.urdf:12: link \"base\" is defined twice; the first definition is in line 3"},
@@ -152,9 +152,11 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
 }
 
 TEST(UrdfFile, JointsOfSeveralValuesAreNotMimicked) {
-  EXPECT_THAT(ErrorOf(Changed("name=\"shoulder\" type=\"revolute\"",
-                              "name=\"shoulder\" type=\"floating\"")),
-              HasSubstr("joint \"shoulder\" is floating; joints that mimic have one value each"));
+  EXPECT_THAT(
+      ErrorOf(
+          Changed("name=\"shoulder\" type=\"revolute\"", "name=\"shoulder\" type=\"floating\"")),
+      HasSubstr(
+          "joint \"shoulder\" is floating; a mimic joint and its leader must have one value each"));
   EXPECT_THAT(
       ErrorOf(Changed("name=\"follow\" type=\"revolute\"", "name=\"follow\" type=\"planar\"")),
       HasSubstr("joint \"follow\" is planar"));

@@ -115,7 +115,7 @@ TEST(CertificateCheck, ADirectionSeparatesOrNotByOneUlp) {
   ExpectValid(kSeparated, Direction(-1, 0, 0), apart, a);
 }
 
-TEST(CertificateCheck, DirectionsMustBeOfUse) {
+TEST(CertificateCheck, DirectionsMustBeFiniteAndNonzero) {
   const Hull a = At(Cube());
   const Hull b = At(Cube(), 2);
   ExpectInvalid(kSeparated, v1::Certificate(), a, b, "no direction");
@@ -287,7 +287,7 @@ TEST(CertificateCheck, TheWholeRangeOfDoublesIsExact) {
 }
 
 // Random certificates: every accepted one must be true, by a separate oracle.
-TEST(CertificateCheck, AcceptsNothingThatIsFalse) {
+TEST(CertificateCheck, RejectsFalseCertificates) {
   constexpr uint32_t kSeed = 20;
   std::mt19937 random(kSeed);
   std::uniform_int_distribution<int> lattice(-1, 1);

@@ -167,7 +167,7 @@ TEST(MotionCheck, ADirectionAloneProvesATranslation) {
                 "intervals[1]: the direction does not separate");
 }
 
-TEST(MotionCheck, BothMayMove) {
+TEST(MotionCheck, BothHullsMayMove) {
   const Moving away = Shifted(Cube(), {0, 0, 0}, {-4, 2, 0});
   ExpectValid(Separated().Until(1, {1, 0, 0}), away, Coming(2, -2));
   ExpectInvalid(Separated().Until(1, {1, 0, 0}), away, Coming(2, -3), "separate at both ends");
@@ -187,7 +187,7 @@ TEST(MotionCheck, ATranslationMeetsAtTheExactTime) {
   ExpectInvalid(claim(std::nextafter(0.5, 0.0), std::nextafter(0.5, 0.0)), kCube, b, "0 is not in");
 }
 
-TEST(MotionCheck, AdjacentDoublesBracketATimeThatIsNoDouble) {
+TEST(MotionCheck, AdjacentDoublesBracketATimeThatIsNotADouble) {
   // The point reaches x = 1 at a third of the time.
   const Moving a = Resting(Octahedron());
   const Moving b = Shifted({0, 0, 0}, {2, 0, 0}, {-1, 0, 0});
@@ -321,7 +321,7 @@ TEST(MotionCheck, TheLengthOfAQuaternionIsPartOfTheMotion) {
   ExpectValid(Separated().Until(1, {1, 0, 0}), kCube, b);
 }
 
-TEST(MotionCheck, APlaneMustHoldBetweenTheEnds) {
+TEST(MotionCheck, APlaneMustSeparateBetweenTheEnds) {
   // The tip of the rod sweeps from (0, -5, 0) over (5, 0, 0) to (0, 5, 0).
   const Moving rod = Turned(kRod, {1, 0, 0, -1}, {1, 0, 0, 1});
   const Moving wall = Resting(Box({4.5, -1, -1}, {6, 1, 1}));
@@ -368,7 +368,7 @@ TEST(MotionCheck, TheLongerDirectionBoundsARadius) {
   ExpectInvalid(claim(3, 2), a, b, "A does not stay");
 }
 
-TEST(MotionCheck, TheEndOfAPlaneIsWhole) {
+TEST(MotionCheck, TheEndOfAPlaneMustBeComplete) {
   const Moving b = Coming(3, 2);
   const auto claim = [] { return Separated().Until(1, {1, 0, 0}, 1.5).To({1, 0, 0}, 1.5); };
   ExpectValid(claim(), kCube, b);
@@ -389,15 +389,15 @@ TEST(MotionCheck, TheEndOfAPlaneIsWhole) {
 TEST(MotionCheck, RotationsNeedOffsets) {
   Claim claim = RodTouches();
   claim.contact.mutable_intervals(0)->clear_offset();
-  ExpectInvalid(claim, kCeiling, kTurningRod, "intervals[0]: there is no offset");
+  ExpectInvalid(claim, kCeiling, kTurningRod, "intervals[0]: the offset is missing");
   // The rotation vanishes at half time.
   const Moving flipped = Turned(Cube(), kNoTurn, {-1, 0, 0, 0});
   const Moving far_away = Shifted(Cube(), {9, 0, 0}, {9, 0, 0});
-  ExpectInvalid(Separated().Until(1, {1, 0, 0}), flipped, far_away, "there is no offset");
+  ExpectInvalid(Separated().Until(1, {1, 0, 0}), flipped, far_away, "the offset is missing");
   ExpectInvalid(Separated().Until(1, {1, 0, 0}, 4), flipped, far_away, "A does not stay");
 }
 
-TEST(MotionCheck, AnOffsetServesTranslationsAsWell) {
+TEST(MotionCheck, TranslationsMayUseOffsets) {
   ExpectValid(Separated().Until(1, {1, 0, 0}, 1.25), kCube, Coming(3, 1.5));
   ExpectInvalid(Separated().Until(1, {1, 0, 0}, 1.5), kCube, Coming(3, 1.5), "B does not stay");
   const Moving both[] = {Shifted(Cube(), {-2, 0, 0}, {0, 0, 0}), Coming(3, 1)};
@@ -492,7 +492,7 @@ TEST(MotionCheck, NegativeRadiiAreRefused) {
   ExpectInvalid(Separated().Until(1, {1, 0, 0}), Rounded(kCube, -1), Coming(3, 2), "negative");
 }
 
-TEST(MotionCheck, IntervalsCoverTheTime) {
+TEST(MotionCheck, IntervalsMustCoverTheTime) {
   const Moving b = Coming(3, 2);
   const auto claim = [] { return Separated().Until(0.5, {1, 0, 0}).Until(1, {1, 0, 0}); };
   ExpectValid(claim(), kCube, b);
@@ -510,7 +510,7 @@ TEST(MotionCheck, IntervalsCoverTheTime) {
   ExpectInvalid(none, kCube, b, "the intervals end at 0");
 }
 
-TEST(MotionCheck, TimesAreABracket) {
+TEST(MotionCheck, TimesMustFormABracket) {
   const Moving b = Coming(3, -1);
   const auto claim = [] { return Overlaps().Until(0.5, {1, 0, 0}).Touching(0.5, {1, 0, 0}, 4, 0); };
   for (const double until : {kNaN, -0.5, 1.5}) {
@@ -536,7 +536,7 @@ TEST(MotionCheck, TimesAreABracket) {
   ExpectInvalid(Separated().Until(1, {1, 0, 0}).Contact(1), kCube, Coming(3, 2), "contact_time");
 }
 
-TEST(MotionCheck, DirectionsAndOffsetsMustBeOfUse) {
+TEST(MotionCheck, DirectionsAndOffsetsMustBeFiniteAndNonzero) {
   const Moving b = Coming(3, 2);
   ExpectInvalid(Separated().Until(1, {0, 0, 0}), kCube, b, "intervals[0]: the direction is zero");
   ExpectInvalid(Separated().Until(1, {kNaN, 0, 0}), kCube, b, "not finite");
@@ -550,7 +550,8 @@ TEST(MotionCheck, DirectionsAndOffsetsMustBeOfUse) {
 
 TEST(MotionCheck, MalformedMotionsAreRefused) {
   const Claim claim = Separated().Until(1, {1, 0, 0});
-  ExpectInvalid(claim, kCube, Coming(3, kNaN), "a translation holds a number that is not finite");
+  ExpectInvalid(claim, kCube, Coming(3, kNaN),
+                "a translation contains a number that is not finite");
   ExpectInvalid(claim, Turned(Cube(), kNoTurn, {0, 0, 0, 0}), Coming(3, 2), "rotation is zero");
 }
 
@@ -578,7 +579,7 @@ TEST(MotionCheck, TheWholeRangeOfDoublesIsExact) {
 
 // Random planes and directions: at sampled times in every accepted interval, a separate oracle
 // finds the hulls separated.
-TEST(MotionCheck, AcceptsNoFalseInterval) {
+TEST(MotionCheck, RejectsFalseIntervals) {
   constexpr uint32_t kSeed = 31;
   constexpr int kSamples = 16;
   std::mt19937 random(kSeed);

@@ -285,7 +285,7 @@ TEST(PieceCheck, PosesMustBeFinite) {
   Body a, b;
   a.Add(Cube(), At(0, 0, 0)).Add(Cube(), At(NAN, 0, 0));
   b.Add(Cube(), At(0, 9, 0));
-  EXPECT_THAT(Fault(kSeparated, {}, a, b), HasSubstr("piece 1 of A: a translation holds"));
+  EXPECT_THAT(Fault(kSeparated, {}, a, b), HasSubstr("piece 1 of A: a translation contains"));
   b.poses[0] = Turned(At(0, 9, 0), 0, 0, 0, 0);
   a.poses[1] = At(0, 0, 0);
   EXPECT_THAT(Fault(kSeparated, {}, a, b), HasSubstr("piece 0 of B: a rotation is zero"));

@@ -79,7 +79,7 @@ HullMesh TetrahedronInCube() {
   return mesh;
 }
 
-TEST(SimplificationCheck, KnowsADistanceToTheLastBit) {
+TEST(SimplificationCheck, DecidesADistanceToTheLastBit) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const double distance = 2 / std::sqrt(3.0);
   const v1::Simplification inside = Asked(kInside, 4);
@@ -94,7 +94,7 @@ TEST(SimplificationCheck, KnowsADistanceToTheLastBit) {
                 "of the simplification is farther than 1.73205080756887");
 }
 
-TEST(SimplificationCheck, KnowsInsideFromOutsideToTheLastBit) {
+TEST(SimplificationCheck, DistinguishesInsideFromOutsideToTheLastBit) {
   const v1::Simplification outside = Asked(kOutside, 8);
   const HullMesh box = Claiming(2, BoxHull({0, 0, 0}, {2, 2, 2}));
   ExpectValid(outside, BoxHull({0, 0, kLeast}, {2, 1.5, 2}), box);
@@ -108,12 +108,12 @@ TEST(SimplificationCheck, KnowsInsideFromOutsideToTheLastBit) {
                 "vertex 1 of the simplification is not a vertex of the hull");
 }
 
-TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
+TEST(SimplificationCheck, ChecksTheRequestedLimits) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const HullMesh simple = Claiming(1.5, TetrahedronInCube());
-  ExpectInvalid(Asked(kInside, 3), cube, simple, "has 4 vertices; at most 3 were asked for");
+  ExpectInvalid(Asked(kInside, 3), cube, simple, "has 4 vertices; at most 3 were requested");
   ExpectInvalid(Asked(kInside, 0, 1.25), cube, simple,
-                "the error is 1.5; at most 1.25 was asked for");
+                "the error is 1.5; at most 1.25 was requested");
   ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
   // With both limits, the nearest that the server finds is accepted.
   ExpectValid(Asked(kInside, 4, 1.25), cube, simple);
@@ -122,7 +122,7 @@ TEST(SimplificationCheck, KnowsTheLimitsThatWereAskedFor) {
   ExpectInvalid(Asked(kInside, 4), cube, Claiming(-1, TetrahedronInCube()), "is not a distance");
 }
 
-TEST(SimplificationCheck, SurvivesMeshesThatMakeNoSense) {
+TEST(SimplificationCheck, SurvivesNonsensicalMeshes) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const v1::Simplification inside = Asked(kInside, 8);
   ExpectValid(inside, {}, Claiming(0, {}));
@@ -217,7 +217,7 @@ TEST(SimplificationCheck, AgreesWithTheOracle) {
   EXPECT_GT(invalid, 2 * kRounds);
 }
 
-TEST(SimplificationCheck, LooksThroughManyVertices) {
+TEST(SimplificationCheck, HandlesManyVertices) {
   Random random(93);
   const Hull hull = BuildHull(RandomOnSphere(random, kManyPoints, 1));
   const HullMesh mesh = MeshOf(hull);

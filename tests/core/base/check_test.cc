@@ -5,13 +5,13 @@
 namespace hulld {
 namespace check_test {
 
-TEST(Check, PassesWhereTheConditionHolds) {
+TEST(Check, PassesIfTheConditionHolds) {
   int evaluations = 0;
   HULLD_CHECK(++evaluations == 1);
   EXPECT_EQ(evaluations, 1);
 }
 
-TEST(CheckDeathTest, NamesPlaceAndCondition) {
+TEST(CheckDeathTest, NamesLocationAndCondition) {
   EXPECT_DEATH(HULLD_CHECK(1 + 1 == 3), "check_test.cc:[0-9]+: check failed: 1 \\+ 1 == 3");
   EXPECT_DEATH(HULLD_UNREACHABLE(), "check_test.cc:[0-9]+: check failed: unreachable");
 }

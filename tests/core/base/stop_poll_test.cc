@@ -7,7 +7,7 @@
 namespace hulld {
 namespace stop_poll_test {
 
-TEST(StopPoll, AsksAtTheFirstStepAndThenOnceInSoManySteps) {
+TEST(StopPoll, PollsAtTheFirstStepAndThenPeriodically) {
   int polls = 0;
   const std::function<bool()> should_stop = [&] {
     ++polls;
@@ -46,7 +46,7 @@ TEST(StopPoll, StopsPollingAfterAStop) {
   EXPECT_EQ(polls, 2);
 }
 
-TEST(StopPoll, NeverStopsWithoutAQuestion) {
+TEST(StopPoll, NeverStopsWithoutACallback) {
   const std::function<bool()> empty;
   StopPoll poll(empty, 1);
   StopPoll never;

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// The arithmetic required to decide a hull of about 1000 such points.
+// The arithmetic required to build a hull of about 1000 such points.
 enum class Arithmetic {
   // Rounded arithmetic with an error bound may suffice.
   kAny,

@@ -75,7 +75,7 @@ TEST(Audit, StopsAtEveryPoll) {
     for (int last = 1; last <= all; last += 1 + all / 16) {
       const absl::Status status = AuditUntil(hull, last, &polls);
       EXPECT_EQ(status.code(), absl::StatusCode::kCancelled) << status;
-      // After a stop it does not poll again.
+      // After a stop, it does not poll again.
       EXPECT_EQ(polls, last);
     }
   }

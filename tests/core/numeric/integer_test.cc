@@ -42,7 +42,7 @@ TEST(IntegerDeathTest, RefusesUndefinedOperations) {
   EXPECT_DEATH(AnyPerpendicular({0, 0, 0}), "check failed: !IsZero");
 }
 
-TEST(Integer, PerpendicularIsAcrossAndNotZero) {
+TEST(Integer, PerpendicularIsNonzeroAndPerpendicular) {
   for (const IntegerVector& d : {IntegerVector{5, 0, 0}, {0, -2, 0}, {0, 0, 1}, {1, 2, 3}}) {
     EXPECT_FALSE(IsZero(AnyPerpendicular(d)));
     EXPECT_EQ(Dot(d, AnyPerpendicular(d)), 0);

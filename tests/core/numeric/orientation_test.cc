@@ -18,7 +18,7 @@ namespace orientation_test {
 using Rational = boost::multiprecision::cpp_rational;
 using Points = std::array<Vector, 4>;
 
-// In rationals, expanded along the last row: a formula unlike the one under test.
+// In rationals, expanded along the last row: a different formula from the one under test.
 int RationalOrient3d(const Points& p) {
   Rational m[3][3];
   for (int i = 0; i < 3; ++i) {
@@ -145,7 +145,7 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
       for (int k = 0; k < 3; ++k) {
         p[k] = Vector(unit(random), unit(random), unit(random));
       }
-      // Anywhere, or rounded into the plane of the other points and hence next to it.
+      // Anywhere, or rounded into the plane of the other points and thus very close to it.
       const double s = unit(random);
       const double t = unit(random);
       p[3] = i % 3 == 0 ? Vector(s, t, unit(random)) : p[0] + s * (p[1] - p[0]) + t * (p[2] - p[0]);
@@ -167,7 +167,7 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
 }
 
 // A power of two on each axis: exponents spread beyond the reach of a common power of two.
-TEST(Orient3d, ExactWhereAxesAreFarApart) {
+TEST(Orient3d, ExactIfAxesDifferInMagnitude) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const auto& [low, high] : {std::array{-1060, 1020},
@@ -199,7 +199,7 @@ TEST(Orient3d, ExactWhereAxesAreFarApart) {
 
 // Any two or three of the points are close together and the rest far away: the determinant is far
 // below the error of differences from a far point. No exact arithmetic is needed.
-TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
+TEST(Orient3d, NearbyPointsAreDecidedRelativeToOneOfThem) {
   std::mt19937_64 random(8);
   std::uniform_real_distribution<double> unit(-1, 1);
   const auto any = [&](double size) {

@@ -66,7 +66,7 @@ TEST(RoundToNearest, TheEndsOfTheRangeSaturate) {
   EXPECT_EQ(RoundToNearest(1, 1, 1024).value, kLargestDouble);
   EXPECT_EQ(RoundToNearest(1, 1, 1024).bound, kInfinity);
   EXPECT_EQ(RoundToNearest(-5, 3, 9000).value, -kLargestDouble);
-  // Half a unit above the largest double is a tie, and goes to infinity in IEEE arithmetic.
+  // Half a unit above the largest double is a tie, which IEEE arithmetic rounds to infinity.
   const Integer largest = (Integer(1) << 53) - 1;
   EXPECT_EQ(RoundToNearest(largest, 1, 971).bound, 0);
   EXPECT_EQ(RoundToNearest(4 * largest + 1, 4, 971).value, kLargestDouble);
@@ -96,7 +96,7 @@ Rational ExactValue(const ScaledInteger& x) {
   return PowerOfTwo(x.exponent) * Rational(BigInteger(x.mantissa.str()));
 }
 
-TEST(ExactSum, LosesNothing) {
+TEST(ExactSum, IsExact) {
   const std::vector<double> terms = {0x1p1000, 1, -0x1p-1074, 0, 3 * 0x1p-60, -0x1p1000};
   Rational sum = 0;
   for (const double term : terms) sum += ExactValue(term);

@@ -153,13 +153,13 @@ TEST(WideInteger, DoublesConvertAsToIntegers) {
   }
 }
 
-TEST(WideInteger, WideOfTakesNegativeNumbers) {
+TEST(WideInteger, WideOfAcceptsNegativeNumbers) {
   EXPECT_EQ(ToInteger(WideOf(Int128{-5})), Integer(-5));
   EXPECT_EQ(ToInteger(WideOf(Int128{7} << 100)), Integer(7) << 100);
   EXPECT_EQ(ToInteger(WideOf(-(Int128{7} << 100))), -(Integer(7) << 100));
 }
 
-TEST(WideInteger, IntegersConvertWhereTheyFit) {
+TEST(WideInteger, IntegersConvertIfTheyFit) {
   const uint64_t seed = 11;
   std::mt19937_64 random(seed);
   for (int i = 0; i < 2000; ++i) {

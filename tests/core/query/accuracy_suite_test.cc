@@ -12,7 +12,7 @@
 namespace hulld {
 namespace accuracy_suite_test {
 
-TEST(AccuracySuite, EveryQuestionIsAnsweredExactly) {
+TEST(AccuracySuite, EveryQueryIsAnsweredExactly) {
 #ifdef HULLD_SANITIZED
   constexpr size_t kStride = 11;
   constexpr size_t kQuestions = 422;

@@ -69,7 +69,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
     options.method = method;
     options.want_axis = true;
     options.want_analysis = true;
-    // The textbook on all pairs would be slow: every seventh suffices.
+    // The textbook method on all pairs would be slow; every seventh pair suffices.
     std::vector<PlacedPair> pairs;
     for (size_t i = 0; i < crowd.pairs.size(); i += method == Method::kTextbookSat ? 7 : 1) {
       pairs.push_back(crowd.pairs[i]);
@@ -115,7 +115,7 @@ TEST(Batch, RelationsAloneEqualThoseOfFullAnswers) {
   for (const int count : seen) EXPECT_GT(count, 60);
 }
 
-TEST(Batch, ATolerancesAnswersDoNotDependOnThreads) {
+TEST(Batch, AnswersWithAToleranceDoNotDependOnThreads) {
   const Crowd crowd = MakeCrowd(704);
   QueryOptions options;
   options.tolerance = 0.5;
@@ -132,7 +132,7 @@ TEST(Batch, ATolerancesAnswersDoNotDependOnThreads) {
   EXPECT_GT(seen[static_cast<size_t>(Relation::kWithinTolerance)], 60);
 }
 
-TEST(Batch, PollsLessOftenThanItAnswersAndStopsForGood) {
+TEST(Batch, PollsLessOftenThanItAnswersAndStaysStopped) {
   const Crowd crowd = MakeCrowd(705);
   for (int threads : {1, 4}) {
     std::atomic<int> polls = 0;
@@ -145,13 +145,13 @@ TEST(Batch, PollsLessOftenThanItAnswersAndStopsForGood) {
   }
 }
 
-TEST(Batch, NoPairsGiveNoAnswers) {
+TEST(Batch, NoPairsYieldNoAnswers) {
   const Crowd crowd = MakeCrowd(702);
   EXPECT_TRUE(CheckCollisions(crowd.placements, {}, {}, 4).empty());
   EXPECT_TRUE(CheckCollisions({}, {}, {}, 1).empty());
 }
 
-TEST(Batch, CancellationCancelsTheRestAndNothingElse) {
+TEST(Batch, CancellationCancelsOnlyTheRemainingPairs) {
   const Crowd crowd = MakeCrowd(703);
   for (int threads : {1, 4}) {
     std::atomic<int> polls = 0;

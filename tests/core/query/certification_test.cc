@@ -65,7 +65,7 @@ TEST(Certificate, SomeOverlapsNeedFiveOrSixPairs) {
   }
 }
 
-TEST(Certificate, TheTextbookMethodGivesOneToo) {
+TEST(Certificate, TheTextbookMethodReturnsOneToo) {
   const Hull cube = BuildHull(Cube());
   QueryOptions options = WantCertificate();
   options.method = Method::kTextbookSat;

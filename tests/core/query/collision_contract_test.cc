@@ -51,7 +51,7 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
 }
 
 // Regression test: formerly, a single call returned EXACT and a stream BOUNDS.
-TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
+TEST(Collision, AnEmptyHullIsDecidedByTheSameRungInEveryCall) {
   const Hull empty;
   const Hull cube = UnitCube();
   const QueryHull query_empty(empty);
@@ -105,18 +105,18 @@ TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
     EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0), &cache), exactly);
     EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0x1p-60), &cache), exactly);
     EXPECT_EQ(ask(At(0.5, 0, 1), At(0.5 + side, 0.25, 0x1p-60), &cache), from_cache);
-    // A contact that ends by the least step.
+    // A contact that the smallest step ends.
     const Pose apart = At(std::nextafter(0.5 + side, 4 * side), 0.25, 0);
     EXPECT_EQ(ask(X_WA, apart, &cache).first, Relation::kSeparated);
     const Pose into = At(std::nextafter(0.5 + side, 0.5), 0.25, 0);
     EXPECT_EQ(ask(X_WA, into, &cache).first, Relation::kOverlapping);
     EXPECT_EQ(ask(X_WA, X_WB, &cache).first, Relation::kTouching);
-    // Another quaternion of the same rotation is not recognized, and a tolerance asks for less.
+    // Another quaternion of the same rotation is not recognized, and a tolerance requires less.
     Pose turned = X_WB;
     turned.q = {2, 0, 0, 0};
     EXPECT_EQ(ask(X_WA, turned, &cache), exactly);
     EXPECT_EQ(ask(X_WA, turned, &cache, 0.125), ask(X_WA, turned, nullptr, 0.125));
-    // Another hull may take the place of one that touched.
+    // Another hull may replace one that touched.
     EXPECT_EQ(ask(X_WA, turned, &cache).first, Relation::kTouching);
     EXPECT_EQ(ask(X_WA, turned, &cache), from_cache);
     cache.ForgetHulls();
@@ -253,7 +253,7 @@ TEST(Collision, PoseErrorsNameTheCoordinate) {
   EXPECT_TRUE(ValidatePose(pose).ok());
 }
 
-TEST(Collision, NoAxisUnlessWanted) {
+TEST(Collision, NoAxisUnlessRequested) {
   const Hull cube = UnitCube();
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     QueryOptions options = Options(method);
@@ -454,7 +454,7 @@ TEST(Collision, SwappingTheHullsMirrorsTheAnswerOfTheSearch) {
   EXPECT_GT(axes, 50);
 }
 
-// A cancelled textbook query on some 2000 x 2000 edges stops soon.
+// A cancelled textbook query on about 2000 x 2000 edges stops soon.
 TEST(Collision, CancellationEndsTheTextbook) {
   const Hull sphere = BuildHull(FibonacciSphere(600));
   for (int threads : {1, 4}) {
@@ -469,7 +469,7 @@ TEST(Collision, CancellationEndsTheTextbook) {
   }
 }
 
-TEST(Collision, ShouldStopThatSaysNoChangesNothing) {
+TEST(Collision, ShouldStopThatReturnsFalseChangesNothing) {
   const Hull sphere = BuildHull(FibonacciSphere(100));
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     QueryOptions options = Options(method);

@@ -1,5 +1,5 @@
-// A query gives the same bits always: on every SIMD path, in either order, and with a warm cache as
-// far as core/README.md promises it (Exactness, determinism).
+// A query always returns the same bits: on every SIMD path, in either order, and with a warm cache
+// as far as core/README.md promises it (Exactness, determinism).
 
 #include <gtest/gtest.h>
 

@@ -385,7 +385,7 @@ Digests Compute() {
 
 class DigestTest : public testing::TestWithParam<SimdPath> {};
 
-TEST_P(DigestTest, IsThatOfEveryProcessor) {
+TEST_P(DigestTest, IsTheSameOnEveryProcessor) {
   const SimdPath before = CurrentSimdPath();
   if (!UseSimdPath(GetParam())) GTEST_SKIP() << "this machine has no such instructions";
   const Digests digests = Compute();

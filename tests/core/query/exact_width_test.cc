@@ -26,7 +26,8 @@ constexpr ExactWidth kWidths[] = {ExactWidth::k1Word, ExactWidth::k2Words, Exact
 constexpr int kMostBits[] = {55, 119, 183, 311, std::numeric_limits<int>::max()};
 constexpr size_t kWidthCount = std::size(kWidths);
 
-// Runs a query in all widths that hold it, from the start and from the end of floating point.
+// Runs a query in all widths that are sufficient, from scratch and from the final state of floating
+// point.
 class WidthCheck {
  public:
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,

@@ -61,7 +61,7 @@ class Narrowing {
   Vector line_;
 };
 
-TEST(NearContact, GenericPairsOnTheBrinkMatchTheOracle) {
+TEST(NearContact, GenericPairsNearContactMatchTheOracle) {
   const uint64_t seed = TestSeed(901);
   Random random(seed);
   RelationCheck check;
@@ -145,7 +145,7 @@ int QuestionsToAsk() {
 // Adjacent lattice hulls of all dimensions, some coordinates moved by an ulp, at poses of small
 // integers, with arbitrary scale: touching, missing, and overlapping by zero, by an ulp, or by a
 // rounding of the pose.
-TEST(NearContact, RandomQuestionsMatchTheOracle) {
+TEST(NearContact, RandomQueriesMatchTheOracle) {
   const uint64_t seed = TestSeed(904);
   Random random(seed);
   RelationCheck check;

@@ -227,13 +227,13 @@ TEST(Normal, OtherOptionsDoNotChangeIt) {
   }
 }
 
-TEST(Normal, EmptyHullsAndQuestionsWithToleranceHaveNone) {
+TEST(Normal, EmptyHullsAndQueriesWithAToleranceHaveNone) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   EXPECT_FALSE(CheckCollision(cube, Pose(), Hull(), Pose(), WantNormal())->normal.has_value());
   QueryOptions options = WantNormal();
   options.tolerance = 1;
   EXPECT_EQ(CheckCollision(cube, Pose(), cube, Pose(), options).status().message(),
-            "tolerance is 1, but want_normal needs the exact relation; leave out one of them");
+            "tolerance is 1, but want_normal needs the exact relation; omit one of them");
   options.tolerance = 0;
   options.method = Method::kTextbookSat;
   EXPECT_TRUE(

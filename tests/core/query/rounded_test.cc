@@ -123,7 +123,7 @@ TEST(Rounded, IrrationalDistancesLieBetweenDoubles) {
   EXPECT_EQ(check.count(Relation::kTouching), 0);
 }
 
-// No double holds these sums of radii.
+// These sums of radii are not doubles.
 TEST(Rounded, TheSumOfTheRadiiIsExact) {
   RoundedCheck check;
   const Vector one(1, 0, 0);
@@ -236,7 +236,7 @@ TEST(Rounded, TheTextbookMethodRefusesRadii) {
   options.method = Method::kTextbookSat;
   const Points cube = LatticeCube(2, 1);
   EXPECT_EQ(CheckRounded(Shape(cube, 0), Shape(cube, 1), options).status().message(),
-            "the textbook method applies to hulls without a radius; leave out one of them");
+            "the textbook method applies to hulls without a radius; omit one of them");
   EXPECT_TRUE(CheckRounded(Shape(cube, 0), Shape(cube, 0), options).ok());
 }
 

@@ -45,7 +45,7 @@ Answer Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
   return CheckCollision(a, X_WA, b, X_WB, WantSeparation(max_error)).value();
 }
 
-TEST(Separation, CubesHaveTheLengthsOneExpects) {
+TEST(Separation, CubesHaveTheExpectedLengths) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   SeparationCheck check;
   const struct {
@@ -92,7 +92,7 @@ TEST(Separation, OutOfRangeValuesSaturate) {
   EXPECT_GT(deep.separation->bound, 0);
 }
 
-TEST(Separation, TheLeastDoubleKeepsItsSign) {
+TEST(Separation, TheSmallestDoubleKeepsItsSign) {
   const Hull point = BuildHull(std::vector<Vector>{{0, 0, 0}});
   const Answer near = Ask(point, Pose(), point, At(kLeast, 0, 0));
   EXPECT_EQ(near.separation->value, kLeast);
@@ -260,7 +260,7 @@ TEST(Separation, AContactPointNeedsExactArithmeticOnlyIfItsErrorMustBeLeast) {
   }
 }
 
-TEST(Separation, TheTextbookMethodGivesTheSame) {
+TEST(Separation, TheTextbookMethodReturnsTheSame) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   QueryOptions textbook = WantSeparation();
   textbook.method = Method::kTextbookSat;
@@ -272,7 +272,7 @@ TEST(Separation, TheTextbookMethodGivesTheSame) {
   }
 }
 
-TEST(Separation, OptionsThatMeanNothingAreRefused) {
+TEST(Separation, MeaninglessOptionsAreRefused) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto message = [&](auto change) {
@@ -298,7 +298,7 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
     });
   };
   const std::string start = "tolerance is 1, but ";
-  const std::string rest = " needs the exact relation; leave out one of them";
+  const std::string rest = " needs the exact relation; omit one of them";
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_separation = true; }),
             start + "want_separation" + rest);
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_certificate = true; }),
@@ -350,7 +350,7 @@ TEST_F(PiercedDisc, TheSearchForItsDepthPollsOften) {
   }
 }
 
-TEST_F(PiercedDisc, TheSearchForItsDepthTakesNoMoreMemoryThanAllowed) {
+TEST_F(PiercedDisc, TheSearchForItsDepthStaysWithinItsMemoryLimit) {
   QueryOptions options = WantSeparation(0);
   options.max_depth_bytes = 100 << 20;
   EXPECT_TRUE(Ask(options).ok());

@@ -109,7 +109,7 @@ TEST(TextbookScenes, TwoRandomBalls) {
 }
 
 // With no time budget, each part tests one block of axes.
-TEST(TextbookCheck, InPiecesGivesTheSameAnswerAndStopsBetweenThem) {
+TEST(TextbookCheck, WorkInPartsReturnsTheSameAnswerAndStopsBetweenThem) {
   Random random(TestSeed(941));
   const Hull a = BuildHull(RandomOnSphere(random, 60, 1));
   const Hull b = BuildHull(RandomOnSphere(random, 60, 1));

@@ -50,8 +50,8 @@ TEST(Tolerance, IsUsedOnlyWhereTheSeparationIsWithinIt) {
   EXPECT_GT(seen[static_cast<size_t>(Relation::kWithinTolerance)], 10);
 }
 
-// Near contact the tolerance avoids the exact rung, which touching contact otherwise needs.
-TEST(Tolerance, SparesExactArithmeticInContact) {
+// Near contact, the tolerance avoids the exact rung, which touching would otherwise require.
+TEST(Tolerance, AvoidsExactArithmeticInContact) {
   Random random(TestSeed(811));
   int spared = 0;
   for (int round = 0; round < 40; ++round) {
@@ -78,7 +78,7 @@ TEST(Tolerance, SparesExactArithmeticInContact) {
 // |separation| is at most the distance of any vertex pair and, if the hulls overlap, at most their
 // reach along any direction: WITHIN_TOLERANCE must never contradict the exact relation of hulls
 // moved apart, or together, by slightly more than the tolerance.
-TEST(Tolerance, IsNeverClaimedBeyondItself) {
+TEST(Tolerance, IsNeverClaimedBeyondTheTolerance) {
   Random random(TestSeed(812));
   int within = 0;
   for (int round = 0; round < 3000; ++round) {

@@ -243,7 +243,7 @@ FileVerdict CheckUrdf(std::string_view content) {
     const RobotJoint& joint = robot->joints[static_cast<size_t>(link.parent_joint)];
     if (joint.child != i || joint.parent >= i) return {"a child before its parent", false};
   }
-  // Mimic chains end, and every link has a place.
+  // Mimic chains terminate, and every link has a pose.
   const std::vector<JointValue> values = AllJointValues(*robot, RestValues(*robot));
   if (values.size() != robot->joints.size()) return {"a joint without a value", false};
   if (LinkPoses(*robot, kNoMotion, values).size() != robot->links.size()) {

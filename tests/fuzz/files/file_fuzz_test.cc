@@ -52,7 +52,7 @@ void Change(Random& random, std::string* content) {
   }
 }
 
-TEST(FileFuzz, SeedsAreRead) {
+TEST(FileFuzz, SeedsAreAccepted) {
   for (const SeedFile& seed : SeedFiles()) {
     // One seed has a point that only --skip-nonfinite accepts.
     if (seed.content.find("nan nan") != std::string::npos) continue;
@@ -62,7 +62,7 @@ TEST(FileFuzz, SeedsAreRead) {
   }
 }
 
-TEST(FileFuzz, ChangedFilesAreReadOrRefused) {
+TEST(FileFuzz, MutatedFilesAreReadOrRefused) {
   const uint64_t seed = TestSeed(701);
   Random random(seed);
   const auto next = [&random](size_t n) {

@@ -87,7 +87,7 @@ class MessageFiller {
   // always.
   bool IsPresent(const FieldDescriptor& field) {
     const std::string& name = field.name();
-    // Most calls take no motions.
+    // Most calls do not accept motions.
     if (name == "end_pose" || name == "max_time_error" || name == "resolution") {
       return in_.OneOf(32);
     }
@@ -184,7 +184,7 @@ class MessageFiller {
     if (name == "groups") return in_.OneOf(3) ? placements_ + slip : 0;
     if (name == "ignored_group_pairs") return in_.OneOf(8) ? 2 + slip : 0;
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return std::min<size_t>(count, 12);
-    // An update names each placement at most one time.
+    // An update names each placement at most once.
     if (name == "placements") return std::min(count, in_.OneOf(16) ? count : size_t{1});
     return count;
   }

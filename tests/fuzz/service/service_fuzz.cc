@@ -21,7 +21,7 @@ namespace {
 
 // Programs between reopenings of a durable store.
 constexpr int kProgramsPerOpening = 8;
-// Fits only some of the hulls of programs, so that the rest come from the store.
+// Fits only some of the programs' hulls, so that the rest are read from the store.
 constexpr uint64_t kSmallMemory = 64 << 10;
 
 // Small limits, so that programs of a hundred bytes reach them.
@@ -193,7 +193,7 @@ std::map<std::string, std::string> ServiceFuzz::Contents() {
 std::string ServiceFuzz::Reopen() {
   const std::map<std::string, std::string> before = Contents();
   std::string former;
-  // Every second time a backup replaces the store.
+  // Every second time, a backup replaces the store.
   if (opened_ % 2 == 0) {
     const std::string file = absl::StrCat(directory_, "/backup-", opened_);
     BackupWriter writer(file);

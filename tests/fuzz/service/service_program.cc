@@ -459,7 +459,7 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   // A body has taken over the ID of a deleted hull.
   if (!response.piece_hulls().empty()) return;
   if (asked.a().has_points() || asked.b().has_points()) return;
-  // The certificate of a motion holds at the time of contact.
+  // The certificate of a motion applies at the time of contact.
   if (asked.a().has_end_pose() || asked.b().has_end_pose()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {

@@ -130,7 +130,7 @@ void ServiceProgram::AskAboutBody() {
   v1::CheckCollisionRequest request;
   FillMessage(in_, Hints(), request.mutable_b());
   request.mutable_a()->set_hull_id(any_body());
-  // No double may hold its sum with the radius of a piece.
+  // Its sum with the radius of a piece may not be a double.
   request.mutable_a()->clear_radius();
   if (in_.OneOf(3)) {
     request.mutable_b()->set_hull_id(any_body());

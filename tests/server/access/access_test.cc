@@ -36,7 +36,7 @@ struct Outcome {
   std::string replies;
 };
 
-// A call as the tests below exercise it.
+// A call, in the form used by the tests below.
 struct CallRule {
   Permission needed;
   // The messages of a request about a hull.
@@ -379,7 +379,7 @@ TEST_F(Access, EveryCallNeedsItsRole) {
 }
 
 // Neither the code nor the message nor the reply differs from that of a missing hull.
-TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
+TEST_F(Access, NoCallRevealsHullsUnderOtherPrefixes) {
   for (const auto& [call, rule] : Rules()) {
     if (rule.refusal == CallRule::kNoHull) continue;
     for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
@@ -390,7 +390,7 @@ TEST_F(Access, NoCallRevealsHullsOfOtherPrefixes) {
       Outcome absent = Do(call, "cell's secret", none);
       const std::string& said =
           rule.refusal == CallRule::kByStatus ? there.status.error_message() : there.replies;
-      EXPECT_THAT(said, HasSubstr("is outside of \"cell-1/\"")) << call << " " << theirs;
+      EXPECT_THAT(said, HasSubstr("is outside the prefix \"cell-1/\"")) << call << " " << theirs;
       EXPECT_EQ(there.status.error_code(), rule.refusal == CallRule::kByStatus
                                                ? grpc::StatusCode::PERMISSION_DENIED
                                                : grpc::StatusCode::OK)
@@ -477,7 +477,7 @@ TEST_F(Access, HealthNeedsNoToken) {
   EXPECT_TRUE(Run("/grpc.health.v1.Health/Check", {}, {""}).status.ok());
 }
 
-TEST_F(Access, ChangedTokensCountFromTheNextCallAndABrokenFileChangesNothing) {
+TEST_F(Access, ChangedTokensApplyFromTheNextCallAndABrokenFileChangesNothing) {
   const auto code = [this](const std::string& token) {
     return Do("hulld.v1.HullService.GetHull", token, "cell-1/own").status.error_code();
   };

@@ -88,7 +88,7 @@ class GuardProcess : public ::testing::Test {
   std::string directory_;
 };
 
-TEST_F(GuardProcess, ChangedFilesAreNoticedWithoutASignal) {
+TEST_F(GuardProcess, ChangedFilesAreDetectedWithoutASignal) {
   Process hulld(Arguments());
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::OK);

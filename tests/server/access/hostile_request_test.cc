@@ -1,4 +1,4 @@
-// Memory that callers can make the program hold, before and after they are authenticated.
+// Memory that callers can make the server allocate, before and after they are authenticated.
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -40,7 +40,7 @@ long StatusField(pid_t pid, const std::string& name) {
   return 0;
 }
 
-// Empty placements, two bytes each: parsed they take forty times as much.
+// Empty placements, two bytes each: parsed, they take forty times as much.
 grpc::ByteBuffer EmptyPlacements() {
   std::string bytes;
   while (bytes.size() < (16u << 20) - 64) bytes.append("\x0a\x00", 2);
@@ -97,7 +97,7 @@ class HostileRequest : public ::testing::Test {
   }
 };
 
-TEST_F(HostileRequest, CallersWithoutATokenTakeLittleMemory) {
+TEST_F(HostileRequest, CallersWithoutATokenUseLittleMemory) {
   std::string pattern = ::testing::TempDir() + "/hulld_hostile_XXXXXX";
   ASSERT_NE(mkdtemp(pattern.data()), nullptr);
   WriteSecret(pattern + "/tokens", "robot read-only * sha256:" + std::string(64, '0') + "\n");
@@ -105,7 +105,7 @@ TEST_F(HostileRequest, CallersWithoutATokenTakeLittleMemory) {
   std::filesystem::remove_all(pattern);
 }
 
-TEST_F(HostileRequest, AuthorizedCallersTakeLittleMemory) {
+TEST_F(HostileRequest, AuthorizedCallersUseLittleMemory) {
   ExpectLittleMemory({}, grpc::RESOURCE_EXHAUSTED);
 }
 

@@ -128,7 +128,7 @@ TEST_F(Tls, WithoutAClientAuthorityAllConnectionsFail) {
   EXPECT_EQ(Connect(Trusting(authority_, client)), grpc::StatusCode::OK);
 }
 
-TEST_F(Tls, NewConnectionsSeeExchangedCertificatesAndOldOnesStand) {
+TEST_F(Tls, NewConnectionsUseReplacedCertificatesAndOldOnesStay) {
   Restart(config_);
   const auto standing =
       v1::StatusService::NewStub(grpc::CreateChannel(server_->address(), Trusting(authority_)));
@@ -142,7 +142,7 @@ TEST_F(Tls, NewConnectionsSeeExchangedCertificatesAndOldOnesStand) {
   EXPECT_EQ(Ask(*standing), grpc::StatusCode::OK);
 }
 
-TEST_F(Tls, HalfAnExchangeIsNotTaken) {
+TEST_F(Tls, AnIncompleteReplacementIsIgnored) {
   Restart(config_);
   const TestIdentity renewed = other_.Issue("hulld");
   Write("server.crt", renewed.certificate);
@@ -198,7 +198,7 @@ TEST_F(Tls, VersionsBefore12AreRefused) {
   EXPECT_EQ(HandshakeWith(port, TLS1_VERSION), "");
 }
 
-TEST_F(Tls, UnixSocketsServeWithAndWithout) {
+TEST_F(Tls, UnixSocketsWorkWithAndWithoutTls) {
   config_.listen = "unix:" + directory_ + "/tls.sock";
   Restart(config_);
   grpc::ChannelArguments arguments;
@@ -252,7 +252,7 @@ TEST_F(Tls, ErrorsNameTheSettingAndTheFile) {
   ExpectWrong(config, "its permissions 0644 are too open");
 }
 
-TEST_F(Tls, ACertificateThatIsNotValidNowIsAFinding) {
+TEST_F(Tls, AnInvalidCertificateIsReported) {
   const auto now = std::chrono::system_clock::now();
   EXPECT_TRUE(CheckConfig(config_, now).ok());
   const absl::Status expired = CheckConfig(config_, now + std::chrono::hours(48)).status();
@@ -261,7 +261,7 @@ TEST_F(Tls, ACertificateThatIsNotValidNowIsAFinding) {
   EXPECT_THAT(std::string(early.message()), HasSubstr("starts on "));
 }
 
-TEST_F(Tls, ADataDirectoryCanBeMadeWhereADirectoryIs) {
+TEST_F(Tls, ADataDirectoryCanBeCreatedInAnExistingDirectory) {
   EXPECT_TRUE(CheckDataDir(directory_).ok());
   EXPECT_TRUE(CheckDataDir(directory_ + "/new/deeper").ok());
   EXPECT_TRUE(CheckDataDir("relative").ok());

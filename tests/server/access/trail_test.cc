@@ -120,8 +120,8 @@ TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
   EXPECT_THAT(log.text(), Not(HasSubstr("points appended")));
 }
 
-// gRPC knows no peer any more once the connection is gone.
-TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
+// gRPC no longer knows the peer after the connection is closed.
+TEST_F(Trail, ADisconnectedWriterIsStillNamed) {
   Restart(TestConfig());
   const CapturedLog log;
   for (int i = 0; i < 20; ++i) {
@@ -142,7 +142,7 @@ TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
   EXPECT_THAT(log.text(), Not(HasSubstr("peer=unknown")));
 }
 
-TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
+TEST_F(Trail, ATraceAppearsInTheLogAndTheReply) {
   const CapturedLog log;
   const auto ask = [this](const std::vector<std::string>& traceparents,
                           const std::string& hull_id) {
@@ -156,7 +156,7 @@ TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
     return ValueOf(context.GetServerTrailingMetadata(), "traceparent");
   };
   EXPECT_EQ(ask({kTraceparent}, "a"), kTraceparent);
-  // A malformed or repeated header is no trace.
+  // A malformed or repeated header does not count as a trace.
   EXPECT_EQ(ask({"00-00000000000000000000000000000000-b7ad6b7169203331-01"}, "b"), "");
   EXPECT_EQ(ask({kTraceparent, kTraceparent}, "c"), "");
   EXPECT_EQ(ask({}, "d"), "");

@@ -79,7 +79,7 @@ TEST_F(BodyCertificates, EveryRelationIsProven) {
   EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
   EXPECT_EQ(touching.piece_certificates_size(), 30);
 
-  // Under a common rotation, the boxes meet and the hulls do not.
+  // Under a common rotation, the boxes intersect but the hulls do not.
   const auto apart =
       Prove(Question(Turned(PlacementOf("row")), Turned(PlacementOf("row", 0.8, 0.8, 0.8))));
   EXPECT_EQ(apart.relation(), v1::RELATION_SEPARATED);

@@ -89,7 +89,7 @@ TEST_F(BodyQuestions, PosesComposeExactly) {
   EXPECT_EQ(Ask(left, right)->relation(), v1::RELATION_TOUCHING);
 }
 
-TEST_F(BodyQuestions, TheTextbookIsForHullsAlone) {
+TEST_F(BodyQuestions, TheTextbookMethodIsOnlyForHulls) {
   PutPair("pair");
   v1::CheckCollisionRequest request;
   *request.mutable_a() = PlacementOf("pair");
@@ -98,7 +98,7 @@ TEST_F(BodyQuestions, TheTextbookIsForHullsAlone) {
   EXPECT_TRUE(absl::IsInvalidArgument(MakeClient().CheckCollision(request).status()));
 }
 
-TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItIsThere) {
+TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItExists) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("b", {PlacementOf("cube"), PlacementOf("late", 5, 0, 0)}).ok());
   const auto missing = Ask(PlacementOf("b"), PlacementOf("cube", 9, 0, 0));
@@ -121,7 +121,7 @@ TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItIsThere) {
               HasSubstr("is a body; this call requires a hull"));
 }
 
-TEST_F(BodyQuestions, APieceIsItsHullAsItIsNow) {
+TEST_F(BodyQuestions, APieceUsesTheCurrentVersionOfItsHull) {
   PutPair("pair");
   EXPECT_EQ(Ask(PlacementOf("pair"), PlacementOf("cube", 2.5, 0, 0))->relation(),
             v1::RELATION_SEPARATED);
@@ -134,7 +134,7 @@ TEST_F(BodyQuestions, APieceIsItsHullAsItIsNow) {
   EXPECT_EQ(grown->piece_a().index(), 0u);
 }
 
-TEST_F(BodyQuestions, BatchesTakeBoth) {
+TEST_F(BodyQuestions, BatchesAcceptHullsAndBodies) {
   PutPair("pair");
   ASSERT_TRUE(PutBody("broken", {PlacementOf("nothing")}).ok());
   v1::BatchCheckCollisionsRequest request;
@@ -194,7 +194,7 @@ TEST_F(BodyQuestions, WithoutBodiesThePiecesColumnIsAbsent) {
   EXPECT_EQ(Batch(request)->columns().pieces_size(), 0);
 }
 
-TEST_F(BodyQuestions, ScenesTakeBoth) {
+TEST_F(BodyQuestions, ScenesAcceptHullsAndBodies) {
   PutPair("pair");
   v1::FindCollisionsRequest request;
   *request.add_placements() = PlacementOf("pair");
@@ -244,7 +244,7 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   take(stream->Update(update));
   EXPECT_THAT(relations, ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING));
   EXPECT_THAT(pieces, ElementsAre(-1, -1, 0, -1));
-  // The body is put again, then one of its hulls is deleted; a refresh shows each change.
+  // Puts the body again, then deletes one of its hulls; a refresh shows each change.
   ASSERT_TRUE(PutBody("pair", {PlacementOf("cube", 30, 0, 0)}).ok());
   v1::CollisionStreamUpdate refresh;
   refresh.set_refresh_hulls(true);
@@ -258,7 +258,7 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(BodyQuestions, ALongQuestionEndsAtItsDeadline) {
+TEST_F(BodyQuestions, ALongQueryEndsAtItsDeadline) {
   Put("sphere", Sphere(2000));
   std::vector<v1::Placement> pieces;
   for (int i = 0; i < 3000; ++i) {

@@ -130,7 +130,7 @@ TEST_F(BodyCalls, HullsAndBodiesShareTheirIds) {
   EXPECT_TRUE(client.CreateHull("body").ok());
 }
 
-TEST_F(BodyCalls, ListsCountAndComeInPages) {
+TEST_F(BodyCalls, ListsAreCountedAndPaged) {
   for (const char* id : {"a/2", "b/1", "a/1", "a/3"}) {
     ASSERT_TRUE(PutBody(id, {PlacementOf("x")}).ok());
   }
@@ -156,7 +156,7 @@ TEST_F(BodyCalls, ListsCountAndComeInPages) {
   EXPECT_EQ(client.GetStatus()->hull_count(), 1u);
 }
 
-TEST_F(BodyCalls, APageTokenBelongsToTheCallThatGaveIt) {
+TEST_F(BodyCalls, APageTokenIsValidOnlyForTheCallThatReturnedIt) {
   for (const char* id : {"a", "b"}) ASSERT_TRUE(PutBody(id, {PlacementOf("x")}).ok());
   for (const char* id : {"c", "d"}) Create(id);
   const Client client = MakeClient();
@@ -199,7 +199,7 @@ TEST_F(BodyCalls, BodiesCountAgainstTheMemoryLimit) {
   const auto second = PutBody("second", pieces);
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_THAT(TextOf(second.status()), HasSubstr("--memory-limit"));
-  // Memory does not suffice for queries either: each call copies the pieces.
+  // Memory is also insufficient for queries: each call copies the pieces.
   EXPECT_TRUE(absl::IsResourceExhausted(Ask(PlacementOf("first"), PlacementOf("cube")).status()));
   // Refused or deleted bodies are no longer counted.
   ASSERT_TRUE(MakeClient().DeleteBody("first").ok());

@@ -246,7 +246,8 @@ TEST_F(BodyWatches, ABodyIsWatchedBeforeItsHullsExist) {
 TEST_F(BodyWatches, AgreeWithBatchesAfterEveryChange) {
   Random random(7);
   const std::vector<std::string> hulls = {"h0", "h1", "h2"};
-  // The last two stand far away, so that every change affects the watch and no mark is needed.
+  // The last two are far away, so that every change affects the watch and no progress mark is
+  // needed.
   const std::vector<std::string> placed = {"b0", "b1", "h0", "b0", "h1", "h2"};
   const std::vector<double> places = {0, 1.5, 3, 6, 100, 200};
   v1::CollisionWatchOpen open;

@@ -113,7 +113,7 @@ TEST_F(Backpressure, AnUnreadBatchIsNotComputedAhead) {
   EXPECT_FALSE(unread->Finish().ok());
 }
 
-// Every pair is found, with a certificate of some hundred bytes. The unread scene delays no other
+// Every pair is found, with a certificate of a few hundred bytes. The unread scene delays no other
 // call, so it need not be ended, and completes when the client resumes reading.
 TEST_F(Backpressure, AnUnreadSceneIsNotSearchedAhead) {
   constexpr int kPlacements = 600;

@@ -158,7 +158,7 @@ TEST_F(ErrorReasons, GrpcsOwnErrorsHaveNone) {
   v1::GetStatusResponse response;
   const grpc::Status cancelled = status_->GetStatus(&context, {}, &response);
   Expect(cancelled, absl::StatusCode::kCancelled, v1::ERROR_REASON_UNSPECIFIED, {});
-  // A domain that is not ours.
+  // A domain other than hulld's.
   Expect(absl::UnavailableError("elsewhere"), absl::StatusCode::kUnavailable,
          v1::ERROR_REASON_UNSPECIFIED, {});
 }

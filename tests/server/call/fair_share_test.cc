@@ -79,7 +79,7 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   EXPECT_THAT(last_message_, HasSubstr("2 slots are reserved for single calls"));
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "max-calls-per-client");
-  // The limit of the whole server works alike.
+  // The limit of the whole server works in the same way.
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "max-calls");
   EXPECT_THAT(last_message_, HasSubstr("3 slots are reserved for single calls"));
@@ -103,7 +103,7 @@ TEST_F(FairShare, ACallWaitsForItsOwnPoolAlone) {
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "max-waiting-calls");
 }
 
-// Thousands of opened or woken watches wait.
+// Thousands of new or woken watches wait.
 TEST_F(FairShare, StreamsThatWaitKeepOutNoSingleCall) {
   Limits limits;
   limits.max_waiting_calls = 5;
@@ -154,7 +154,7 @@ TEST_F(FairShare, AConnectionHasAWatchOfHealthOutsideOfAllShares) {
   EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(1)), "max-anonymous-calls");
   EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(2)), "max-anonymous-calls");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, client, peer(1)), "");
-  // After the end of its watch, a connection may have another one.
+  // After its watch ends, a connection may open another one.
   tickets_.pop_front();
   EXPECT_EQ(Refusal(Rpc::kHealthWatch, client, peer(1)), "");
   // A proxy on this machine has the watches of all its clients.

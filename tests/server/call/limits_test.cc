@@ -56,7 +56,7 @@ class LimitsTest : public ServerTest {
     EXPECT_THAT(status.error_details(), HasSubstr("google.rpc.RetryInfo"));
   }
 
-  // A batch of hours of work, which runs until cancelled.
+  // A batch with hours of work, which runs until cancelled.
   v1::BatchCheckCollisionsRequest LongBatch() {
     v1::BatchCheckCollisionsRequest request;
     request.set_method(v1::METHOD_TEXTBOOK_SAT);
@@ -172,8 +172,8 @@ TEST_F(LimitsTest, TheLimitPerClientHoldsRegardlessOfFreeSlots) {
   EXPECT_TRUE(GetHull(&again).ok());
 }
 
-// A textbook query of hours runs in slices. A similar one of some milliseconds is answered during
-// it.
+// A textbook query that takes hours runs in slices. A similar one that takes milliseconds is
+// answered meanwhile.
 TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   Config config = TestConfig();
   config.limits.max_textbook_axes = uint64_t{1} << 40;
@@ -208,7 +208,7 @@ TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
   EXPECT_EQ(response.relation(), v1::RELATION_OVERLAPPING);
   long_context.TryCancel();
   long_query.join();
-  // It ran throughout: it was not answered, and could still be cancelled.
+  // It was still running: it had not been answered, and could be cancelled.
   EXPECT_EQ(long_status.error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(WaitIdle());
 }
@@ -330,7 +330,7 @@ TEST_F(LimitsTest, AnUnreadCallLosesItsSlotAtItsDeadline) {
   Restart(config);
   Put("cube", Cube());
   ASSERT_TRUE(WaitIdle());
-  // Some 72 MB, far more than gRPC's windows hold.
+  // About 72 MB, far more than fits in gRPC's windows.
   v1::BatchCheckCollisionsRequest request;
   request.mutable_wanted()->set_separation(true);
   request.mutable_wanted()->set_witness(true);
@@ -430,7 +430,7 @@ TEST_F(LimitsTest, PlacementsAndPointsPerHullAreBounded) {
   EXPECT_FALSE(appender.Append(2, {0, 0, 0}).has_value());
   const grpc::Status points = appender.Finish();
   ExpectRefused(points, "max-points-per-hull");
-  EXPECT_THAT(points.error_message(), HasSubstr("chunk 2: hull \"ball\" has taken 10 points"));
+  EXPECT_THAT(points.error_message(), HasSubstr("chunk 2: hull \"ball\" has received 10 points"));
   EXPECT_EQ(Get("ball").hull().counts().received(), 10);
 
   v1::BatchCheckCollisionsRequest batch;

@@ -112,7 +112,7 @@ TEST(MessageLayout, BoundsTheMemoryOfParsing) {
   }
 }
 
-// A damaged message is parsed up to the damage at most.
+// A damaged message is parsed at most up to the damage.
 TEST(MessageLayout, BoundsTheMemoryOfParsingDamagedMessages) {
   // Protobuf logs strings that are not UTF-8 to standard error.
   const google::protobuf::LogSilencer silencer;

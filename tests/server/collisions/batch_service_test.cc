@@ -462,7 +462,7 @@ TEST_F(BatchCall, ConflictingOptionsFailTheWholeCall) {
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "tolerance is NaN");
 }
 
-// Like the previous test, with measures wanted of every pair, at an unpredictable cost.
+// Like the previous test, but requests measures of every pair, at an unpredictable cost.
 TEST_F(BatchCall, CancellingEndsALongBatchOfMeasures) {
   Put("ball", Sphere(2000));
   v1::BatchCheckCollisionsRequest request;
@@ -494,7 +494,7 @@ TEST_F(BatchCall, CancellingEndsALongBatch) {
   while (stream->Read(&part)) {
   }
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
-  // The server stops computing: otherwise this call would run for hours.
+  // The server stops computing; otherwise this call would run for hours.
   server_->BeginDrain();
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }

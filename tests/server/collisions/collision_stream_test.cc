@@ -374,7 +374,7 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   v1::BatchCheckCollisionsRequest batch;
   std::vector<v1::Placement> placements;
   std::vector<uint32_t> pairs;
-  // So many that threads share the placing of movers, and then their pairs.
+  // Enough that threads share the placing of movers, and then their pairs.
   constexpr uint32_t kPlacements = 250;
   constexpr uint32_t kPairsEach = 40;
   for (uint32_t i = 0; i < kPlacements; ++i) {
@@ -502,7 +502,7 @@ TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// So many that threads share them.
+// Enough that threads share them.
 TEST_F(StreamCollisionsCall, OnlyChangesAgreesWithABatch) {
   Put("cube", Cube());
   Put("ball", Sphere(60));

@@ -98,11 +98,13 @@ TEST_F(FirstPairsTest, FirstOnlyNamesTheFieldsThatItExcludes) {
   EXPECT_THAT(MessageOf(Find(request).status()), HasSubstr("no placement has an end_pose"));
   *request.mutable_placements(1) = MovingTo(request.placements(1), 1);
   request.set_limit(1);
-  EXPECT_THAT(MessageOf(Find(request).status()), StartsWith("first_only excludes a limit"));
+  EXPECT_THAT(MessageOf(Find(request).status()),
+              StartsWith("first_only and limit cannot be combined"));
   request.clear_limit();
   request.set_first_only(false);
   request.set_every_piece(true);
-  EXPECT_THAT(MessageOf(Find(request).status()), StartsWith("every_piece excludes end_pose"));
+  EXPECT_THAT(MessageOf(Find(request).status()),
+              StartsWith("every_piece and end_pose cannot be combined"));
 }
 
 }  // namespace moving_placements

@@ -213,7 +213,7 @@ TEST_F(MovingBodies, PiecesWithPosesOfTheirOwnMove) {
 
   *body.add_pieces() = MovingTo(PlacementOf("cube"), 1);
   EXPECT_THAT(MessageOf(client().PutBody(body).status()),
-              StartsWith("pieces[2].end_pose is set; a piece is at rest"));
+              StartsWith("pieces[2].end_pose is set; a piece cannot move"));
 }
 
 // Quarter turns and translations of these points are exact in doubles, so that a posed piece is
@@ -340,7 +340,8 @@ TEST_F(MovingBodies, EveryPieceGivesARowToEachPairOfPieces) {
   *limited.add_placements() = PlacementOf("row");
   limited.set_every_piece(true);
   limited.set_limit(1);
-  EXPECT_THAT(MessageOf(Find(limited).status()), StartsWith("every_piece excludes a limit"));
+  EXPECT_THAT(MessageOf(Find(limited).status()),
+              StartsWith("every_piece and limit cannot be combined"));
 }
 
 }  // namespace moving_placements

@@ -58,7 +58,7 @@ inline v1::BatchCheckCollisionsRequest Batch(const std::vector<v1::Placement>& p
   return request;
 }
 
-// A rod that turns by 90 degrees about z, and a box that it meets at half time, in (3, 4, 0).
+// A rod that turns by 90 degrees about z, and a box that it meets halfway, at (3, 4, 0).
 inline v1::Placement TurningRod() {
   v1::Placement rod = Shape({0, 0, 0, 5, 0, 0});
   Turn(1, 0, 0, 1, rod.mutable_end_pose());

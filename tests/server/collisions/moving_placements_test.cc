@@ -31,7 +31,7 @@ TEST_F(MovingPlacements, TranslationsMeetAtExactTimes) {
   ExpectMeets(cube, MovingTo(PlacementOf("cube", 0.5), 9), kOverlapping, 0);
   ExpectMeets(MovingTo(PlacementOf("cube"), 2), MovingTo(PlacementOf("cube", 4), 0), kOverlapping,
               0.5);
-  // A third of the time is no double.
+  // A third of the time is not a double.
   ExpectMeets(cube, MovingTo(PlacementOf("cube", 2), -1), kOverlapping, std::nextafter(1.0 / 3, 1));
 }
 
@@ -243,12 +243,13 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
   for (const auto& [name, set] : excluded) {
     v1::CheckCollisionRequest request = moving;
     set(&request);
-    ExpectRefused(request, absl::StrCat(name, " excludes end_pose"));
+    ExpectRefused(request, absl::StrCat(name, " cannot be combined with end_pose"));
     v1::BatchCheckCollisionsRequest batch = Batch({request.a(), request.b()}, {0, 1});
     batch.set_method(request.method());
     batch.set_tolerance(request.tolerance());
     *batch.mutable_wanted() = request.wanted();
-    EXPECT_THAT(MessageOf(Ask(batch).status()), StartsWith(absl::StrCat(name, " excludes")));
+    EXPECT_THAT(MessageOf(Ask(batch).status()),
+                StartsWith(absl::StrCat(name, " cannot be combined")));
     if (request.method() != v1::METHOD_UNSPECIFIED) continue;
     v1::FindCollisionsRequest scene;
     *scene.mutable_placements() = batch.placements();
@@ -256,7 +257,7 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
     *scene.mutable_wanted() = request.wanted();
     const absl::Status found = Find(scene).status();
     EXPECT_EQ(found.code(), absl::StatusCode::kInvalidArgument);
-    EXPECT_THAT(MessageOf(found), StartsWith(absl::StrCat(name, " excludes")));
+    EXPECT_THAT(MessageOf(found), StartsWith(absl::StrCat(name, " cannot be combined")));
   }
   for (const double bad : {0.0, -1.0, 1.5, kNaN}) {
     v1::CheckCollisionRequest request = moving;

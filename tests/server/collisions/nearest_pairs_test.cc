@@ -237,7 +237,7 @@ TEST_F(LimitedScene, ARowWithoutItsCertificateFailsAlone) {
 TEST_F(LimitedScene, ErrorsNameTheField) {
   v1::FindCollisionsRequest request;
   request.set_limit(0);
-  ExpectRefused(request, "limit is 0; set at least 1");
+  ExpectRefused(request, "limit is 0; set it to at least 1");
   request.set_limit(1);
   ExpectRefused(request, "set wanted.separation and wanted.clearance");
   request.mutable_wanted()->set_separation(true);

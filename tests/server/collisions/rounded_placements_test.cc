@@ -151,9 +151,10 @@ TEST_F(RoundedPlacements, TextbookRefusesThem) {
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
   const grpc::Status status = CheckError(request);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.error_message(),
-            "a.radius is 0.5, but METHOD_TEXTBOOK_SAT applies to hulls without a radius; leave out "
-            "one of them");
+  EXPECT_EQ(
+      status.error_message(),
+      "a.radius is 0.5, but METHOD_TEXTBOOK_SAT applies to hulls without a radius; omit one of "
+      "them");
 }
 
 TEST_F(RoundedPlacements, RadiiOfBodiesAddToThoseOfTheirPieces) {

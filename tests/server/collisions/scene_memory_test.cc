@@ -57,7 +57,7 @@ TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   // Each is bounded by the test's time limit only.
   while (Metric("hulld_pairs_total") == 0) std::this_thread::yield();
   EXPECT_GT(Metric("hulld_cache_bytes") - before, kLeast);
-  // A concurrent scene with a reader runs to its end; both take turns.
+  // A concurrent scene whose answers are read completes; both take turns.
   grpc::ClientContext read_context;
   const auto read = collisions_->FindCollisions(&read_context, Heap(1500));
   v1::FindCollisionsResponse part;

@@ -1,4 +1,4 @@
-// Memory that textbook pairs hold between their slices, and its accounting.
+// Memory that textbook pairs use between slices, and its accounting.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -86,7 +86,7 @@ TEST_F(TextbookMemory, AStartedPairIsCountedAndFurtherOnesAreRefused) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
 }
 
-// Also while it waits for its next slice.
+// This also holds while it waits for its next slice.
 TEST_F(TextbookMemory, ABatchIsCountedFromSliceToSlice) {
   PutLarge();
   v1::BatchCheckCollisionsRequest request;

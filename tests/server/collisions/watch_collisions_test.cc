@@ -268,7 +268,7 @@ TEST_F(WatchCollisions, RefusesMalformedRequests) {
   expect(Refused(Pair(open, 0, 2)), "open: pairs[1] is 2");
   v1::CollisionWatchOpen both = Pair(open, 0, 1);
   both.set_movers(1);
-  expect(Refused(both), "pairs are set, and groups or movers too");
+  expect(Refused(both), "pairs cannot be combined with groups or movers");
   v1::CollisionWatchOpen clearance = open;
   clearance.set_clearance(-1);
   expect(Refused(clearance), "open: clearance is -1");

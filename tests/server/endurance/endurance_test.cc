@@ -132,7 +132,7 @@ class MixedClient {
     (this->*calls[Below(calls.size())])();
   }
 
-  // Checks all its hulls. Requires: the server is not killed concurrently.
+  // Checks all of its hulls. Requires: the server is not killed concurrently.
   void LookAtAll() {
     for (HullModel& hull : own_) {
       EXPECT_TRUE(LookAt(&hull));
@@ -553,7 +553,7 @@ class Endurance : public RestartableServer {
   std::thread reader_;
 };
 
-TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
+TEST_F(Endurance, AllAnswersAreRightAndNoResourceLeaks) {
   const auto seed = static_cast<uint64_t>(NumberIn("HULLD_TEST_SEED", 1));
   const int rounds = NumberIn("HULLD_ENDURANCE_ROUNDS", kRounds);
   ClientOptions options;
@@ -606,7 +606,7 @@ TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
     full_disks += is_full;
     for (std::thread& thread : threads) thread.join();
     for (const auto& client : clients) client->LookAtAll();
-    // A freshly started server holds less.
+    // A freshly started server has fewer.
     if (round >= kWarmRounds) held.push_back(HoldingsOf(server_->pid()));
   }
   uint64_t verified = 0;

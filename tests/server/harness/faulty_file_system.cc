@@ -16,7 +16,7 @@ using rocksdb::IODebugContext;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
-// RocksDB adds slashes of its own when it joins paths.
+// RocksDB adds extra slashes when it joins paths.
 std::string Normal(const std::string& path) {
   std::string normal = std::filesystem::path(path).lexically_normal().string();
   if (normal.size() > 1 && normal.ends_with('/')) normal.pop_back();
@@ -90,7 +90,7 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   }
 
  private:
-  // The real disk is not synced: its power is not cut.
+  // Does not sync the real disk, because its power is never cut.
   IOStatus SyncWritten() {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
@@ -126,7 +126,7 @@ class FaultyFileSystem::Overwritten : public rocksdb::FSRandomRWFileOwnerWrapper
     system_.files_[name_].overwritten.emplace(offset, former);
     return FSRandomRWFileOwnerWrapper::Write(offset, data, options, debug);
   }
-  // Does not count as one of the failures, as it runs at intervals of its own.
+  // Does not count as a failure because it runs at its own intervals.
   IOStatus Sync(const IOOptions&, IODebugContext*) override {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);

@@ -42,8 +42,8 @@ Process::Process(const std::string& program, std::vector<std::string> arguments)
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  // Not fork(): client threads run here, and the child would deadlock on any lock that one of them
-  // holds.
+  // Avoids fork(): client threads run here, and the child would deadlock on any lock that one of
+  // them holds.
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);

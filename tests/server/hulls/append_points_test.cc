@@ -113,7 +113,7 @@ TEST_F(AppendPoints, AReconnectedWriterResumesAfterItsLastSequence) {
   EXPECT_EQ(other.opened().last_sequence(), 0);
 }
 
-TEST_F(AppendPoints, AWriterWithoutNameGetsARandomOne) {
+TEST_F(AppendPoints, AWriterWithoutANameGetsARandomOne) {
   Create("h");
   Appender one(*hulls_, "h", "");
   Appender two(*hulls_, "h", "");
@@ -121,7 +121,7 @@ TEST_F(AppendPoints, AWriterWithoutNameGetsARandomOne) {
   EXPECT_NE(one.opened().writer_id(), two.opened().writer_id());
 }
 
-TEST_F(AppendPoints, SequencesStartAgainInAnotherIncarnation) {
+TEST_F(AppendPoints, SequencesStartOverInANewIncarnation) {
   Put("h", Cube());
   ASSERT_TRUE(Delete("h").ok());
   Create("h");
@@ -140,7 +140,7 @@ TEST_F(AppendPoints, AGapNamesTheExpectedSequence) {
   EXPECT_EQ(Get("h").hull().counts().received(), 8);
 }
 
-TEST_F(AppendPoints, ARefusedChunkChangesNothingAndEarlierOnesStand) {
+TEST_F(AppendPoints, ARefusedChunkChangesNothingAndEarlierOnesRemain) {
   Create("h");
   Coordinates bad = Cube(5);
   bad[3 * 6 + 1] = std::numeric_limits<double>::quiet_NaN();
@@ -178,7 +178,7 @@ TEST_F(AppendPoints, AcksOfEarlierChunksArriveBeforeTheError) {
   EXPECT_EQ(received, 20);
 }
 
-TEST_F(AppendPoints, AClientThatReadsNoAckUntilTheEndIsServed) {
+TEST_F(AppendPoints, AClientThatReadsAcksOnlyAtTheEndIsServed) {
   Create("h");
   grpc::ClientContext context;
   auto stream = hulls_->AppendPoints(&context);
@@ -264,7 +264,7 @@ TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   expect({open, open}, "open was sent twice");
   expect({v1::AppendPointsRequest()}, "set open or chunk");
   expect({OpenMessage("a//b", "w")}, "open.hull_id \"a//b\" has an empty segment");
-  expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id holds 257");
+  expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id has 257");
   expect({open, ChunkMessage(0, Cube())}, "sequences start at 1");
   expect({open, ChunkMessage(1, {1, 2, 3, 4})}, "chunk 1: points.xyz holds 4 numbers");
   v1::AppendPointsRequest both = ChunkMessage(1, {1, 2, 3});

@@ -171,7 +171,7 @@ TEST_F(HullCalls, GetReportsPropertiesWhenRequested) {
   EXPECT_FALSE(response.has_properties());
 }
 
-TEST_F(HullCalls, GetWithoutFacetsReportsAllElse) {
+TEST_F(HullCalls, GetWithoutFacetsReportsEverythingElse) {
   Put("cube", Cube(-1, 3));
   for (const bool audit : {false, true}) {
     grpc::ClientContext context;
@@ -244,7 +244,7 @@ TEST_F(HullCalls, MeshOfACubeIsItsCanonicalSnapshot) {
   EXPECT_THAT(std::vector(mesh.indices.begin(), mesh.indices.begin() + 4), ElementsAre(0, 1, 3, 2));
 }
 
-TEST_F(HullCalls, SimplifiedMeshesStandForTheHullWithinTheirError) {
+TEST_F(HullCalls, SimplifiedMeshesAreWithinTheirErrorOfTheHull) {
   Put("ball", Sphere(500));
   v1::GetHullMeshRequest request;
   request.set_hull_id("ball");
@@ -274,7 +274,7 @@ TEST_F(HullCalls, MeshOfAnEmptyHullIsItsHeader) {
   EXPECT_EQ(mesh.header.hull().dimension(), -1);
 }
 
-TEST_F(HullCalls, ALargeMeshIsCutIntoMessagesOfAMebibyte) {
+TEST_F(HullCalls, ALargeMeshIsSplitIntoMessagesOfAMebibyte) {
   constexpr int kVertices = 60'000;
   Put("ball", Sphere(kVertices));
   const Mesh mesh = GetMesh("ball");
@@ -296,7 +296,7 @@ TEST_F(HullCalls, ListsInByteOrderByPrefixAndPage) {
   EXPECT_EQ(ListAll("", 2), ListAll("", 1000));
 }
 
-TEST_F(HullCalls, PagesHoldAHundredByDefaultAndAThousandAtMost) {
+TEST_F(HullCalls, PagesHave100EntriesByDefaultAndAtMost1000) {
   for (int i = 0; i < 101; ++i) Create(absl::StrCat("h", i));
   v1::ListHullsRequest request;
   v1::ListHullsResponse response;
@@ -316,13 +316,13 @@ TEST_F(HullCalls, PagesHoldAHundredByDefaultAndAThousandAtMost) {
   }
 }
 
-TEST_F(HullCalls, APrefixLongerThanAnyIdIsRefusedAndNotSentBack) {
+TEST_F(HullCalls, APrefixLongerThanAnyIdIsRefusedAndNotEchoed) {
   v1::ListHullsRequest request;
   v1::ListHullsResponse response;
   request.set_prefix(std::string(100'000, 'x'));
   const grpc::Status status = List(request, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(status.error_message(), "prefix holds 100000 characters; an ID holds at most 256");
+  EXPECT_EQ(status.error_message(), "prefix has 100000 characters; the limit is 256");
 }
 
 TEST_F(HullCalls, ForeignPageTokensAreRefused) {
@@ -386,7 +386,7 @@ TEST_F(HullCalls, StatusCountsHullsAndVertices) {
   EXPECT_GT(response.started().seconds(), 1'500'000'000);
 }
 
-TEST_F(HullCalls, TheStoreIdIsAnotherAfterARestartInMemory) {
+TEST_F(HullCalls, AnInMemoryStoreHasANewIdAfterARestart) {
   Create("h");
   const std::string before = Get("h").header().store_id();
   Restart(TestConfig());

@@ -208,7 +208,7 @@ TEST_F(WatchHulls, EndsAtItsDeadline) {
 
 // A client does not read while many hulls change. The changes are acknowledged nevertheless, and
 // the client gets each hull once when it resumes reading.
-TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
+TEST_F(WatchHulls, ASlowReaderReceivesTheLastStateOfEachHull) {
   const auto slow = SlowReader();
   Watch watch(*slow, {});
   watch.ReadUntilSynced();
@@ -449,7 +449,7 @@ void ExpectTrue(const Moments& moments, const Writer::History& histories) {
   }
 }
 
-TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
+TEST_F(WatchHulls, EventsAddUpToTheStoreStateAfterAnyResume) {
   constexpr int kWriters = 3;
   constexpr int kChanges = 250;
   constexpr int kWatches = 3;
@@ -512,7 +512,7 @@ TEST_F(WatchHulls, FoldsToTheStateOfTheStoreWhereverItIsCutAndResumed) {
 }
 
 // The client's watch resumes when the server comes back.
-TEST_F(WatchHulls, TheClientGoesOnAfterARestart) {
+TEST_F(WatchHulls, TheClientContinuesAfterARestart) {
   Config config = TestConfig();
   config.listen = "unix:" + ::testing::TempDir() + absl::StrCat("watch_", getpid(), ".sock");
   Restart(config);

@@ -64,7 +64,7 @@ class MigrateProgram : public ::testing::Test {
   std::string conninfo_;
 };
 
-TEST_F(MigrateProgram, MovesAStoreThatItsClientsGoOnWith) {
+TEST_F(MigrateProgram, ClientsContinueOnAMovedStore) {
   const Words on_rocksdb = Words{"--store", "rocksdb", "--data-dir"} + Directory("first");
   const Words on_postgres = {"--store", "postgres", "--postgres-conninfo-file", conninfo_};
   const Words to_postgres = Words{"--from-data-dir"} + Directory("first") +

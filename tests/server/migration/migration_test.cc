@@ -191,7 +191,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
   std::unique_ptr<StorePlace> to_;
 };
 
-TEST_P(MigrationTest, TheCopyServesTheSame) {
+TEST_P(MigrationTest, TheCopyServesTheSameContents) {
   FillSource();
   const Ran ran = Migrate(*from_, *to_);
   ASSERT_EQ(ran.code, 0) << ran.err;
@@ -200,7 +200,7 @@ TEST_P(MigrationTest, TheCopyServesTheSame) {
   EXPECT_THAT(ran.out, HasSubstr("\nverified: all records match; "));
   const auto source = from_->Serve();
   const auto copy = to_->Serve();
-  EXPECT_THAT(ran.out, HasSubstr("is store " + copy->store().id() + " now\n"));
+  EXPECT_THAT(ran.out, HasSubstr("is now store " + copy->store().id() + "\n"));
   ExpectSame(*source, *copy);
   // It continues at the source's revision.
   ASSERT_TRUE(copy->Put("grown", {{0, 0, 99}}).ok());
@@ -287,7 +287,7 @@ TEST_P(MigrationTest, ASourceWithChangedCountsIsCopiedAgain) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
-TEST_P(MigrationTest, OnlyAnEmptyDestinationIsTaken) {
+TEST_P(MigrationTest, OnlyAnEmptyDestinationIsAccepted) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
   // A store created by a server that never held data is accepted.
   { to_->Serve(); }

@@ -1,6 +1,6 @@
 // Small programs that attack hulld. Each ends with a server that still answers and, for attacks on
-// one connection, with the end of that connection. The same against haproxy as configured by
-// docker/haproxy/front.cfg.
+// one connection, with the end of that connection. The same attacks run against haproxy as
+// configured by docker/haproxy/front.cfg.
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
@@ -163,7 +163,7 @@ TEST(Attacks, ConnectionsThatExhaustTheDescriptorsAreSurvived) {
   }
 }
 
-TEST(Attacks, IdleConnectionsMakeRoomWhenDescriptorsRunOut) {
+TEST(Attacks, IdleConnectionsAreClosedWhenDescriptorsRunOut) {
   Process hulld("/bin/sh", {"-c", absl::StrCat("ulimit -n 64; exec ", HULLD_PROGRAM,
                                                " --store memory --listen 127.0.0.1:0")});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
@@ -174,7 +174,7 @@ TEST(Attacks, IdleConnectionsMakeRoomWhenDescriptorsRunOut) {
   }
 }
 
-TEST(Attacks, AnAddressHasSoManyConnections) {
+TEST(Attacks, ConnectionsPerAddressAreLimited) {
   Process hulld(
       {"--store", "memory", "--listen", "127.0.0.1:0", "--max-connections-per-address", "2"});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));

@@ -37,7 +37,7 @@ TEST(PeerAddress, GrpcAndSocketsNameTheSamePeer) {
   EXPECT_EQ(PeerAddress::FromGrpc(""), std::nullopt);
 }
 
-TEST(ConnectionTable, TheOneIdleLongestMakesRoom) {
+TEST(ConnectionTable, TheLongestIdleConnectionIsEvicted) {
   ConnectionTable table(3, 3);
   EXPECT_EQ(table.Add(1, Peer("ipv4:192.0.2.1:1")).evicted, 0);
   EXPECT_EQ(table.Add(2, Peer("ipv4:192.0.2.2:1")).evicted, 0);
@@ -51,7 +51,7 @@ TEST(ConnectionTable, TheOneIdleLongestMakesRoom) {
   EXPECT_EQ(table.size(), 3);
 }
 
-TEST(ConnectionTable, ConnectionsWithCallsStay) {
+TEST(ConnectionTable, ConnectionsWithCallsAreKept) {
   ConnectionTable table(1, 1);
   table.Add(1, Peer("ipv4:192.0.2.1:1"));
   EXPECT_EQ(table.BeginCall(Peer("ipv4:192.0.2.1:1")), 1);
@@ -64,7 +64,7 @@ TEST(ConnectionTable, ConnectionsWithCallsStay) {
   EXPECT_EQ(table.Evict(), 3);
 }
 
-TEST(ConnectionTable, ANetworkHasSoMany) {
+TEST(ConnectionTable, ConnectionsPerNetworkAreLimited) {
   ConnectionTable table(10, 2);
   const auto add = [&table](uint64_t id, const std::string& peer) {
     return table.Add(id, Peer(peer));
@@ -83,7 +83,7 @@ TEST(ConnectionTable, ANetworkHasSoMany) {
   EXPECT_EQ(add(8, "ipv4:192.0.2.9:3").evicted, 1);
 }
 
-TEST(ConnectionTable, UnixSocketsCountInTotalAlone) {
+TEST(ConnectionTable, UnixSocketsCountOnlyTowardTheTotal) {
   ConnectionTable table(3, 1);
   for (const uint64_t id : {1, 2, 3}) {
     EXPECT_EQ(table.Add(id, std::nullopt).refusal, Refusal::kNone);

@@ -77,7 +77,7 @@ TEST_F(FrameGuardTest, HalfOpenStreamsAreBoundedByConnectionAndInTotal) {
   EXPECT_EQ(other.Take(Open(3), now_), Verdict::kHalfOpenStreams);
 }
 
-TEST_F(FrameGuardTest, AGuardThatEndsReturnsItsHalfOpenStreams) {
+TEST_F(FrameGuardTest, ADestroyedGuardReleasesItsHalfOpenStreams) {
   {
     FrameGuard other(FrameLimits{}, all_half_open_, now_);
     ASSERT_EQ(other.Take(kOpening + Open(1), now_), Verdict::kAllowed);
@@ -86,7 +86,7 @@ TEST_F(FrameGuardTest, AGuardThatEndsReturnsItsHalfOpenStreams) {
   EXPECT_EQ(all_half_open_, 0);
 }
 
-TEST_F(FrameGuardTest, AHeaderBlockIsBoundedOverItsContinuations) {
+TEST_F(FrameGuardTest, AHeaderBlockIsBoundedIncludingContinuations) {
   ASSERT_EQ(Send(kOpening + FrameBytes(Frame::kHeaders, 0, 1, std::string(10'000, 'a'))),
             Verdict::kAllowed);
   ASSERT_EQ(Send(FrameBytes(Frame::kContinuation, 0, 1, std::string(6'384, 'a'))),
@@ -94,7 +94,7 @@ TEST_F(FrameGuardTest, AHeaderBlockIsBoundedOverItsContinuations) {
   EXPECT_EQ(Send(FrameBytes(Frame::kContinuation, 0, 1, "a")), Verdict::kHeaderBlock);
 }
 
-TEST_F(FrameGuardTest, LargeHeaderBlocksAreBoundedInTime) {
+TEST_F(FrameGuardTest, TheRateOfLargeHeaderBlocksIsBounded) {
   ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
   const auto send_large = [this](uint32_t stream) {
     return Send(FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, stream,
@@ -107,7 +107,7 @@ TEST_F(FrameGuardTest, LargeHeaderBlocksAreBoundedInTime) {
   EXPECT_EQ(send_large(stream), Verdict::kLargeHeaders);
 }
 
-TEST_F(FrameGuardTest, ControlFramesOfEveryKindAreBoundedInTime) {
+TEST_F(FrameGuardTest, TheRateOfControlFramesIsBounded) {
   for (const std::string& frame :
        {Reset(1), FrameBytes(Frame::kPing, 0, 0, "12345678"),
         FrameBytes(Frame::kSettings, 0, 0, ""), FrameBytes(Frame::kContinuation, 0, 1, ""),

@@ -29,7 +29,7 @@ class GuardedSockets : public testing::Test {
   int closed_ = 0;
 };
 
-TEST_F(GuardedSockets, ACloseIsReportedOneTime) {
+TEST_F(GuardedSockets, ACloseIsReportedOnce) {
   Guard(1);
   EXPECT_EQ(closed_, 0);
   close(sockets_[0]);
@@ -43,7 +43,7 @@ TEST_F(GuardedSockets, ACloseIsReportedOneTime) {
   EXPECT_EQ(closed_, 1);
 }
 
-TEST_F(GuardedSockets, AShutDownEndsBothDirectionsOfItsConnectionAlone) {
+TEST_F(GuardedSockets, AShutdownEndsBothDirectionsOfOnlyItsConnection) {
   Guard(2);
   ShutDown(sockets_[0], 1);
   EXPECT_FALSE(PeerReadsEnd());

@@ -14,7 +14,7 @@ namespace heap_test {
 // Sanitizers' allocators retain freed memory to detect its use.
 TEST(Heap, DISABLED_FreeMemoryGoesBackOnlyWhenThereIsMuch) {
 #else
-TEST(Heap, OnlyMuchFreeMemoryIsReturned) {
+TEST(Heap, OnlyLargeAmountsOfFreeMemoryAreReturned) {
 #endif
   GiveBackFreeMemory();
   constexpr size_t kBlock = 8 << 10;

@@ -76,7 +76,7 @@ class Observation : public ServerTest {
   }
 };
 
-TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
+TEST_F(Observation, MetricsAreServedOverHttpOnlyOnLoopback) {
   EXPECT_EQ(server_->metrics_address(), "");
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
@@ -134,7 +134,7 @@ TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
 }
 
 // A client that sends half a request, or reads no reply, delays no other.
-TEST_F(Observation, AConnectionThatSaysNothingDoesNotHoldUpTheMetrics) {
+TEST_F(Observation, ASilentConnectionDoesNotDelayTheMetrics) {
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
   Restart(config);
@@ -178,7 +178,7 @@ TEST_F(Observation, OpenAndRunningCallsAreShown) {
   EXPECT_EQ(Metric("hulld_snapshot_duration_seconds_count"), 1);
 }
 
-TEST_F(Observation, TokensAreCountedByNameUpToANumber) {
+TEST_F(Observation, TokensAreCountedByNameUpToALimit) {
   server::Metrics metrics;
   metrics.CountToken("");
   for (size_t i = 0; i < server::Metrics::kMostTokens + 7; ++i)
@@ -221,7 +221,7 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  // None of this waits; the canonical snapshot is no work for gRPC's thread.
+  // None of these calls waits; building the canonical snapshot is not a job for gRPC's thread.
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 0);
   Get("a");
   EXPECT_EQ(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
@@ -257,7 +257,7 @@ TEST_F(Observation, ReaderAndWriterMemoryAreReportedSeparately) {
   v1::StreamCollisionsResponse answer;
   ASSERT_TRUE(stream->Read(&answer));
   EXPECT_GT(Metric("hulld_cache_reading_bytes"), 0);
-  // With memory alone, no hull is at rest.
+  // Without storage, no hull can be evicted.
   EXPECT_EQ(Metric("hulld_cache_bytes"),
             Metric("hulld_cache_reading_bytes") + Metric("hulld_cache_writing_bytes"));
   stream->WritesDone();
@@ -309,7 +309,7 @@ std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& met
   return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
+TEST_F(Observation, RepliesCarryTheGivenOrReportedRequestId) {
   const auto ask = [this](const std::string& given, const std::string& hull_id = "none") {
     grpc::ClientContext context;
     if (!given.empty()) context.AddMetadata("x-request-id", given);
@@ -379,7 +379,7 @@ TEST_F(Observation, ErrorsNameTheRequestInTheirDetails) {
                          message + "\x1a" + std::string(1, static_cast<char>(any.size())) + any));
 }
 
-TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
+TEST(LineBudget, AllowsALimitedNumberOfLinesAndCountsTheRest) {
   const LineBudget::Clock::time_point start{};
   LineBudget budget(2, std::chrono::seconds(10));
   EXPECT_EQ(budget.Spend(start), 0);
@@ -442,7 +442,7 @@ TEST_F(Observation, SlowRequestsAreLoggedWithTheirSizes) {
   Restart(config);
   Put("ball", Sphere(100));
   const CapturedLog log;
-  // Some 10^8 operations: more than a millisecond on any machine.
+  // About 10^8 operations: more than a millisecond on any machine.
   v1::BatchCheckCollisionsRequest request;
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
   *request.add_placements() = PlacementOf("ball");

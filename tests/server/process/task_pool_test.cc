@@ -59,7 +59,7 @@ class HeldPool {
   std::unique_ptr<TaskPool::Lane> lane_;
 };
 
-TEST(TaskPool, SingleCallsGoBeforeSlicesThatWereQueuedFirst) {
+TEST(TaskPool, SingleCallsOvertakeQueuedSlices) {
   HeldPool held;
   Order order;
   TaskPool::Lane batch(held.pool());
@@ -73,7 +73,7 @@ TEST(TaskPool, SingleCallsGoBeforeSlicesThatWereQueuedFirst) {
   EXPECT_THAT(order.names(), ElementsAre("single 1", "single 2", "slice 1", "slice 2"));
 }
 
-TEST(TaskPool, ASingleCallWaitsForOneSliceAtMost) {
+TEST(TaskPool, ASingleCallWaitsForAtMostOneSlice) {
   HeldPool held;
   Order order;
   TaskPool& pool = held.pool();
@@ -113,7 +113,7 @@ TEST(TaskPool, ConnectionsOfAClientTakeTurns) {
   EXPECT_THAT(order.names(), ElementsAre("a1", "b1", "A1", "b2", "a2", "b3", "a3"));
 }
 
-TEST(TaskPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
+TEST(TaskPool, ClientsTakeTurnsRegardlessOfTheirLoad) {
   HeldPool held;
   Order order;
   for (const char* name : {"a1", "a2", "a3"}) held.pool().Submit(order.Task(name), {1});
@@ -131,7 +131,7 @@ TEST(TaskPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
                                          "slice b2", "slice a2", "slice A2"));
 }
 
-TEST(WorkerPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
+TEST(WorkerPool, ClientsTakeTurnsRegardlessOfTheirLoad) {
   Order order;
   {
     std::promise<void> released;
@@ -157,7 +157,7 @@ TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
   std::promise<void> done;
   TaskPool pool(2);
   TaskPool::Lane lane(pool);
-  // Each waits for the other.
+  // Both tasks wait for each other.
   lane.Submit([&] {
     first.set_value();
     second.get_future().wait();
@@ -170,7 +170,7 @@ TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
   done.get_future().wait();
 }
 
-TEST(TaskPool, SlicesWaitNoLongerThanSingleCallsArrive) {
+TEST(TaskPool, SlicesWaitOnlyWhileSingleCallsArrive) {
   std::promise<void> both;
   std::atomic<int> running = 0;
   TaskPool pool(2);
@@ -186,7 +186,7 @@ TEST(TaskPool, SlicesWaitNoLongerThanSingleCallsArrive) {
   ready.wait();
 }
 
-TEST(TaskPool, EndingRunsQueuedTasks) {
+TEST(TaskPool, DestructionRunsQueuedTasks) {
   std::atomic<int> ran = 0;
   {
     auto pool = std::make_unique<TaskPool>(2);
@@ -212,7 +212,7 @@ TEST(SharedLoop, RunsEachOnce) {
   }
 }
 
-TEST(SharedLoop, WaitsForNoThreadThatIsNotFree) {
+TEST(SharedLoop, DoesNotWaitForBusyThreads) {
   WorkerPool helpers(1);
   std::promise<void> free;
   helpers.Submit([ready = free.get_future().share()] { ready.wait(); });

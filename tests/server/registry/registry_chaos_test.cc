@@ -73,7 +73,7 @@ class RegistryChaos : public RegistryInterleaving {
         ++seen;
       }
       if (random() % 5 > 0) continue;
-      // Evicts everything idle; chunks that arrive now are refused.
+      // Evicts everything idle; chunks that arrive during this time are refused.
       const MemoryCharge charge(registry_.memory(), MemoryUse::kWriting,
                                 registry_.Cache().limit_bytes);
       registry_.CheckMemory(MemoryUse::kWriting).IgnoreError();

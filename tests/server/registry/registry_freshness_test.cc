@@ -199,7 +199,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatIsHalfUsedUpHasTheStoreAskedOnceForReads
   }
   store_.AwaitQuestion(before + 1);
   store_.Release();
-  // One read that followed the other reads' request: no other request was sent in between.
+  // A read that joined the request of earlier reads: no other request was sent in between.
   ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
   EXPECT_EQ(store_.asked(), before + 2);
 }

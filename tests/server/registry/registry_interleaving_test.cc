@@ -151,7 +151,7 @@ TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
 
 // Cancelled before it reads the next one.
 TEST_F(RegistryInterleaving, AReaderOfAFewHullsCanBeCancelled) {
-  // So few that no other thread helps.
+  // Too few for another thread to help.
   constexpr int kHulls = 7;
   std::vector<std::string> ids;
   for (int i = 0; i < kHulls; ++i) {
@@ -315,7 +315,7 @@ TEST_F(RegistryInterleaving, PointsOfAnotherDimensionAreDamage) {
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
 }
 
-// The points read make another hull than recorded, which its builder detects.
+// The loaded points form a different hull than recorded, which the builder detects.
 TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
   for (const bool by_writer : {false, true}) {
     const std::string id = by_writer ? "writer" : "reader";

@@ -385,7 +385,7 @@ TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
   EXPECT_EQ(registry.Cache().bytes, 0);
 }
 
-// Versions of a hull share most of their data, which counts one time only.
+// Versions of a hull share most of their data, which is counted only once.
 TEST_F(RegistryMemory, SharedMemoryOfVersionsCountsOnce) {
   Start();
   Registry& registry = hulls_->registry();
@@ -428,7 +428,7 @@ TEST_F(RegistryMemory, IdleStreamsRefuseNoAppendsAndWritersNoStreams) {
     EXPECT_TRUE(hulls_->View("empty").ok());
     const absl::Status refused = hulls_->View("0").status();
     EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
-    EXPECT_THAT(std::string(refused.message()), HasSubstr("readers hold"));
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("readers use"));
   }
   const MemoryCharge busy(registry.memory(), MemoryUse::kWriting, 100 << 20);
   EXPECT_EQ(hulls_->Put("0", CubeCorners()).status().code(), absl::StatusCode::kResourceExhausted);

@@ -145,7 +145,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   EXPECT_THAT(built, testing::ElementsAre(0, 3, 1, 2));
 }
 
-// No version is ready to be served, and the builder is busy with this chunk.
+// No version can be served yet, and the builder is busy with this chunk.
 TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
@@ -216,7 +216,7 @@ TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
   for (const Hull* hull : made) EXPECT_EQ(hull, view.served->canonical());
   EXPECT_FALSE(view.served->has_canonical_query_hull());
   EXPECT_EQ(view.served->canonical_query_hull().canonical(), made[0]);
-  // It serves all queries from now on.
+  // From here on, it serves all queries.
   EXPECT_EQ(&view.served->query_hull(), &view.served->canonical_query_hull());
   ASSERT_TRUE(Append(OpenAppend("h", "other")->session, 1, {{0, 0, 9000}}).ok());
   EXPECT_EQ(registry_.Resolve("h", {})->second.served->canonical(), nullptr);

@@ -8,7 +8,7 @@
 namespace hulld::server {
 
 // A stack that runs tasks sequentially, each until it suspends itself. All fibers of a thread run
-// on that thread, one after another. Cost of a switch: some 10 ns.
+// on that thread, one after another. Cost of a switch: ~10 ns.
 //
 // AddressSanitizer is notified of each switch. A fiber is never destroyed, because the stack of a
 // hung task cannot be unwound. It is reused or abandoned.

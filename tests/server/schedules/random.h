@@ -18,7 +18,7 @@ class Random {
     z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
     return z ^ (z >> 31);
   }
-  // Returns a number below n, or 0 for n = 0. Not quite uniform: by one in 2^32.
+  // Returns a number below n, or 0 for n = 0. Nearly uniform: the bias is one in 2^32.
   uint32_t Below(uint32_t n) { return static_cast<uint32_t>(((Next() >> 32) * n) >> 32); }
   // True with probability 1/n; never for n = 0.
   bool OneIn(uint32_t n) { return n > 0 && Below(n) == 0; }

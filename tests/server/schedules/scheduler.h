@@ -22,7 +22,7 @@ struct ScheduleFault {
     // As kDeadlock, but the condition of a waiting thread holds: its notification is missing. A
     // wait with a time limit counts as well.
     kLostWakeup,
-    // The schedule does not end.
+    // The schedule does not terminate.
     kLivelock,
     // An answer, or a change that the store keeps, violates the specification.
     kWrongAnswer,
@@ -47,7 +47,7 @@ struct ScheduleFault {
 // missing, which is a fault. Some seeds also wake threads spuriously, as the standard allows.
 class Scheduler {
  public:
-  // A schedule with more steps does not end. **Observed**: 3 000 at most.
+  // A schedule with more steps counts as nonterminating. **Observed**: at most 3000.
   static constexpr size_t kMostSteps = 100'000;
   static constexpr int64_t kNoDeadline = -1;
 

@@ -30,7 +30,7 @@ void Join(std::vector<Thread>& threads) {
   for (Thread& thread : threads) thread.join();
 }
 
-TEST(Scheduler, FindsMutexesThatAreTakenInTwoOrders) {
+TEST(Scheduler, FindsMutexesLockedInDifferentOrders) {
   const auto fault = Find([] {
     Mutex first;
     Mutex second;

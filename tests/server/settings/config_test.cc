@@ -167,7 +167,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
   expect_all(Accepted({}));
 }
 
-TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
+TEST_F(ConfigTest, PostgresNeedsItsFileAndNoSettingsOfOtherStores) {
   const std::vector<std::string> postgres = {"--store=postgres", "--postgres-conninfo-file=/p"};
   EXPECT_EQ(Accepted(postgres).postgres_conninfo_file, "/p");
   EXPECT_FALSE(Accepted(postgres).take_over);
@@ -185,7 +185,7 @@ TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
   environment_["HULLD_STORE"] = "postgres";
   environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
   EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");
-  // Servers that always took over would forever take the store from each other.
+  // Servers that always took over would keep taking the store from each other forever.
   environment_["HULLD_TAKE_OVER"] = "true";
   EXPECT_FALSE(Accepted({}).take_over);
 }
@@ -237,7 +237,7 @@ TEST_F(ConfigTest, ErrorsOfTheFileNameItsLine) {
   refused("threads = 1\nconfig = \"other.toml\"\n", "unknown key \"config\"");
 }
 
-TEST_F(ConfigTest, SizesTakeUnits) {
+TEST_F(ConfigTest, SizesAcceptUnits) {
   EXPECT_EQ(Accepted({"--memory-limit=1GB"}).limits.memory_limit, 1'000'000'000);
   EXPECT_EQ(Accepted({"--memory-limit=64MiB"}).limits.memory_limit, 64 << 20);
   EXPECT_EQ(Accepted({"--memory-limit=0"}).limits.memory_limit, 0);
@@ -263,7 +263,7 @@ TEST_F(ConfigTest, TheWrongOneOfSeveralVariablesOfTheProcessIsNamed) {
               HasSubstr("HULLD_MAX_HULLS: --max-hulls: \"many\""));
 }
 
-TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
+TEST_F(ConfigTest, TheDefaultDataDirectoryFollowsXdg) {
   EXPECT_EQ(Accepted({}).data_dir, "hulld-data");
   environment_["HOME"] = "/home/me";
   EXPECT_EQ(Accepted({}).data_dir, "/home/me/.local/state/hulld");
@@ -272,7 +272,7 @@ TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
   EXPECT_EQ(Accepted({"--data-dir", "here"}).data_dir, "here");
 }
 
-TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
+TEST_F(ConfigTest, PrintedSettingsReadBackAsTheSameSettings) {
   environment_["HULLD_TLS_CERT"] = "/c \"d\"";
   const std::vector<std::string> arguments = {"--max-hulls=7", "--insecure", "--check-config"};
   const absl::StatusOr<CommandLine> parsed = Parse(arguments);

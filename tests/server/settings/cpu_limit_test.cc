@@ -39,7 +39,7 @@ TEST_F(CpuLimitTest, AContainerSeesItsOwnGroupAsTheRoot) {
   EXPECT_EQ(Quota(), 2);
 }
 
-TEST_F(CpuLimitTest, TheLeastOfTheGroupsAboveCounts) {
+TEST_F(CpuLimitTest, TheLowestLimitOfAllAncestorsApplies) {
   Write("proc/self/cgroup", "0::/a/b/c");
   Write("sys/fs/cgroup/a/cpu.max", "300000 100000");
   Write("sys/fs/cgroup/a/b/cpu.max", "75000 50000");
@@ -68,7 +68,7 @@ TEST_F(CpuLimitTest, MinusOneIsNoQuotaInVersionOne) {
   EXPECT_TRUE(std::isinf(Quota()));
 }
 
-TEST_F(CpuLimitTest, FilesThatHoldNoQuotaAreNone) {
+TEST_F(CpuLimitTest, FilesWithoutAQuotaMeanNoLimit) {
   Write("proc/self/cgroup", "no colons\n0::/a");
   for (const char* content : {"", "max", "100000", "100000 0", "-5 100000", "much 100000"}) {
     Write("sys/fs/cgroup/a/cpu.max", content);
@@ -84,7 +84,7 @@ TEST(CpuLimit, ThreadsAreRoundedUpAndNeverMoreThanProcessors) {
   EXPECT_EQ((CpuLimit{8}).threads(), 8);
 }
 
-TEST(CpuLimit, TheLogSaysWhy) {
+TEST(CpuLimit, TheLogStatesTheReason) {
   EXPECT_EQ((CpuLimit{64, 1.5}).Describe(), "2; the control group grants 1.5 of 64 processors");
   EXPECT_EQ((CpuLimit{8}).Describe(), "8; the process may use 8 processors");
   EXPECT_EQ((CpuLimit{1, 3}).Describe(), "1; the process may use 1 processor");

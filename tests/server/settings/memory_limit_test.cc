@@ -41,7 +41,7 @@ TEST_F(MemoryLimit, TheGroupOfTheProcessLimitsIt) {
   EXPECT_EQ(ControlGroupMemory(root_), 1000000);
 }
 
-TEST_F(MemoryLimit, TheLeastLimitOfTheGroupsAboveCounts) {
+TEST_F(MemoryLimit, TheLowestLimitOfAllAncestorsApplies) {
   Write("proc/self/cgroup", "0::/a/b/c");
   Write("sys/fs/cgroup/a/memory.max", "3000");
   Write("sys/fs/cgroup/a/b/memory.max", "2000");
@@ -55,7 +55,7 @@ TEST_F(MemoryLimit, MaxIsNoLimit) {
   EXPECT_EQ(ControlGroupMemory(root_), kNone);
 }
 
-TEST_F(MemoryLimit, InANamespaceOfItsOwnTheGroupIsTheRoot) {
+TEST_F(MemoryLimit, InItsOwnNamespaceTheGroupIsTheRoot) {
   Write("proc/self/cgroup", "0::/");
   Write("sys/fs/cgroup/memory.max", "4096");
   EXPECT_EQ(ControlGroupMemory(root_), 4096);
@@ -69,7 +69,7 @@ TEST_F(MemoryLimit, AGroupOutsideTheNamespaceDoesNotLeadOutOfTheTree) {
   EXPECT_EQ(ControlGroupMemory(root_), 4096);
 }
 
-TEST_F(MemoryLimit, VersionOneHasAHierarchyOfItsOwn) {
+TEST_F(MemoryLimit, VersionOneHasASeparateHierarchy) {
   Write("proc/self/cgroup",
         "12:cpu,cpuacct:/x\n5:hugetlb,memory:/docker/box\n1:name=systemd:/y\n0::/z");
   Write("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712");
@@ -80,13 +80,13 @@ TEST_F(MemoryLimit, VersionOneHasAHierarchyOfItsOwn) {
 }
 
 // The path is the host's, but the mounted tree is the container's own group.
-TEST_F(MemoryLimit, InAContainerOfVersionOneTheRootCounts) {
+TEST_F(MemoryLimit, InAContainerOfVersionOneTheRootApplies) {
   Write("proc/self/cgroup", "5:memory:/docker/0123");
   Write("sys/fs/cgroup/memory/memory.limit_in_bytes", "7000");
   EXPECT_EQ(ControlGroupMemory(root_), 7000);
 }
 
-TEST_F(MemoryLimit, LinesThatAreNotUnderstoodAreLeftOut) {
+TEST_F(MemoryLimit, UnknownLinesAreIgnored) {
   Write("proc/self/cgroup", "nonsense\n\n0:\n0::/a");
   Write("sys/fs/cgroup/a/memory.max", "2000");
   EXPECT_EQ(ControlGroupMemory(root_), 2000);

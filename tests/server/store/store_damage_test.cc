@@ -17,7 +17,7 @@ namespace store_damage_test {
 
 using ::testing::HasSubstr;
 
-// Makes three hulls. Tests damage the second one.
+// Creates three hulls. Tests damage the second one.
 template <typename Hulls>
 void PutThree(Hulls& hulls) {
   for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(hulls.Put(id, CubeCorners()).ok());
@@ -130,7 +130,7 @@ TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   ExpectOnlyBIsDamaged();
 }
 
-TEST_P(StoreDamage, DeletingADamagedHullLeavesNothingAfterAStart) {
+TEST_P(StoreDamage, DeletingADamagedHullLeavesNothingAfterARestart) {
   FillThree();
   ASSERT_TRUE(hulls_->Put("b", SpherePoints(40'000, 9)).ok());
   ASSERT_GT(CountKeys(kBasePrefix), 0);
@@ -145,7 +145,7 @@ TEST_P(StoreDamage, DeletingADamagedHullLeavesNothingAfterAStart) {
   EXPECT_EQ(hulls_->Open("a", "w")->last_sequence, 1);
 }
 
-TEST_P(StoreDamage, ReplacingADamagedHullLeavesNothingAfterAStart) {
+TEST_P(StoreDamage, ReplacingADamagedHullLeavesNothingAfterARestart) {
   FillThree();
   Flip(HullKey("b"));
   Start();
@@ -174,7 +174,7 @@ TEST_F(RocksDbDamage, DeletingADamagedHullReadsNoOtherRecord) {
 }
 
 // With two such hulls, the owner of each key is unknown.
-TEST_F(RocksDbDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
+TEST_F(RocksDbDamage, KeysOfAnotherDamagedHullAreKeptUntilItIsDeletedToo) {
   FillThree();
   FlipRecord("a");
   FlipRecord("b");
@@ -228,7 +228,7 @@ TEST_P(StoreDamage, AMissingPartOfABaseIsReported) {
               HasSubstr("part 1 of its base: it is missing"));
 }
 
-TEST_P(StoreDamage, ADamagedSequenceIsNotTakenForAnother) {
+TEST_P(StoreDamage, ADamagedSequenceIsDetected) {
   FillThree();
   Flip(WriterKey(hulls_->View("b")->record.create_revision, "w"));
   Start();
@@ -307,7 +307,7 @@ TEST_F(RocksDbDamage, FlippedBitsInItsFilesAreNeverServed) {
 }
 
 // Simulates a process that is killed while it writes a record.
-TEST_F(RocksDbDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
+TEST_F(RocksDbDamage, ALogEndingInAPartialRecordLosesOnlyThatRecord) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   const std::string store_id = hulls_->store().id();
@@ -323,7 +323,7 @@ TEST_F(RocksDbDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
 }
 
 // Simulates an acknowledged record whose middle was lost.
-TEST_F(RocksDbDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
+TEST_F(RocksDbDamage, ALastRecordTornInTheMiddleIsDamage) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
@@ -344,7 +344,7 @@ TEST_F(RocksDbDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
   EXPECT_NE(hulls_->store().id(), store_id);
 }
 
-TEST_F(RocksDbDamage, ALogThatIsDamagedInItsMiddleCanBeCutThere) {
+TEST_F(RocksDbDamage, ALogDamagedInTheMiddleCanBeCutThere) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   const std::string store_id = hulls_->store().id();

@@ -54,7 +54,7 @@ class StoreFault : public StoreTest {
       }
       files_->SetFault(Fault::kNone);
     }
-    // No restart, not even a new stream.
+    // Neither a restart nor a new stream is needed.
     const absl::StatusOr<ChunkResult> accepted = hulls_->Append(session, 2, {{9, 9, 9}});
     ASSERT_TRUE(accepted.ok()) << accepted.status();
     EXPECT_GT(accepted->hull_revision, revision);
@@ -79,15 +79,15 @@ class StoreFault : public StoreTest {
   const std::unique_ptr<rocksdb::Env> faulty_env_ = rocksdb::NewCompositeEnv(files_);
 };
 
-TEST_F(StoreFault, AFullDiskRefusesChangesAndNothingElse) {
+TEST_F(StoreFault, AFullDiskRefusesOnlyChanges) {
   ExpectRefusedThenWell(Fault::kNoSpace, absl::StatusCode::kResourceExhausted, "is full");
 }
 
-TEST_F(StoreFault, ADiskThatFailsRefusesChangesAndNothingElse) {
+TEST_F(StoreFault, AFailingDiskRefusesOnlyChanges) {
   ExpectRefusedThenWell(Fault::kIoError, absl::StatusCode::kUnavailable, "Input/output error");
 }
 
-TEST_F(StoreFault, ADiskMountedForReadingRefusesChangesAndNothingElse) {
+TEST_F(StoreFault, AReadOnlyDiskRefusesOnlyChanges) {
   ExpectRefusedThenWell(Fault::kReadOnly, absl::StatusCode::kUnavailable, "Read-only file system");
 }
 
@@ -174,7 +174,7 @@ TEST_F(StoreFault, FailedChangesAreNotFoundByTheNextProcess) {
 }
 
 // An orderly end leaves no refused change behind.
-TEST_F(StoreFault, RefusedChangesDoNotSurviveAnEnd) {
+TEST_F(StoreFault, RefusedChangesDoNotSurviveAShutdown) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   files_->SetFault(Fault::kNoSpaceAtSync);
@@ -312,7 +312,7 @@ TEST_F(StoreFault, DirectoriesThatAFirstStartLeftUnsyncedAreSyncedByTheNext) {
   EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
 }
 
-TEST_F(StoreFault, AFirstChangeThatFailsLeavesTheStoreItsId) {
+TEST_F(StoreFault, AFailedFirstChangeKeepsTheStoreId) {
   Start();
   const std::string id = hulls_->store().id();
   files_->SetFault(Fault::kNoSpace);
@@ -339,7 +339,7 @@ TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
   EXPECT_EQ(content, "mine");
 }
 
-TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
+TEST_F(StoreFault, AnUnreadableStoreIsNotCopied) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   std::ofstream(directory_ + "/data/rocksdb/CURRENT") << "nothing";
@@ -359,8 +359,8 @@ TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
   EXPECT_EQ(directories(), before);
 }
 
-// Its former revisions may be given to other changes.
-TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
+// Its former revisions may be assigned to other changes.
+TEST_F(StoreFault, ARelaxedStoreGetsANewIdAfterAnOutage) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
   Start();
@@ -397,7 +397,7 @@ TEST_F(StoreFault, ARelaxedStoreWithAFailedFinalSyncGetsANewId) {
   EXPECT_NE(hulls_->store().id(), id);
 }
 
-TEST_F(StoreFault, AStoreThatSyncsKeepsItsIdThroughAnOutage) {
+TEST_F(StoreFault, ADurableStoreKeepsItsIdThroughAnOutage) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   std::mt19937_64 random(5);

@@ -23,7 +23,8 @@ using ::testing::HasSubstr;
 
 class StoreLoss : public StoreTest {
  protected:
-  // Makes each hull in a log of its own, without a flush, and copies the store like a kill.
+  // Creates each hull in a separate log, without a flush, and copies the store as a kill would
+  // leave it.
   void PutInLogsOfTheirOwn(const std::vector<std::string>& hulls) {
     Start();
     rocksdb::DB& db = hulls_->store().db();
@@ -108,7 +109,7 @@ class StoreLoss : public StoreTest {
   std::string doctor_says_;
 };
 
-TEST_F(StoreLoss, NothingIsLostWhereNothingWasTouched) {
+TEST_F(StoreLoss, AnIntactStoreIsAccepted) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   ASSERT_EQ(Logs().size(), 3);
   for (int start = 0; start < 2; ++start) {
@@ -121,13 +122,13 @@ TEST_F(StoreLoss, NothingIsLostWhereNothingWasTouched) {
   EXPECT_THAT(doctor_says_, HasSubstr(store_id_));
 }
 
-TEST_F(StoreLoss, ALogThatIsCutWithinARecordIsRefused) {
+TEST_F(StoreLoss, ALogTruncatedWithinARecordIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   fs::resize_file(Logs()[0], fs::file_size(Logs()[0]) - 10);
   ExpectLoss("holds");
 }
 
-TEST_F(StoreLoss, ALogThatIsCutBetweenTwoRecordsIsRefused) {
+TEST_F(StoreLoss, ALogTruncatedBetweenRecordsIsRefused) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   fs::path log;
@@ -144,7 +145,7 @@ TEST_F(StoreLoss, ALogThatIsCutBetweenTwoRecordsIsRefused) {
   ExpectLoss("holds");
 }
 
-TEST_F(StoreLoss, AChunkThatChangedNoVertexIsMissedToo) {
+TEST_F(StoreLoss, ALostChunkThatChangedNoVertexIsDetected) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   const uint64_t revision = hulls_->registry().Sizes().store_revision;
@@ -157,13 +158,13 @@ TEST_F(StoreLoss, AChunkThatChangedNoVertexIsMissedToo) {
   EXPECT_EQ(OpenStore("left").status().code(), absl::StatusCode::kDataLoss);
 }
 
-TEST_F(StoreLoss, TheOnlyLogIsMissed) {
+TEST_F(StoreLoss, AMissingOnlyLogIsDetected) {
   PutInLogsOfTheirOwn({"a"});
   fs::remove(Logs()[0]);
   ExpectLoss("is missing");
 }
 
-TEST_F(StoreLoss, EachOfSeveralLogsIsMissed) {
+TEST_F(StoreLoss, EachMissingLogIsDetected) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   const fs::path whole = directory_ + "/whole";
   fs::copy(Left(), whole, fs::copy_options::recursive);
@@ -181,7 +182,7 @@ TEST_F(StoreLoss, EachOfSeveralLogsIsMissed) {
 }
 
 // Logs after a gap are not replayed, so the store has the state at one revision.
-TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
+TEST_F(StoreLoss, ATruncatedLogEndsTheHistoryBeforeLaterLogs) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   fs::resize_file(Logs()[1], 0);
   ExpectLoss("holds 0 bytes");
@@ -193,12 +194,12 @@ TEST_F(StoreLoss, ALogThatIsCutBeforeAnotherEndsTheHistoryThere) {
   EXPECT_EQ(hulls.View("c").status().code(), absl::StatusCode::kNotFound);
 }
 
-// RocksDB takes zeros for preallocated bytes.
+// RocksDB interprets zeros as preallocated bytes.
 TEST_F(StoreLoss, ALogEndingInZerosIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   const std::string content = Read(Logs()[0]);
   Write(Logs()[0], std::string(content.size(), '\0'));
-  ExpectLoss("does not hold what was written");
+  ExpectLoss("differ from what was written");
 }
 
 TEST_F(StoreLoss, AnOlderCopyOfTheLogIsRefused) {
@@ -277,7 +278,7 @@ TEST_F(StoreLoss, ADamagedMarkIsRefused) {
   EXPECT_EQ((*store)->revision(), revision_);
 }
 
-TEST_F(StoreLoss, TheDoctorLeavesAStoreAloneThatAServerHasOpen) {
+TEST_F(StoreLoss, TheDoctorRefusesAStoreThatAServerHasOpen) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
   for (const std::vector<std::string>& arguments :
@@ -293,7 +294,7 @@ TEST_F(StoreLoss, TheDoctorLeavesAStoreAloneThatAServerHasOpen) {
   EXPECT_EQ(OpenStore().status().code(), absl::StatusCode::kFailedPrecondition);
 }
 
-TEST_F(StoreLoss, AServerIsRefusedWhileTheDoctorLooks) {
+TEST_F(StoreLoss, AServerIsRefusedWhileTheDoctorRuns) {
   Start();
   hulls_ = nullptr;
   RocksDbOptions options;

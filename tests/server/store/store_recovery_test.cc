@@ -36,7 +36,7 @@ void ExpectSame(const HullView& a, const HullView& b) {
   }
 }
 
-TEST_P(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
+TEST_P(StoreRecovery, AcknowledgedChangesSurviveAReopen) {
   KeptRegistry& first = Start();
   ASSERT_TRUE(first.Create("empty").ok());
   ASSERT_TRUE(first.Put("point", {{1, 2, 3}, {1, 2, 3}}).ok());
@@ -68,7 +68,7 @@ TEST_P(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
   EXPECT_EQ(second.Open("cube", "one")->last_sequence, 2);
 }
 
-TEST_P(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
+TEST_P(StoreRecovery, AHullOfManyDeltasIsRestoredBitForBit) {
   const std::vector<Vector> sphere = SpherePoints(6000);
   KeptRegistry& first = Start();
   const AppendSession session = first.Open("h")->session;
@@ -87,7 +87,7 @@ TEST_P(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
   ExpectSame(*Start().View("h"), before);
 }
 
-TEST_P(StoreRecovery, AChunkThatChangesNoVertexWritesItsCountersOnly) {
+TEST_P(StoreRecovery, AChunkThatChangesNoVertexWritesOnlyItsCounters) {
   KeptRegistry& first = Start();
   const AppendSession session = first.Open("h")->session;
   ASSERT_TRUE(first.Append(session, 1, CubeCorners()).ok());
@@ -110,7 +110,7 @@ TEST_P(StoreRecovery, ADeletedHullLeavesNothing) {
   }
 }
 
-TEST_P(StoreRecovery, ALargeBaseInPartsComesBack) {
+TEST_P(StoreRecovery, ALargeBaseInPartsIsRestored) {
   ASSERT_TRUE(Start().Put("h", SpherePoints(70'000)).ok());
   const HullView before = *hulls_->View("h");
   EXPECT_EQ(CountKeys(kBasePrefix), 3);
@@ -154,7 +154,7 @@ TEST_P(StoreRecovery, ReplacingAMissingHullNeedsCreateIfAbsent) {
   EXPECT_EQ(Start().View("h")->record.vertex_count, 8);
 }
 
-TEST_P(StoreRecovery, BodiesComeBackAndAreDamagedByThemselves) {
+TEST_P(StoreRecovery, BodiesAreRestoredAndDamagedIndividually) {
   KeptRegistry& first = Start();
   ASSERT_TRUE(first.Put("cube", CubeCorners()).ok());
   const auto put = [this](const std::string& id, double x) {
@@ -191,7 +191,7 @@ TEST_P(StoreRecovery, BodiesComeBackAndAreDamagedByThemselves) {
   EXPECT_THAT(seen, ::testing::ElementsAre("changed", "damaged"));
 }
 
-TEST_P(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
+TEST_P(StoreRecovery, ASessionIsNotifiedThatItsHullWasReplaced) {
   KeptRegistry& hulls = Start();
   std::promise<absl::Status> gone;
   const auto opened = KeptRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
@@ -225,7 +225,7 @@ TEST_P(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   EXPECT_LT(hulls.registry().Commits().batches, kHulls);
 }
 
-TEST_F(RocksDbRecovery, AStartRemovesOldCopiesOfItsOwnAlone) {
+TEST_F(RocksDbRecovery, AStartRemovesOnlyItsOwnOldCopies) {
   Start();
   const absl::StatusOr<std::string> copy = hulls_->store().MakeCopy();
   ASSERT_TRUE(copy.ok()) << copy.status();

@@ -42,7 +42,7 @@ class StoreRoom : public StoreTest {
     files_->SetRoom(files_->used() + 4096);
     ExpectFull();
   }
-  // A change of 1.4 MB is refused again and again, and changes nothing.
+  // A change of 1.4 MB is refused each time, without effect.
   void ExpectFull() {
     const uint64_t revision = hulls_->registry().Sizes().store_revision;
     for (int attempt = 0; attempt < 3; ++attempt) {
@@ -61,7 +61,7 @@ class StoreRoom : public StoreTest {
   int hulls_put_ = 0;
 };
 
-TEST_F(StoreRoom, AFullDiskTakesDeletionsAlone) {
+TEST_F(StoreRoom, AFullDiskAcceptsOnlyDeletions) {
   FillDisk();
   ASSERT_TRUE(hulls_->Delete("h0").ok());
   EXPECT_EQ(hulls_->View("h0").status().code(), absl::StatusCode::kNotFound);
@@ -96,7 +96,7 @@ TEST_F(StoreRoom, AServerStartsOnAFullDisk) {
 }
 
 // The reserve is too small to open the store for changes.
-TEST_F(StoreRoom, AServerThatCannotOpenItsStoreForChangesAnswersQuestions) {
+TEST_F(StoreRoom, AServerThatCannotWriteItsStoreAnswersQueries) {
   reserve_bytes_ = 4096;
   FillDisk();
   const std::string id = hulls_->store().id();
@@ -113,7 +113,7 @@ TEST_F(StoreRoom, AServerThatCannotOpenItsStoreForChangesAnswersQuestions) {
   ASSERT_TRUE(hulls_->Delete("h0").ok());
 }
 
-TEST_F(StoreRoom, AStoreThatWouldBeNewIsRefusedOnAFullDisk) {
+TEST_F(StoreRoom, ANewStoreIsRefusedOnAFullDisk) {
   files_->SetRoom(0);
   EXPECT_EQ(OpenStore().status().code(), absl::StatusCode::kResourceExhausted);
   files_->SetRoom(kPlenty);
@@ -121,7 +121,7 @@ TEST_F(StoreRoom, AStoreThatWouldBeNewIsRefusedOnAFullDisk) {
 }
 
 // Uses the defaults, on a real file system.
-TEST(SmallDiskRoom, AFullDiskTakesDeletionsAndIsStartedOn) {
+TEST(SmallDiskRoom, AFullDiskAcceptsDeletionsAndAllowsAStart) {
   const SmallDisk disk(160);
   if (!disk.is_mounted()) GTEST_SKIP() << SmallDisk::kNoMount;
   std::unique_ptr<DurableRegistry> hulls;
@@ -141,7 +141,7 @@ TEST(SmallDiskRoom, AFullDiskTakesDeletionsAndIsStartedOn) {
   };
   for (; count < 20; ++count) ASSERT_TRUE(put().ok());
   for (int attempt = 0; attempt < 3; ++attempt) {
-    // Preallocated bytes of the log take some more changes.
+    // Preallocated bytes of the log have space for some more changes.
     absl::Status refused;
     for (; refused.ok(); ++count) {
       disk.Fill();

@@ -30,7 +30,7 @@ TEST(HullId, SegmentsJoinedBySlashesAreAccepted) {
   EXPECT_TRUE(CheckHullIdSyntax(std::string(256, 'a'), "hull_id").ok());
 }
 
-TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
+TEST(HullId, AnythingElseIsRefusedWithItsPosition) {
   const auto expect = [](const std::string& id, const std::string& what) {
     const absl::Status status = CheckHullIdSyntax(id, "field");
     ASSERT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << id;
@@ -45,10 +45,10 @@ TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
   expect("a\nb", "\"a\\nb\" is malformed at character 1");
   expect("\xC3\xA4", "\"\xC3\xA4\" is malformed at character 0");
   expect(std::string("a\0b", 3), "malformed at character 1");
-  expect(std::string(257, 'a'), "holds 257 characters; the limit is 256");
+  expect(std::string(257, 'a'), "has 257 characters; the limit is 256");
 }
 
-TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {
+TEST(FreshnessWords, ConditionsAreForwarded) {
   using std::chrono::nanoseconds;
   const MemoryStore store;
   const auto began = SteadyClock::now();
@@ -121,7 +121,7 @@ TEST(ListenAddress, OtherAddressesNeedInsecure) {
   }
 }
 
-TEST(ListenAddress, MalformedOnesNameTheFlag) {
+TEST(ListenAddress, MalformedAddressesNameTheFlag) {
   for (const char* text : {"", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", ":1",
                            "::1:50551", "unix:", "127.0.0.1:+1"}) {
     const absl::Status status = ParseListenAddress(text).status();

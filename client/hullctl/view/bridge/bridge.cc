@@ -55,8 +55,8 @@ struct Shared {
   std::list<HttpConnection*> awaiting;
   std::thread::id io_thread;
   std::vector<std::weak_ptr<PageConnection>> pages;
-  // Each destroys the handler of a closed page. This waits for the handler's threads, which may
-  // wait for an answer of hulld; other pages must not wait for it.
+  // Each thread destroys the handler of a closed page. That waits for the handler's threads, which
+  // may wait for an answer from hulld; other pages must not be delayed by it.
   std::vector<std::thread> reapers;
 };
 

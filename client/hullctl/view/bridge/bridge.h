@@ -23,7 +23,7 @@ class PageChannel {
 };
 
 // Handles the messages of a page. Destroyed after the page has closed; the destructor may wait for
-// threads that send, as sending then no longer blocks.
+// threads that send, because sending no longer blocks then.
 class PageHandler {
  public:
   virtual ~PageHandler() = default;

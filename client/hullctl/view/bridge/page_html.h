@@ -26,8 +26,8 @@ struct PictureSize {
 };
 
 // Returns a standalone page without panels that stores a PNG of its view, as a data URL, in the
-// attribute data-png of its body. Its scripts run at once, as virtual time waits for no
-// decompression.
+// attribute data-png of its body. Its scripts run immediately, because virtual time does not wait
+// for decompression.
 std::string PicturePage(std::string_view recording_json, const PictureSize& size);
 
 }  // namespace hulld

@@ -46,7 +46,7 @@ class SessionGuard {
   struct Decision {
     Verdict verdict = Verdict::kRefuse;
     int http_status = 0;
-    // For people: the problem and its remedy.
+    // The problem and its remedy, for people.
     std::string reason;
   };
   // Decides on a request. kExchange consumes the one-time token.

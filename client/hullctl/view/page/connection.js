@@ -35,7 +35,7 @@ class BridgeConnection {
   }
 }
 
-// Answers from a recording, at the waypoint or time last asked for; unrecorded questions get no
+// Answers from a recording, at the waypoint or time last requested; unrecorded queries get no
 // answer.
 class Recording {
   constructor(handlers, recording) {

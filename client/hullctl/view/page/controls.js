@@ -1,4 +1,4 @@
-// The bar, the tools, the keys, and clicks: what the user asks of the viewer.
+// User input: the bar, the tools, the keys, and clicks.
 import {pick} from 'hulld/drawing/picking.js';
 import {savePicture} from 'hulld/drawing/picture.js';
 import {bindKeys} from 'hulld/panels/keys.js';

@@ -7,7 +7,7 @@ import {runsOf} from 'hulld/panels/time_line.js';
 const WAYPOINT_MS = 600;
 const LEAST_MS = 3000;
 const MOST_MS = 30000;
-// Steps of the slider between two waypoints. A recording has the waypoints alone.
+// Steps of the slider between two waypoints. A recording has only the waypoints.
 const STEPS = 16;
 
 export class Joints {
@@ -62,7 +62,7 @@ export class Joints {
     this.connection.send({type: 'joints', scene: this.model.number, values, waypoint});
   }
 
-  // Takes the poses that answer the values in flight.
+  // Applies the poses that answer the values in flight.
   arrived(poses) {
     const {rest} = this.inFlight;
     this.inFlight = null;
@@ -70,7 +70,7 @@ export class Joints {
     this.model.setJointedPoses(poses, rest);
   }
 
-  // Called when there is no answer.
+  // Called if there is no answer.
   failed() {
     this.inFlight = null;
   }

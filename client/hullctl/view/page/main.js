@@ -172,7 +172,7 @@ class Viewer {
     this.former = new Map();
     this.fitted = false;
     this.ruler.forget();
-    // Answers to earlier questions concern another scene.
+    // Answers to earlier queries concern another scene.
     this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
@@ -395,7 +395,7 @@ class Viewer {
     if (this.model.decidingPieces().some((piece, k) => piece !== before[k])) this.tree.rebuild();
   }
 
-  // Returns true if a message answers a question about the current scene.
+  // Returns true if a message answers a query about the current scene.
   isCurrent({update}) {
     return update >= this.firstUpdate;
   }
@@ -503,7 +503,7 @@ class Viewer {
     this.rebuildGround();
   }
 
-  // Runs `work` a single time before the next frame, regardless of the number of calls.
+  // Runs `work` once before the next frame, regardless of the number of calls.
   soon(name, work) {
     this.waiting ??= new Map();
     if (this.waiting.size === 0) {

@@ -16,7 +16,7 @@ const MOST_UNDONE = 200;
 // Bodies with more pairs of pieces than this are queried without a certificate.
 const MOST_PIECE_PAIRS = 1000;
 
-// Times at which the path of a moving object is enclosed in the picture.
+// Number of times at which a moving object must be inside the picture.
 const PATH_TIMES = [0, 0.25, 0.5, 0.75, 1];
 
 // Shapes with more vertices than this, and those of a crowd, are represented by their box.
@@ -96,8 +96,8 @@ export class Model extends EventTarget {
         ...object,
         index,
         start: object.pose,
-        // Moved by the joints or the time of the scene, or at rest in a recorded watch: not by
-        // hand.
+        // True if the object cannot be dragged: it is moved by joints or by the time of the scene,
+        // or belongs to a recorded watch.
         isDriven: object.isJointed || Boolean(object.endPose) || this.watch.length > 0,
         // The pose after the last completed drag.
         rested: object.pose,
@@ -138,7 +138,8 @@ export class Model extends EventTarget {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
   }
 
-  // Returns [{hull, pose, radius}]: the hull of an object, or the pieces of a body that are here.
+  // Returns [{hull, pose, radius}]: the hull of an object, or the pieces of a body that have
+  // arrived.
   partsOf(object) {
     const {radius = 0, hullId} = object;
     const pieces = this.bodyOf(object)?.pieces ?? [{hullId, pose: IDENTITY}];
@@ -330,7 +331,7 @@ export class Model extends EventTarget {
     return isOfPair ? motion : null;
   }
 
-  // Returns true if the pair's certificate is requested. For large bodies it would hold one for
+  // Returns true if the pair's certificate is requested. For large bodies, it would contain one for
   // each of very many pairs of pieces.
   wantsCertificate(rest) {
     const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);

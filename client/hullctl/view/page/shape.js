@@ -63,7 +63,7 @@ function measure(xyz, triangles, [cx, cy, cz]) {
 }
 
 // Returns true if every edge of a mesh is traversed once in each direction, with corners at the
-// same place merged. Only then the mesh has a volume.
+// same position merged. Only then does the mesh have a volume.
 function isClosed(xyz, triangles) {
   const places = new Map();
   const place = (v) => {

@@ -1,4 +1,4 @@
-// A recorded watch: the colliding pairs, or the hulls that exist, at each of its moments.
+// A recorded watch: the colliding pairs, or the existing hulls, at each moment.
 import {runsOf} from 'hulld/panels/time_line.js';
 
 // Time that a moment takes while playing, within limits for the whole.
@@ -57,7 +57,7 @@ export class Watch {
     });
   }
 
-  // True if the existence of hulls is that of the recording.
+  // True if the recording determines which hulls exist.
   get ownsHulls() {
     return this.moments.length > 0 && !this.isOfPairs;
   }

@@ -11,7 +11,8 @@ from hulld.connection import Connection
 from hulld.errors import CancelledError, HulldError, InternalError, from_rpc_error, from_status
 from hulld.geometry.points import PointsLike
 
-#: Points of a call: an array, or an iterator of either kind of arrays that are sent as they come.
+#: Points of a call: an array, or a synchronous or asynchronous iterator of arrays that are sent
+#: as they arrive.
 PointsSource = Union[PointsLike, Iterator[PointsLike], AsyncIterator[PointsLike]]
 
 Lock = asyncio.Lock
@@ -43,8 +44,8 @@ def cancel_call(call: Any) -> None:
 
 
 async def invoke(call: Any, request: Any, timeout: float | None, metadata: Any) -> bytes:
-    """Calls a method with a message, or with an asynchronous iterator of messages. HulldError: how
-    the call failed."""
+    """Calls a method with a message, or with an asynchronous iterator of messages. HulldError: the
+    call failed."""
     import grpc
 
     try:
@@ -55,8 +56,9 @@ async def invoke(call: Any, request: Any, timeout: float | None, metadata: Any) 
 
 
 async def read(call: Any) -> bytes | None:
-    """The next message of a stream of answers; None: it ended well. HulldError: how the
-    call failed; its CancelledError: the call was cancelled, not the task."""
+    """The next message of a stream of answers; None: the stream ended without an error.
+    HulldError: the call failed. hulld.CancelledError means that the call was cancelled, not the
+    task."""
     import grpc.aio
 
     check_process()
@@ -77,12 +79,12 @@ def _is_task_cancelled() -> bool:
 
 
 def is_iterator(points: PointsSource) -> bool:
-    """True if the arrays of `points` come one by one."""
+    """True if `points` yields arrays one by one."""
     return isinstance(points, (AsyncIterator, Iterator))
 
 
 async def each(points: PointsSource) -> AsyncIterator[PointsLike]:
-    """The arrays of `points`. Lists and tuples are arrays."""
+    """The arrays of `points`. A list or tuple counts as an array."""
     if isinstance(points, AsyncIterator):
         async for block in points:
             yield block
@@ -94,9 +96,9 @@ async def each(points: PointsSource) -> AsyncIterator[PointsLike]:
 
 
 class Duplex:
-    """A call with a stream each way, and a bound on each wait. A task reads: gRPC reports the end
-    of a call only after all messages before it are read, and a write to a call that has ended waits
-    for that. Made in a running loop. For one task, except `cancel` and `send`."""
+    """A bidirectional streaming call with a bound on each wait. A task reads, because gRPC reports
+    the end of a call only after all earlier messages are read, and a write to a finished call waits
+    for that. Create it in a running loop. For use by one task, except for `cancel` and `send`."""
 
     def __init__(self, call: Any, metadata: Any, most_waiting: int | None = None) -> None:
         check_process()
@@ -128,12 +130,12 @@ class Duplex:
 
     @property
     def ready(self) -> bool:
-        """True if `receive` does not wait."""
+        """True if `receive` would not wait."""
         return self._ended or not self._incoming.empty()
 
     async def send(self, message: bytes, timeout: float | None) -> None:
-        """Waits for room on the connection. TimeoutError: none within `timeout` seconds. If the
-        call has ended, nothing happens, and `receive` raises the error."""
+        """Sends a message; waits while the connection is congested. TimeoutError: not sent within
+        `timeout` seconds. If the call has ended, does nothing; `receive` raises the error."""
         import grpc
 
         check_process()
@@ -143,7 +145,7 @@ class Duplex:
         except (grpc.RpcError, asyncio.InvalidStateError):
             pass
         except asyncio.CancelledError:
-            # If the call alone was cancelled, this task goes on.
+            # If only the call was cancelled, this task continues.
             if _is_task_cancelled():
                 raise
 
@@ -157,8 +159,8 @@ class Duplex:
             pass
 
     async def receive(self, timeout: float | None) -> bytes | None:
-        """The next message; None: the call ended well. TimeoutError: no message within `timeout`
-        seconds. HulldError: how the call failed; later calls raise it again."""
+        """The next message; None: the call ended without an error. TimeoutError: no message within
+        `timeout` seconds. HulldError: the call failed; later calls raise the error again."""
         check_process()
         if not self._ended:
             item = await asyncio.wait_for(self._incoming.get(), timeout)
@@ -173,14 +175,14 @@ class Duplex:
         return None
 
     async def expect(self, timeout: float | None) -> bytes:
-        """As `receive`, for a call that must not end yet: InternalError."""
+        """As `receive`, for a call that must not end yet. InternalError: the call ended."""
         message = await self.receive(timeout)
         if message is None:
             raise InternalError("the server ended the stream early")
         return message
 
     def cancel(self) -> None:
-        """Ends the call, unless it has ended."""
+        """Ends the call if it has not ended."""
         cancel_call(self._call)
         if self._room is not None:
             self._room.release()

@@ -19,7 +19,7 @@ class BatchAssembly:
         self._frame = new_frame(wanted)
 
     def add(self, data: bytes) -> None:
-        """ValueError: it does not follow the message before."""
+        """ValueError: the message does not follow the previous one."""
         before = self._frame.columns.rows
         self._frame.read_batch(data)
         if self._frame.columns.rows > before and self._frame.numbers.get(4, 0) != before:
@@ -77,7 +77,8 @@ class StepAssembly:
         self._frame = new_frame(wanted)
 
     def add(self, data: bytes) -> bool:
-        """Returns true for the last message of the step. ValueError: it answers another step."""
+        """Returns true for the last message of the step. ValueError: the message belongs to another
+        step."""
         update, last = self._frame.read_stream(data)
         if update != self._update:
             raise ValueError(f"the server answered message {update}, not {self._update}")

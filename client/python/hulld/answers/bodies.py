@@ -31,8 +31,8 @@ class BodyInfo:
 
 @dataclass(frozen=True)
 class Body:
-    """pieces: in the order of put_body, each a hull with a radius at a pose in the frame of the
-    body, with the same doubles."""
+    """pieces: in the order of put_body; each is a hull with a radius, at a pose in the frame of the
+    body, with the doubles that were put."""
 
     info: BodyInfo
     pieces: Placements
@@ -41,7 +41,7 @@ class Body:
 
 @dataclass(frozen=True)
 class ReplacedBody:
-    """created: there was no body before."""
+    """created: True if the body did not exist before."""
 
     body: BodyInfo
     created: bool
@@ -51,7 +51,7 @@ class ReplacedBody:
 
 @dataclass(frozen=True)
 class BodyPage:
-    """One page of a list; next_page: empty on the last."""
+    """One page of a list; next_page: empty on the last page."""
 
     bodies: Sequence[BodyInfo]
     next_page: str

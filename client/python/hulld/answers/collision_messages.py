@@ -63,7 +63,7 @@ def _piece_of(message: Any) -> DecidingPiece:
 
 def _problem_of(message: Any) -> Problem:
     reason = None
-    # A reason of a later contract has no name here.
+    # A reason from a later version of the contract has no name here.
     if message.reason and message.reason in error_pb2.ErrorReason.values():
         reason = error_pb2.ErrorReason.Name(message.reason).removeprefix("ERROR_REASON_")
     return Problem(status_name(message.code), message.message, reason)
@@ -243,7 +243,7 @@ class ColumnReader:
                 axis = collision_pb2.Axis.FromString(bytes(value))
                 self.axes.append(_axis_of(axis) if axis.kind else None)
             elif number == 4:
-                # Every row that is answered has sizes; the rest have none.
+                # Only rows with an answer have sizes.
                 analysis = collision_pb2.Analysis.FromString(bytes(value))
                 self.analyses.append(_analysis_of(analysis) if analysis.ByteSize() else None)
             elif number == 5:
@@ -260,7 +260,7 @@ class ColumnReader:
                 self.motion_proofs[first + motion.row] = _intervals_of(motion.intervals)
 
     def finish(self) -> Answers:
-        """ValueError: the columns do not fit each other."""
+        """ValueError: the columns do not match."""
 
         def doubles(
             wanted: bool, parts: list[npt.NDArray[np.float64]], shape: tuple[int, ...], name: str

@@ -27,7 +27,7 @@ class Relation(IntEnum):
     TOUCHING = 2
     #: No small translation separates them.
     OVERLAPPING = 3
-    #: With a tolerance only: |separation| <= tolerance; neither colliding nor not.
+    #: With a tolerance only: |separation| <= tolerance; collision undecided.
     WITHIN_TOLERANCE = 4
 
 
@@ -36,7 +36,7 @@ class Method(IntEnum):
 
     UNSPECIFIED = 0
     CERTIFIED_SEARCH = 1
-    #: Every vertex projected on every candidate axis; its time grows with the cube of the size.
+    #: Projects every vertex on every candidate axis; its time grows with the cube of the size.
     TEXTBOOK_SAT = 2
 
 
@@ -67,7 +67,7 @@ class AxisKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullVersion:
-    """The hull that an answer was computed from. Empty for an inline shape."""
+    """The version of a hull that an answer was computed from. Empty for an inline shape."""
 
     hull_id: str
     create_revision: int
@@ -81,7 +81,7 @@ class HullVersion:
 @dataclass(frozen=True)
 class DecidingPiece:
     """The piece of a body in the pair of pieces that decided. index: in the order of the body,
-    from 0. hull: the hull of the piece that the answer was computed from."""
+    from 0. hull: the version of the piece's hull that the answer was computed from."""
 
     index: int
     hull: HullVersion
@@ -93,7 +93,8 @@ class Separation:
     the caller's length unit.
 
     value: the distance when positive; minus the penetration depth when negative; 0 exactly when
-    TOUCHING; infinite when a hull is empty. bound: infinite where a double cannot hold the value.
+    TOUCHING; infinite when a hull is empty. bound: infinite if a double cannot represent the
+    value.
     """
 
     value: float
@@ -117,8 +118,8 @@ class Normal:
 
     direction: x y z in the world frame, of unit length up to rounding. SEPARATED: from the nearest
     point of A to that of B. TOUCHING: normal to a plane that has A on one side and B on the other.
-    OVERLAPPING: that of the shortest translation of B that ends the overlap. angle_bound: the angle
-    to the exact direction is at most this, in radians (proven).
+    OVERLAPPING: the direction of the shortest translation of B that ends the overlap. angle_bound:
+    the angle to the exact direction is at most this, in radians (proven).
     """
 
     direction: npt.NDArray[np.float64]
@@ -140,9 +141,9 @@ class Feature:
 
 @dataclass(frozen=True)
 class Axis:
-    """Any direction that shows that the hulls are separated or touch; see Normal for that in which
-    they are nearest. direction: x y z in the world frame, from A toward B, of unit length up to
-    rounding."""
+    """A direction that proves that the hulls are separated or touch, not necessarily the one in
+    which they are nearest (see Normal). direction: x y z in the world frame, from A toward B, of
+    unit length up to rounding."""
 
     direction: npt.NDArray[np.float64]
     kind: AxisKind
@@ -167,8 +168,9 @@ class Certificate:
 
     direction: x y z in the world frame, from A toward B, exact as given; integers (of any size) if
     doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max n.A
-    <= min n.B, and the differences of at most four pairs hold 0 in their convex hull. OVERLAPPING:
-    the differences of at most six pairs hold 0 strictly inside.
+    <= min n.B, and the convex hull of the differences of at most four pairs contains 0.
+    OVERLAPPING: the convex hull of the differences of at most six pairs contains 0 strictly
+    inside.
     """
 
     direction: tuple[float, float, float] | tuple[int, int, int] | None
@@ -198,9 +200,9 @@ class FirstContact:
     """The first contact of a pair in motion, over times from 0 to 1.
 
     separated_until: the pair is separated (proven) at all times before; 1 when SEPARATED.
-    contact_time: it is in contact at this time; equal to separated_until if a double is the exact
-    time, and None when SEPARATED or WITHIN_TOLERANCE. intervals: the proof of the separation, if a
-    certificate was wanted; the certificate of the answer holds at contact_time.
+    contact_time: the pair is in contact at this time; equal to separated_until if the exact time is
+    a double, and None when SEPARATED or WITHIN_TOLERANCE. intervals: the proof of the separation,
+    if a certificate was requested; the certificate of the answer then applies at contact_time.
     """
 
     separated_until: float
@@ -258,13 +260,13 @@ class Collision:
     """The answer about a pair.
 
     relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness,
-    normal: None if not asked for, or if there is none. within_clearance: separation <= clearance;
-    None without a clearance. hull_a, hull_b: the hulls or bodies of the answer, with their
-    revisions. piece_a, piece_b: of a body, the piece that decided; axis, analysis, witness, and
-    normal are of its hull. None for a hull, and if no pair of pieces decided alone.
+    normal: None if not requested, or if the pair has none. within_clearance: separation <=
+    clearance; None without a clearance. hull_a, hull_b: the hulls or bodies of the answer, with
+    their revisions. piece_a, piece_b: for a body, the piece that decided; axis, analysis, witness,
+    and normal refer to its hull. None for a hull, and if no pair of pieces decided alone.
     piece_certificates: with a body, the proof in place of the certificate; piece_hulls: then the
-    hulls of all pieces, by ID. first_contact: of a motion, when the pair meets; the relation is
-    then SEPARATED if it never does. None without an end pose.
+    hulls of all pieces, by ID. first_contact: for a motion, when the pair meets; if it never meets,
+    the relation is SEPARATED. None without an end pose.
     """
 
     relation: Relation
@@ -326,7 +328,7 @@ class Collision:
 
 
 def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:
-    """A repr without the parts that were not asked for. Long parts are given by name alone."""
+    """A repr without parts that were not requested. Long parts are shown by name only."""
     parts = [first] if first else []
     for part in fields(answer):
         value = getattr(answer, part.name)
@@ -360,8 +362,9 @@ def _versioned(hull: HullVersion) -> str:
 class AnswerRow:
     """The answer about one of many pairs.
 
-    pair: the indices of its placements; None in rows of Answers. problem: why there is no answer.
-    pieces: the pieces of bodies that decided, by index; -1 for a hull. The rest as in Collision.
+    pair: the indices of its placements; None in rows of Answers. problem: the reason for a missing
+    answer. pieces: the pieces of bodies that decided, by index; -1 for a hull. Other fields are as
+    in Collision.
     """
 
     pair: tuple[int, int] | None
@@ -398,16 +401,16 @@ class Answers:
     """Answers of several pairs, a row for each; m rows. answers[i] is row i as AnswerRow.
 
     relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
-    Relation.TOUCHING. If asked for: separations, separation_bounds (m), witness_points (m x 2 x 3:
+    Relation.TOUCHING. If requested: separations, separation_bounds (m), witness_points (m x 2 x 3:
     the point of A, then of B, world frame), witness_errors (m), normals (m x 3),
     normal_angle_bounds (m), NaN in rows without one; within_clearance (m, bool); axes, analyses,
     certificates, None in rows without one. Otherwise None. problems: by row, the reason for a
-    missing answer that is not in placement_problems. pieces: m x 2, of bodies the pieces that
+    missing answer that is not in placement_problems. pieces: m x 2, the pieces of bodies that
     decided, by index; -1 for a hull, and if no pair of pieces decided alone; None without bodies.
     piece_proofs: by row, for a pair with a body, the certificates of pairs of pieces; its entry of
-    `certificates` is None. separated_until, contact_times: m, of motions, as in FirstContact; a
-    contact time is NaN if there is none; None without motions. motion_proofs: by row, the intervals
-    of FirstContact.
+    `certificates` is None. separated_until, contact_times: m, for motions, as in FirstContact; the
+    contact time is NaN for a pair without a contact; None without motions. motion_proofs: by row,
+    the intervals of FirstContact.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -433,7 +436,7 @@ class Answers:
         return len(self.relations)
 
     def __getitem__(self, row: int) -> AnswerRow:
-        """The answer in a row; -1: the last. IndexError: no such row."""
+        """The answer in a row; -1 is the last one. IndexError: no such row."""
         row = range(len(self))[row]
 
         def cell(column: Any) -> Any:
@@ -521,7 +524,7 @@ class _Rows:
         return len(self.pairs)
 
     def __getitem__(self, row: int) -> AnswerRow:
-        """The answer about pairs[row]; -1: the last. IndexError: no such row."""
+        """The answer for pairs[row]; -1 is the last one. IndexError: no such row."""
         answer = self.answers[row]
         a, b = self.pairs[row].tolist()
         return replace(answer, pair=(a, b), problem=self.problem(row))
@@ -536,7 +539,7 @@ class _Rows:
         return f"{type(self).__name__}({_counted(self.answers)})"
 
     def problem(self, row: int) -> Problem | None:
-        """Why pairs[row] has no answer; None: it has one."""
+        """The reason why pairs[row] has no answer; None if it has one."""
         row = range(len(self))[row]
         if row in self.answers.problems:
             return self.answers.problems[row]
@@ -554,7 +557,7 @@ class _Rows:
 
 @dataclass(frozen=True)
 class BatchPart:
-    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls,
+    """Answers to the pairs from `first_pair` on. The first parts also contain header, hulls,
     placement_problems and piece_hulls, as in Batch."""
 
     first_pair: int
@@ -569,10 +572,10 @@ class BatchPart:
 class Batch(_Rows):
     """The answers to all pairs of a batch.
 
-    pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the
-    answers are about; IDs without a hull are missing. placement_problems: by index of the
-    placement, why no pair with it has an answer. piece_hulls: where certificates were wanted, the
-    hulls of the pieces of all bodies, by ID.
+    pairs: m x 2, as requested. answers: row i answers pairs[i]. hulls: by ID, the revision that the
+    answers are based on; IDs without a hull are missing. placement_problems: by index of the
+    placement, the reason why no pair with it has an answer. piece_hulls: if certificates were
+    requested, the hulls of the pieces of all bodies, by ID.
     """
 
     pairs: npt.NDArray[np.uint32]
@@ -585,7 +588,7 @@ class Batch(_Rows):
 
 @dataclass(frozen=True)
 class SceneTotals:
-    """Counts of pairs: asked about; with boxes that meet; found, by relation; without an answer."""
+    """Counts of pairs: queried; with intersecting boxes; found, by relation; without an answer."""
 
     pairs: int
     candidates: int
@@ -599,8 +602,8 @@ class SceneTotals:
 @dataclass(frozen=True)
 class ScenePart:
     """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first
-    parts hold no pairs but header, hulls, placement_problems and piece_hulls, as in Scene; the last
-    one holds the totals."""
+    parts contain no pairs, but header, hulls, placement_problems and piece_hulls, as in Scene; the
+    last one contains the totals."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
@@ -614,7 +617,7 @@ class ScenePart:
 @dataclass(frozen=True, repr=False)
 class Scene(_Rows):
     """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
-    lower index first, ascending. The rest as in Batch."""
+    lower index first, ascending. Other fields are as in Batch."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
@@ -629,10 +632,10 @@ class Scene(_Rows):
 class StreamAnswer(_Rows):
     """The answer to one message of a collision stream.
 
-    update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as
-    positions in the pairs of the stream, ascending; row i of `answers` is about pairs[rows[i]].
-    pairs: the same as k x 2 indices of placements. hulls, placement_problems, piece_hulls: as in
-    Batch, where the hulls were resolved for this message; empty otherwise.
+    update: the number of the message; 0 opened the stream. rows: the answered pairs, as positions
+    in the pairs of the stream, ascending; row i of `answers` belongs to pairs[rows[i]]. pairs: the
+    same pairs as k x 2 indices of placements. hulls, placement_problems, piece_hulls: as in Batch
+    if the hulls were resolved for this message; empty otherwise.
     """
 
     update: int
@@ -659,14 +662,14 @@ class CollisionEventKind(IntEnum):
     NEAR = 4
     #: It is farther apart than the clearance, and was within it before.
     FAR = 5
-    #: It has no answer any more: a placement has a problem.
+    #: It no longer has an answer: a placement has a problem.
     LOST = 6
 
 
 @dataclass(frozen=True)
 class CollisionEvent:
-    """placements: the pair, as indices. revisions: of the hulls or bodies that this is about; 0
-    when LOST. piece_a, piece_b: of a body, the piece that decided, as in Collision."""
+    """placements: the pair, as indices. revisions: of the hulls or bodies of the pair; 0 when LOST.
+    piece_a, piece_b: for a body, the piece that decided, as in Collision."""
 
     kind: CollisionEventKind
     placements: tuple[int, int]
@@ -682,9 +685,9 @@ class CollisionChanges:
     """One message of a watch of collisions.
 
     header: when synced, every change of a watched hull up to this revision is included. update: the
-    last update that these events include, 0 for the opening. synced: all pairs have been reported
-    at that update's poses. hulls: new to the watch, or changed. placement_problems: new ones.
-    piece_hulls: the hulls of the pieces of bodies, as `hulls`.
+    last update that these events include; 0 is the opening message. synced: all pairs have been
+    reported at that update's poses. hulls: hulls that are new to the watch, or have changed.
+    placement_problems: new problems. piece_hulls: the hulls of the pieces of bodies, as `hulls`.
     """
 
     header: Header

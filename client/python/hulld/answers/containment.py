@@ -1,4 +1,4 @@
-"""Points inside, on, or outside a hull: the question as a batch, and its answer."""
+"""Points inside, on, or outside a hull: the query as a batch, and its answer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hulld.geometry.placements import Placement, Placements
 from hulld.geometry.points import Points
 from hulld.geometry.poses import pack_pose
 
-#: The most points of a call: about 4 MiB.
+#: Maximum number of points per call: about 4 MiB.
 _POINTS_PER_CALL = 1 << 16
 _ORIGIN = np.zeros((1, 3))
 
@@ -23,9 +23,9 @@ _ORIGIN = np.zeros((1, 3))
 class Containment:
     """The positions of n points, as in `points[found.inside]`.
 
-    relations: of each point with the hull, as Relation in uint8. separations, separation_bounds: if
-    requested, the distance from the hull, or minus the depth below its surface, 0 on it, each with
-    its proven bound; otherwise None.
+    relations: of each point to the hull, as Relation in uint8. separations, separation_bounds: if
+    requested, the distance from the hull (minus the depth below the surface inside it, 0 on its
+    boundary) and its proven bound; otherwise None.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -44,7 +44,7 @@ class Containment:
 
     @property
     def outside(self) -> npt.NDArray[np.bool_]:
-        """n: no point of the hull. Always true for an empty hull."""
+        """n: not in the hull. Always true for an empty hull."""
         return self._are(Relation.SEPARATED)
 
     def _are(self, relation: Relation) -> npt.NDArray[np.bool_]:
@@ -63,8 +63,8 @@ class Containment:
 
 
 class PointQuestion:
-    """The points of a call, as pairs with a hull. A point is an inline shape, the origin, placed at
-    the point: its pose is exact, and all points share the shape."""
+    """The points of a call, as pairs with a hull. Each point is the same inline shape, the origin,
+    translated to the point, which is exact."""
 
     def __init__(self, hull: Placement, orthogonality_tolerance: float) -> None:
         self._ids = [] if hull.id is None else [hull.id]
@@ -86,7 +86,7 @@ class PointQuestion:
 
 
 def points_per_call(limits: Limits) -> int:
-    """The most points of a call that the server accepts."""
+    """The maximum number of points per call that the server accepts."""
     return max(1, min(_POINTS_PER_CALL, limits.max_pairs_per_batch, limits.max_placements - 1))
 
 
@@ -96,13 +96,13 @@ def require_answers(batch: Batch, first: int) -> Answers:
     missing = np.flatnonzero(batch.answers.relations == Relation.UNSPECIFIED)
     if missing.size:
         row = int(missing[0])
-        # A problem of the hull is not one of the point.
+        # A problem of the hull is not a problem of the point.
         raise batch.error(row, "" if batch.placement_problems else f"points[{first + row}]: ")
     return batch.answers
 
 
 def collect(parts: Sequence[Answers], separation: bool) -> Containment:
-    """Puts the answers of consecutive calls together."""
+    """Concatenates the answers of consecutive calls."""
     relations = [part.relations for part in parts]
     values = [part.separations for part in parts if part.separations is not None]
     bounds = [part.separation_bounds for part in parts if part.separation_bounds is not None]

@@ -16,11 +16,11 @@ class Hits:
     """The placements that rays meet: k rows, ascending by ray, then by time.
 
     rays, placements: k indices. times: k, from 0 at the origin of the ray to 1 at its end; a time
-    that no double represents becomes the next one. Of a placement with a radius or a rotation, a
-    time is at most 2^-30 late, and NaN where Relation.WITHIN_TOLERANCE leaves open if the ray meets
-    it. points: k x 3, on the ray at that time. normals: k x 3, of unit length, out of the facet
-    that is met; within rounding of an edge or vertex, normal to some plane that has the placement
-    on one side; NaN if the ray starts in contact.
+    that is not a double is rounded up to the next one. For a placement with a radius or a rotation,
+    a time is at most 2^-30 late, and NaN if the relation is WITHIN_TOLERANCE, which leaves open
+    whether the ray hits it. points: k x 3, on the ray at that time. normals: k x 3, of unit length,
+    outward from the facet that is hit; within rounding of an edge or vertex, normal to some plane
+    that has the placement on one side; NaN if the ray starts in contact.
     """
 
     rays: npt.NDArray[np.uint32]
@@ -39,7 +39,7 @@ class Hits:
         return f"Hits({len(self)} of {len(np.unique(self.rays))} rays)"
 
     def first(self) -> Hits:
-        """The first hit of each ray that meets a placement."""
+        """The first hit of each ray that hits a placement."""
         rows = np.unique(self.rays, return_index=True)[1]
         return Hits(
             self.rays[rows],
@@ -64,7 +64,7 @@ def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
 
 
 def _proof(answers: Answers, row: int) -> Sequence[SeparatedInterval]:
-    """The intervals of a row; of a body, those of the piece that is hit."""
+    """The intervals of a row; for a body, those of the piece that is hit."""
     for one in answers.piece_proofs.get(row, ()):
         if one.relation != Relation.SEPARATED:
             return one.intervals

@@ -17,9 +17,9 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 
 @dataclass(frozen=True)
 class Header:
-    """The store, and its revision that a reply was answered from. Revisions of different stores
-    mean nothing to each other. staleness: seconds; the answer to a read with a Freshness holds
-    everything that was committed up to that long before the call, at least."""
+    """The store and the revision that a reply was answered from. Revisions of different stores are
+    unrelated. staleness: seconds; the answer to a read with a Freshness includes at least
+    everything committed that long before the call."""
 
     store_id: str
     revision: int
@@ -80,7 +80,7 @@ class Durability(IntEnum):
 
 @dataclass(frozen=True)
 class CreatedHull:
-    """created: False where if_absent met an existing hull."""
+    """created: False if the hull existed and if_absent was set."""
 
     hull: HullInfo
     created: bool
@@ -89,7 +89,7 @@ class CreatedHull:
 
 @dataclass(frozen=True)
 class ReplacedHull:
-    """created: there was no hull before."""
+    """created: True if the hull did not exist before."""
 
     hull: HullInfo
     created: bool
@@ -118,9 +118,9 @@ class BoundedValue:
 class HullProperties:
     """Measures of a hull in its own frame, at density 1, in powers of the caller's length unit.
 
-    Volume, centroid, and inertia are the doubles nearest to the exact values, and exact where their
-    bound is 0. volume: 0 if the dimension is less than 3. area: of the surface; of a polygon, both
-    sides count. centroid: x y z, the mean of the points of the hull. inertia: 3 x 3, about the
+    Volume, centroid, and inertia are the doubles nearest to the exact values, and exact if their
+    bound is 0. volume: 0 if the dimension is less than 3. area: of the surface; for a polygon, of
+    both sides. centroid: x y z, the mean of the points of the hull. inertia: 3 x 3, about the
     centroid. centroid_bounds (3), inertia_bounds (3 x 3): of each number.
     """
 
@@ -136,9 +136,9 @@ class HullProperties:
 class Hull:
     """Sizes, counts and box of a hull.
 
-    edge_count, facet_count: None where they were not asked for. box: 2 x 3, the lowest and the
-    highest corner, in the caller's length unit; None when the hull is empty. audit, properties:
-    None where they were not asked for; an empty hull has no properties.
+    edge_count, facet_count: None if not requested. box: 2 x 3, the lowest and the highest corner,
+    in the caller's length unit; None when the hull is empty. audit, properties: None if not
+    requested; an empty hull has no properties.
     """
 
     info: HullInfo
@@ -210,8 +210,8 @@ class HullMesh:
 
     @property
     def triangles(self) -> npt.NDArray[np.int64]:
-        """m x 3: each facet as a fan around its first vertex, for libraries that take triangles
-        only."""
+        """m x 3: each facet as a fan around its first vertex, for libraries that accept only
+        triangles."""
         sizes = self.facet_sizes.astype(np.int64)
         starts = np.cumsum(sizes) - sizes
         fans = np.maximum(sizes - 2, 0)
@@ -275,12 +275,12 @@ class HullEventKind(IntEnum):
 
     UNSPECIFIED = 0
     #: The hull exists. The only kind besides DELETED until `synced`. Later, it replaces the next
-    #: three while the reader is far behind.
+    #: three kinds while the reader lags far behind.
     PRESENT = 1
     CREATED = 2
-    #: Its vertices changed, or a body was put again; it is the same incarnation.
+    #: Its vertices changed, or the body was put again; the incarnation is the same.
     CHANGED = 3
-    #: It is a new incarnation: it was replaced, or deleted and created again.
+    #: It has a new incarnation: it was replaced, or deleted and created again.
     REPLACED = 4
     DELETED = 5
 
@@ -288,8 +288,8 @@ class HullEventKind(IntEnum):
 @dataclass(frozen=True)
 class HullEvent:
     """hull: as of its revision; DELETED: only hull_id, and the revision of the deletion. box: as in
-    Hull. is_body: a body, of which `hull` holds ID, revisions, and damage, and piece_count the
-    number of pieces."""
+    Hull. is_body: True for a body; `hull` then has only its ID, revisions, and the damaged flag,
+    and piece_count is its number of pieces."""
 
     kind: HullEventKind
     hull: HullInfo
@@ -304,8 +304,8 @@ class HullChanges:
 
     header: every change up to this revision is in this message or an earlier one, unless a later
     change superseded it; a watch resumes from here. events: each hull at most once. synced: the
-    initial state is complete; later events are changes as they are committed. restarted: discard all
-    earlier events; the watch starts again with the full state.
+    initial state is complete; later events report changes as they are committed. restarted: discard
+    all earlier events; the watch starts over with the full state.
     """
 
     header: Header
@@ -318,7 +318,7 @@ class HullChanges:
 
 
 def enum_or_zero(kind: Any, value: int) -> Any:
-    """A value of a later contract reads as UNSPECIFIED."""
+    """A value from a later version of the contract reads as UNSPECIFIED."""
     try:
         return kind(value)
     except ValueError:
@@ -426,7 +426,7 @@ _MESH_HEADER, _MESH_VERTICES, _MESH_FACETS = 1, 2, 3
 
 
 def decode_mesh_part(data: bytes) -> MeshPart:
-    """Raises ValueError where the message is of no known kind."""
+    """Raises ValueError if the message is of an unknown kind."""
     for number, _, value in read_fields(data):
         if number == _MESH_HEADER and isinstance(value, memoryview):
             message = hull_pb2.MeshHeader.FromString(bytes(value))
@@ -459,7 +459,7 @@ def decode_mesh_part(data: bytes) -> MeshPart:
 
 
 class MeshAssembly:
-    """Puts the parts of a mesh together, and checks that they are consistent."""
+    """Assembles the parts of a mesh, and checks that they are consistent."""
 
     def __init__(self, viewer: Viewer | None) -> None:
         self._viewer = viewer
@@ -485,9 +485,9 @@ class MeshAssembly:
         sizes = np.concatenate([np.empty(0, np.uint32), *(part.sizes for part in self._facets)])
         indices = np.concatenate([np.empty(0, np.uint32), *(part.indices for part in self._facets)])
         if len(vertices) != head.vertex_count or len(sizes) != head.facet_count:
-            raise ValueError("the mesh stream ended early, or its header miscounts")
+            raise ValueError("the mesh stream ended early, or the counts of its header are wrong")
         if int(sizes.sum(dtype=np.uint64)) != len(indices):
             raise ValueError("the mesh stream's facet sizes and indices disagree")
         if indices.size and int(indices.max()) >= len(vertices):
-            raise ValueError("the mesh stream names a vertex that it does not hold")
+            raise ValueError("the mesh stream refers to a vertex that it does not contain")
         return HullMesh(head.info, vertices, sizes, indices, head.error, head.header, self._viewer)

@@ -31,7 +31,7 @@ class Limits:
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
-    #: The limits of a client: a token or, without tokens, an address.
+    #: Limits per client: a token or, without tokens, an address.
     max_calls_per_client: int
     max_batches_per_client: int
     #: Bytes that requests may take until they are answered.

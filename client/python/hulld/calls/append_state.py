@@ -30,7 +30,8 @@ DEFAULT_CHUNK_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Opened:
-    """The server's first answer. last_sequence: of this writer, committed; 0 if none."""
+    """The server's first answer. last_sequence: the writer's last committed sequence; 0 if
+    none."""
 
     hull: HullInfo
     writer_id: str
@@ -43,9 +44,9 @@ class Appended:
     """The progress of an append.
 
     chunks, points: sent. points_acknowledged: committed with this durability. counts: sums over the
-    acknowledgements received; without chunks_recovered, which are committed, but lost their
-    acknowledgement with a connection. hull_revision, vertex_count: after the last acknowledged
-    chunk. header: of the last reply.
+    acknowledgements received, excluding chunks_recovered: chunks that were committed, but whose
+    acknowledgement was lost with a connection. hull_revision, vertex_count: after the last
+    acknowledged chunk. header: of the last reply.
     """
 
     chunks: int
@@ -112,14 +113,14 @@ class AppendState:
         self._next_sequence = self.opened.last_sequence + 1
         self._revision, self._vertices = self.opened.hull.revision, self.opened.hull.vertex_count
         self._header = self.opened.header
-        # The hull exists now. If it is gone at a reconnect, creating it again would hide that
-        # points were lost.
+        # The hull exists now. If it is missing on reconnect, recreating it would hide the loss of
+        # points.
         self._create = False
         return self.opened
 
     def resume(self, data: bytes) -> list[bytes]:
-        """Takes the first answer of a later connection. Returns the requests to send again.
-        HulldError: the append cannot go on."""
+        """Processes the first answer of a later connection. Returns the requests to resend.
+        HulldError: the append cannot continue."""
         assert self.opened is not None
         opened = _opened(data)
         if (opened.header.store_id, opened.hull.create_revision) != (
@@ -167,7 +168,7 @@ class AppendState:
 
     @property
     def full(self) -> bool:
-        """True if the next chunk has to wait for acknowledgements."""
+        """True if the next chunk must wait for acknowledgements."""
         return (
             len(self._unacknowledged) >= self._max_chunks
             or self._bytes_in_flight >= self._max_bytes
@@ -227,7 +228,8 @@ def _opened(data: bytes) -> Opened:
 
 
 def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Iterator[Points]:
-    """The chunks of points. ValueError: wrong arguments; several chunks with if_revision."""
+    """Splits points into chunks. ValueError: invalid arguments, or several chunks with
+    if_revision."""
     array = as_points(points)
     arguments.revision(if_revision)
     size = arguments.count(chunk_bytes, "chunk_bytes", least=1)

@@ -1,4 +1,4 @@
-"""Attempts of a call, and of a search for a lost server."""
+"""Attempts of a call, and attempts to reach a lost server."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ class Attempts:
 
 
 class Search:
-    """Attempts to reach a lost server. The deadline counts from the first failure on, however long
-    the connection was quiet before."""
+    """Attempts to reach a lost server. The deadline counts from the first failure, regardless of
+    how long the connection was quiet before."""
 
     def __init__(self, policy: RetryPolicy, patience: float | None, connected: bool) -> None:
-        """connected: the server was reached before, so that only `patience` bounds the search."""
+        """connected: True if the server was reached before; then only `patience` bounds the
+        attempts."""
         self._policy = dataclasses.replace(policy, max_attempts=None) if connected else policy
         self._patience = patience
         self._attempts: Attempts | None = None

@@ -1,4 +1,4 @@
-"""gRPC's channel, opened by the first call, and its end in forked processes."""
+"""gRPC's channel, opened by the first call, and its behavior in forked processes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from hulld.errors import FailedPreconditionError
 
 
 class Channel:
-    """A channel that opens at the first call. gRPC, which takes most of the time of `import hulld`
-    otherwise, is imported then."""
+    """A channel that opens at the first call. gRPC, which would otherwise take most of the time of
+    `import hulld`, is imported at that time."""
 
     def __init__(self, connection: Connection, opener: Callable[[Connection, Any], Any]) -> None:
-        """opener: makes gRPC's channel of the connection and its PEM files."""
+        """opener: creates gRPC's channel for the connection and its PEM files."""
         self._connection = connection
         self._opener = opener
         self._pem_files = connection.pem_files()
@@ -27,14 +27,15 @@ class Channel:
         self._calls: dict[str, Any] = {}
 
     def get(self) -> Any:
-        """gRPC's channel. FailedPreconditionError: it is closed, or as in check_process."""
+        """gRPC's channel. FailedPreconditionError: the channel is closed; or as in
+        check_process."""
         check_process()
         with self._lock:
             if self._closed:
                 raise FailedPreconditionError("the client is closed; create a new one")
             if self._channel is None:
-                # gRPC's own support of forks blocks a fork forever while a channel reconnects, and
-                # forked processes make no calls anyway.
+                # gRPC's own fork support blocks a fork forever while a channel is reconnecting, and
+                # forked processes cannot make calls anyway.
                 os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
                 self._channel = self._opener(self._connection, self._pem_files)
                 _open_channels.add(self)
@@ -70,7 +71,7 @@ os.register_at_fork(after_in_child=_note_fork)
 
 def check_process() -> None:
     """FailedPreconditionError: the parent of this process had connections when it forked. gRPC's
-    threads are missing in the child: calls would hang or fail at random, with new clients, too."""
+    threads are missing in the child: calls would hang or fail at random, even with new clients."""
     if _is_forked:
         raise FailedPreconditionError(
             f"process {os.getpid()} was forked while its parent had an open hulld client, which "

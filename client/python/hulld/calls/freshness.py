@@ -19,14 +19,14 @@ FIELD = 15
 @dataclass(frozen=True)
 class Freshness:
     """The freshness of a read if several servers serve one store, as in
-    proto/hulld/v1/freshness.proto. Both conditions hold if both are given; without any, and without
-    a Freshness, the answer holds everything acknowledged before the call.
+    proto/hulld/v1/freshness.proto. If both conditions are given, both must hold; without either, or
+    without a Freshness, the answer includes everything acknowledged before the call.
 
-    at_least: the header of an earlier answer; the answer is of its revision of the store or a later
-    one. With the header of its last answer a client sees its own changes and never goes back in
-    time, whichever server answers. max_staleness: in seconds; the answer holds everything committed
-    that long before the call, and needs no round trip to the store while the server has that much.
-    The answer's header.staleness bounds its age.
+    at_least: the header of an earlier answer; the new answer comes from that revision of the store
+    or a later one. A client that passes the header of its last answer sees its own changes and
+    never goes back in time, whichever server answers. max_staleness: in seconds; the answer
+    includes everything committed at least that long before the call, and needs no round trip to the
+    store while the server is that fresh. The answer's header.staleness bounds its age.
     """
 
     at_least: Header | None = None
@@ -47,7 +47,7 @@ class Freshness:
         return message
 
     def for_next_page(self, header: Header) -> Freshness:
-        """For the page after one with this header: at least as fresh."""
+        """The freshness for the page that follows one with this header: at least as fresh."""
         if self.max_staleness is None and self.at_least is None:
             return self
         return replace(self, at_least=header)

@@ -1,4 +1,4 @@
-"""The state of a watch of collisions over all its connections: poses, and pairs reported."""
+"""The state of a watch of collisions across all its connections: poses and reported pairs."""
 
 from __future__ import annotations
 
@@ -63,9 +63,9 @@ class WatchedPlacements:
 
 
 class ReportedPairs:
-    """Merges the messages of a lost call and its replacement, which starts with the full state:
-    leaves out known events, and adds events that ended in between. Memory: the pairs that collide
-    or are near."""
+    """Merges the messages of a lost call and of its replacement, which starts with the full state:
+    drops events already reported, and adds the end events of pairs that no longer collide. Memory:
+    the pairs that collide or are near."""
 
     def __init__(self, watched: WatchedPlacements) -> None:
         self._watched = watched
@@ -80,7 +80,7 @@ class ReportedPairs:
         self._repeated = set()
 
     def take(self, changes: CollisionChanges, updates_before: int) -> CollisionChanges:
-        """The message as one uninterrupted call would have sent it."""
+        """The message as a single uninterrupted call would have sent it."""
         for hull in changes.hulls:
             self._revisions[hull.hull_id] = hull.revision
             for placement in [p for p in self._problems if self._hull_of(p) == hull.hull_id]:
@@ -110,7 +110,7 @@ class ReportedPairs:
         return kept
 
     def _take_event(self, event: CollisionEvent) -> CollisionEvent | None:
-        """None: the state of the pair is known."""
+        """None: the state of the pair was already reported."""
         now = (event.relation, bool(event.within_clearance))
         before = self._reported.pop(event.placements, (Relation.UNSPECIFIED, False))
         if now[0] in _COLLIDING or now[1]:

@@ -1,5 +1,5 @@
-"""One function per call of the contract: its request, its decoder, and True if it is safe to
-repeat."""
+"""One function per call of the contract; each returns the request, the decoder, and True if the
+call is safe to repeat."""
 
 from __future__ import annotations
 
@@ -328,7 +328,7 @@ class SceneFilter:
     movers: int | None
 
     def put(self, message: Any, placements: int) -> None:
-        """Fills the fields of the same names. placements: their number."""
+        """Fills the fields of the same names. placements: the number of placements."""
         if self.groups is not None:
             groups = _group_numbers(self.groups, "groups")
             if groups.shape != (placements,):
@@ -343,7 +343,7 @@ class SceneFilter:
             pairs = _group_numbers(self.ignored_group_pairs, "ignored_group_pairs")
             if pairs.size and (pairs.ndim != 2 or pairs.shape[1] != 2):
                 raise ValueError(
-                    f"ignored_group_pairs has the shape {pairs.shape}; it takes (k, 2), two groups "
+                    f"ignored_group_pairs has the shape {pairs.shape}; expected (k, 2), two groups "
                     "in each row"
                 )
             message.ignored_group_pairs.extend(pairs.reshape(-1).tolist())

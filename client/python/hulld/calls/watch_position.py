@@ -1,4 +1,4 @@
-"""The position of a watch of hulls over all its connections."""
+"""The position of a watch of hulls across all its connections."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class WatchPosition:
         self._has_events = False
 
     def take(self, changes: HullChanges, first: bool) -> HullChanges:
-        """Advances the position. first: of its connection. A call that resumed no position starts
-        with the full state, without deletions in between, which the message then states."""
+        """Advances the position. first: of its connection. A call that could not resume starts with
+        the full state, without the deletions in between; the message says so."""
         resumed = self.after is not None and self.after.revision > 0
         if first and self._has_events and not resumed:
             changes = dataclasses.replace(changes, restarted=True)

@@ -26,7 +26,7 @@ from hulld.wire import MessageWriter
 
 # Fields of PackedPlacements.
 _HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS, _RADII, _END_POSES = range(1, 8)
-#: The most points of an inline shape.
+#: Maximum number of points of an inline shape.
 _MOST_SHAPE_POINTS = 4096
 
 
@@ -35,13 +35,13 @@ class Placement:
     """The hull or body with this ID, or the inline shape of `points`, at a pose; None: the
     identity.
 
-    points: 1 to 4096, n x 3. They mean the same as a registered hull of these points, and are not
+    points: 1 to 4096, n x 3. They are equivalent to a registered hull of these points, but are not
     stored. radius: grows the shape, or each piece of the body, by a closed ball: a point becomes a
-    sphere, a segment a capsule. end_pose: of a motion, at time 1; None: the placement is at rest.
-    At time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1, exactly;
-    of q1 and -q1, the same rotation, the one with the shorter path is taken. A translation alone
-    ends with the identity rotation, as any pose of this form. ValueError: a malformed ID, shape, or
-    radius, or not exactly one of ID and points.
+    sphere, a segment a capsule. end_pose: the pose at time 1 of a motion; None: the placement is at
+    rest. At time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1,
+    exactly. Since q1 and -q1 are the same rotation, the sign with the shorter path is used. A
+    translation alone means the identity rotation at the end, as in any pose of this form.
+    ValueError: a malformed ID, shape, or radius, or not exactly one of ID and points.
     """
 
     id: str | None = None
@@ -72,7 +72,8 @@ PlacementLike = Union[Subject, Placement, tuple[Subject, PoseLike]]
 
 
 def as_shape(points: PointsLike, name: str = "points") -> Points:
-    """The points of an inline shape. ValueError: as in as_points, or none, or more than 4096."""
+    """The points of an inline shape. ValueError: as in as_points, or no points, or more than
+    4096."""
     array = as_points(points, name)
     if not 1 <= len(array) <= _MOST_SHAPE_POINTS:
         raise ValueError(
@@ -100,7 +101,7 @@ def as_placement(placement: PlacementLike) -> Placement:
 
 
 def as_moving(placement: PlacementLike, end_pose: PoseLike) -> Placement:
-    """The placement, with this end pose unless it is None. Errors as in as_placement."""
+    """The placement, with this end pose unless it is None. Errors are as in as_placement."""
     given = as_placement(placement)
     return given if end_pose is None else replace(given, end_pose=end_pose)
 
@@ -109,10 +110,10 @@ class Placements:
     """Placements of hulls, bodies, and inline shapes, stored compactly: each ID or shape once, and
     the poses in one array.
 
-    ids: the distinct IDs. shapes: inline shapes, each given by its points as in Placement. poses:
-    the pose of each placement, as in pack_poses; None: the identity. indices: for each placement,
-    the index of its subject in the list of ids followed by shapes; None: one placement for each
-    subject, or, of a single subject, one for each pose. radii: the radius of each placement, or one
+    ids: the distinct IDs. shapes: inline shapes, each as an array of points as in Placement.
+    poses: the pose of each placement, as in pack_poses; None: the identity. indices: for each
+    placement, the index of its subject in the list of ids followed by shapes; None: one placement
+    per subject or, for a single subject, one per pose. radii: the radius of each placement, or one
     for all, as in Placement; None: 0. end_poses: the end pose of each placement, as in
     Placement.end_pose; a placement at rest repeats its pose. None: all are at rest.
     orthogonality_tolerance, quaternion_order: as in pack_poses.
@@ -122,7 +123,7 @@ class Placements:
         Placements(["arm", "box"], poses, [0, 1, 1, 1])  # four placements of two hulls
         Placements([], poses, shapes=[points])           # one inline shape at n poses
 
-    ValueError: the lists do not fit each other, or hold a malformed ID, shape, or radius.
+    ValueError: the lists do not match, or contain a malformed ID, shape, or radius.
     """
 
     def __init__(
@@ -194,7 +195,7 @@ class Placements:
         for placement in single:
             if placement.id is not None:
                 places.setdefault(placement.id, len(places))
-        # An array that is given several times is one shape.
+        # An array that occurs several times is a single shape.
         shapes: dict[int, Points] = {}
         shape_places: dict[int, int] = {}
         indices = []
@@ -268,15 +269,17 @@ PlacementsLike = Union[Placements, Iterable[PlacementLike]]
 
 
 def as_radii(radii: npt.ArrayLike | None, count: int) -> npt.NDArray[np.float64] | None:
-    """A radius for each of `count` placements; None if all are 0. ValueError: another number of
-    them, or one that is negative or not finite."""
+    """A radius for each of `count` placements; None if all are 0. ValueError: a different number of
+    radii, or one that is negative or not finite."""
     if radii is None:
         return None
     array = arguments.as_floats(arguments.as_array(radii, "radii"), "radii").astype(np.float64)
     if array.ndim == 0:
         array = np.full(count, array)
     if array.shape != (count,):
-        raise ValueError(f"radii has the shape {array.shape}; it takes one for each of {count}")
+        raise ValueError(
+            f"radii has the shape {array.shape}; expected one number for each of {count}"
+        )
     good = np.isfinite(array) & (array >= 0)
     if not good.all():
         at = int(np.argmin(good))
@@ -295,8 +298,8 @@ def as_integers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
 
 
 def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.uint32]:
-    """`values` as indices below `count`, in their shape. ValueError names the first that is not;
-    TypeError: not integers."""
+    """`values` as indices below `count`, in the same shape. ValueError names the first index out of
+    range; TypeError: not integers."""
     array = as_integers(values, name)
     if not array.size:
         return np.empty(array.shape, np.uint32)
@@ -310,13 +313,13 @@ def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.u
 
 
 def as_pairs(pairs: npt.ArrayLike, count: int) -> npt.NDArray[np.uint32]:
-    """m x 2 indices of placements. ValueError: another shape, or an index out of range."""
+    """m x 2 indices of placements. ValueError: a different shape, or an index out of range."""
     array = arguments.as_array(pairs, "pairs")
     if array.size == 0:
         array = np.empty((0, 2), np.uint32)
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(
-            f"pairs has the shape {array.shape}; it takes (m, 2), two indices of placements in "
+            f"pairs has the shape {array.shape}; expected (m, 2), two indices of placements in "
             "each row"
         )
     return as_indices(array, count, "pairs")
@@ -330,7 +333,7 @@ def all_pairs(count: int) -> npt.NDArray[np.uint32]:
 def check_update(
     placements: npt.ArrayLike, poses: PosesLike, count: int, orthogonality_tolerance: float
 ) -> tuple[npt.NDArray[np.uint32], PackedPoses]:
-    """The indices of moved placements, of `count`, and their packed poses; errors as in
+    """The indices of moved placements, out of `count`, and their packed poses. Errors are as in
     CollisionStream.update."""
     indices = as_indices(placements, count, "placements").reshape(-1)
     packed = pack_poses(poses, orthogonality_tolerance=orthogonality_tolerance)

@@ -36,16 +36,16 @@ _XYZ, _XYZ_FLOAT = 1, 2  # fields of PointBlock
 
 
 def as_points(points: PointsLike, name: str = "points") -> Points:
-    """An n x 3 array of float64 or float32 that holds the same numbers, exactly.
+    """Converts points to an n x 3 array of float64 or float32 with exactly the same numbers.
 
-    points: n x 3, the caller's length unit, or an object with these as `vertices` or `points`: of
-    trimesh, Open3D, meshio, PyVista, or hulld. A single point of shape (3,) counts as 1 x 3.
-    float64 and float32 stay as they are, and so does their memory. float16 and integers are
-    widened. No copy is made where none is needed.
+    points: n x 3, the caller's length unit, or an object with these as `vertices` or `points`, such
+    as those of trimesh, Open3D, meshio, PyVista, or hulld. A single point of shape (3,) counts as 1
+    x 3. float64 and float32 are kept without a copy; float16 and integers are widened. Copies only
+    if necessary.
 
-    ValueError: another shape; a coordinate that is masked or not finite (the message names it);
-    numbers that no double holds, such as integers beyond 2^53 or long doubles. TypeError: not
-    numbers, such as booleans or complex numbers.
+    ValueError: a different shape; a coordinate that is masked or not finite (the message names it);
+    numbers that are not exactly doubles, such as some integers beyond 2^53 or long doubles.
+    TypeError: not numbers, such as booleans or complex numbers.
     """
     if not isinstance(points, np.ndarray):
         points = getattr(points, "vertices", getattr(points, "points", points))
@@ -55,7 +55,7 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
     if array.ndim == 1 and array.shape[0] == 3:
         array = array.reshape(1, 3)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"{name} has the shape {array.shape}; it takes (n, 3), x y z in each row")
+        raise ValueError(f"{name} has the shape {array.shape}; expected (n, 3), x y z in each row")
     array = as_floats(array, name)
     finite = np.isfinite(array)
     if not finite.all():
@@ -68,7 +68,7 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
 
 
 def point_block(points: Points) -> MessageWriter:
-    """The message PointBlock, its array being the bytes of `points`."""
+    """The message PointBlock, whose array is the bytes of `points`."""
     writer = MessageWriter()
     return (
         writer.floats(_XYZ_FLOAT, points)
@@ -78,7 +78,7 @@ def point_block(points: Points) -> MessageWriter:
 
 
 def chunks_of(points: Points, most_bytes: int) -> Iterator[Points]:
-    """`points` in pieces of at most `most_bytes`, and at least one point each."""
+    """`points` in pieces of at most `most_bytes`, with at least one point each."""
     rows = max(1, most_bytes // (3 * points.dtype.itemsize))
     for first in range(0, len(points), rows):
         yield points[first : first + rows]

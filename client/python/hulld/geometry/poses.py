@@ -1,4 +1,4 @@
-"""Poses: quaternion and translation, as the contract has them, and 4 x 4 matrices."""
+"""Poses: quaternion and translation, as in the contract, and 4 x 4 matrices."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from hulld import arguments
 
-#: The default of the largest entry of R Rᵀ - I that a matrix may have. It is relative to 1, the
-#: length of a row: within it, a hull of 1 m stands within about a nanometer of its place by the matrix.
-#: Products of hundreds of rotations in double precision stay far below (observed: 1e-13), matrices
-#: of float32 do not (1e-7).
+#: Default of the largest entry of R Rᵀ - I that is accepted in a matrix. It is relative to 1, the
+#: length of a row: a hull of 1 m is then placed within about a nanometer of its position by the
+#: matrix. Products of hundreds of rotations in double precision stay far below (observed: 1e-13),
+#: float32 matrices do not (1e-7).
 ORTHOGONALITY_TOLERANCE = 1e-9
 
 PackedPoses = npt.NDArray[np.float64]
@@ -58,16 +58,16 @@ class Pose:
         """The pose of a 4 x 4 matrix [R t; 0 0 0 1].
 
         A matrix of doubles is a rotation only up to rounding. The pose has the nearest quaternion,
-        whose matrix differs from R by some units of rounding more than R differs from a rotation.
+        whose matrix differs from R by a few units of rounding more than R differs from a rotation.
         Rotations by multiples of 90 degrees are exact. tolerance: the largest entry of R Rᵀ - I
-        that is accepted, orthogonality_tolerance elsewhere.
+        that is accepted (elsewhere orthogonality_tolerance).
 
-        ValueError: R Rᵀ is farther from the identity (the message says how far), R mirrors, the
-        last row is not 0 0 0 1, a number is not finite.
+        ValueError: R Rᵀ is farther from the identity (the message says how far), R is a reflection,
+        the last row is not 0 0 0 1, or a number is not finite.
         """
         array = _doubles(matrix)
         if array.shape != (4, 4):
-            raise ValueError(f"the matrix has the shape {array.shape}; it takes (4, 4)")
+            raise ValueError(f"the matrix has the shape {array.shape}; expected (4, 4)")
         return cls.from_packed(pack_matrices(array.reshape(1, 4, 4), tolerance=tolerance)[0])
 
     @classmethod
@@ -99,7 +99,7 @@ PosesLike = Union[npt.ArrayLike, Sequence[PoseLike]]
 
 
 def _doubles(values: Any, name: str = "pose") -> npt.NDArray[np.float64]:
-    """ValueError: a number that no double holds."""
+    """ValueError: a number that is not exactly a double."""
     doubles: npt.NDArray[np.float64] = arguments.as_floats(
         arguments.as_array(values, name), name
     ).astype(np.float64, copy=False)
@@ -112,7 +112,7 @@ def pack_pose(
     orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     quaternion_order: QuaternionOrder = "wxyz",
 ) -> npt.NDArray[np.float64]:
-    """The seven numbers of a pose; arguments and errors as in pack_poses."""
+    """The seven numbers of a pose. Arguments and errors are as in pack_poses."""
     if pose is None:
         return np.array([1.0, 0, 0, 0, 0, 0, 0])
     if isinstance(pose, Pose):
@@ -120,8 +120,8 @@ def pack_pose(
     array = _doubles(pose)
     if array.shape not in ((3,), (7,), (4, 4)):
         raise ValueError(
-            f"a pose of shape {array.shape} is not one of (4, 4), a matrix; (7,), a quaternion and "
-            "a translation w x y z x y z; (3,), a translation"
+            f"a pose has the shape {array.shape}; expected (4, 4), a matrix; (7,), a quaternion and "
+            "a translation w x y z x y z; or (3,), a translation"
         )
     packed: npt.NDArray[np.float64] = _pack_array(
         array[np.newaxis], orthogonality_tolerance, quaternion_order
@@ -137,12 +137,13 @@ def pack_poses(
 ) -> PackedPoses:
     """Poses as n x 7 numbers, w x y z x y z in each row.
 
-    Doubles pass unchanged; matrices become quaternions as in Pose.from_matrix.
-    orthogonality_tolerance: the largest entry of R Rᵀ - I that a matrix may have.
-    quaternion_order: the order of the quaternions in rows of seven numbers; a Pose has its own.
+    Doubles are kept unchanged; matrices become quaternions as in Pose.from_matrix.
+    orthogonality_tolerance: the largest entry of R Rᵀ - I that is accepted in a matrix.
+    quaternion_order: the order of the quaternions in rows of seven numbers; a Pose has its own
+    order.
 
-    ValueError names the pose: another shape, a masked or non-finite number, a zero quaternion, a
-    matrix that is not a rigid motion.
+    ValueError names the pose: a different shape, a masked or non-finite number, a zero quaternion,
+    or a matrix that is not a rigid motion.
     """
     if isinstance(poses, (np.ndarray, np.ma.MaskedArray)) and poses.dtype != object:
         return _pack_array(_doubles(poses, "poses"), orthogonality_tolerance, quaternion_order)
@@ -165,7 +166,8 @@ def pack_poses(
 
 def shorter_path(starts: PackedPoses, ends: PackedPoses) -> PackedPoses:
     """The end poses of motions, n x 7, each with the sign of its quaternion that makes the path
-    from the start shorter: their scalar product is at least 0. Both signs are one rotation."""
+    from the start shorter: their scalar product is at least 0. Both signs are the same
+    rotation."""
 
     def scaled(poses: PackedPoses) -> PackedPoses:
         rotations = poses[:, :4]
@@ -185,8 +187,8 @@ def _pack_array(
         return pack_matrices(array, tolerance=tolerance)
     if array.ndim != 2 or array.shape[1] not in (3, 7):
         raise ValueError(
-            f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions "
-            "and translations w x y z x y z; (n, 3), translations"
+            f"poses have the shape {array.shape}; expected (n, 4, 4), matrices; (n, 7), "
+            "quaternions and translations w x y z x y z; or (n, 3), translations"
         )
     finite = np.isfinite(array)
     if not finite.all():
@@ -217,7 +219,7 @@ def _reordered(rows: npt.NDArray[np.float64], order: QuaternionOrder) -> npt.NDA
 def pack_matrices(
     matrices: npt.NDArray[np.float64], *, tolerance: float = ORTHOGONALITY_TOLERANCE
 ) -> PackedPoses:
-    """n x 4 x 4 matrices as n x 7 numbers; errors as in Pose.from_matrix."""
+    """n x 4 x 4 matrices as n x 7 numbers. Errors are as in Pose.from_matrix."""
     _check_matrices(matrices, arguments.length(tolerance, "orthogonality_tolerance"))
     packed = np.empty((len(matrices), 7))
     packed[:, :4] = _quaternions_of(matrices[:, :3, :3])
@@ -230,7 +232,7 @@ def _check_matrices(matrices: npt.NDArray[np.float64], tolerance: float) -> None
         return int(np.argmax(bad)) if bad.any() else None
 
     if (index := first(~np.isfinite(matrices).all(axis=(1, 2)))) is not None:
-        raise ValueError(f"poses[{index}]: the matrix holds a number that is not finite")
+        raise ValueError(f"poses[{index}]: the matrix contains a number that is not finite")
     if (index := first((matrices[:, 3] != (0, 0, 0, 1)).any(axis=1))) is not None:
         raise ValueError(f"poses[{index}]: the last row is {matrices[index, 3]}, not 0 0 0 1")
     rotations = matrices[:, :3, :3]
@@ -259,7 +261,8 @@ def _rounded_up(deviation: float) -> str:
 
 def _quaternions_of(rotations: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """Quaternions w x y z of n x 3 x 3 rotations, scaled by their largest component, which avoids
-    every root: so quarter turns are exact. Source: Shepperd 1978, Quaternion from Rotation Matrix.
+    square roots, so quarter turns are exact. Source: Shepperd 1978, Quaternion from Rotation
+    Matrix.
     """
     m = rotations
     xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]

@@ -12,7 +12,7 @@ Vectors = npt.NDArray[np.float64]
 
 
 def ray_ends(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Vectors, Vectors]:
-    """The origins and ends of rays, n x 3 each; one origin or direction serves all rays.
+    """The origins and ends of rays, n x 3 each; a single origin or direction applies to all rays.
     ValueError: other shapes; an origin, direction, or end that is not finite."""
     starts = as_points(origins, "origins").astype(np.float64)
     along = as_points(directions, "directions").astype(np.float64)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hulld.answers.collisions import Answers, Relation, Separation
 
-# Relations from the weakest to the strongest, and the place of each among these.
+# Relations from weakest to strongest, and the rank of each.
 _BY_STRENGTH = np.array(
     [
         Relation.UNSPECIFIED,
@@ -30,14 +30,15 @@ class RobotCheck:
     """The answers about n configurations of a robot with m pairs. check[i] is the answer about one.
 
     relations (n): the strongest relation of any pair, in the order SEPARATED, WITHIN_TOLERANCE,
-    TOUCHING, OVERLAPPING. deciding (n): the row in `pairs` of the pair that decides: that of the
-    least separation if it was asked for, else the first with this relation; -1 if SEPARATED
-    without separations. separations, separation_bounds (n): of the deciding pair.
-    within_clearance (n): true if any pair is. pairs (m x 2): indices into `names`, of the robot's
+    TOUCHING, OVERLAPPING. deciding (n): the row in `pairs` of the deciding pair: the pair of least
+    separation if separations were requested, otherwise the first pair with this relation; -1 if
+    SEPARATED without separations. separations, separation_bounds (n): of the deciding pair.
+    within_clearance (n): True if any pair is. pairs (m x 2): indices into `names`, of the robot's
     parts and then the scene. pair_relations, pair_separations (n x m): of each pair. None if not
-    asked for.
+    requested.
 
-    relation, separation, and pair sum up all configurations: those of the strongest.
+    relation, separation, and pair summarize all configurations: they belong to the configuration
+    with the strongest relation.
     """
 
     names: Sequence[str]
@@ -58,7 +59,7 @@ class RobotCheck:
 
     @property
     def first_contact(self) -> int | None:
-        """The first configuration that is colliding; None: none is. Of a trajectory, the first
+        """The first colliding configuration; None if there is none. Of a trajectory, the first
         waypoint: Robot.check_motion also checks the motion between waypoints."""
         return int(np.argmax(self.colliding)) if self.colliding.any() else None
 
@@ -69,7 +70,7 @@ class RobotCheck:
 
     @property
     def separation(self) -> Separation | None:
-        """The least separation of any configuration; None if not asked for."""
+        """The least separation of any configuration; None if not requested."""
         if self.separations is None or self.separation_bounds is None:
             return None
         at = self._strongest()
@@ -77,8 +78,8 @@ class RobotCheck:
 
     @property
     def pair(self) -> tuple[str, str] | None:
-        """The names of the pair that decides `relation` and `separation`; None: `deciding` has
-        none."""
+        """The names of the pair that decides `relation` and `separation`; None if `deciding` has no
+        pair."""
         row = int(self.deciding[self._strongest()])
         return None if row < 0 else self.names_of(row)
 
@@ -100,7 +101,8 @@ class RobotCheck:
         return len(self.relations)
 
     def __getitem__(self, index: int) -> RobotCheck:
-        """The answer about one configuration; -1: the last. IndexError: no such configuration."""
+        """The answer for one configuration; -1 is the last one. IndexError: no such
+        configuration."""
         at = range(len(self))[index]
         some = slice(at, at + 1)
         return RobotCheck(
@@ -138,10 +140,11 @@ class RobotCheck:
 class MotionContact:
     """The end of the search for the first contact of a pair between two waypoints.
 
-    waypoint: the index of the waypoint before. pair: names. separated_until: the pair is separated
-    (proven), by more than the clearance, at all times before this one; 0 and 1 are the waypoints.
-    contact_time: its poses at this time touch or overlap, or are within the clearance; None: not
-    decided, as the pair comes within the resolution of that. relation: at contact_time.
+    waypoint: the index of the preceding waypoint. pair: names. separated_until: the pair is
+    separated (proven), by more than the clearance, at all times before this one; 0 and 1 are the
+    waypoints. contact_time: its poses at this time touch or overlap, or are within the clearance;
+    None: undecided, because the pair comes within the resolution of contact. relation: at
+    contact_time.
     """
 
     waypoint: int
@@ -155,9 +158,9 @@ class MotionContact:
 class MotionCheck:
     """The answer about a motion through n waypoints.
 
-    contacts: the first contact of each pair that has one, in order of time. undecided: pairs and
-    waypoints without a decision before a contact. Pairs that are in neither are free: separated
-    (proven), by more than the clearance, throughout the exact motion of the joints.
+    contacts: the first contact of each pair that has one, in order of time. undecided: pairs that
+    remained undecided between two waypoints, before any contact. Pairs in neither list are free:
+    separated (proven), by more than the clearance, throughout the exact motion of the joints.
     """
 
     waypoints: int
@@ -166,7 +169,7 @@ class MotionCheck:
 
     @property
     def first_contact(self) -> MotionContact | None:
-        """The earliest contact; None: there is none."""
+        """The earliest contact; None if there is none."""
         return self.contacts[0] if self.contacts else None
 
     @property
@@ -191,7 +194,7 @@ class MotionCheck:
 def collect(
     names: Sequence[str], pairs: npt.NDArray[np.uint32], batches: Sequence[Answers]
 ) -> RobotCheck:
-    """The answers of batches with all pairs of some configurations each."""
+    """Collects the answers of batches; each batch has all pairs of some configurations."""
 
     def column(name: str) -> Any:
         parts = [getattr(batch, name) for batch in batches]
@@ -209,7 +212,7 @@ def collect(
     else:
         decides = strength == strongest[:, np.newaxis]
         deciding = np.argmin(np.where(decides, separations, np.inf), axis=1)
-        # An empty hull is separated by infinity, and no minimum.
+        # An empty hull has an infinite separation, and is never the minimum.
         deciding = np.where(decides[rows, deciding], deciding, np.argmax(decides, axis=1))
     return RobotCheck(
         tuple(names),

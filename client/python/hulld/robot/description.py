@@ -36,8 +36,8 @@ VARIABLES: dict[JointKind, tuple[tuple[str, int], ...]] = {
 
 @dataclass(frozen=True)
 class Shape:
-    """A collision shape. size: the edges of a box; the radius, then the length, of the others,
-    which for a capsule leaves out the caps. mesh: the file as the description names it. scale: the
+    """A collision shape. size: the edges of a box, otherwise the radius, then the length; the
+    length of a capsule excludes the caps. mesh: the file name in the description. scale: the
     factors of its coordinates. X_LS: the pose in the frame of the link."""
 
     kind: ShapeKind
@@ -52,7 +52,7 @@ class Shape:
 class Link:
     name: str
     shapes: tuple[Shape, ...]
-    #: The index of the joint above; -1 for the root.
+    #: The index of the parent joint; -1 for the root.
     parent_joint: int
 
 
@@ -81,7 +81,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Variable:
-    """A column of configurations. place: the index in the value of the joint."""
+    """A column of configurations. place: the index within the joint's value."""
 
     name: str
     joint: int
@@ -120,10 +120,11 @@ class Description:
 
     def adjacent_pairs(self) -> set[tuple[int, int]]:
         """The pairs of links connected by a joint, or by a chain of joints through links without
-        shapes. Planar and floating joints connect no links here: their links can move into each
-        other."""
-        # A group holds links with shapes between which there are only links without. Its key is
-        # the topmost of these, or the lower link of a joint that connects two links with shapes.
+        shapes. Planar and floating joints do not connect links here, because their links can move
+        into each other."""
+        # A group consists of links with shapes that are connected only through links without
+        # shapes. Its key is the topmost link without shapes, or the lower link of a joint that
+        # connects two links with shapes.
         groups: dict[int, set[int]] = {}
         key_of: list[int] = []
         for index, link in enumerate(self.links):

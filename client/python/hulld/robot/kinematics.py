@@ -1,8 +1,8 @@
 """Poses of links for many configurations at once.
 
 A pose is seven columns w x y z x y z, each a number or an array of n numbers: the quaternion, which
-need not be normalized, and the translation. The operations are those of hullctl, in its order, so
-that both check the same poses up to the rounding of sine and cosine.
+need not be normalized, and the translation. The operations are the same as hullctl's, in the same
+order, so that both check the same poses up to the rounding of sine and cosine.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class Mesh:
         return pieces
 
     def is_closed(self) -> bool:
-        """True if each edge is passed as often in one direction as in the other."""
+        """True if each edge is traversed equally often in both directions."""
         _, merged = np.unique(self.vertices + 0.0, axis=0, return_inverse=True)
         corners = merged.reshape(-1)[self.triangles]
         start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
@@ -96,11 +96,11 @@ def enclosed_volume(vertices: Points, triangles: npt.NDArray[Any]) -> float:
 def read_pieces(
     path: pathlib.Path, scale: Scale, split: bool, load_mesh: MeshLoader | None
 ) -> list[tuple[Points, float]]:
-    """The points of a mesh file, each coordinate times its factor of the scale, rounded once; and
-    the volume of the mesh, 0 if it is unknown.
+    """The points of a mesh file, each coordinate times its scale factor, rounded once; and the
+    volume of the mesh, 0 if unknown.
 
-    split: a file of several named parts that are all convex gives each. load_mesh: reads the file;
-    None: STL and OBJ are read here. ValueError names the file and its defect.
+    split: returns each part of a file whose named parts are all convex. load_mesh: reads the file;
+    None: this module reads STL and OBJ. ValueError names the file and its defect.
     """
     if load_mesh is not None:
         points = as_points(load_mesh(path), str(path)).astype(np.float64)
@@ -146,7 +146,7 @@ def _number(word: str, factor: Fraction, place: str) -> float:
 
 
 def _lines(path: os.PathLike[str], data: bytes) -> Iterator[tuple[str, str]]:
-    """Each line with its place, as in FILE:7."""
+    """Each line with its location, as in FILE:7."""
     text = data.decode("utf-8-sig", "replace")
     for number, line in enumerate(text.splitlines(), 1):
         yield f"{os.fspath(path)}:{number}", line
@@ -164,7 +164,7 @@ def _read_obj(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
     largest = (0, "")
     for place, line in _lines(path, data):
         content = line.strip()
-        # Comments often hold paths of Windows.
+        # Comments often contain Windows paths.
         if content.endswith("\\") and (continued or not content.startswith("#")):
             continued += content[:-1] + " "
             continue
@@ -190,10 +190,10 @@ def _read_obj(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
     if continued:
         raise ValueError(f"{place}: the file ends after a backslash that continues its line")
     if not vertices:
-        raise ValueError(f"{path}: holds no vertex: no line starts with v; is it an OBJ file?")
+        raise ValueError(f"{path}: contains no vertices: no line starts with v; is it an OBJ file?")
     if largest[0] > len(vertices):
         raise ValueError(
-            f"{largest[1]}: a face names vertex {largest[0]}, but the file holds {len(vertices)}"
+            f"{largest[1]}: a face names vertex {largest[0]}, but the file has {len(vertices)}"
         )
     indices = np.array(triangles, np.intp).reshape(-1, 3)
     return Mesh(np.array(vertices), indices, np.array(parts, np.intp))
@@ -211,7 +211,7 @@ def _corners(words: list[str], before: int, place: str) -> list[int]:
         corner = int(text) if digits.isascii() and digits.isdigit() else 0
         corner += before + 1 if corner < 0 else 0
         if corner <= 0:
-            raise ValueError(f"{place}: {word!r} names no vertex; {before} came before")
+            raise ValueError(f"{place}: {word!r} is not a vertex; {before} precede this line")
         corners.append(corner - 1)
     if not corners:
         raise ValueError(f"{place}: a face names no vertex")
@@ -222,8 +222,8 @@ def _corners(words: list[str], before: int, place: str) -> list[int]:
 
 
 def _read_stl(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
-    """Text starts with `solid` and has no control characters in its first KiB; keywords are of any
-    letter case, and normals may be missing."""
+    """Text starts with `solid` and has no control characters in its first KiB; keywords may have
+    any letter case, and normals may be missing."""
     if any(byte < 0x20 and byte not in b"\t\n\v\f\r" for byte in data[:_BYTES_TO_CLASSIFY]):
         corners = _read_binary_stl(path, data).astype(np.float64)
         columns = [_scaled(corners[:, i], scale[i]) for i in range(3)]
@@ -247,7 +247,9 @@ def _read_binary_stl(path: pathlib.Path, data: bytes) -> npt.NDArray[np.float32]
     corners: npt.NDArray[np.float32] = np.frombuffer(data, _TRIANGLE, count, 84)["corners"]
     finite = np.isfinite(corners).all(axis=(1, 2))
     if not finite.all():
-        raise ValueError(f"{path}: triangle {int(np.argmin(finite))} has a coordinate not finite")
+        raise ValueError(
+            f"{path}: triangle {int(np.argmin(finite))} has a coordinate that is not finite"
+        )
     return corners.reshape(-1, 3)
 
 
@@ -260,7 +262,7 @@ def _read_text_stl(
     end = str(path)
 
     def words() -> Iterator[tuple[str, str, str]]:
-        """The place, the word, and, behind `solid`, the name of the solid."""
+        """The location, the word, and, after `solid`, the name of the solid."""
         nonlocal end
         for end, line in _lines(path, data):
             for word in line.split():
@@ -277,7 +279,7 @@ def _read_text_stl(
         return f"{len(parts)} facet" + "s" * (len(parts) != 1)
 
     def take(expected: str) -> tuple[str, str]:
-        """The next word, and the name behind it. ValueError: it is not `expected`."""
+        """The next word, and the name after it. ValueError: it is not `expected`."""
         place, word, name = next(text, ("", "", ""))
         if not place:
             raise ValueError(

@@ -2,7 +2,8 @@
 linearly.
 
 client/robot/joint_motion.cc derives them; names and constants are the same. Each bound is a number
-or an array over motions, computed in floating point; `travel` and `deviation` add what that rounds.
+or an array over motions, computed in floating point; `travel` and `deviation` add the rounding
+errors.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from hulld.robot.description import Description, Joint, PoseNumbers
 from hulld.robot.kinematics import Columns
 
-#: Motions with more turn in a span, in radians, have no bound.
+#: Motions that turn by more than this in a span, in radians, have no bound.
 MOST_TURN = 2.0
 
 _UNIT = sys.float_info.epsilon / 2
@@ -67,7 +68,7 @@ class MotionBound:
         return self._offset(math.hypot(*X[4:]), 0.0, 0.0)._rotated(0.0, 0.0)
 
     def moved(self, joint: Joint, start: Columns, end: Columns) -> MotionBound:
-        """The bound of the frame behind a joint."""
+        """The bound of the frame after a joint."""
         if joint.kind in ("revolute", "continuous"):
             return self._turned(start[0], end[0])
         if joint.kind == "prismatic":
@@ -154,8 +155,8 @@ def bound_motions(
 
 
 def align_turns(robot: Description, values: list[list[Any]]) -> None:
-    """Negates quaternions of floating joints where that makes the rotation from the waypoint before
-    the shorter one. values: of joint_values, arrays over waypoints."""
+    """Negates quaternions of floating joints where that shortens the rotation from the previous
+    waypoint. values: of joint_values, arrays over waypoints."""
     for joint, value in zip(robot.joints, values):
         if joint.kind != "floating":
             continue

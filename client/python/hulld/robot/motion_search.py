@@ -77,7 +77,7 @@ class Movers:
         placements.radii = radii.reshape(-1)
         moves = objects < parts
         part = np.where(moves, objects, 0)
-        # The last row stands for the parts.
+        # The last row represents the parts.
         around = np.concatenate([self.around.poses, [NO_MOTION]])
         fixed = around[np.where(moves, -1, objects - parts)]
         rows = np.arange(len(objects))[:, np.newaxis]
@@ -118,9 +118,10 @@ class _Search:
 
 
 class MotionSearch:
-    """ask(placements, pairs, objects, **options): the answers of Client.check_collisions; raises if
-    a pair has none. objects: k x 2, of parts, then of the placements around; pairs likewise, m x 2.
-    clearance: separations up to this count as contact. resolution: see Robot.check_motion."""
+    """ask(placements, pairs, objects, **options): returns the answers of Client.check_collisions;
+    raises if a pair has none. objects: k x 2, indices of parts, then of the surrounding placements;
+    pairs: m x 2, likewise. clearance: separations up to this count as contact. resolution: see
+    Robot.check_motion."""
 
     def __init__(
         self,
@@ -165,14 +166,14 @@ class MotionSearch:
                 )
 
     def _round(self, searches: Sequence[_Search]) -> None:
-        """Asks about the first open spans of each search, then about the poses in their middle."""
+        """Queries the first open spans of each search, then the poses in their middle."""
         met: dict[int, int] = {}
         for search in searches:
             if search.contact_time is not None:
                 met.setdefault(search.pair, search.segment)
         asked: list[tuple[_Search, _Span]] = []
         for search in searches:
-            # A contact makes the later searches of its pair needless.
+            # A contact makes the later searches of its pair unnecessary.
             if search.segment > met.get(search.pair, search.segment):
                 search.is_done = True
             if not search.is_done and len(asked) < _MOST_SPANS:
@@ -213,7 +214,7 @@ class MotionSearch:
     def _separated_until(
         self, segments: _Indices, objects: _Indices, begins: _Floats, durations: _Floats
     ) -> _Floats:
-        """The part of each span up to which its pair is proven free; 1: throughout."""
+        """The fraction of each span up to which its pair is proven free; 1: throughout."""
         if not len(segments):
             return np.empty(0)
         moves, bounds, reaches = self._moving(segments, objects)
@@ -239,8 +240,8 @@ class MotionSearch:
     def _divide(
         self, asked: Sequence[tuple[_Search, _Span]], until: list[float], is_last: list[bool]
     ) -> list[tuple[_Search, float]]:
-        """Replaces the asked spans, at the front of their searches, by their halves that are not
-        proven free. Returns the times at which poses have to be checked."""
+        """Replaces the queried spans, at the front of their searches, with their halves that are
+        not proven free. Returns the times at which poses have to be checked."""
         times: list[tuple[_Search, float]] = []
         left: dict[int, list[_Span]] = {}
         for (search, span), proven, last in zip(asked, until, is_last):

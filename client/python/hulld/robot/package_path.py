@@ -17,10 +17,11 @@ def resolve_file(
     """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
     the description's folder. If no file has the name, its escapes such as %20 are decoded.
 
-    A package is the first folder with the file among: that of `packages`, alone; DIR/PACKAGE, or
-    DIR itself if it is named PACKAGE, for each DIR of ROS_PACKAGE_PATH, and packages at most three
-    folders below it; DIR/share/PACKAGE for each DIR of AMENT_PREFIX_PATH; the nearest folder above
-    the description that is named PACKAGE or contains one. FileNotFoundError lists them.
+    A package is the first of these folders that contains the file: the folder in `packages`,
+    exclusively; DIR/PACKAGE, or DIR itself if it is named PACKAGE, for each DIR of
+    ROS_PACKAGE_PATH, and packages at most three folders below it; DIR/share/PACKAGE for each DIR of
+    AMENT_PREFIX_PATH; the nearest folder above the description that is named PACKAGE or contains
+    one. FileNotFoundError lists these folders.
     """
     scheme, separator, rest = name.partition("://")
     if not separator or scheme == "file":
@@ -46,7 +47,7 @@ def resolve_file(
 
 
 def _file_in(folder: pathlib.Path, name: str) -> pathlib.Path | None:
-    """folder/name. URIs may hold escapes such as %20, and so may names of files."""
+    """folder/name. URIs may contain escapes such as %20, and so may file names."""
     for spelled in (name, urllib.parse.unquote(name)):
         if (folder / spelled).is_file():
             return folder / spelled

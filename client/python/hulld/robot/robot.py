@@ -46,10 +46,10 @@ _SWELL_TO_WARN = 1.5
 
 @dataclass(frozen=True)
 class Part:
-    """A hull of a robot: a shape, or a convex piece of a mesh. name: that of the link, followed by
-    /1, /2, and so on if the link has several. points: n x 3, in the frame of the shape. X_LS: its
-    pose in the frame of the link. radius: as in Placement. excess: the rounded hull extends at most
-    this far beyond the shape. mesh_volume: 0 if it is unknown."""
+    """A hull of a robot: a shape, or a convex piece of a mesh. name: the link's name, followed by
+    /1, /2, and so on if the link has several parts. points: n x 3, in the frame of the shape.
+    X_LS: its pose in the frame of the link. radius: as in Placement. excess: the rounded hull
+    extends at most this far beyond the shape. mesh_volume: 0 if it is unknown."""
 
     name: str
     link: int
@@ -61,8 +61,8 @@ class Part:
 
 
 class Robot:
-    """A robot description with a hull for each shape: joint values in, exact answers about the
-    resulting poses out. Made by from_urdf. Any thread may use it.
+    """A robot description with a hull for each shape: converts joint values to poses, and answers
+    exactly for these poses. Created by from_urdf. Thread-safe.
 
     The first check registers the hulls. `close`, or the end of a `with` block, deletes them.
     """
@@ -75,7 +75,7 @@ class Robot:
         client: Client | None,
         prefix: str | None,
     ) -> None:
-        """left_out: pairs of links that are not checked, the lower index first."""
+        """left_out: unchecked pairs of links, the lower index first."""
         self._description = description
         self.parts = tuple(parts)
         self._radii = np.array([part.radius for part in parts])
@@ -103,27 +103,28 @@ class Robot:
         client: Client | None = None,
         prefix: str | None = None,
     ) -> Self:
-        """Reads a URDF file and its meshes; asks no server.
+        """Reads a URDF file and its meshes, without a server.
 
         Boxes, spheres, and capsules are exact; meshes become their convex hulls, cylinders
         enclosing polyhedra. Shapes of one link are not checked against each other. Without `srdf`,
-        neither are adjacent links, which a joint connects, or joints through links without shapes;
-        `adjacent` includes these. srdf: a file; exactly the pairs that it disables are left out.
+        neither are adjacent links, which are connected by a joint, or by joints through links
+        without shapes; `adjacent` includes them. srdf: a file; exactly the pairs that it disables
+        are skipped.
 
-        packages: folders by the name in package://NAME/. Names without a folder are searched in
+        packages: folders by the name in package://NAME/. Other packages are searched in
         ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of
         several named convex parts, as V-HACD and CoACD write OBJ, becomes one hull per part.
-        load_mesh: reads mesh files, as trimesh.load_mesh; None: STL and OBJ are read here.
+        load_mesh: reads mesh files, as trimesh.load_mesh; None: reads STL and OBJ.
 
-        client: of the server that answers; None: a private one in memory, shared by all robots of
-        this process. prefix: keeps the hulls under this ID prefix, as in "arm/"; None: `close`
-        deletes them.
+        client: for the server that answers; None: a private in-memory server, shared by all robots
+        of this process. prefix: keeps the hulls under this ID prefix, such as "arm/"; None:
+        `close` deletes them.
 
         ValueError: the description, the SRDF, or a mesh is malformed; the message names file and
         line. OSError: a file is missing.
         """
         if not isinstance(client, (Client, type(None))):
-            raise TypeError(f"client is {client!r}; it takes a hulld.Client")
+            raise TypeError(f"client is {client!r}; it must be a hulld.Client")
         description = read_urdf(path)
         left_out = set() if adjacent else description.adjacent_pairs()
         if srdf is not None:
@@ -176,7 +177,7 @@ class Robot:
 
     @property
     def limits(self) -> npt.NDArray[np.float64]:
-        """dof x 2: lower and upper limit; infinite where there is none."""
+        """dof x 2: lower and upper limits; infinite if there is no limit."""
         joints = self._description.joints
         rows = [joints[v.joint].limits for v in self._description.variables]
         return np.array([row or (-np.inf, np.inf) for row in rows]).reshape(-1, 2)
@@ -200,14 +201,14 @@ class Robot:
         return poses_of_links
 
     def _configurations(self, q: Configurations) -> npt.NDArray[np.float64]:
-        """n x dof finite numbers. ValueError, TypeError: q is something else."""
+        """n x dof finite numbers. ValueError, TypeError: q has another form."""
         if isinstance(q, Mapping):
             return self._by_name(q)
         array = arguments.as_floats(arguments.as_array(q, "q"), "q").astype(np.float64, copy=False)
         rows = array[np.newaxis] if array.ndim == 1 else array
         if rows.ndim != 2 or rows.shape[1] != self.dof:
             raise ValueError(
-                f"q has the shape {array.shape}; {self.name} takes ({self.dof},) or (n, "
+                f"q has the shape {array.shape}; {self.name} expects ({self.dof},) or (n, "
                 f"{self.dof}): {', '.join(self.variables)}"
             )
         finite = np.isfinite(array)
@@ -235,7 +236,9 @@ class Robot:
             )
         sizes = {column.size for column in columns.values() if column.ndim > 0}
         if len(sizes) > 1 or any(column.ndim > 1 for column in columns.values()):
-            raise ValueError("q takes a number or n numbers for each name, the same n for all")
+            raise ValueError(
+                "q must have one number, or n numbers, for each name, with the same n for all"
+            )
         rows = np.tile(self.rest, (sizes.pop() if sizes else 1, 1))
         for name, column in columns.items():
             floats = arguments.as_floats(column, f"q[{name!r}]")
@@ -260,11 +263,11 @@ class Robot:
         """Checks configurations for collisions of the robot with itself and with a scene.
 
         q: one configuration (dof), many (n x dof), in the order of `variables`, or values by name,
-        as in {"elbow": 1.5}, with the other variables at rest. Values beyond limits are used, with
-        a warning. scene: placements of hulls and bodies on the server of `client`. ignore: pairs of
-        names of links, parts, or IDs of the scene. base: the pose of the root link. separation,
-        clearance, tolerance: as in Client.check_collision. timeout: of each call, for some thousand
-        configurations.
+        as in {"elbow": 1.5}, with the other variables at rest. Values beyond limits cause a
+        warning, but are used. scene: placements of hulls and bodies on the server of `client`.
+        ignore: pairs of names of links, parts, or IDs of the scene. base: the pose of the root
+        link. separation, clearance, tolerance: as in Client.check_collision. timeout: of each call,
+        which covers a few thousand configurations.
 
         Poses are computed in floating point, and answers are exact for these poses. The motion
         between configurations is not checked; see check_motion.
@@ -308,21 +311,21 @@ class Robot:
         timeout: float | None = None,
     ) -> MotionCheck:
         """Finds the first contact of each pair while every joint moves linearly from each waypoint
-        to the next; floating joints turn the shorter way. The same check as `hullctl robot check
+        to the next; floating joints turn the shorter way. Same check as `hullctl robot check
         --continuous`.
 
         q: the waypoints, n x dof, n >= 2, or values by name. clearance: in meters; a separation of
-        at most this counts as contact. resolution: in meters; a pair may stay undecided that comes
-        this close to contact or to the clearance. The rest as in `check`. Contacts and free pairs
-        hold for the exact motion of the joints: bounds cover the paths of the links and all
-        rounding. A pair is not checked after its contact.
+        at most this counts as contact. resolution: in meters; a pair that comes this close to
+        contact, or to the clearance, may remain undecided. Other arguments are as in `check`.
+        Contacts and free pairs hold for the exact motion of the joints: bounds cover the paths of
+        the links and all rounding. A pair is not checked after its contact.
 
         ValueError: q has another shape, no pair is left, a placement of the scene moves, or a part
         turns or moves too far between two waypoints. NotFoundError: a hull of the scene is missing.
         """
         values = self._configurations(q)
         if len(values) < 2:
-            raise ValueError(f"q holds {len(values)} waypoints; a motion takes at least 2")
+            raise ValueError(f"q holds {len(values)} waypoints; a motion needs at least 2")
         clearance = arguments.number(clearance, "clearance", least=0)
         resolution = arguments.number(resolution, "resolution", least=0)
         self._warn_of_limits(values)
@@ -379,7 +382,7 @@ class Robot:
         def poses_at(
             segments: npt.NDArray[np.intp], times: npt.NDArray[np.float64]
         ) -> npt.NDArray[np.float64]:
-            # Many pairs share their times.
+            # Many pairs have the same times.
             keys, inverse = np.unique(
                 np.stack([segments, times], axis=1), axis=0, return_inverse=True
             )
@@ -413,7 +416,7 @@ class Robot:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """The pairs of parts that `check` asks about, by name."""
+        """The pairs of parts that `check` queries, by name."""
         return [(self.parts[a].name, self.parts[b].name) for a, b in self._pairs]
 
     def _pairs_to_check(
@@ -475,7 +478,7 @@ class Robot:
         return self._client or shared_client()
 
     def _registered(self) -> list[str]:
-        """The IDs of the parts' hulls, which exist."""
+        """The IDs of the parts' hulls. The hulls exist when this returns."""
         with self._lock:
             if self._hull_ids:
                 return self._hull_ids
@@ -550,11 +553,11 @@ def _many_robots(
     pairs: npt.NDArray[np.uint32],
 ) -> tuple[Placements, npt.NDArray[np.uint32]]:
     """The placements of n robots, then of the scene, and the pairs of each robot. ids: of the
-    parts, then of the scene. radii: of the parts. poses: n x parts x 7. pairs: of one robot, the
-    scene behind its parts."""
+    parts, then of the scene. radii: of the parts. poses: n x parts x 7. pairs: of one robot, with
+    the scene after its parts."""
     count, parts = poses.shape[:2]
     robots = np.arange(count, dtype=np.uint32)[:, np.newaxis, np.newaxis]
-    # The scene is behind all robots.
+    # The scene follows all robots.
     robot = np.where(pairs < parts, robots, np.uint32(max(0, count - 1)))
     shifted = pairs + robot * np.uint32(parts)
     of_parts = np.tile(np.arange(parts, dtype=np.uint32), count)

@@ -17,9 +17,9 @@ _OUTWARD = 1 + 2.0**-46
 
 
 def primitive_points(shape: Shape) -> tuple[Points, float, float]:
-    """n x 3 points in the frame of the shape, which is not a mesh, the radius, and the excess: the
-    rounded hull contains the shape and extends at most this far beyond it, up to the rounding of
-    this number.
+    """The rounded hull of a shape other than a mesh: n x 3 points in the frame of the shape, the
+    radius, and the excess. The rounded hull contains the shape and extends at most the excess
+    beyond it, up to the rounding of this number.
 
     A box, a sphere (its center), and a capsule (its segment) are exact. A cylinder becomes a prism
     of 32 sides.
@@ -34,7 +34,7 @@ def primitive_points(shape: Shape) -> tuple[Points, float, float]:
     half = shape.size[1] / 2
     if shape.kind == "capsule":
         return np.array([(0, 0, -half), (0, 0, half)]), radius, 0.0
-    # The sides of a regular polygon are nearer to its center than its corners, by this factor.
+    # Ratio of the distance of a regular polygon's sides from its center to that of its corners.
     reach = _OUTWARD * radius / math.cos(math.pi / CYLINDER_SIDES)
     angles = [2 * math.pi * side / CYLINDER_SIDES for side in range(CYLINDER_SIDES)]
     sides = [

@@ -128,7 +128,7 @@ def _origin_of(element: Element) -> PoseNumbers:
         if "rpy" in origin.attributes
         else (0.0, 0.0, 0.0)
     )
-    # Rz(yaw) Ry(pitch) Rx(roll), in liburdfdom's order of operations, so that poses agree.
+    # Rz(yaw) Ry(pitch) Rx(roll), in liburdfdom's order of operations, so that poses agree with it.
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     cy, sy = math.cos(yaw), math.sin(yaw)
     i = sr * cp * cy - cr * sp * sy
@@ -149,8 +149,8 @@ def _shapes_of(link: Element) -> list[Shape]:
         element = next(iter(geometry.children), None)
         if element is None or element.tag not in get_args(ShapeKind):
             raise (element or geometry).error(
-                f"<geometry> holds {repr(element.tag) if element else 'nothing'}; it takes a box, "
-                "cylinder, sphere, capsule or mesh"
+                f"<geometry> contains {repr(element.tag) if element else 'nothing'}; it must "
+                "contain a box, cylinder, sphere, capsule or mesh"
             )
         kind = cast(ShapeKind, element.tag)
         if kind == "mesh":
@@ -214,8 +214,8 @@ def _check_mimics(joints: dict[str, Element]) -> None:
             for one in (name, leader):
                 if joints[one].get("type") in ("planar", "floating"):
                     raise mimic.error(
-                        f"joint {one!r} is {joints[one].get('type')}; joints that mimic have one "
-                        "value each"
+                        f"joint {one!r} is {joints[one].get('type')}; a mimic joint and its leader "
+                        "must have one value each"
                     )
             if leader in seen:
                 raise element.error(f"joint {name!r} mimics itself through other joints")

@@ -45,7 +45,7 @@ class Element:
         return self.get(name)
 
     def numbers(self, name: str, count: int) -> list[float]:
-        """An attribute of `count` finite numbers. ValueError: it is something else, or missing."""
+        """An attribute of `count` finite numbers. ValueError: it is missing or malformed."""
         if name not in self.attributes:
             raise self.error(f'<{self.tag}> lacks {name}="..."')
         words = self.get(name).split()

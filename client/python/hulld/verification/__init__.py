@@ -2,8 +2,8 @@
 
 Everything is a rational number (fractions.Fraction), so nothing is rounded: a vertex, a translation
 and the components of a quaternion are doubles, and the rotation of a quaternion q is a matrix of
-integers in these, divided by |q|^2. The server is trusted only for the hulls and bodies that it
-stores, at the revisions that the answer names.
+integers in these, divided by |q|^2. The server is trusted only for the stored hulls and bodies at
+the revisions named in the answer.
 """
 
 from __future__ import annotations

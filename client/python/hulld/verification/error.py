@@ -1,11 +1,11 @@
-"""The error of a certificate that does not hold."""
+"""The error of an invalid certificate."""
 
 from __future__ import annotations
 
 
 class VerificationError(Exception):
     """A certificate does not prove the answer, or cannot be checked. moved: the hull or body has
-    changed since, or is gone; a new answer may be checked."""
+    since changed or been deleted; a new answer can be checked."""
 
     def __init__(self, reason: str, *, moved: bool = False) -> None:
         super().__init__(reason)

@@ -102,8 +102,8 @@ class MovingPiece:
         return parallel and sum(p * q for p, q in zip(q0, q1)) > 0
 
     def is_below(self, plane: _Plane, begin: float, until: float, may_end: bool) -> bool:
-        """True if n.p + radius |n| < offset for all vertices p over the interval, with the longer
-        of both ends for |n|; if may_end, they may be equal at its end. |q(t)|^2 times the
+        """True if n.p + radius |n| < offset for all vertices p over the interval, with |n| replaced
+        by the longer of both ends; if may_end, equality is allowed at its end. |q(t)|^2 times the
         difference is a polynomial in t of degree 4. It is negative if no Bernstein coefficient is
         positive and the outer ones are negative."""
         (q0, x0), (q1, x1) = self._parts_at(Fraction(begin)), self._parts_at(Fraction(until))
@@ -112,7 +112,7 @@ class MovingPiece:
         norms = [norm for _, norm in forms]
         crossed = (dot(n0, x1) + dot(n1, x0) - offset0 - offset1) / 2
         constants = _product(norms, (dot(n0, x0) - offset0, crossed, dot(n1, x1) - offset1))
-        # For each axis of the hull: its dot product with each direction, turned by each form.
+        # For each axis of the hull: its dot product with each direction, rotated by each form.
         middle = (n0[0] + n1[0]) / 2, (n0[1] + n1[1]) / 2, (n0[2] + n1[2]) / 2
         directions = [
             [
@@ -153,7 +153,7 @@ def _check_interval(
     until = interval.until
     if interval.offset is None:
         if not (a.keeps_rotation() and b.keeps_rotation()):
-            raise VerificationError("there is no offset, which only translations do without")
+            raise VerificationError("the offset is missing, which is allowed only for translations")
         at_end = _gap_sign(n, a.at(until), b.at(until))
         at_begin = _gap_sign(n, a.at(begin), b.at(begin))
         if at_begin <= 0 or at_end < 0 or (at_end == 0 and not may_end):
@@ -193,7 +193,7 @@ def _check_contact(
     a: MovingPiece,
     b: MovingPiece,
 ) -> None:
-    """Checks that the pair is in contact at contact_time, or, for translations, by then."""
+    """Checks that the pair is in contact at contact_time or, for translations, by that time."""
     if certificate is None or contact.contact_time is None:
         raise VerificationError("the answer has no certificate of the contact")
     places = a.at(contact.contact_time), b.at(contact.contact_time)
@@ -262,7 +262,8 @@ def check_moving_bodies(
     b: Sequence[MovingPiece],
     max_time_error: float,
 ) -> None:
-    """Each pair of pieces needs intervals up to separated_until, and one of them the contact."""
+    """Each pair of pieces needs intervals up to separated_until, and one pair needs the
+    contact."""
     if contact is None:
         raise VerificationError("the answer is about a motion, but has no first contact")
     _check_times(relation, contact, max_time_error)

@@ -82,7 +82,7 @@ def sign(a: Fraction, b: Fraction, c: Fraction) -> int:
 
 
 def holds_origin(points: Sequence[Point]) -> bool:
-    """True if the convex hull of the points holds 0 (Caratheodory: some simplex does)."""
+    """True if the convex hull of the points contains 0 (Caratheodory: some simplex does)."""
     if any(p == ORIGIN for p in points):
         return True
     for p, q in combinations(points, 2):
@@ -95,7 +95,7 @@ def holds_origin(points: Sequence[Point]) -> bool:
         if all(dot(n, cross(a, b)) >= 0 for a, b in ((p, q), (q, r), (r, p))):
             return True
     for p, q, r, s in combinations(points, 4):
-        # Six volumes each: with 0 in the place of each corner.
+        # Six times each volume, with 0 in place of each corner.
         volume = dot(minus(q, p), cross(minus(r, p), minus(s, p)))
         parts = (
             dot(q, cross(r, s)),
@@ -109,9 +109,9 @@ def holds_origin(points: Sequence[Point]) -> bool:
 
 
 def surrounds_origin(points: Sequence[Point]) -> bool:
-    """True if 0 is strictly inside the convex hull: no half-space through 0 holds all points. If
-    the points span space, such a half-space could be turned until two of them, independent, lie on
-    its boundary."""
+    """True if 0 is strictly inside the convex hull: no half-space through 0 contains all points.
+    If the points span space, such a half-space could be turned until two of them, independent, lie
+    on its boundary."""
     spans = any(dot(a, cross(b, c)) != 0 for a, b, c in combinations(points, 3))
     if not spans:
         return False

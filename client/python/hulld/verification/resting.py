@@ -59,10 +59,12 @@ class Piece:
         if self._in_any_order:
             places = np.flatnonzero((self._vertices == vertex).all(axis=1))
             if not places.size:
-                raise VerificationError("a vertex pair names a point that its shape does not have")
+                raise VerificationError(
+                    "a vertex pair refers to a point that its shape does not have"
+                )
             index = int(places[0])
         if index >= len(self.points):
-            raise VerificationError("a vertex pair names a vertex that does not exist")
+            raise VerificationError("a vertex pair refers to a vertex that does not exist")
         if not (self._vertices[index] == vertex).all():
             raise VerificationError(f"a vertex pair gives other coordinates of vertex {index}")
         return self.points[index]
@@ -108,7 +110,7 @@ def direction_of(given: Sequence[float] | Sequence[int] | None) -> Point:
     try:
         return (Fraction(given[0]), Fraction(given[1]), Fraction(given[2]))
     except (ValueError, OverflowError):
-        raise VerificationError("the direction holds a number that is not finite") from None
+        raise VerificationError("the direction contains a number that is not finite") from None
 
 
 def differences_of(certificate: Certificate, a: Piece, b: Piece) -> list[Point]:

@@ -153,8 +153,7 @@ def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
             raise WireError("a field has the number 0")
         if at + size > len(view):
             raise WireError(
-                f"field {number} is cut off: {size} bytes were announced, {len(view) - at} are "
-                "there"
+                f"field {number} is cut off: {size} bytes were declared, {len(view) - at} are left"
             )
         yield number, wire_type, view[at : at + size]
         at += size

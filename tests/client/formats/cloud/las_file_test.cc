@@ -119,7 +119,7 @@ TEST(LasFile, CompressedFilesAreRefusedByName) {
   EXPECT_EQ(*PointFormatOfPath("scan.LAZ"), PointFormat::kLas);
 }
 
-TEST(LasFile, FilesThatLackPointsAreErrors) {
+TEST(LasFile, FilesWithMissingPointsAreErrors) {
   LasText las;
   las.xyz = {1, 2, 3, 4, 5, 6};
   const std::string text = las.Text();
@@ -140,10 +140,10 @@ TEST(LasFile, FilesThatLackPointsAreErrors) {
   std::string disagreeing = two.Text();
   disagreeing[247] = 9;
   EXPECT_THAT(ReadText(disagreeing, PointFormat::kLas).error(),
-              HasSubstr("declares 2 points in its old field and 9 in that of LAS 1.4"));
+              HasSubstr("declares 2 points in its legacy field and 9 in its LAS 1.4 field"));
 }
 
-TEST(LasFile, HeadersThatAreNotUnderstoodAreErrors) {
+TEST(LasFile, UnsupportedHeadersAreErrors) {
   LasText las;
   las.xyz = {1, 2, 3};
   const auto changed = [&](auto change) {
@@ -154,7 +154,7 @@ TEST(LasFile, HeadersThatAreNotUnderstoodAreErrors) {
   EXPECT_THAT(changed([](LasText* l) { l->minor = 5; }), HasSubstr("LAS 1.5 is not supported"));
   EXPECT_THAT(changed([](LasText* l) { l->format = 11; }), HasSubstr("point format 11 is unknown"));
   EXPECT_THAT(changed([](LasText* l) { l->format = 1; }),
-              HasSubstr("a record of point format 1 takes 28 bytes, not 20"));
+              HasSubstr("a record of point format 1 needs 28 bytes, not 20"));
   EXPECT_THAT(changed([](LasText* l) { l->scale[1] = 0; }), HasSubstr("the scale of y must be"));
   EXPECT_THAT(changed([](LasText* l) { l->offset[2] = HUGE_VAL; }), HasSubstr("the scale of z"));
   EXPECT_EQ(ReadText("LAS", PointFormat::kLas).error(),

@@ -38,7 +38,7 @@ std::string Head(const std::string& fields, size_t points) {
 
 constexpr char kFloats[] = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
 
-TEST(CompressedPcd, FieldsLieOneAfterAnother) {
+TEST(CompressedPcd, FieldsAreStoredOneAfterAnother) {
   const PointsRead read =
       ReadText(Head(kFloats, 3) + Compressed(Packed<float>({1, 2, 3, 10, 20, 30, 0.1f, 200, 300})),
                PointFormat::kPcd);
@@ -116,7 +116,7 @@ TEST(CompressedPcd, SizesAreCheckedAgainstTheData) {
   EXPECT_EQ(error(Head(kFloats, 0) + Packed<uint32_t>({0, 0})), "");
 }
 
-TEST(PcdFile, HeadersThatDoNotFitTheirDataAreErrors) {
+TEST(PcdFile, HeadersThatContradictTheirDataAreErrors) {
   const std::string fields = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
   const auto error = [&](const std::string& rest) {
     return ReadText(fields + rest, PointFormat::kPcd).error();

@@ -15,7 +15,7 @@ TEST(PtsFile, CountThenPointsWithIntensityAndColor) {
   EXPECT_THAT(ReadText("# scan\n\n1\n1 2 3\n", PointFormat::kPts).xyz(), ElementsAre(1, 2, 3));
 }
 
-TEST(PtsFile, HoldsOneScanAfterAnother) {
+TEST(PtsFile, ReadsConsecutiveScans) {
   EXPECT_THAT(ReadText("1\n1 2 3 4\n0\n2\n4 5 6 7\n7 8 9 0\n", PointFormat::kPts).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
 }

@@ -79,7 +79,7 @@ TEST(QuantizedGltf, EachTypeIsDecodedAsTheExtensionSays) {
   EXPECT_THAT(read(Bytes<uint16_t>({0, 65535, 1}), "5123", false), ElementsAre(0, 65535, 1));
 }
 
-TEST(GltfFile, RequiredExtensionsThatAreNotKnownAreRefusedByName) {
+TEST(GltfFile, UnknownRequiredExtensionsAreRefusedByName) {
   for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "ACME_new"}) {
     EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, "",
                            absl::StrCat(R"("extensionsRequired":[")", name, R"("],)"))),
@@ -90,14 +90,14 @@ TEST(GltfFile, RequiredExtensionsThatAreNotKnownAreRefusedByName) {
             "");
 }
 
-TEST(GltfFile, FloatsThatNothingMovesStayFloats) {
+TEST(GltfFile, UntransformedFloatsStayFloats) {
   const PointsRead read = ReadText(Gltf(Bytes(kTriangle), kFloats), PointFormat::kGltf);
   ASSERT_TRUE(read.status.ok()) << read.status;
   EXPECT_TRUE(read.all_float());
   EXPECT_THAT(read.xyz(), ElementsAre(0.1f, 0, 0, 1, 0, 0, 0, 2, 0));
 }
 
-TEST(GltfFile, FilesWithoutScenesShowAllRoots) {
+TEST(GltfFile, FilesWithoutScenesUseAllRoots) {
   const std::string text = Replaced(Gltf(Bytes(kTriangle), kFloats, R"(,"translation":[0,0,5])"),
                                     R"("scene":0,"scenes":[{"nodes":[0]}],)", "");
   EXPECT_THAT(ReadText(text, PointFormat::kGltf).xyz(), ElementsAre(0.1f, 0, 5, 1, 0, 5, 0, 2, 5));
@@ -105,7 +105,7 @@ TEST(GltfFile, FilesWithoutScenesShowAllRoots) {
   EXPECT_EQ(ReadText(bare, PointFormat::kGltf).counts.points, 3u);
 }
 
-TEST(GltfFile, NodesComposeMatricesAndTurns) {
+TEST(GltfFile, NodesComposeMatricesAndRotations) {
   const std::string matrix = R"(,"matrix":[0,1,0,0,-1,0,0,0,0,0,1,0,10,0,0,1])";
   EXPECT_THAT(ReadText(Gltf(Bytes(kTriangle), kFloats, matrix), PointFormat::kGltf).xyz(),
               ElementsAre(10, 0.1f, 0, 10, 1, 0, 8, 0, 0));
@@ -119,7 +119,7 @@ TEST(GltfFile, NodesComposeMatricesAndTurns) {
               HasSubstr("several parents"));
 }
 
-TEST(GltfFile, BuffersMayLieInFilesWithEscapedNames) {
+TEST(GltfFile, BuffersMayBeFilesWithEscapedNames) {
   const TempFile buffer("my buffer#1.bin", Bytes(kTriangle));
   const std::string name = buffer.path().substr(buffer.path().rfind('/') + 1);
   const std::string escaped = Replaced(Replaced(name, " ", "%20"), "#", "%23");
@@ -170,14 +170,14 @@ TEST(GltfFile, MorphTargetsMoveVerticesByTheirWeights) {
   EXPECT_THAT(read("[0,0]", ""), ElementsAre(x, 0, 0, 1, 0, 0, 0, 2, 0));
   EXPECT_THAT(read("[0.5,0]", ""), ElementsAre(x + 1, 2, 4, 2, 2, 4, 1, 4, 4));
   EXPECT_THAT(read("[0.5,1]", ""), ElementsAre(x + 1 + 100, 2, 4, 102, 2, 4, 101, 4, 4));
-  // The node's weights win.
+  // The node's weights take precedence.
   EXPECT_THAT(read("[9,9]", "[-0.5,0]"), ElementsAre(x - 1, -2, -4, 0, -2, -4, -1, 0, -4));
   EXPECT_THAT(Error(Replaced(MorphGltf("[1,0]", ""), R"("count":3,"byteOffset":36)",
                              R"("count":2,"byteOffset":36)")),
               HasSubstr("a morph target has 2 positions for 3 vertices"));
 }
 
-// The first vertex hangs on nodes[1], the second on nodes[2], the third on both.
+// The first vertex follows nodes[1], the second nodes[2], the third both.
 std::string SkinGltf() {
   const std::string bytes = Bytes(kTriangle) +
                             Bytes<uint8_t>({0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}) +
@@ -203,7 +203,7 @@ TEST(GltfFile, SkinsPlaceVerticesByTheirJoints) {
   EXPECT_THAT(read.xyz(), ElementsAre(0.1f, 0, 8, 1, 4, 0, 0, 5, 2));
 }
 
-TEST(GltfFile, SkinsThatDoNotFitTheirMeshAreErrors) {
+TEST(GltfFile, SkinsThatDoNotMatchTheirMeshAreErrors) {
   const auto error = [](const std::string& from, const std::string& to) {
     return Error(Replaced(SkinGltf(), from, to));
   };
@@ -262,7 +262,7 @@ TEST(GltfFile, IndicesMakeTrianglesOfEachMode) {
   EXPECT_THAT(triangles("6", "4"), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(0, 2, 3)));
 }
 
-TEST(GltfFile, BinaryFormIsReadAndCutOnesAreRefused) {
+TEST(GltfFile, BinaryFilesAreReadAndTruncatedOnesRefused) {
   std::string json = Replaced(Gltf(Bytes(kTriangle), kFloats),
                               absl::StrCat(R"(,"uri":")", DataUri(Bytes(kTriangle)), "\""), "");
   while (json.size() % 4 != 0) json += ' ';

@@ -1,4 +1,4 @@
-// --max-staleness and --at-least: the commands that take them, and their transmission with each
+// --max-staleness and --at-least: the commands that accept them, and their transmission with each
 // read.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -25,7 +25,7 @@ class ListAndDelete : public HullctlOnServer {
   }
 };
 
-TEST_F(ListAndDelete, ListsAreSortedAndCut) {
+TEST_F(ListAndDelete, ListsAreSortedAndLimited) {
   EXPECT_EQ(Names({"list"}), "arm/1\narm/2\nbox\n");
   EXPECT_EQ(Names({"list", "--reverse"}), "box\narm/2\narm/1\n");
   EXPECT_EQ(Names({"list", "--sort", "vertices"}), "arm/2\narm/1\nbox\n");
@@ -58,7 +58,7 @@ TEST_F(ListAndDelete, SeveralAreDeletedOnlyWithConfirmation) {
   EXPECT_EQ(Names({"list"}), "box\n");
   const Ran none = Ask({"delete", "--prefix", "arm/", "--yes"});
   EXPECT_EQ(none.code, 0);
-  EXPECT_THAT(none.err, HasSubstr("no hull starts with \"arm/\""));
+  EXPECT_THAT(none.err, HasSubstr("no hull ID starts with \"arm/\""));
 }
 
 TEST_F(ListAndDelete, AMissingHullDoesNotPreventOtherDeletions) {

@@ -17,7 +17,7 @@ class SafeWrites : public HullctlOnServer {
   bool Exists(const std::string& hull_id) { return Ask({"get", hull_id}).code == 0; }
 };
 
-TEST_F(SafeWrites, ReplaceByNoPointsIsRefusedUnlessItIsMeant) {
+TEST_F(SafeWrites, ReplacingWithNoPointsMustBeExplicit) {
   Put("h", server::Cube());
   const TempFile empty("empty.xyz", "");
   const TempFile only_nan("nan.xyz", "nan 0 0\n");
@@ -36,7 +36,7 @@ TEST_F(SafeWrites, ReplaceByNoPointsIsRefusedUnlessItIsMeant) {
   EXPECT_EQ(Get("h").hull().vertex_count(), 0U);
 }
 
-TEST_F(SafeWrites, AppendCreatesNoHullOfAFileThatIsRefused) {
+TEST_F(SafeWrites, AppendCreatesNoHullFromARefusedFile) {
   const TempFile malformed("a.xyz", "1 2 x\n");
   const TempFile nan("b.xyz", "nan 1 2\n");
   for (const TempFile* file : {&malformed, &nan}) {
@@ -55,13 +55,13 @@ TEST_F(SafeWrites, AppendNamesDirectoriesAndMissingFilesOfAnyExtension) {
               HasSubstr("cannot open /no/such/file: No such file"));
 }
 
-TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
+TEST_F(SafeWrites, AppendCreatesNoHullFromNoPoints) {
   const TempFile empty("empty.xyz", "# nothing\n");
   const Ran ran = Ask({"append", "new", empty.path(), "--create"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("contain no points"), HasSubstr("hullctl create")));
   EXPECT_FALSE(Exists("new"));
-  // Adding nothing to an existing hull is allowed.
+  // Appending no points to an existing hull is allowed.
   Put("h", server::Cube());
   EXPECT_EQ(Ask({"append", "h", empty.path(), "--create"}).code, 0);
 }
@@ -75,7 +75,7 @@ TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoint
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("the limit is 3"));
   EXPECT_FALSE(Exists("new"));
-  // A previously existing hull stays, though empty.
+  // A hull that existed before is kept, even if empty.
   Create("mine");
   EXPECT_EQ(Ask({"append", "mine", file.path(), "--create"}).code, 1);
   EXPECT_TRUE(Exists("mine"));
@@ -85,7 +85,7 @@ TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoint
   EXPECT_EQ(Get("some").hull().vertex_count(), 4U);
 }
 
-TEST_F(SafeWrites, MissingHullsAreNotCreatedInOrderToBeDeleted) {
+TEST_F(SafeWrites, NotFoundErrorsDoNotSuggestCreatingTheHull) {
   const Ran ran = Ask({"delete", "nope"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));

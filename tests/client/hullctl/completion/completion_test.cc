@@ -64,7 +64,7 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   EXPECT_THAT(parts, ElementsAre("arm/", ":"));
 }
 
-TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreTaken) {
+TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreAccepted) {
   Create("bolt");
   ASSERT_EQ(RunTool({"body", "put", "bracket", "bolt", "--server", server_->address()}).code, 0);
   EXPECT_THAT(Offers({"check", "b"}), ElementsAre("bolt", "bracket", ":"));
@@ -92,7 +92,7 @@ TEST(CompletionScript, CallsTheProgramThatIsTyped) {
   }
   const Ran other = RunTool({"completion", "csh"});
   EXPECT_EQ(other.code, 2);
-  EXPECT_THAT(other.err, HasSubstr("\"csh\" is none of bash, zsh, fish"));
+  EXPECT_THAT(other.err, HasSubstr("\"csh\" is not one of bash, zsh, fish"));
 }
 
 }  // namespace completion_test

@@ -31,7 +31,7 @@ TEST(Combine, EarlierLayersWinSettingBySetting) {
   EXPECT_EQ(Combine({}).at("server").source, "default");
 }
 
-TEST(Combine, AContextForAnotherServerIsLeftAsideWithItsToken) {
+TEST(Combine, AContextForAnotherServerIsIgnoredWithItsToken) {
   const SettingsLayer context{"context c", {{"server", "c:1"}, {"token-file", "c.token"}}, true};
   EXPECT_FALSE(Combine({Options({{"server", "a:1"}}), context}).contains("token-file"));
   EXPECT_TRUE(Combine({Options({{"server", "c:1"}}), context}).contains("token-file"));
@@ -118,7 +118,7 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
   EXPECT_THAT(problem(R"({"contexts":{"a b":{"server":"a:1"}}})"), HasSubstr("a name is up to"));
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","tls":"yes"}}})"),
               HasSubstr("tls is not a true or false"));
-  // A token does not belong in this file, and is not repeated in errors.
+  // A token does not belong in this file, and errors do not quote it.
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","token":"hunter2"}}})"),
               AllOf(HasSubstr("\"token\", which is not a setting"), Not(HasSubstr("hunter2"))));
   // Commands without a server ignore the error.

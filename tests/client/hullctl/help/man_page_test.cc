@@ -16,7 +16,7 @@ namespace man_page_test {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Suggestion, IsAPrefixOrNear) {
+TEST(Suggestion, IsAPrefixOrSimilar) {
   const std::vector<std::string> words = {"check", "delete", "--verify", "--version"};
   EXPECT_EQ(Suggestion("chek", words), "; did you mean \"check\"?");
   EXPECT_EQ(Suggestion("del", words), "; did you mean \"delete\"?");
@@ -56,7 +56,7 @@ TEST(ManPage, RepeatsTheHelpInRoff) {
       "codes.\n");
 }
 
-TEST(ManPage, EveryCommandHasOne) {
+TEST(ManPage, EveryCommandHasAManPage) {
   const std::string folder = ::testing::TempDir() + "/hulld_man_pages";
   std::filesystem::remove_all(folder);
   ASSERT_EQ(RunTool({"__man", folder}).code, 0);

@@ -48,7 +48,7 @@ TEST(LatencyHistogram, MergingEqualsRecordingInOne) {
   }
 }
 
-TEST(LatencyHistogram, RowsHoldEverythingOnce) {
+TEST(LatencyHistogram, RowsCoverEverythingOnce) {
   LatencyHistogram histogram;
   for (const int64_t ns : {150, 199, 201, 4999, 5100, 2000000}) histogram.Record(nanoseconds(ns));
   const std::vector<LatencyHistogram::Row> rows = histogram.Rows();

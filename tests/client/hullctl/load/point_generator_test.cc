@@ -120,7 +120,7 @@ TEST(PointGenerator, LatticesRunXFirst) {
   EXPECT_EQ(points[7], (Point{1.5, 0.5, 0.5}));
 }
 
-TEST(PointGenerator, TheLatticeIsTheSmallestThatHoldsAllPoints) {
+TEST(PointGenerator, TheLatticeIsTheSmallestThatFitsAllPoints) {
   EXPECT_EQ(LatticeSide(0), 0u);
   EXPECT_EQ(LatticeSide(1), 1u);
   EXPECT_EQ(LatticeSide(8), 2u);
@@ -131,7 +131,7 @@ TEST(PointGenerator, TheLatticeIsTheSmallestThatHoldsAllPoints) {
   }
 }
 
-TEST(PointGenerator, AnotherSeedGivesOtherPoints) {
+TEST(PointGenerator, AnotherSeedYieldsDifferentPoints) {
   CloudOptions options;
   options.count = 10;
   const std::vector<Point> first = Generate(options);

@@ -1,4 +1,4 @@
-// Queries about files, and servers of hullctl's own.
+// Queries about files, and hullctl's private servers.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,7 +65,7 @@ TEST_F(Files, AreCheckedWithoutBeingStored) {
   EXPECT_TRUE(StoresNothing());
 }
 
-TEST_F(Files, MeetHullsAndAreVerified) {
+TEST_F(Files, CollideWithHullsAndAreVerified) {
   Put("ball", server::Sphere(300));
   const std::string cube = Write("cube.xyz", server::Cube());
   for (const char* const pose : {"0,0,0", "1,0,0", "3,0,0"}) {
@@ -145,8 +145,9 @@ TEST_F(Files, AreNamedInErrors) {
   EXPECT_THAT(Ask({"check", "./part", "./part"}).err, HasSubstr("./part"));
   EXPECT_THAT(Ask({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
   const std::string empty = Write("empty.xyz", {});
-  EXPECT_THAT(Ask({"check", empty, empty}).err, HasSubstr("empty.xyz: the file holds no point"));
-  // A name that no file has is an ID.
+  EXPECT_THAT(Ask({"check", empty, empty}).err,
+              HasSubstr("empty.xyz: the file contains no points"));
+  // A name without a matching file is an ID.
   EXPECT_THAT(Ask({"check", "part.stl", "part.stl"}).err, HasSubstr("part.stl"));
 }
 

@@ -72,7 +72,7 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
-TEST_F(Judge, AProgramThatOnlySaysCollidingMayCallTouchingEither) {
+TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayJudgeTouchingEitherWay) {
   const Ran ran = JudgeText(
       "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
   EXPECT_EQ(ran.code, 1);
@@ -144,14 +144,14 @@ TEST_F(Judge, PairsWithoutAnAnswerFailAlone) {
   EXPECT_THAT(ran.out, StartsWith("# 2 answers, 0 wrong, 1 failed\n"));
 }
 
-TEST_F(Judge, NamesLineAndColumnOfAMistake) {
+TEST_F(Judge, ErrorsNameLineAndColumn) {
   const auto error = [this](const std::string& table, const std::string& what) {
     const Ran ran = JudgeText(table);
     EXPECT_EQ(ran.code, 2) << table;
     EXPECT_THAT(ran.err, HasSubstr(what)) << table;
   };
-  error("", "the table holds no answers");
-  error("a,b,colliding\n", "the table holds no answers");
+  error("", "the table contains no answers");
+  error("a,b,colliding\n", "the table contains no answers");
   error("a,colliding\n", "answers.csv:1: the header has no column b");
   error("a,b,b_x\n", "needs relation, colliding, distance, depth, or contact_time");
   error("a,b,colliding,A\n", "the header names \"a\" twice");
@@ -171,8 +171,7 @@ TEST_F(Judge, NamesLineAndColumnOfAMistake) {
         "b_to_qw, b_to_qx, b_to_qy, b_to_qz are all 0");
   error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is not a time from 0 to 1");
   error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
-  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n",
-        "distance and depth apply only to a pair at rest");
+  error("a,b,b_to_x,distance\ncube,cube,1,0.5\n", "distance and depth apply only to pairs at rest");
   error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is not a duration of at least 0");
 }
 
@@ -205,7 +204,7 @@ TEST_F(Judge, TimesOfContactAreJudgedAgainstTheProvenBracket) {
   EXPECT_EQ(Ask({"verify", Write("record.json", record)}).out, "OVERLAPPING: valid\n");
 }
 
-TEST_F(Judge, ThePlotShowsTheProgramBesideTheServer) {
+TEST_F(Judge, ThePlotShowsTheProgramNextToTheServer) {
   const std::string table = "a,b,b_x,distance,us\ncube,cube,3,2.25,12\ncube,cube,4,3,8\n";
   const std::string chart = Write("trade.svg", "");
   const Ran ran = JudgeText(table, {"--plot", chart});

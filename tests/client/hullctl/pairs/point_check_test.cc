@@ -16,7 +16,7 @@ using ::testing::StartsWith;
 
 class PointCheck : public CubeServer {};
 
-TEST_F(PointCheck, TellsInsideOnAndOutsideExactly) {
+TEST_F(PointCheck, DistinguishesInsideOnAndOutsideExactly) {
   const std::string points =
       Write("points.xyz", "0.5 0.5 0.5\n1 0.5 0.5\n1.0000000000000002 0.5 0.5\n1 1 1\n");
   const Ran ran = Ask({"check", "cube", "--points", points});
@@ -64,7 +64,7 @@ TEST_F(PointCheck, SendsPartsWithinTheLimits) {
   EXPECT_THAT(ran.out, EndsWith("# inside 0 on 667 outside 333 failed 0\n"));
 }
 
-TEST_F(PointCheck, NamesWhatIsWrong) {
+TEST_F(PointCheck, ErrorsNameTheDefect) {
   const std::string points = Write("points.xyz", "0 0 0\n");
   const Ran missing = Ask({"check", "absent", "--points", points});
   EXPECT_EQ(missing.code, 1);
@@ -80,7 +80,7 @@ TEST_F(PointCheck, NamesWhatIsWrong) {
   usage({"check", "cube", "--points", points, "--verify"}, "remove --verify");
   usage({"check", "cube", "--points", points, "--tolerance", "1"}, "remove --tolerance");
   usage({"check", "cube"}, "B is required");
-  usage({"check", "cube", "--points", Write("empty.xyz", "")}, "the file holds no point");
+  usage({"check", "cube", "--points", Write("empty.xyz", "")}, "the file contains no points");
   usage({"check", "cube", "--points", Write("nan.xyz", "0 nan 0\n")}, "nan.xyz:1");
   usage({"check", "cube", "--points", "none.xyz"}, "none.xyz");
 }

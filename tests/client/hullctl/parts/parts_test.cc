@@ -36,7 +36,7 @@ class HullctlParts : public HullctlOnServer {
   const TempFile bracket_;
 };
 
-TEST_F(HullctlParts, AppendSaysHowMuchLargerTheHullIs) {
+TEST_F(HullctlParts, AppendReportsHowMuchLargerTheHullIs) {
   Ran ran = Ask({"append", "l", bracket_.path(), "--create"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("volume     1.643 times that of the mesh\n"));
@@ -90,7 +90,7 @@ TEST_F(HullctlParts, SplitMakesABodyOfTheParts) {
   EXPECT_THAT(ran.out, HasSubstr("{\"bodyId\":\"j\",\"pieces\":\"2\",\"added\":\"2\","));
 }
 
-TEST_F(HullctlParts, SplitChangesNothingWhereTheServerWouldRefuseTheBody) {
+TEST_F(HullctlParts, SplitChangesNothingIfTheServerWouldRefuseTheBody) {
   server::Config config = TestConfig();
   config.limits.max_pieces_per_body = 1;
   Restart(config);
@@ -100,7 +100,7 @@ TEST_F(HullctlParts, SplitChangesNothingWhereTheServerWouldRefuseTheBody) {
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
 }
 
-TEST_F(HullctlParts, SplitChangesNothingWhereAHullHasTheName) {
+TEST_F(HullctlParts, SplitChangesNothingIfAHullHasTheName) {
   Put("l", server::Cube());
   const std::string before = Ask({"list"}).out;
   Ran ran = Ask({"append", "l", bracket_.path(), "--split", "names", "--create"});
@@ -113,7 +113,7 @@ TEST_F(HullctlParts, SplitChangesNothingWhereAHullHasTheName) {
   EXPECT_EQ(Ask({"list"}).out, before);
 }
 
-TEST_F(HullctlParts, CoverTakesTheBodyAtItsPoses) {
+TEST_F(HullctlParts, CoverUsesThePosesOfTheBody) {
   ASSERT_EQ(Ask({"append", "l", bracket_.path(), "--split", "names", "--create"}).code, 0);
   Ran ran = Ask({"cover", "l", bracket_.path()});
   EXPECT_EQ(ran.out, "ENCLOSED: each of the 24 triangles is in the hulls together (exact)\n");

@@ -36,7 +36,7 @@ TEST(ProgressBar, ShowsNothingAtOnceOrWhenHidden) {
   EXPECT_EQ(out.str(), "");
 }
 
-TEST(Painter, ColorsAreForTerminalsThatWantThem) {
+TEST(Painter, ColorsAreForTerminalsThatSupportThem) {
   setenv("TERM", "xterm", 1);
   unsetenv("NO_COLOR");
   EXPECT_TRUE(WantsColor("auto", true));

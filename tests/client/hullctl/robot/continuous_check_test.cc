@@ -161,7 +161,7 @@ TEST_F(Continuous, AMissingHullOfTheSceneFails) {
   EXPECT_THAT(ran.out, HasSubstr("# free 1 contact 0 undecided 0 failed 2\n"));
 }
 
-TEST_F(Continuous, SurroundingsStandStill) {
+TEST_F(Continuous, SurroundingsMustBeAtRest) {
   Put("cube", server::Cube());
   const TempFile scene("cell.yaml", "place:\n  post: {id: cube, at: [-0.5, 1.2499, 0]}\n");
   const Ran ran = CheckMotion(Swing("9"), "hinge\n0\n3\n", {"--scene", scene.path()});
@@ -170,7 +170,7 @@ TEST_F(Continuous, SurroundingsStandStill) {
   EXPECT_THAT(ran.out, HasSubstr("# free 2 contact 1 "));
 }
 
-TEST_F(Continuous, OptionsThatDoNotFitAreRefused) {
+TEST_F(Continuous, IncompatibleOptionsAreRefused) {
   const auto error = [&](const std::string& path, std::vector<std::string> more) {
     const Ran ran = CheckMotion(Swing("1.8"), path, std::move(more));
     EXPECT_EQ(ran.code, 2) << ran.out;

@@ -96,7 +96,7 @@ TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
   EXPECT_THAT(ran.out, HasSubstr("# separated 2 touching 0 overlapping 1 failed 0\n"));
 }
 
-// More waypoints than one message holds.
+// More waypoints than fit in one message.
 TEST_F(HullctlRobot, LongTrajectoriesGoInSeveralMessages) {
   std::string text = "j\n";
   for (int i = 0; i < 5000; ++i) text += i == 4321 ? "-2\n" : "0\n";
@@ -106,7 +106,7 @@ TEST_F(HullctlRobot, LongTrajectoriesGoInSeveralMessages) {
   EXPECT_THAT(ran.out, HasSubstr("4322\tENTER\ta\tc\tOVERLAPPING\n4323\tLEAVE"));
 }
 
-TEST_F(HullctlRobot, ASceneStandsAround) {
+TEST_F(HullctlRobot, ASceneSurroundsTheRobot) {
   Put("cube", server::Cube());
   const TempFile scene("cell.yaml", "place:\n  floor: {id: cube, at: [0, 0, 0.5]}\n");
   Ran ran = Robot({"--scene", scene.path(), "--base", "0,0,0"});
@@ -121,7 +121,7 @@ TEST_F(HullctlRobot, ASceneStandsAround) {
   EXPECT_THAT(ran.err, HasSubstr("hull \"nowhere\" not found"));
 }
 
-TEST_F(HullctlRobot, ABodyStandsAround) {
+TEST_F(HullctlRobot, ABodySurroundsTheRobot) {
   Put("cube", server::Cube());
   ASSERT_EQ(Ask({"body", "put", "stand", "cube@9,9,9", "cube@0,0,0.5"}).code, 0);
   const TempFile scene("cell.yaml", "place:\n  stand: {id: stand}\n");
@@ -161,7 +161,7 @@ TEST_F(HullctlRobot, PairsLeftOutThroughLinksWithoutShapesAreCounted) {
               HasSubstr("# 3 pairs\na\tb\tOVERLAPPING"));
 }
 
-TEST_F(HullctlRobot, AdjacentIsHintedAtOnlyWhereItHelps) {
+TEST_F(HullctlRobot, AdjacentIsSuggestedOnlyIfItHelps) {
   const std::string link =
       "<collision><geometry><box size=\"1 1 1\"/></geometry></collision></link>";
   const TempFile two("two.urdf", "<robot name=\"r\"><link name=\"a\">" + link +
@@ -196,7 +196,7 @@ constexpr char kLooseUrdf[] = R"(<robot name="loose">
   <joint name="free" type="floating"><parent link="world"/><child link="crate"/></joint>
 </robot>)";
 
-TEST_F(HullctlRobot, PlanarAndFloatingJointsTakeValues) {
+TEST_F(HullctlRobot, PlanarAndFloatingJointsAcceptValues) {
   const TempFile loose("loose.urdf", kLooseUrdf);
   Ran ran = Ask({"robot", "check", loose.path(), "--joint", "free=1,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -274,7 +274,7 @@ TEST_F(MeshRobot, ConvexPartsOfAFileArePieces) {
   }
 }
 
-TEST_F(MeshRobot, OtherPartsArePiecesWhereAskedFor) {
+TEST_F(MeshRobot, OtherPartsArePiecesIfRequested) {
   // An object with two components, and another object.
   const std::string obj =
       BoxObj("o both", 0, 1) + BoxObj("# still both", 5, 9) + BoxObj("o far", 20, 17);

@@ -91,7 +91,7 @@ TEST_F(RobotScene, PartsAreObjectsThatJointsMove) {
   EXPECT_THAT((*poses)[2], ElementsAre(1, 0, 0, 0, 2.5, 0, 0));
 }
 
-TEST_F(RobotScene, AdjacentLinksAreExcludedOrThoseOfTheSrdf) {
+TEST_F(RobotScene, ExcludesAdjacentLinksOrThePairsOfTheSrdf) {
   ASSERT_TRUE(Add().ok());
   EXPECT_THAT(scene_.pairs, Optional(ElementsAre(0, 2)));
   const TempFile srdf("chain.srdf",
@@ -102,7 +102,7 @@ TEST_F(RobotScene, AdjacentLinksAreExcludedOrThoseOfTheSrdf) {
   EXPECT_THAT(scene_.pairs, Optional(ElementsAre(0, 1, 1, 2)));
 }
 
-TEST_F(RobotScene, SurroundingsMeetThePartsOnly) {
+TEST_F(RobotScene, SurroundingsAreCheckedAgainstPartsOnly) {
   const TempFile cell("cell.yaml",
                       "place: {post: {id: cube, at: [4, 0, 0]}, floor: {id: cube, radius: 0.5}}\n");
   arguments_.scene = cell.path();

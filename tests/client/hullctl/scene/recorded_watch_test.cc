@@ -35,7 +35,7 @@ TEST(RecordedWatch, KeepsMessagesWithEventsAndTheEndOfTheInitialState) {
               ElementsAre(HasSubstr(R"("synced":true)"), HasSubstr(R"("placementB":7)")));
 }
 
-TEST(RecordedWatch, TellsHullsFromPairs) {
+TEST(RecordedWatch, DistinguishesHullsFromPairs) {
   const auto watch = Read(
       R"({"events":[{"kind":"HULL_EVENT_KIND_PRESENT","hull":{"hullId":"arm"}}],"restarted":true})");
   ASSERT_TRUE(watch.ok()) << watch.status();
@@ -43,7 +43,7 @@ TEST(RecordedWatch, TellsHullsFromPairs) {
   EXPECT_THAT(watch->messages, ElementsAre(HasSubstr(R"("hullId":"arm")")));
 }
 
-TEST(RecordedWatch, NamesTheLineThatIsNoMessage) {
+TEST(RecordedWatch, NamesTheLineThatIsNotAMessage) {
   EXPECT_THAT(Error("{}"), HasSubstr("watch.jsonl: contains no event"));
   EXPECT_THAT(Error("ENTER\t0\t1\n"), HasSubstr("watch.jsonl:1: not a line of 'hullctl watch"));
   EXPECT_THAT(Error(std::string(kEnter) + "\n{\"restarted\":true}"),

@@ -52,7 +52,7 @@ TEST_F(HullctlScene, ApplyRepairsDifferencesAndPrunes) {
             "# 1 hull unchanged\n");
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--dry-run"});
   EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tto delete\n"));
-  // Without a terminal no prompt is possible.
+  // Without a terminal, prompting is impossible.
   ASSERT_EQ(Ask({"append", "cell/table", far.path()}).code, 0);
   const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path(), "--prune"});
@@ -88,7 +88,7 @@ TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsItsIds) {
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell-3/table\ncell-30/stray\ncell-3stray\n");
 }
 
-TEST_F(HullctlScene, CheckAnswersTheQuestionsOfTheFile) {
+TEST_F(HullctlScene, CheckAnswersTheQueriesOfTheFile) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Ran ran = Ask({"scene", "check", cell_.path()});
   EXPECT_EQ(ran.out, "a\tb\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
@@ -155,7 +155,7 @@ class HullctlSceneBodies : public HullctlOnServer {
   const TempFile cell_{"cell.yaml", Cell("[1.5, 1, 0]")};
 };
 
-TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
+TEST_F(HullctlSceneBodies, ApplyPutsBodiesOnceAfterTheirHulls) {
   const std::string to_do =
       "+ cell/bar\tto create\n+ cell/cube\tto create\n+ cell/ell\tbody to create\n"
       "# 0 hulls and 0 bodies unchanged\n";
@@ -236,7 +236,7 @@ TEST_F(HullctlSceneBodies, BatchesProveBodiesAndWatchesReportThem) {
   EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\n"));
 }
 
-TEST_F(HullctlSceneBodies, TheTextbookTakesPieces) {
+TEST_F(HullctlSceneBodies, TheTextbookMethodUsesPieces) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   const Ran ran = Ask({"batch", cell_.path(), "--textbook"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -263,14 +263,14 @@ TEST_F(HullctlSceneBodies, PruneAndDeleteRemoveBodiesBeforeHulls) {
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
 }
 
-TEST_F(HullctlSceneBodies, AHullOfTheNameIsRefused) {
+TEST_F(HullctlSceneBodies, AHullWithTheSameNameIsRefused) {
   ASSERT_EQ(Ask({"create", "cell/ell"}).code, 0);
   const Ran ran = Ask({"scene", "apply", cell_.path()});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("\"cell/ell\""));
 }
 
-TEST_F(HullctlScene, AMissingFileNamesItsPlace) {
+TEST_F(HullctlScene, AMissingFileIsReportedWithItsLocation) {
   const TempFile scene("s.yaml", "hulls:\n  a: {file: nowhere.stl}\n");
   const Ran ran = Ask({"scene", "apply", scene.path()});
   EXPECT_EQ(ran.code, 2);
@@ -280,7 +280,8 @@ TEST_F(HullctlScene, AMissingFileNamesItsPlace) {
 
 class SceneUnits : public HullctlOnServer {};
 
-// Each coordinate is rounded one time: 3 in is the double nearest to 0.0762 m, as is that text.
+// Each coordinate is rounded only once: 3 in is the double nearest to 0.0762 m, just as the text
+// 0.0762.
 TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMeters) {
   const struct {
     const char* unit;

@@ -56,7 +56,7 @@ TEST(SceneFile, JsonIsASubsetOfYaml) {
   }
 }
 
-TEST(SceneFile, NoPairMeansEachTwoOfAllPlacements) {
+TEST(SceneFile, WithoutPairsAllPairsOfPlacementsAreMeant) {
   for (const char* text : {"place: {a: {id: h}, b: {id: h}, c: {id: h}}\n",
                            R"({"placements":[{"hullId":"h"},{"hullId":"h"},{"hullId":"h"}]})"}) {
     const auto scene = Read(text);
@@ -135,15 +135,15 @@ TEST(SceneFile, GroupsAndMoversLeaveOutPairs) {
   EXPECT_THAT(std::string(PairsOf(*none, "FILE").status().message()), HasSubstr("no pairs"));
 }
 
-TEST(SceneFile, ASceneIsReadToItsEndAndNoFurther) {
+TEST(SceneFile, ASceneIsReadOnlyToItsEnd) {
   const TempFile file("poses", "\n{\"placements\":\n[]}\n{\"refreshHulls\":true}\n");
   const auto source = ByteSource::Open(file.path());
   ASSERT_TRUE(ReadScene(source->get()).ok());
   EXPECT_THAT(std::string(RefuseUpdates(source->get(), "batch").message()),
-              HasSubstr(":4: 'hullctl batch' takes no updates after the scene"));
+              HasSubstr(":4: 'hullctl batch' does not accept updates after the scene"));
 }
 
-TEST(SceneFile, JsonThatIsNoSceneIsExplained) {
+TEST(SceneFile, JsonThatIsNotASceneIsExplained) {
   const std::string placements = R"({"placements":[{"hullId":"a"}],)";
   EXPECT_THAT(Error(placements + R"("pairs":[0,1]})"), HasSubstr("pairs names placement 1"));
   EXPECT_THAT(Error(placements + R"("pairs":[0]})"), HasSubstr("each pair needs two"));
@@ -164,7 +164,7 @@ TEST(SceneFile, ErrorsNameFileAndLine) {
   EXPECT_THAT(Error("\nmove a b\n"), HasSubstr("FILE:2:1: "));
 }
 
-TEST(SceneFile, TooManyPairsAreRefusedBeforeTheyAreMade) {
+TEST(SceneFile, TooManyPairsAreRefusedBeforeTheyAreBuilt) {
   std::string text = "place:\n";
   for (int i = 0; i < 6000; ++i) text += "  n" + std::to_string(i) + ": {id: h}\n";
   const auto scene = Read(text);

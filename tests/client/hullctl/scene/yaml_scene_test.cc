@@ -96,7 +96,7 @@ TEST(YamlScene, WithoutPlacementsIsAnEmptyRequest) {
   EXPECT_FALSE(scene->request.ignore_same_group());
 }
 
-TEST(YamlScene, BodiesArePutAsTheyAreWritten) {
+TEST(YamlScene, BodiesArePutAsWritten) {
   const v1::PutBodyRequest request = BodyRequest(Parse(kCell).bodies[0]);
   EXPECT_EQ(request.body_id(), "cell/corner");
   ASSERT_EQ(request.pieces_size(), 3);
@@ -153,7 +153,7 @@ TEST(YamlScene, PlacementsMoveOnTheShorterPath) {
   EXPECT_THAT(ErrorOf(head + "to: [1, 2]}\n"), HasSubstr("to"));
 }
 
-TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
+TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotQueried) {
   const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n";
   EXPECT_THAT(PairsIn(head + "place: {a: {hull: h}, b: {body: b}}"),
               ElementsAre("a b/h", "a b/h-2"));
@@ -170,7 +170,7 @@ TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
   EXPECT_THAT(PairsIn(kCell).size(), 3u + 9u);
 }
 
-TEST(YamlScene, PairsAndMoversAreTaken) {
+TEST(YamlScene, PairsAndMoversAreRead) {
   const std::string head =
       "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n"
       "place: {a: {hull: h}, b: {body: b}, c: {hull: h}}\n";
@@ -179,7 +179,7 @@ TEST(YamlScene, PairsAndMoversAreTaken) {
   EXPECT_THAT(PairsIn(head + "ask: {movers: [c]}"), ElementsAre("c a", "c b/h", "c b/h-2"));
 }
 
-TEST(YamlScene, AliasesStandForTheirAnchors) {
+TEST(YamlScene, AliasesResolveToTheirAnchors) {
   EXPECT_THAT(PairsIn("hulls: {h: {box: &size [1, 1, 1]}, i: {box: *size}}\n"
                       "place: {a: {hull: h, at: &pose [1, 2, 3]}, b: {hull: i, at: *pose}}"),
               ElementsAre("a b"));
@@ -187,11 +187,11 @@ TEST(YamlScene, AliasesStandForTheirAnchors) {
 
 TEST(YamlScene, ErrorsNameLineColumnAndKey) {
   const std::pair<const char*, const char*> cases[] = {
-      {"hulls: {h: {box: [1, 1]}}", "cell.yaml:1:18: box takes 3 numbers, got 2"},
+      {"hulls: {h: {box: [1, 1]}}", "cell.yaml:1:18: box must have 3 numbers, got 2"},
       {"hulls:\n  h: {fil: a.stl}",
        "cell.yaml:2:7: hull \"h\" has no key \"fil\"; did you mean \"file\"?"},
       {"hulls:\n  h: {file: a.stl, box: [1, 1, 1]}",
-       "cell.yaml:2:6: hull \"h\" takes exactly one of"},
+       "cell.yaml:2:6: hull \"h\" needs exactly one of"},
       {"hulls: {h: {points: [[0, 0, x]]}}", "cell.yaml:1:29: a point: \"x\" is not a number"},
       {"hulls: {h: {points: [[0, 0, .inf]]}}", "\".inf\" is not a number"},
       {"scale: inch", "cell.yaml:1:8: scale: \"inch\" is not a unit"},
@@ -202,14 +202,14 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
       {"hulls: {bracket: {box: [1, 1, 1]}}\nplace: {a: {hull: braket}}",
        "did you mean \"bracket\"?"},
       {"place: {a: {body: b}}", "cell.yaml:1:19: body \"b\" is not defined under bodies"},
-      {"place: {a: {id: x, at: [0, 0]}}", "cell.yaml:1:24: at takes 3 or 7 numbers, got 2"},
+      {"place: {a: {id: x, at: [0, 0]}}", "cell.yaml:1:24: at must have 3 or 7 numbers, got 2"},
       {"place: {a: {id: x, at: {rpy: [0, 0, 0], quaternion: [1, 0, 0, 0]}}}", "not both"},
       {"place: {a: {id: x, at: [0, 0, 0, 0, 0, 0, 0]}}", "the quaternion is zero"},
       {"place: {a: {id: x}, a: {id: y}}", "cell.yaml:1:21: place has the key \"a\" twice"},
       {"place: {a: {id: x}}\nignore: [[a, b]]", "cell.yaml:2:14: ignore: \"b\" is not a placement"},
-      {"place: {a: {id: x}}\nignore: [[a]]", "cell.yaml:2:10: ignore takes pairs of names"},
+      {"place: {a: {id: x}}\nignore: [[a]]", "cell.yaml:2:10: ignore must be pairs of names"},
       {"place: {a: {id: x}}\nask: {pairs: [[a, a]], movers: [a]}", "cannot be combined"},
-      {"ask: {separation: yes}", "cell.yaml:1:19: separation takes true or false"},
+      {"ask: {separation: yes}", "cell.yaml:1:19: separation must be true or false"},
       {"ask: {clearance: -1}", "clearance must be at least 0"},
       {"place: {a: {id: x, radius: -1}}", "cell.yaml:1:28: radius must be at least 0"},
       {"place: {a: {id: x, radius: wide}}", "radius: \"wide\" is not a number"},
@@ -229,7 +229,7 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
   EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("not valid YAML"));
 }
 
-TEST(YamlScene, TheOneReaderTakesIt) {
+TEST(YamlScene, IsReadByReadScene) {
   const TempFile file("cell.yaml",
                       "# comment\n\nplace:\n  a: {id: x}\n  b: {id: x, at: [1, 0, 0]}\n");
   const auto source = ByteSource::Open(file.path());

@@ -9,7 +9,7 @@ namespace answer_feed_test {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(AnswerFeed, AMotionIsAskedFromStartToEndAtAnyTime) {
+TEST(AnswerFeed, AMotionIsQueriedFromStartToEndAtAnyTime) {
   ViewObject wall{"wall", "cube", -1, {1, 0, 0, 0, 9, 0, 0}, 0.5};
   ViewObject ball{"ball", "cube"};
   ball.motion = {{1, 0, 0, 0, 3, 0, 0}, {0, 1, 0, 0, 1, 0, 0}};
@@ -57,7 +57,7 @@ TEST(AnswerFeed, TheFirstContactOfAMotionMayBeAbsent) {
             R"({"type":"motion","update":7,"pair":[0,1],"problem":"hull \"a\" not found"})");
 }
 
-TEST(AnswerFeed, TheProofOfAMotionIsPassedOn) {
+TEST(AnswerFeed, TheProofOfAMotionIsForwarded) {
   v1::CheckCollisionResponse response;
   response.mutable_first_contact()->add_intervals()->set_until(0.5);
   response.mutable_certificate()->mutable_direction()->set_x(3);

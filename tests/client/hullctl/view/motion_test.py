@@ -70,12 +70,12 @@ class MotionTest(viewer_case.ViewerCase):
         self.go_to(0.25)
         self.assertEqual(self.pose(1), [1, 0, 0, 0, 0, 4.5, 0])
         self.assertAlmostEqual(self.assert_answers_as_api()["separation"]["value"], 2.5)
-        # The time is that of the server, and not the nearest step of the slider.
+        # The time is the server's, not the nearest step of the slider.
         self.browser.driver.find_element(By.ID, "contact").click()
         self.assertEqual(self.browser.js("hulldViewer.model.time"), time)
         self.assertEqual(self.pose(1)[5], (1 - time) * 6)
         self.assert_answers_as_api()
-        # The motion alone moves it.
+        # Only the motion moves it.
         self.assertTrue(self.browser.js("document.querySelector('#mode-move').disabled"))
         self.keys("x", "x")
         self.assertEqual(self.pose(1)[4], 0)

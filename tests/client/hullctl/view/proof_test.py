@@ -49,7 +49,7 @@ class ProofTest(viewer_case.ViewerCase):
         said = subprocess.run([*self.hulld.command(), "verify", str(target), "--output", "json"],
                               text=True, capture_output=True).stdout
         verdict = json.loads(said)
-        # The page shows the bracket of a contact, and has no opinion about its width.
+        # The page shows the bracket of a contact, and does not check its width.
         is_proven = verdict["verdict"] == "VALID" or "which are more than" in verdict["reason"]
         return "" if is_proven else verdict["reason"]
 

@@ -61,7 +61,7 @@ TEST(Protocol, QuestionsKeepEveryBitOfAPose) {
   EXPECT_TRUE(question.rest);
 }
 
-TEST(Protocol, QuestionMayNameNoPair) {
+TEST(Protocol, AQueryMayNameNoPairs) {
   const auto message = ParsePageMessage(R"({"type":"question","update":1,"pair":[]})");
   ASSERT_TRUE(message.ok()) << message.status();
   EXPECT_FALSE(message->question->pair.has_value());
@@ -109,7 +109,7 @@ TEST(Protocol, EditsAreRead) {
               HasSubstr("three numbers"));
 }
 
-TEST(Protocol, MessagesThatAreWrongAreRefused) {
+TEST(Protocol, MalformedMessagesAreRefused) {
   EXPECT_NE(ErrorOf("no json"), "");
   EXPECT_NE(ErrorOf("[]"), "");
   EXPECT_THAT(ErrorOf("{}"), HasSubstr("type"));
@@ -161,14 +161,14 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
   EXPECT_THAT(json, HasSubstr(R"("joints":[],"waypoints":[],"contacts":[],"named":[])"));
 }
 
-TEST(Protocol, MotionsTravelWithTheirEnd) {
+TEST(Protocol, MotionsAreSentWithTheirEnd) {
   ViewScene scene;
   scene.objects = {{"box", "box", -1, {1, 0, 0, 0, 0.1, 0, 0}}};
   scene.objects[0].motion = {{1, 0, 0, 0, 0.1, 0, 0}, {0, 2, 0, 0, 1e-300, 0, 5}};
   EXPECT_THAT(SceneMessage(scene, 3), HasSubstr(R"("endPose":[0,2,0,0,1e-300,0,5]})"));
 }
 
-TEST(Protocol, JointsTravelWithTheirTrajectory) {
+TEST(Protocol, JointsAreSentWithTheirTrajectory) {
   ViewScene scene;
   scene.joints.joints = {{"elbow", -1, 2, 0.5}};
   scene.joints.waypoints = {{0.5}, {1e-300}};
@@ -197,7 +197,7 @@ TEST(Protocol, NamesOfFilesAreUtf8) {
   EXPECT_EQ(ShownName("\xe2\x82"), "??");
 }
 
-TEST(Protocol, NumbersThatJsonHasNotBecomeNull) {
+TEST(Protocol, NumbersThatJsonLacksBecomeNull) {
   const double numbers[] = {std::numeric_limits<double>::infinity(), std::nan(""), 2};
   EXPECT_EQ(NumbersJson(numbers, 3), "[null,null,2]");
 }

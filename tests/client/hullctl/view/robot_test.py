@@ -55,7 +55,7 @@ class RobotTest(viewer_case.ViewerCase):
         self.assertEqual(self.place(1), [6, 0, 0])
         answer = self.assert_answers_as_api()
         self.assertAlmostEqual(answer["separation"]["value"], 2.5)
-        # Links are moved by joints alone.
+        # Only joints move links.
         self.assertTrue(self.browser.js("document.querySelector('#mode-move').disabled"))
         self.keys("x", "x")
         self.assertEqual(self.place(2), [4, 0, 0])
@@ -116,7 +116,7 @@ class RobotTest(viewer_case.ViewerCase):
         self.view("arm.urdf", "--joints", "path.csv", "--scene", "cell.yaml", "--ignore", "base,floor")
         self.assertEqual(self.browser.js("hulldViewer.model.objects.map(({name}) => name)"),
                          ["base", "rod", "hand", "post", "lamp", "floor"])
-        # Post and lamp overlap, as do floor and base; neither pair is asked about.
+        # Post and lamp overlap, as do floor and base; neither pair is queried.
         self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
         self.slide("[aria-label='Joint lift']", 1.5)
         self.browser.wait("hulldViewer.model.collisions.pairs.join() === '2,3,RELATION_OVERLAPPING'")

@@ -11,7 +11,7 @@ namespace view_scene_test {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-TEST(ViewScene, TakesEachFormatOfAScene) {
+TEST(ViewScene, AcceptsEachSceneFormat) {
   const TempFile yaml("scene.yaml",
                       "place: {left: {id: cube}, right: {id: cube, at: [1, 2, 3]}}\n");
   const TempFile json("scene.json", R"({"placements":[{"hullId":"cube"},{"hullId":"cube",

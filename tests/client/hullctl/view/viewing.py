@@ -82,7 +82,7 @@ class Hulld:
                               **options).stdout
 
     def json(self, *arguments, server=None):
-        """Returns the answer of a command; server: another one than this."""
+        """Returns the output of a command; server: a different server than this one."""
         command = [self.programs / "hullctl", *arguments, "--server", server or self.address,
                    "--output", "json"]
         return json.loads(subprocess.run(command, cwd=self.directory, check=True,

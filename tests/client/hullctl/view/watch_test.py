@@ -73,13 +73,13 @@ class WatchTest(viewer_case.ViewerCase):
             self.assertEqual(self.pairs(), expected[moment])
         self.assertEqual(self.marks(), [[0, 100]])
         self.assertIn("revision", self.browser.text("#moment-text"))
-        # The server's answer about the pairs of now changes nothing here.
+        # The server's answer about the current pairs changes nothing here.
         self.go_to(2)
         self.browser.js("hulldViewer.ask(true)")
         self.browser.wait(viewer_case.AT_REST)
         self.assertEqual(self.pairs(), expected[2])
         self.assertIn("2 pairs collide", self.browser.text("#collision-count"))
-        # Objects stay where they were watched.
+        # Objects stay at their watched poses.
         self.assertTrue(self.browser.js("document.querySelector('#mode-move').disabled"))
         self.browser.js("document.querySelector('#play').click()")
         self.browser.wait("!hulldViewer.timeLine.playing && hulldViewer.timeLine.slider.value === '3'")

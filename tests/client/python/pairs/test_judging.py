@@ -186,8 +186,8 @@ def test_a_turning_motion_takes_the_shorter_way(client: hulld.Client) -> None:
     [
         ({"contact_time": [1.5]}, r"contact_time\[0\] is above 1"),
         ({"contact_time": [-0.5]}, r"contact_time\[0\] is -0.5; it must be at least 0"),
-        ({"distance": [1]}, r"distance\[0\] is that of a motion"),
-        ({"contact_time": [0.5], "end_poses_b": [(1, 0, 0)]}, r"contact_time\[0\] is that of no"),
+        ({"distance": [1]}, r"distance\[0\] is set for a motion"),
+        ({"contact_time": [0.5], "end_poses_b": [(1, 0, 0)]}, r"contact_time\[0\] requires a motion"),
     ],
 )
 def test_malformed_motions_are_named(change: dict[str, Any], message: str) -> None:

@@ -76,7 +76,7 @@ def test_each_part_of_a_proof_is_checked(client: hulld.Client, cube: str) -> Non
     expect("stay", intervals=(dataclasses.replace(first, offset=first.offset - 9), *rest))
     expect("offsets at both ends", intervals=(dataclasses.replace(first, offset=None), *rest))
     at_rest = dataclasses.replace(first, offset=None, end_direction=None, end_offset=None)
-    expect("no offset", intervals=(at_rest, *rest))
+    expect("offset is missing", intervals=(at_rest, *rest))
     assert first.end_offset is not None
     for change in (9.0, -9.0):
         moved = dataclasses.replace(first, end_offset=first.end_offset + change)
@@ -176,7 +176,7 @@ def test_options_bound_the_bracket(client: hulld.Client, cube: str) -> None:
     hulld.Verifier(client).check(a, b, answer, to_b=to, max_time_error=1e-3)
     with pytest.raises(hulld.InvalidArgumentError, match="wanted.max_time_error"):
         client.check_collision(a, b, to_b=to, max_time_error=2)
-    with pytest.raises(hulld.InvalidArgumentError, match="wanted.witness excludes end_pose"):
+    with pytest.raises(hulld.InvalidArgumentError, match="wanted.witness cannot be combined"):
         client.check_collision(a, b, to_b=to, witness=True)
 
 

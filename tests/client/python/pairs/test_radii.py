@@ -94,5 +94,5 @@ def test_malformed_radii_are_refused(radius: float) -> None:
         hulld.Placement("cube", radius=radius)
     with pytest.raises((ValueError, TypeError), match="radii"):
         hulld.Placements("cube", [(0, 0, 0)], radii=[radius])
-    with pytest.raises(ValueError, match="one for each of 1"):
+    with pytest.raises(ValueError, match="one number for each of 1"):
         hulld.Placements("cube", [(0, 0, 0)], radii=[1, 2])

@@ -132,7 +132,7 @@ def test_configurations_are_checked(write: Write) -> None:
     robot = hulld.Robot.from_urdf(write(ARM))
     rest = robot.rest
     for q, message in (
-        (rest[:5], r"q has the shape \(5,\); arm takes \(12,\) or \(n, 12\): cart/x, "),
+        (rest[:5], r"q has the shape \(5,\); arm expects \(12,\) or \(n, 12\): cart/x, "),
         (np.tile(rest, (2, 2, 1)), r"q has the shape \(2, 2, 12\)"),
         (np.where(np.arange(12) == 3, np.nan, rest), r"q\[3\] is nan"),
         (np.zeros((2, 12)), r"q\[0\]: the quaternion of free is zero"),
@@ -191,8 +191,12 @@ def test_configurations_are_checked(write: Write) -> None:
         ('joint="j1"', 'joint="cart"', "14: joint 'cart' is planar"),
         ('<box size="1 1 1"/>', '<box size="1 0 1"/>', "2: <box> size must be above 0"),
         ('<box size="1 1 1"/>', '<box size="1 1"/>', "2: <box> size takes 3 numbers, got 2"),
-        ('<box size="1 1 1"/>', '<cone size="1 1"/>', "2: <geometry> holds 'cone'; it takes a box"),
-        ('<box size="1 1 1"/>', "", "2: <geometry> holds nothing"),
+        (
+            '<box size="1 1 1"/>',
+            '<cone size="1 1"/>',
+            "2: <geometry> contains 'cone'; it must contain a box",
+        ),
+        ('<box size="1 1 1"/>', "", "2: <geometry> contains nothing"),
         ('<box size="1 1 1"/>', '<cylinder radius="1"/>', '2: <cylinder> lacks length="..."'),
         ('<box size="1 1 1"/>', '<mesh scale="1 1 1"/>', '2: <mesh> lacks filename="..."'),
         (
@@ -214,7 +218,7 @@ def test_other_arguments_are_checked(write: Write) -> None:
     with pytest.raises(FileNotFoundError):
         hulld.Robot.from_urdf("/nowhere/arm.urdf")
     for client in (hulld.AsyncClient(), "localhost"):
-        with pytest.raises(TypeError, match="it takes a hulld.Client"):
+        with pytest.raises(TypeError, match="it must be a hulld.Client"):
             hulld.Robot.from_urdf(write(ARM), client=client)  # type: ignore[arg-type]
 
 

@@ -75,7 +75,7 @@ def test_stl_is_read_in_both_forms(tmp_path: pathlib.Path) -> None:
         (binary_stl(TRIANGLES[:0]), "declares 0 triangles"),
         (gzip.compress(binary_stl(TRIANGLES)), "is compressed"),
         ("solid\n".encode("utf-16"), "is UTF-16 text"),
-        (binary_stl(TRIANGLES * np.float32("nan")), "triangle 0 has a coordinate not finite"),
+        (binary_stl(TRIANGLES * np.float32("nan")), "triangle 0 has a coordinate that is not"),
         (f"solid\n{FACET}".encode(), "8: the file ends after 1 facet, before .*; is it complete?"),
         (f"solid\n{FACET[:56]}".encode(), "ends after 0 facets"),
         (
@@ -103,13 +103,13 @@ def test_obj_is_read(tmp_path: pathlib.Path) -> None:
     )
     assert points_of(tmp_path / "a.obj", text).tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
     for bad, message in (
-        ("", "holds no vertex"),
+        ("", "contains no vertices"),
         ("v 0 0\n", "1: a vertex has 2 of 3 coordinates"),
         ("v 0 0 nan\n", "1: 'nan' is not a finite number"),
-        ("v 0 0 0\nf 1 1 2\n", "2: a face names vertex 2, but the file holds 1"),
-        ("v 0 0 0\nf 1 0 1\n", "2: '0' names no vertex"),
-        ("v 0 0 0\nf -2 1 1\n", "2: '-2' names no vertex; 1 came before"),
-        ("v 0 0 0\nf a\n", "2: 'a' names no vertex"),
+        ("v 0 0 0\nf 1 1 2\n", "2: a face names vertex 2, but the file has 1"),
+        ("v 0 0 0\nf 1 0 1\n", "2: '0' is not a vertex"),
+        ("v 0 0 0\nf -2 1 1\n", "2: '-2' is not a vertex; 1 precede this line"),
+        ("v 0 0 0\nf a\n", "2: 'a' is not a vertex"),
         ("v 0 0 0\nf\n", "2: a face names no vertex"),
         ("v 0 0 0 \\", "1: the file ends after a backslash"),
     ):

@@ -117,7 +117,7 @@ def test_a_scene_is_at_rest(make: Make, client: hulld.Client, name: str) -> None
 @pytest.mark.parametrize(
     "arguments,options,message",
     [
-        ([[0.5]], {}, "1 waypoints; a motion takes at least 2"),
+        ([[0.5]], {}, "1 waypoints; a motion needs at least 2"),
         ([0.5], {}, "1 waypoints"),
         ([[0], [1e5]], {}, "arm turns or moves too far between waypoints 0 and 1"),
         ([[0], [1]], {"clearance": -1}, "clearance"),
@@ -219,5 +219,5 @@ def test_bounds_hold_for_sampled_motions(
                 assert (way <= bound.travel(duration, 1.3) + 1e-13).all()
                 if counts.any() and duration == 2.0**-6:
                     tightest = max(tightest, float((apart / most)[counts].max()))
-    # The bound is not idle.
+    # The bound is tight enough to matter.
     assert tightest > 0.05

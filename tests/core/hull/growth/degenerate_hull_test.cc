@@ -70,7 +70,7 @@ TEST(DegenerateHull, CornersAThousandTimesAreABox) {
   ExpectBox(builder.Snapshot());
 }
 
-TEST(DegenerateHull, EqualPointsAreOnePoint) {
+TEST(DegenerateHull, EqualPointsMakeOnePoint) {
   const std::vector<Vector> equal(5000, Vector(0.1, 0.2, 0.3));
   const Hull hull = BuildHull(equal);
   EXPECT_EQ(hull.dimension(), 0);
@@ -274,7 +274,7 @@ TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
 
 // Snapshots have canonical order for any distribution of the vertices' x: on a sphere, in two
 // planes, near one end, on either side of zero, and so far apart that their distance is no double.
-TEST(DegenerateHull, SnapshotsAreCanonicalHoweverXIsSpread) {
+TEST(DegenerateHull, SnapshotsAreCanonicalForAnyDistributionOfX) {
   Random random(209);
   const std::vector<Vector> sphere = RandomOnSphere(random, 300, 1);
   std::vector<Vector> prism;
@@ -300,7 +300,7 @@ TEST(DegenerateHull, SnapshotsAreCanonicalHoweverXIsSpread) {
 
 // Streams with first blocks unlike the last: clusters far apart, growing shells, flat starts. Any
 // split into blocks gives the hull of a single block.
-TEST(DegenerateHull, StreamsOfUnlikeBlocksEqualOneBlock) {
+TEST(DegenerateHull, StreamsOfDissimilarBlocksEqualOneBlock) {
   const uint64_t seed = TestSeed(211);
   Random random(seed);
   for (int round = 0; round < kLargeRounds; ++round) {

@@ -203,7 +203,7 @@ TEST(ExtremeCoordinates, CubesOfTheLeastAndTheLargestDoubleHaveSixSquares) {
 }
 
 // Each apex sees every side of the cone below it: the most expensive order.
-TEST(ExtremeOrders, LastOfTheRisingApexesRemains) {
+TEST(ExtremeOrders, OnlyTheLastOfTheRisingApexesRemains) {
   for (const Extreme& extreme : Extremes()) {
     if (extreme.facets_one_by_one == nullptr) continue;
     const Hull hull = BuildOneByOne(extreme.make(kPoints));

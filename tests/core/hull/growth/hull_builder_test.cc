@@ -214,7 +214,7 @@ TEST(HullBuilder, PowersOfTwoOnEachAxisKeepTheFacets) {
   }
 }
 
-TEST(HullBuilder, OrderAndBlocksLeaveNoTrace) {
+TEST(HullBuilder, OrderAndBlocksDoNotMatter) {
   const uint64_t seed = TestSeed(104);
   Random random(seed);
   for (int round = 0; round < 40; ++round) {
@@ -234,7 +234,7 @@ TEST(HullBuilder, OrderAndBlocksLeaveNoTrace) {
   }
 }
 
-TEST(HullBuilder, SnapshotsBetweenBlocksDoNotDisturb) {
+TEST(HullBuilder, SnapshotsBetweenBlocksHaveNoEffect) {
   Random random(105);
   const std::vector<Vector> points = RandomLatticePoints(random, 120, 5);
   HullBuilder builder;
@@ -246,7 +246,7 @@ TEST(HullBuilder, SnapshotsBetweenBlocksDoNotDisturb) {
   }
 }
 
-TEST(HullBuilder, VerticesOfAHullGiveTheHullBack) {
+TEST(HullBuilder, VerticesOfAHullReproduceTheHull) {
   Random random(106);
   for (int round = 0; round < 30; ++round) {
     const Hull hull = BuildHull(RandomInBall(random, 200, 1));
@@ -254,7 +254,7 @@ TEST(HullBuilder, VerticesOfAHullGiveTheHullBack) {
   }
 }
 
-TEST(HullBuilder, DimensionsGrowIntoEachOther) {
+TEST(HullBuilder, DimensionsGrowOneByOne) {
   HullBuilder builder;
   const auto add = [&](double x, double y, double z) {
     const Vector p(x, y, z);
@@ -403,7 +403,7 @@ TEST(HullBuilder, VertexLimitHoldsForFlatHulls) {
   }
 }
 
-TEST(HullBuilder, CancellationChangesNothingWheneverItComes) {
+TEST(HullBuilder, CancellationAtAnyTimeChangesNothing) {
   Random random(110);
   const std::vector<Vector> first = RandomInBall(random, 500, 1);
   const std::vector<Vector> block = RandomOnSphere(random, 20000, 2);
@@ -502,7 +502,7 @@ TEST(HullBuilder, RefusedBlocksLeaveNoMap) {
 }
 
 // A stop noticed during the choice of the insertion order omits no points.
-TEST(HullBuilder, NoBlockEndsWellAfterAStop) {
+TEST(HullBuilder, NoBlockSucceedsAfterAStop) {
   for (const Extreme& extreme : Extremes()) {
     const std::vector<Vector> points = extreme.make(600);
     const std::span<const Vector> first = std::span(points).first(100);
@@ -539,7 +539,7 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
     int asked = 0;
     const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
     EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled) << stopped.status();
-    // After a stop it does not poll again.
+    // After a stop, it does not poll again.
     EXPECT_EQ(asked, last);
   }
   EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
@@ -578,7 +578,7 @@ TEST(HullBuilder, NewVerticesComeFromTheLastBlock) {
       const PointCounts counts = builder.Add(points).value();
       const std::vector<Vector> fresh = builder.NewVertices();
       ASSERT_EQ(fresh.size(), counts.outside) << "seed " << seed << " round " << round;
-      // Each exactly one time, with no former and no missing vertex.
+      // Each vertex occurs exactly once; none is missing or out of date.
       const auto after = SetOf(builder.Vertices());
       std::set<std::tuple<double, double, double>> expected;
       std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
@@ -597,7 +597,7 @@ TEST(HullBuilder, NewVerticesComeFromTheLastBlock) {
   EXPECT_GT(nothing_new, 50u);
 }
 
-TEST(HullBuilder, NewVerticesOutliveABlockThatIsRefused) {
+TEST(HullBuilder, NewVerticesSurviveARefusedBlock) {
   Random random(114);
   HullBuilder builder;
   ASSERT_TRUE(builder.Add(RandomInBall(random, 100, 1)).ok());
@@ -617,7 +617,7 @@ TEST(HullBuilder, NewVerticesOutliveABlockThatIsRefused) {
   EXPECT_TRUE(builder.NewVertices().empty());
 }
 
-TEST(HullBuilder, CopiesGoTheirOwnWays) {
+TEST(HullBuilder, CopiesAreIndependent) {
   Random random(111);
   const std::vector<Vector> first = RandomInBall(random, 100, 1);
   const std::vector<Vector> more = RandomInBall(random, 100, 2);
@@ -633,7 +633,7 @@ TEST(HullBuilder, CopiesGoTheirOwnWays) {
   EXPECT_TRUE(SameBits(moved.Snapshot(), builder.Snapshot()));
 }
 
-TEST(Hull, KnowsItsLargestCoordinate) {
+TEST(Hull, ReportsItsLargestCoordinate) {
   EXPECT_EQ(Hull().max_abs_coordinate(), 0);
   const std::vector<Vector> points = {{1, -7, 2}, {3, 0, 0}};
   EXPECT_EQ(BuildHull(points).max_abs_coordinate(), 7);

@@ -131,7 +131,7 @@ TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
 }
 
 // A block's undo record depends on its changes, not on the size of the hull.
-TEST(HullCost, UndoingCostsAsMuchAsTheChange) {
+TEST(HullCost, UndoCostIsProportionalToTheChange) {
   const uint64_t seed = TestSeed(507);
   Random random(seed);
   const std::vector<Vector> inside = RandomInBall(random, 2000, 0.9);
@@ -147,7 +147,7 @@ TEST(HullCost, UndoingCostsAsMuchAsTheChange) {
     limits.max_vertices = static_cast<size_t>(vertices);
     ASSERT_TRUE(builder.Add(inside, limits).ok());
     of_inside.push_back(builder.undo_bytes());
-    // Each equals a vertex.
+    // Every point equals a vertex.
     ASSERT_TRUE(builder.Add(std::span(sphere).first(2000), limits).ok());
     EXPECT_LE(builder.undo_bytes(), 2000 * 48u) << "seed " << seed;
     // Refused at the end, after all were added.
@@ -184,7 +184,7 @@ std::vector<Vector> ParabolaPrism(int n) {
 }
 
 // Facets with many corners grow at one side: no point costs as much as its facet has corners.
-TEST(HullCost, FacetsOfManyCornersTakeNoQuadraticTime) {
+TEST(HullCost, FacetsOfManyCornersTakeLessThanQuadraticTime) {
   const uint64_t seed = TestSeed(508);
   for (const bool one_by_one : {false, true}) {
     std::vector<double> signs;

@@ -131,7 +131,7 @@ TEST(SimplifyTarget, ErrorIsReachedWithFewVertices) {
   }
 }
 
-TEST(SimplifyTarget, UnreachableErrorGivesTheHullItself) {
+TEST(SimplifyTarget, AnUnreachableErrorReturnsTheHullItself) {
   const Hull full = HullOf(Sphere(100, 4));
   const auto inside = SimplifyInside(full, {0, 1e-300, {}});
   ASSERT_TRUE(inside.ok());
@@ -243,7 +243,7 @@ TEST(SimplifyExtremes, EveryScaleIsEnclosed) {
 }
 
 // With both limits, max_vertices holds always, and max_error whenever the method can achieve it.
-TEST(SimplifyTarget, BothLimitsHoldWhereTheyCan) {
+TEST(SimplifyTarget, BothLimitsHoldIfPossible) {
   const Hull full = HullOf(Sphere(300, 8));
   for (const auto simplify : {SimplifyInside, SimplifyOutside}) {
     for (const size_t max_vertices : {8, 20, 80, 300, 1000}) {
@@ -292,7 +292,7 @@ TEST(SimplifyInside, ErrorsNearTheLargestDoubleAreTrue) {
   EXPECT_EQ(SimplifyInside(full, {0, 1e305, {}})->hull.vertices().size(), 6u);
 }
 
-TEST(SimplifyInside, TiltedPolygonsKeepToTheirVertices) {
+TEST(SimplifyInside, TiltedPolygonsKeepTheirVertices) {
   const Hull full = HullOf({{274860, -1031166, -756306},
                             {288628, 610227, 898855},
                             {662020, 809661, 1471681},
@@ -319,7 +319,7 @@ TEST(SimplifyOutside, NeverHasMoreVerticesThanTheHull) {
   EXPECT_LE(outside->hull.vertices().size(), 9u);
 }
 
-TEST(SimplifyOutside, UsesTheVerticesThatItMay) {
+TEST(SimplifyOutside, UsesTheAllowedVertices) {
   for (const unsigned seed : {10u, 11u, 12u, 13u}) {
     const Hull full = HullOf(Sphere(80, seed));
     const auto outside = SimplifyOutside(full, {64, 0, {}});
@@ -444,7 +444,7 @@ TEST(SimplifyQuality, SpheresNeedAtMostHalfMoreThanTheFewestVertices) {
   }
 }
 
-TEST(SimplifyQuality, SpheresErrAtMostHalfMoreThanTheLeast) {
+TEST(SimplifyQuality, ErrorsOfSpheresAreAtMostHalfAboveTheMinimum) {
   const Hull full = HullOf(Sphere(kSphere, 15));
   for (const size_t max_vertices : {24, 54, kSphere / 100}) {
     const auto inside = SimplifyInside(full, {max_vertices, 0, {}});

@@ -66,14 +66,14 @@ TEST(ChunkedVector, UndoRestoresThePreviousContent) {
   }
 }
 
-TEST(ChunkedVector, AnElementOfItsOwnIsAppendedWhileItGrows) {
+TEST(ChunkedVector, AppendsItsOwnElementWhileGrowing) {
   Elements vector;
   vector.push_back(5);
   for (int i = 0; i < 1000; ++i) vector.push_back(vector[0]);
   EXPECT_EQ(Contents(vector), std::vector<int>(1001, 5));
 }
 
-TEST(ChunkedVector, FewElementsTakeLittleMemory) {
+TEST(ChunkedVector, SmallVectorsTakeLittleMemory) {
   Elements vector;
   for (int i = 0; i < 9; ++i) vector.push_back(i);
   EXPECT_LE(vector.MemoryBytes(), 16 * sizeof(int) + 64);

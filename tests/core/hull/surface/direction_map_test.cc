@@ -121,7 +121,7 @@ TEST(DirectionMap, RoundSetsNeedNoFrame) {
 }
 
 // At any scale. A set without any thickness has no frame.
-TEST(DirectionMap, FramesUndoThemselves) {
+TEST(DirectionMap, FramesAreInvertible) {
   const Vector center(1, 1, 1);
   const Vector direction(0.25, -1, 0.5);
   for (const double scale : {1e-300, 1.0, 1e300}) {
@@ -135,7 +135,7 @@ TEST(DirectionMap, FramesUndoThemselves) {
   }
 }
 
-TEST(DirectionMap, CoarsenedMapsStillBound) {
+TEST(DirectionMap, CoarsenedMapsRemainValid) {
   const Vector center(0, 0, 0);
   DirectionMap map = MapOf(BallGauge, center, 12);
   EXPECT_TRUE(map.Coarsen());

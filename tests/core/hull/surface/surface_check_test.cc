@@ -120,7 +120,7 @@ TEST_F(SurfaceCheck, FindsATriangleTurnedInsideOut) {
   EXPECT_STREQ(Defect(), "the center is not inside");
 }
 
-TEST_F(SurfaceCheck, FindsAVertexThatIsGone) {
+TEST_F(SurfaceCheck, FindsADeadVertex) {
   VertexTable without = vertices_;
   without.Remove(Triangle(0).corners[2]);
   // Otherwise the counts reveal it.
@@ -139,7 +139,7 @@ TEST_F(SurfaceCheck, FindsTrianglesWithoutArea) {
   EXPECT_STREQ(Defect(), "a triangle has no area");
 }
 
-TEST_F(SurfaceCheck, FindsAPlaneThatIsOff) {
+TEST_F(SurfaceCheck, FindsAnInaccuratePlane) {
   Triangle(0).offset *= 1 + 0x1p-40;
   EXPECT_STREQ(Defect(), "a rounded plane misses a corner");
 }
@@ -203,7 +203,7 @@ TEST_F(SurfaceCheck, FindsAStarWithoutItsApex) {
 }
 
 #ifndef NDEBUG
-TEST_F(SurfaceCheck, EndsTheProcessAtTheInsertionThatBreaksTheSurface) {
+TEST_F(SurfaceCheck, AbortsAtTheInsertionThatBreaksTheSurface) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   SurfaceTestPeer::CountOneMore(surface_);
   EXPECT_DEATH(surface_.Insert(vertices_, Vector(2, 0, 0)),

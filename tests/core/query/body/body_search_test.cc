@@ -153,7 +153,7 @@ TEST(BodySearch, SwappingTheBodiesMirrorsTheAnswer) {
   }
 }
 
-TEST(BodySearch, SeparationIsTheLeastOfAllPairs) {
+TEST(BodySearch, SeparationIsTheMinimumOverAllPairs) {
   Random random(TestSeed(3));
   QueryOptions wanted;
   wanted.want_separation = true;
@@ -198,7 +198,7 @@ TEST(BodySearch, SeparationIsTheLeastOfAllPairs) {
   EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 10);
 }
 
-TEST(BodySearch, FewNearPairsOfManyPiecesAreAllThatIsAskedAbout) {
+TEST(BodySearch, OnlyTheFewNearPairsOfManyPiecesAreQueried) {
   OwnBody grid;
   FillGrid(10, 2, &grid);
   // The corners of the grids overlap in one pair of cubes.
@@ -233,7 +233,7 @@ TEST(BodySearch, FewNearPairsOfManyPiecesAreAllThatIsAskedAbout) {
 }
 
 // Regression test: the search for the relation went on among all pairs within the clearance.
-TEST(BodySearch, AClearanceThatIsMetEndsWithTheFirstPairWithinIt) {
+TEST(BodySearch, AClearanceSearchEndsAtTheFirstPairWithinIt) {
   OwnBody grid;
   FillGrid(10, 2, &grid);
   QueryOptions options;
@@ -261,7 +261,7 @@ TEST(BodySearch, AClearanceThatIsMetEndsWithTheFirstPairWithinIt) {
   EXPECT_EQ(counts.pairs, 1u);
 }
 
-TEST(BodySearch, AClearanceTakesNoMoreWorkThanTheSeparation) {
+TEST(BodySearch, AClearanceCostsNoMoreWorkThanTheSeparation) {
   Random random(TestSeed(9));
   QueryOptions separation;
   separation.want_separation = true;
@@ -312,7 +312,7 @@ TEST(BodySearch, AHullIsQueriedAgainstBodies) {
   EXPECT_EQ(touching->answer.separation->bound, 0);
 }
 
-TEST(BodySearch, WithoutPointsABodyIsSeparatedFromAll) {
+TEST(BodySearch, ABodyWithoutPointsIsSeparatedFromEverything) {
   OwnBody none, empty, cube;
   none.Finish();
   empty.Add({}, Pose());
@@ -332,7 +332,7 @@ TEST(BodySearch, WithoutPointsABodyIsSeparatedFromAll) {
 }
 
 // The relation is that of the pieces, not of their union.
-TEST(BodySearch, ASeamBelongsToThePieces) {
+TEST(BodySearch, ASeamIsTreatedAsTheBoundaryOfThePieces) {
   OwnBody block, sheet;
   block.Add(LatticeCube(2, 1), At(0, 0, 0));
   block.Add(LatticeCube(2, 1), At(1, 0, 0));
@@ -360,7 +360,7 @@ TEST(BodySearch, WithinToleranceIsStrongerThanTouching) {
               testing::AnyOf(Relation::kWithinTolerance, Relation::kOverlapping));
 }
 
-TEST(BodySearch, StepsLeadToTheSameAnswer) {
+TEST(BodySearch, StepwiseSearchReturnsTheSameAnswer) {
   OwnBody grid;
   FillGrid(5, 1, &grid);
   const PlacedBody a = grid.Placed(Pose());
@@ -401,7 +401,7 @@ TEST(BodySearch, RefusesOptionsForPairsOfHulls) {
       HasSubstr("not of bodies"));
 }
 
-TEST(BodySearch, CoordinatesBeyondTheRangeOfBoxesAreAskedAboutAllTheSame) {
+TEST(BodySearch, CoordinatesBeyondTheRangeOfBoxesAreStillQueried) {
   OwnBody large, small;
   large.Add(Scaled(LatticeCube(2, 1), 1e307), At(0, 0, 0));
   large.Add(LatticeCube(2, 1), At(-1e307, 0, 0));

@@ -188,7 +188,7 @@ TEST(PieceCertification, HullsAreBodiesOfOnePiece) {
   EXPECT_EQ(answer->certificates[0].pieces, (PiecePair{0, 1}));
 }
 
-TEST(PieceCertification, WhereBoxesSettleAllNothingIsCertified) {
+TEST(PieceCertification, NothingIsCertifiedIfBoxesSettleAllPairs) {
   OwnBody grid, none;
   FillGrid(4, 2, &grid);
   none.Finish();

@@ -94,7 +94,7 @@ TEST(LatticeContact, FoundContactsTouch) {
   EXPECT_GT(across_axes, kRounds / 200);
 }
 
-TEST(LatticeContact, OneUnitDecides) {
+TEST(LatticeContact, OneUnitMakesADifference) {
   const Hull box = BuildHull(LatticeCube(2, 1));
   Pose X_WB;
   X_WB.t = {1, 0.25, -0.5};
@@ -105,7 +105,7 @@ TEST(LatticeContact, OneUnitDecides) {
   }
 }
 
-TEST(LatticeContact, CoordinatesOfManyBitsAreLeftToIntegers) {
+TEST(LatticeContact, CoordinatesWithManyBitsAreLeftToIntegers) {
   const Hull box = BuildHull(LatticeCube(2, 1));
   const Hull fine = BuildHull(Concatenated(LatticeCube(2, 1), {{0.5, 0.5, -0x1p-60}}));
   Pose X_WB;

@@ -33,7 +33,7 @@ Motion Swinging(const Vector& axis) {
           {{c, v.x(), v.y(), v.z()}, Vector::Zero()}};
 }
 
-// A hull in motion, of a size near 1.
+// A hull in motion, with a size of about 1.
 struct Part {
   std::vector<Vector> points;
   Motion motion = {};
@@ -98,7 +98,7 @@ OwnMoving Moving(const Part& part, double scale, double shift) {
 
 struct Answered {
   FirstContact contact;
-  // Number of times that the search asked if it should stop: once for each step at least.
+  // Number of times that the search polled should_stop: at least once per step.
   int polls = 0;
 };
 
@@ -130,7 +130,7 @@ constexpr int kDigitStep = 4;
 constexpr double kScales[] = {1, 3e-18};
 constexpr int kDigitStep = 2;
 #endif
-// Exact arithmetic asks several times in a step.
+// Exact arithmetic polls several times per step.
 constexpr int kMostPolls = 2500;
 
 TEST(Graze, StepsGrowWithTheLogarithmOfTheGap) {
@@ -204,7 +204,8 @@ TEST(Graze, AnswersAgreeWithDenseSamples) {
   }
 }
 
-// A tip passes the wall, however near, and a longer one meets it after another quarter turn.
+// A tip passes the wall, no matter how close, and a longer one meets it after another quarter
+// turn.
 TEST(Graze, ContactAfterAGrazeIsFound) {
   std::vector<Vector> tips = Octahedron();
   tips[3] = {0, -1.01, 0};

@@ -131,7 +131,8 @@ TEST(Translation, PiecesWithAPoseAgreeWithBruteForce) {
   EXPECT_GT(counts.between, 4);
 }
 
-// The contacts of a point with a polygon or of two segments last no time; most are between doubles.
+// The contact of a point with a polygon, or of two segments, lasts only an instant; most are
+// between doubles.
 TEST(Translation, ContactsOfAnInstantAreFound) {
   Random random(TestSeed(3));
   Counts counts;
@@ -180,7 +181,7 @@ TEST(Translation, GrazingPairsTouch) {
   const FirstContact brief = Find(a, corner);
   EXPECT_EQ(brief.relation, Relation::kTouching);
   EXPECT_TRUE(IsBracketOf(brief, Rational(1, 3)));
-  // Nothing is missed by a graze that is moved away by the least amount.
+  // A graze moved away by the smallest amount misses.
   const OwnMoving apart(Cube(1), Straight({5, std::nextafter(2.0, 3.0), 0}, {-5, 2.5, 0}));
   EXPECT_EQ(Find(a, apart).relation, Relation::kSeparated);
 }

@@ -301,7 +301,7 @@ TEST(Turning, RadiiBringTheContactForward) {
   const FirstContact spheres = Find(OwnMoving(center, AtRest(), 0.5), sphere);
   EXPECT_EQ(spheres.relation, Relation::kOverlapping);
   EXPECT_NEAR(*spheres.contact_time, 2.0 / 3, 1e-9);
-  // Beside it at the distance of the radii, it grazes; a little farther, it passes.
+  // Offset by the sum of the radii, it grazes; a little farther, it passes.
   const auto beside = [&](double y) {
     return Find(OwnMoving(center, AtRest({0, y, 0}), 0.5), sphere).relation;
   };

@@ -87,7 +87,7 @@ class Comparison {
 };
 
 // All extreme clouds, point by point, prepared occasionally.
-TEST(LiveHull, EveryStepAnswersAsAFreshHull) {
+TEST(LiveHull, EveryStepAnswersLikeAFreshHull) {
   const uint64_t seed = TestSeed(941);
   Random random(seed);
   int counts[3] = {};
@@ -125,7 +125,7 @@ TEST(LiveHull, EveryStepAnswersAsAFreshHull) {
 }
 
 // Old versions stay unchanged while the hull grows and is prepared.
-TEST(LiveHull, MarksKeepTheirMoment) {
+TEST(LiveHull, MarksPreserveTheirState) {
   Random random(TestSeed(942));
   Growing growing;
   std::vector<LiveHull::Mark> marks;
@@ -158,7 +158,7 @@ TEST(LiveHull, MarksKeepTheirMoment) {
 }
 
 // As after a change that could not be stored.
-TEST(LiveHull, CopiesGoOnFromAMark) {
+TEST(LiveHull, CopiesContinueFromAMark) {
   Random random(TestSeed(943));
   Growing growing;
   growing.Add(RandomOnSphere(random, 30, 1));
@@ -189,7 +189,7 @@ TEST(LiveHull, EmptyHullsAreSeparatedFromAll) {
 
 // A hull without queries is never prepared; a queried hull is prepared after the queries have
 // scanned as much as preparation costs.
-TEST(LiveHull, QuestionsPayForPreparing) {
+TEST(LiveHull, QueriesPayForPreparation) {
   Random random(TestSeed(944));
   Growing growing;
   growing.Add(RandomOnSphere(random, 500, 1));
@@ -216,7 +216,7 @@ TEST(LiveHull, QuestionsPayForPreparing) {
 
 // One point per step and a query after each, counted in operations: points that queries scan and
 // that merges move.
-TEST(LiveHull, WorkAStepIsPolylogarithmic) {
+TEST(LiveHull, WorkPerStepIsPolylogarithmic) {
   Random random(TestSeed(945));
   const Hull probe = BuildHull(RandomOnSphere(random, 20, 1));
   const QueryHull query_probe(probe);

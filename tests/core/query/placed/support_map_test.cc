@@ -142,7 +142,7 @@ TEST(SupportMap, FindsTheFarthestPointOfAnySet) {
 }
 
 // Ties are exact if coordinates and directions are small integers: all points of a face.
-TEST(SupportMap, CandidatesHoldAllThatAreExactlyFarthest) {
+TEST(SupportMap, CandidatesIncludeAllExactlyFarthestPoints) {
   Random random(TestSeed(932));
   std::vector<Vector> lattice = LatticeCube(9, 1);
   const SupportMap map(lattice);
@@ -205,7 +205,7 @@ TEST(SupportMap, ListedPointsHaveTheSameHull) {
   EXPECT_GT(hidden, 1000u);
 }
 
-TEST(SupportMap, EveryInstructionSetGivesTheSameBits) {
+TEST(SupportMap, EveryInstructionSetReturnsTheSameBits) {
   const SimdPath best = BestSimdPath();
   if (best == SimdPath::kPortable) GTEST_SKIP() << "this machine has one SIMD path only";
   Random random(TestSeed(935));

@@ -109,7 +109,7 @@ TEST(Scene, RadiiGrowTheBoxes) {
   EXPECT_GT(totals.found, without_radii.found);
 }
 
-TEST(Scene, GroupsAndMoversLeaveOutTheirPairs) {
+TEST(Scene, GroupsAndMoversExcludeTheirPairs) {
   const Scene scene = MakeScene(822, 300, 9);
   std::vector<uint32_t> groups;
   for (uint32_t i = 0; i < 300; ++i) groups.push_back(i * i % 7);
@@ -137,7 +137,7 @@ TEST(Scene, GroupsAndMoversLeaveOutTheirPairs) {
   }
 }
 
-TEST(Scene, RefusesGroupsThatAreNotOneForEachPlacement) {
+TEST(Scene, RequiresAGroupForEachPlacement) {
   const Scene scene = MakeScene(823, 3, 3);
   const std::vector<uint32_t> groups = {0, 1};
   SceneOptions options;
@@ -200,7 +200,7 @@ TEST(BoxTree, IsTheSameOnAnyNumberOfThreads) {
       for (const uint32_t child : one.children(node)) waiting.push_back(child);
     }
     EXPECT_TRUE(std::ranges::all_of(placed, [](bool is_placed) { return is_placed; }));
-    // The whole world meets all but the empty ones.
+    // All of space intersects every box except empty ones.
     std::vector<uint32_t> found;
     two.AppendMeeting(Box::All(), 0, found);
     EXPECT_EQ(found.size(),
@@ -234,7 +234,7 @@ TEST(Scene, AnswersAreEmittedInBoundedParts) {
   }
 }
 
-TEST(Scene, CandidatesAreGatheredInStepsAndTakeABitEachAtMost) {
+TEST(Scene, CandidatesAreGatheredInStepsAndUseAtMostOneBitEach) {
   constexpr uint32_t kPlacements = 5000;
   Random random(TestSeed(827));
   const Hull ball = BuildHull(RandomOnSphere(random, 8, 1));
@@ -294,7 +294,7 @@ TEST(Scene, MembersOfAGroupThatIgnoresItselfAreNotVisited) {
   }
 }
 
-TEST(Scene, BoxesHoldTheirHullsAtEveryScale) {
+TEST(Scene, BoxesContainTheirHullsAtEveryScale) {
   Random random(TestSeed(825));
   for (const double scale : {1e-305, 1e-100, 1e-3, 1.0, 1e80, 1e300}) {
     for (const double offset : {0.0, 1.0, 1e15}) {

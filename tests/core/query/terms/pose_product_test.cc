@@ -145,7 +145,7 @@ TEST(PoseProduct, TimesOfAMotionRoundWithinTheirBounds) {
   EXPECT_GT(finite, 40);
 }
 
-TEST(PoseProduct, WithoutAPoseOfThePieceIsThePoseOfTheBody) {
+TEST(PoseProduct, WithoutAPieceItEqualsThePoseOfTheBody) {
   Random random(TestSeed(2));
   const Pose pose = RandomPose(random, 10);
   const PoseProduct product(pose, Pose());
@@ -234,7 +234,7 @@ TEST(PoseProduct, WideProductsAreExactToo) {
   }
 }
 
-TEST(PoseProduct, ExtremesOfScaleAreDecidedAsRationalNumbersAre) {
+TEST(PoseProduct, ExtremesOfScaleAgreeWithRationalArithmetic) {
   Random random(TestSeed(6));
   const std::array<double, 8> scales = {0x1p-1060, 1e-300, 1e-150, 1e-20, 1, 1e20, 1e150, 1e307};
   for (int round = 0; round < TestSize(120, 20); ++round) {

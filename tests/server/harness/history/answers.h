@@ -13,8 +13,8 @@
 
 namespace hulld::server {
 
-// Returns a context with a deadline far beyond any of these calls, so that a defect fails instead
-// of hanging.
+// Returns a context with a deadline far beyond any of these calls, so that a defect makes the test
+// fail instead of hang.
 std::unique_ptr<grpc::ClientContext> NewContext();
 
 void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen);

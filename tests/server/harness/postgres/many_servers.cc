@@ -155,7 +155,7 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
         ++made;
         made.notify_one();
       });
-      // All clients have ended; wake every waiter.
+      // All clients have ended; wakes every waiter.
       if (++ended == kClients) {
         made = kClients * static_cast<size_t>(calls.each);
         made.notify_one();

@@ -123,7 +123,7 @@ void PostgresCluster::MakeDirectory() {
   std::error_code error;
   const auto in_memory = std::filesystem::space("/dev/shm", error);
   const bool fits = !error && in_memory.available >= kSpaceInMemory;
-  // Kept short: a socket path holds at most 107 characters.
+  // Kept short: a socket path has at most 107 characters.
   std::string name = absl::StrCat(fits ? "/dev/shm" : "/tmp", "/hulld-postgres-XXXXXX");
   directory_ = mkdtemp(name.data());
   GiveToServer(directory_);

@@ -11,7 +11,7 @@ namespace hulld::server {
 
 // A PostgreSQL server with its own data directory, in memory (/dev/shm) or, if that is too small,
 // in /tmp. It listens only on a unix socket there and ends with the test. Under root it runs as the
-// user postgres, as PostgreSQL refuses root. Any failure ends the test program.
+// user postgres, because PostgreSQL refuses to run as root. Any failure ends the test program.
 class PostgresCluster {
  public:
   // Returns true if PostgreSQL's server is installed. Tests are skipped without it.
@@ -40,8 +40,8 @@ class PostgresCluster {
 
   // Creates an empty database owned by the role hulld; returns its name.
   std::string MakeDatabase(const std::string& tablespace = "pg_default");
-  // Returns a connection string for the role hulld, which is no superuser. host: a proxy's; empty:
-  // the server's own.
+  // Returns a connection string for the role hulld, which is not a superuser. host: a proxy's;
+  // empty: the server's own.
   std::string Conninfo(const std::string& database, const std::string& host = "") const;
   // Writes the connection string to a file for --postgres-conninfo-file, deleted with this object.
   // host: as above, or several, separated by commas.

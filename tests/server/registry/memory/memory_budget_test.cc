@@ -128,14 +128,13 @@ TEST_F(MemoryBudgetTest, EachUseHasAShareOfItsOwn) {
   writing.Set(61);
   const absl::Status refused = Check(MemoryUse::kWriting);
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("writers hold 61 bytes"));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("writers use 61 bytes"));
   EXPECT_THAT(std::string(refused.message()), HasSubstr("the limit is 60 (--memory-limit)"));
   EXPECT_TRUE(Check(MemoryUse::kReading).ok());
   writing.Set(60);
   reading.Set(41);
   EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
-  EXPECT_THAT(std::string(Check(MemoryUse::kReading).message()),
-              HasSubstr("readers hold 41 bytes"));
+  EXPECT_THAT(std::string(Check(MemoryUse::kReading).message()), HasSubstr("readers use 41 bytes"));
 }
 
 TEST_F(MemoryBudgetTest, APartIsHeldForReadersWhileOneHoldsIt) {

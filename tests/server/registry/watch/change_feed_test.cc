@@ -262,7 +262,7 @@ TEST_F(ChangeFeedTest, ReportsBodiesIfRequested) {
   EXPECT_THAT(hulls.All(), ElementsAre("created c"));
   EXPECT_THAT(both.All(), ElementsAre("replaced c"));
   EXPECT_THAT(one.All(), ElementsAre("replaced c"));
-  // And in the opposite direction.
+  // The same in the opposite direction.
   ASSERT_TRUE(hulls_->Delete("d").ok());
   PutBody("d");
   EXPECT_THAT(hulls.All(), ElementsAre("deleted d"));

@@ -9,7 +9,7 @@ namespace conninfo_test {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Conninfo, KeywordsAndUrisAreTaken) {
+TEST(Conninfo, KeywordsAndUrisAreAccepted) {
   for (const char* text : {"host=db.example dbname=hulls user=hulld password='two words'\n",
                            "postgresql://hulld:two%20words@db.example/hulls"}) {
     const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(text);
@@ -29,8 +29,8 @@ TEST(Conninfo, TimeoutsHaveDefaults) {
   EXPECT_EQ(given.at("connect_timeout"), "60");
 }
 
-// Each text moves part of the password into the host, the port, the database, or a word of an
-// error.
+// In each string, part of the password would be parsed as the host, the port, or the database, or
+// quoted in an error.
 TEST(Conninfo, NoErrorQuotesAPassword) {
   for (const char* text :
        {"password=geheim und noch", "password='geheim", "geheim",

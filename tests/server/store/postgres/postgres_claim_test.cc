@@ -84,7 +84,7 @@ TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
     return false;
   };
   auto next = std::async(std::launch::async, [this] { return Open(); });
-  // It found the store claimed.
+  // The server found the store claimed.
   asked.get_future().get();
   EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
   hulls_ = nullptr;
@@ -166,7 +166,7 @@ TEST_F(PostgresClaim, AWrongPasswordIsReportedAndNotShown) {
   EXPECT_THAT(log.text(), Not(HasSubstr("falsches-Wort")));
 }
 
-TEST_F(PostgresClaim, ARoleWithoutRightsGetsTheMissingGrant) {
+TEST_F(PostgresClaim, ARoleWithoutRightsIsToldTheMissingGrant) {
   Ask("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
   options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
                                    " user=stranger password=fremd");

@@ -113,7 +113,7 @@ TEST_F(PostgresFault, WritersDoNotNoticeARestartOfTheDatabase) {
   EXPECT_EQ(ReceivedAfterRestart("h"), 10);
 }
 
-TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
+TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
   options_.patience = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -165,7 +165,7 @@ TEST_F(PostgresFault, AHungDatabaseBlocksNoThreadForever) {
 }
 
 // The database rejects the transaction and keeps none of it.
-TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
+TEST_F(PostgresFault, ARefusedTransactionLeavesNothing) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   Ask("ALTER TABLE hulld.deltas ADD CONSTRAINT never CHECK (length(vertices) < 20) NOT VALID");
@@ -179,7 +179,7 @@ TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
 }
 
 // PostgreSQL reports a commit with a warning that a standby may lack it.
-TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
+TEST_F(PostgresFault, ACancelledWaitForAStandbyIsNotAnAcknowledgement) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   Ask("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");

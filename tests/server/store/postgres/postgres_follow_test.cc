@@ -390,7 +390,7 @@ TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
   EXPECT_THAT(log.text(), HasSubstr("no commit notices are arriving"));
 }
 
-// The database speaks PostgreSQL's protocol but lacks LISTEN. The log says so a single time.
+// The database speaks PostgreSQL's protocol but lacks LISTEN. The log reports this only once.
 TEST_F(PostgresFollow, ServersPollIfTheDatabaseRefusesToListen) {
   const CapturedLog log;
   options_.look = options_.beat = std::chrono::milliseconds(10);

@@ -94,7 +94,7 @@ TEST_F(PostgresRecords, ASingleActiveServerHasNoPeersToFollow) {
   EXPECT_EQ((*store)->peers(), nullptr);
 }
 
-TEST_F(PostgresRecords, APrefixThatNoIdHasListsNothing) {
+TEST_F(PostgresRecords, AnUnmatchedPrefixListsNothing) {
   Start();
   FillSome();
   for (const std::string& prefix : {std::string("a\0", 2), std::string("\xff\xfe"),

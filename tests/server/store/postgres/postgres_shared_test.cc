@@ -145,7 +145,7 @@ TEST_F(PostgresShared, RevisionsAreTotallyOrdered) {
   EXPECT_EQ(hulls_->store().id(), other->store().id());
 }
 
-TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
+TEST_F(PostgresShared, ASequenceIsCountedOnceAcrossServers) {
   Start();
   const Server other = StartPeer();
   const auto here = hulls_->Open("h");
@@ -201,7 +201,7 @@ TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
   }
 }
 
-TEST_F(PostgresShared, OneOfTwoConditionsOnOneRevisionHolds) {
+TEST_F(PostgresShared, OneOfTwoConditionsOnTheSameRevisionSucceeds) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -267,7 +267,7 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   EXPECT_FALSE(other->registry().has_bodies());
 }
 
-TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
+TEST_F(PostgresShared, SessionsEndOnAllServersWhenTheirHullIsDeleted) {
   Start();
   const Server other = StartPeer();
   std::promise<absl::Status> gone;
@@ -410,7 +410,7 @@ TEST_F(PostgresShared, ACommitWithALostAnswerIsFoundAndNotRepeated) {
 }
 
 // The change is refused with an unknown outcome, and later applied as if a peer server had made it.
-TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
+TEST_F(PostgresShared, AnUnknownOutcomeIsResolvedLater) {
   options_.patience = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
@@ -435,7 +435,7 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
 
 // The transaction holds the lock and its COMMIT is in flight. A query of its outcome waits for the
 // lock.
-TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
+TEST_F(PostgresShared, ALateCommitIsAwaited) {
   Start();
   const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
@@ -448,7 +448,7 @@ TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
   EXPECT_EQ(Received(*hulls_, "h"), 9);
 }
 
-TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
+TEST_F(PostgresShared, ACommitAfterItsTurnChangesNothing) {
   Start();
   const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
@@ -463,7 +463,7 @@ TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
   EXPECT_EQ(Received(*other, "h"), 10);
 }
 
-TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
+TEST_F(PostgresShared, ALateRequestForTheTurnChangesNothing) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -542,7 +542,7 @@ TEST_F(PostgresShared, ChangesAreDecidedByPeerChanges) {
   EXPECT_EQ(Received(*other, "h"), 24);
 }
 
-TEST_F(PostgresShared, ServersThatStartAtOnceMakeOneStore) {
+TEST_F(PostgresShared, ServersThatStartTogetherCreateOneStore) {
   constexpr size_t kServers = 8;
   for (int round = 0; round < 2; ++round) {
     options_.conninfo = cluster().Conninfo(cluster().MakeDatabase());
@@ -571,7 +571,7 @@ TEST_F(PostgresShared, ServersThatStartAtOnceMakeOneStore) {
 }
 
 // Simulates leftover sessions of killed servers.
-TEST_F(PostgresShared, AServerThatFindsNoRoomForItsSessionsWaits) {
+TEST_F(PostgresShared, AServerWaitsIfTheDatabaseHasNoFreeSessions) {
   for (const int room : {1, 3}) {
     const std::string role = absl::StrCat("narrow_", room);
     const std::string database = cluster().MakeDatabase();
@@ -597,7 +597,7 @@ TEST_F(PostgresShared, AServerThatFindsNoRoomForItsSessionsWaits) {
   }
 }
 
-TEST_F(PostgresShared, AllGoOnWhenTheDatabaseEndsTheirSessions) {
+TEST_F(PostgresShared, AllServersContinueWhenTheDatabaseEndsTheirSessions) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -607,13 +607,13 @@ TEST_F(PostgresShared, AllGoOnWhenTheDatabaseEndsTheirSessions) {
   EXPECT_EQ(Received(*hulls_, "h"), 9);
 }
 
-TEST_F(PostgresShared, AServerThatWasActiveAloneIsShutOutAndShutsOut) {
+TEST_F(PostgresShared, AnExclusiveServerAndSharedServersExcludeEachOther) {
   options_.shared = false;
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   options_.shared = true;
   options_.should_stop = [] { return true; };
-  // It waits for the server that is active alone.
+  // It waits for the server that requires exclusive access.
   EXPECT_TRUE(absl::IsCancelled(Open().status()));
   hulls_ = nullptr;
   options_.should_stop = {};
@@ -636,7 +636,7 @@ TEST_F(PostgresShared, WithoutSyncItIsRefused) {
   EXPECT_THAT(std::string(status.message()), HasSubstr("synchronous_commit"));
 }
 
-TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
+TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
   Start();
   const Server other = StartPeer();
   const std::string id = hulls_->store().id();

@@ -1,7 +1,7 @@
-// The convex hull of a few hundred points in floating point, for pictures: hulld computes the hulls
-// that answers are about.
+// The convex hull of a few hundred points in floating point, for pictures only: answers use the
+// hulls computed by hulld.
 
-// Points nearer to a facet than this part of the extent do not count as outside.
+// Points closer to a facet than this fraction of the extent do not count as outside.
 const RELATIVE_TOLERANCE = 1e-9;
 
 const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
@@ -11,7 +11,7 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross =
     (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
-// Returns the index with the greatest measure.
+// Returns the index of the maximum measure.
 function farthest(points, measure) {
   let best = 0;
   let most = -Infinity;

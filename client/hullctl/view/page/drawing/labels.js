@@ -50,9 +50,9 @@ export class Labels {
     return index === this.model.selected || index === this.model.other;
   }
 
-  // Places each label above its object in the picture, or below it. Hides it if it would
-  // overlap a label that matters more or the buttons, or if the object is out of the picture.
-  // Reads all sizes before it writes: reading after a write makes the browser lay out the page.
+  // Places each label above its object in the picture, or below it. Hides it if it would overlap a
+  // more important label or the buttons, or if the object is outside the picture. Reads all sizes
+  // before it writes: reading after a write makes the browser lay out the page.
   place() {
     const taken = this.buttonBoxes();
     const shown = [];

@@ -136,7 +136,7 @@ export class Marks extends DrawnGroup {
     if (this.on.plane) this.addPlane(n, middle, objects);
   }
 
-  // Draws the part of the plane through `middle` that lies in the box of the objects, with a grid.
+  // Draws the part of the plane through `middle` inside the box of the objects, with a grid.
   addPlane(n, middle, objects) {
     const corners = clipToBox(n, middle, this.boxOf(objects));
     if (corners.length < 3) return;

@@ -27,7 +27,7 @@ export function geometryOf(shape, kind) {
 // For a larger hull, lines would cover the surface, and drawing both sides would double the cost.
 const isHuge = (hull) => hull.facetCount > 200000;
 
-// Many lines hide the surface.
+// Too many lines would hide the surface.
 export const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
 export class ObjectView extends DrawnGroup {
@@ -36,7 +36,7 @@ export class ObjectView extends DrawnGroup {
     this.object = object;
   }
 
-  // Rebuilds the drawn parts; cheap, as geometries are shared.
+  // Rebuilds the drawn parts; cheap because geometries are shared.
   rebuild() {
     const {model, object} = this;
     this.clear();

@@ -1,5 +1,5 @@
-// Pictures of the stage: the drawing, its labels, its axes, and its scale. They depend neither on
-// the browser's window nor on the time at which it is shown.
+// Pictures of the stage: the drawing, its labels, its axes, and its scale. They are independent of
+// the browser's window and of timing.
 
 // Returns a canvas with the picture of the last frame.
 function pictureOf(stage) {

@@ -1,4 +1,4 @@
-// Draws a simpler hull in place of the selected one with the shell of its proven error, or the
+// Draws a simpler hull, instead of the selected one, with the shell of its proven error, or the
 // shell of the tolerance.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {THREE} from 'hulld/drawing/three.js';

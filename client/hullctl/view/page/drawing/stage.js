@@ -7,7 +7,7 @@ const FLIGHT_MS = 350;
 
 // Parts on this layer are left out of coarse frames.
 export const FINE_LAYER = 1;
-// Frames that follow each other more slowly than this are drawn coarsely, until a pause.
+// Frame time above which frames are drawn coarsely, until a pause.
 const SLOW_MS = 50;
 const PAUSE_MS = 200;
 
@@ -36,8 +36,8 @@ export class Stage {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
     this.camera.layers.enable(FINE_LAYER);
-    // The sky tells upper from lower faces; the lamp, above the camera's left, left from right
-    // ones.
+    // The sky distinguishes upper from lower faces; the lamp, above the camera's left,
+    // distinguishes left from right ones.
     this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.7);
     this.lamp = new THREE.DirectionalLight(0xffffff, 0.42);
     this.lamp.position.set(-0.7, 1, 0.5);
@@ -81,8 +81,8 @@ export class Stage {
     const negative = (axis) => axis.map((value) => -value);
     const front = {x: z, y: z, z: negative(y)}[up];
     const right = {x: negative(y), y: x, z: x}[up];
-    // Directions from the target to the camera. The top has a bit of the front, so that the front
-    // is at the bottom of the picture.
+    // Directions from the target to the camera. The top view is tilted slightly to the front, so
+    // that the front is at the bottom of the picture.
     this.views = {
       front,
       right,

@@ -34,7 +34,7 @@ function sampledPoses({start, endPose}) {
     sample(t, (t + until) / 2, halvings - 1);
     sample((t + until) / 2, until, halvings - 1);
   };
-  // Halves first, as the angle between both ends says nothing about a longer way around.
+  // Halves first, because the angle between both ends does not reveal a longer way around.
   sample(0, 0.5, MOST_HALVINGS);
   sample(0.5, 1, MOST_HALVINGS);
   return angleBetween(start, endPose) === 0 && poses.length === 3 ? [start, endPose] : poses;

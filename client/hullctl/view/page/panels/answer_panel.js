@@ -27,7 +27,7 @@ export class AnswerPanel {
     this.marks = marks;
     this.live = live;
     this.root = document.getElementById('answer');
-    // Shown next to the objects, as it concerns all of them.
+    // Shown next to the objects because it concerns all of them.
     this.list = document.getElementById('collisions');
     this.body = element('div', {'aria-live': 'polite', 'aria-busy': 'false'});
     this.proofLine = new ProofLine('proof');

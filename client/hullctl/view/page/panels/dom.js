@@ -1,4 +1,4 @@
-// Makes elements: element('dt', {className: 'quiet'}, 'text', child).
+// Creates elements: element('dt', {className: 'quiet'}, 'text', child).
 export function element(name, properties = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(properties)) {
@@ -24,7 +24,7 @@ export const rounded = (...values) => element(
     'span', {className: 'number', title: values.map((value) => String(Number(value))).join(' ')},
     values.map(short).join(' '));
 
-// Puts a text on the clipboard. Browsers without permission for it accept an older way.
+// Puts a text on the clipboard. Falls back to an older method in browsers that deny permission.
 export async function copy(text) {
   try {
     await navigator.clipboard.writeText(text);

@@ -2,7 +2,7 @@
 import {element, short} from 'hulld/panels/dom.js';
 
 export class JointPanel {
-  // move(values, rest): moves the joints; rest: the slider was let go.
+  // move(values, rest): moves the joints; rest: the slider was released.
   constructor(model, live, move) {
     this.model = model;
     this.live = live;

@@ -1,4 +1,4 @@
-// The selected object: its pose, a simpler hull in its place, and its properties.
+// The selected object: its pose, a simplification of its hull, and its properties.
 import {copy, element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
 import {poseText} from 'hulld/pose.js';
 
@@ -158,7 +158,7 @@ export class ObjectPanel {
       'data-pose': i,
       'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
       onchange: () => this.typed(object, i),
-      // A text that is no number stays until it is corrected.
+      // Text that is not a number stays until it is corrected.
       onfocus: () => {
         if (input.getAttribute('aria-invalid') !== 'true') input.value = String(object.pose[i]);
       },
@@ -319,7 +319,7 @@ export class ObjectPanel {
     this.compare();
   }
 
-  // Shows the simpler hull and its answer beside the exact ones. Called when either changes.
+  // Shows the simpler hull and its answer next to the exact ones. Called when either changes.
   compare() {
     const {simpler} = this;
     const exact = this.object && this.model.hullOf(this.object);

@@ -1,5 +1,5 @@
-// A time line under the picture: a slider with marks, and a button that plays it. A track gives it
-// a meaning.
+// A time line under the picture: a slider with marks, and a button that plays it. A track defines
+// its meaning.
 
 // Merges ascending moments into runs [first, last].
 export function runsOf(moments) {

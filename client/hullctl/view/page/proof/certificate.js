@@ -88,12 +88,12 @@ export const placedHull = ({xyz, poses, radii = []}, exponent) => poses.reduceRi
     new ExactHull(xyz, radii, exponent));
 
 export function checkPlacement({xyz, poses, radii = []}) {
-  require(xyz.every(Number.isFinite), 'a hull holds a number that is not finite');
-  require(areFinite(radii), 'a radius holds a number that is not finite');
+  require(xyz.every(Number.isFinite), 'a hull contains a number that is not finite');
+  require(areFinite(radii), 'a radius contains a number that is not finite');
   require(radii.every((radius) => radius >= 0), 'a radius is negative');
   for (const pose of poses) {
-    require(areFinite(pose.slice(4)), 'a translation holds a number that is not finite');
-    require(areFinite(pose.slice(0, 4)), 'a rotation holds a number that is not finite');
+    require(areFinite(pose.slice(4)), 'a translation contains a number that is not finite');
+    require(areFinite(pose.slice(0, 4)), 'a rotation contains a number that is not finite');
     require(isRotated(pose), 'a rotation is zero');
   }
 }
@@ -113,7 +113,7 @@ export function readDirection({direction, integerDirection}) {
   let exponent = 0;
   if (direction) {
     const numbers = numbersOf(direction);
-    require(areFinite(numbers), 'the direction holds a number that is not finite');
+    require(areFinite(numbers), 'the direction contains a number that is not finite');
     exponent = commonExponent(numbers);
     n = toIntegers(numbers, exponent);
   } else {

@@ -78,8 +78,8 @@ const signOf = (a, b, c) => (a >= 0n || b === 0n ? a + b : b * b * c - a * a);
 
 // Returns true if the hull is on the side n.p < offset of a plane over the interval, or, if
 // `mayEnd`, on the plane at its end. `normals` and `offsets`: of the plane at both ends of the
-// interval; both are linear in between, and the length of the longer normal stands for |n|. For
-// each vertex p, |q|^2 (n.p + radius |n| - offset) is a polynomial of time of degree 4. It is
+// interval; both are linear in between, and |n| is replaced by the length of the longer normal.
+// For each vertex p, |q|^2 (n.p + radius |n| - offset) is a polynomial of time of degree 4. It is
 // negative if no coefficient is positive and the outer ones, its values at both ends, are negative.
 function isBelow({inBody}, {normals, offsets}, {q, x, divisor}, mayEnd) {
   const forms = productOf(q, q, rotationForm, sumOfForms);
@@ -146,7 +146,7 @@ class MovingPair {
 
   // n.(b - a) is linear in time for each pair of vertices, so its signs at both ends suffice.
   checkTranslation({n}, {until}, begin, mayEnd) {
-    require(this.isTranslation, 'there is no offset, which only translations do without');
+    require(this.isTranslation, 'the offset is missing, which is allowed only for translations');
     const [atBegin, atEnd] =
         [begin, Number(until)].map((time) => gapSign(...this.hullsAt(time), n));
     require(
@@ -232,7 +232,7 @@ function checkTimes(relation, {separatedUntil, contactTime}) {
 const endsOf = ({poses: [start, ...inBody], end, ...hull}) => [start, end].map(
     (pose) => ({...hull, poses: [pose, ...inBody]}));
 
-// Returns a function that makes the pair of pieces i and j.
+// Returns a function that creates the pair of pieces i and j.
 function pairsOf(a, b) {
   const ends = [...a, ...b].filter(({xyz}) => xyz.length).flatMap(endsOf);
   ends.forEach(checkPlacement);

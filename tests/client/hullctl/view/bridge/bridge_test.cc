@@ -130,7 +130,7 @@ std::string TextFrame(const std::string& text, uint64_t size) {
   return frame + std::string(4, '\0') + text;
 }
 
-TEST_F(BridgeTest, PageComesWithAPolicyThatAllowsItsOwnFilesAlone) {
+TEST_F(BridgeTest, PagePolicyAllowsOnlyItsOwnFiles) {
   const std::string cookie = ComeIn();
   const std::string page = Ask("/", cookie);
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
@@ -150,7 +150,7 @@ TEST_F(BridgeTest, PageComesWithAPolicyThatAllowsItsOwnFilesAlone) {
   }
 }
 
-TEST_F(BridgeTest, StrangersGetNothing) {
+TEST_F(BridgeTest, ClientsWithoutASessionGetNothing) {
   EXPECT_THAT(Ask("/"), AllOf(StartsWith("HTTP/1.1 403"), Not(HasSubstr("<script"))));
   EXPECT_THAT(Ask("/style.css"), StartsWith("HTTP/1.1 403"));
   EXPECT_THAT(Ask("/?token=0"), StartsWith("HTTP/1.1 403"));
@@ -238,14 +238,14 @@ TEST_F(BridgeTest, PagesBeyondTheLimitAreClosed) {
   EXPECT_EQ(third.ReadAll(), "");
 }
 
-TEST_F(BridgeTest, PortThatIsTakenIsNamed) {
+TEST_F(BridgeTest, APortInUseIsNamed) {
   BridgeOptions options;
   options.port = bridge_->port();
   const auto second = Bridge::Start(std::move(options));
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("choose another --port"));
 }
 
-TEST_F(BridgeTest, EndsWhilePagesAreOpen) {
+TEST_F(BridgeTest, ShutsDownWhilePagesAreOpen) {
   const std::string cookie = ComeIn();
   Socket page(bridge_->port());
   page.Send(UpgradeRequest(cookie, "http://" + host_));
@@ -254,7 +254,7 @@ TEST_F(BridgeTest, EndsWhilePagesAreOpen) {
   EXPECT_FALSE(page.ReadUntil("never said"));
 }
 
-TEST(StandalonePage, HoldsAllThatItNeeds) {
+TEST(StandalonePage, IsSelfContained) {
   const std::string recording = "{\"note\":\"</script><script>alert(1)\"}";
   const std::string page = StandalonePage(recording);
   // The page is too long to print on failure.
