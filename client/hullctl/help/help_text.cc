@@ -43,8 +43,8 @@ void AppendList(const std::string& heading, const std::vector<Entry>& entries, s
   for (const auto& [name, help] : entries) {
     absl::StrAppend(text, "  ", name);
     const bool fits = name.size() <= kWidestName;
-    absl::StrAppend(
-        text, fits ? std::string(indent - 2 - name.size(), ' ') : "\n" + std::string(indent, ' '));
+    absl::StrAppend(text, fits ? "" : "\n",
+                    std::string(fits ? indent - 2 - name.size() : indent, ' '));
     absl::StrAppend(text, Wrapped(help, indent, kHelpWidth - indent), "\n");
   }
 }
