@@ -86,7 +86,7 @@ TEST(DaeFile, UnitsMustBeLengths) {
   }
   // As FBX's exporter of 2008 wrote it in some countries.
   EXPECT_EQ(Error(DaeReplaced(kPlate, "0.01", "0,010000")),
-            "FILE:3: \"0,010000\" is not a number (the decimal mark is a point)");
+            "FILE:3: \"0,010000\" is not a number (use a point as the decimal mark)");
   EXPECT_THAT(ReadDaeText(DaeText(" meter=\"1\"", "")).xyz()[3], 200);
   EXPECT_THAT(ReadDaeText(DaeText("<unit name=\"centimeter\" meter=\"1\"/>", "")).xyz()[3], 200);
   EXPECT_THAT(Error(DaeText("<mesh>", "<asset><unit meter=\"0.1\"/></asset><mesh>")),
@@ -241,8 +241,8 @@ TEST(DaeFile, SourcesThatAreMissingOrDisagreeAreRefused) {
               HasSubstr("FILE:10: <triangles> has no input VERTEX"));
   EXPECT_EQ(Error(DaeText(kNumbers, "0 0 0 200 0 x 0 0 50")), "FILE:5: \"x\" is not a number");
   EXPECT_EQ(Error(DaeText(kNumbers, "0 0 0\n200\n0,5 0 0 0 50")),
-            "FILE:7: \"0,5\" is not a number (the decimal mark is a point)");
-  EXPECT_THAT(Error(DaeText("0 50", "0 1e999")), HasSubstr("beyond the largest double"));
+            "FILE:7: \"0,5\" is not a number (use a point as the decimal mark)");
+  EXPECT_THAT(Error(DaeText("0 50", "0 1e999")), HasSubstr("exceeds the largest double"));
 }
 
 TEST(DaeFile, NonFinitePointsAreErrorsOrSkipped) {

@@ -99,7 +99,7 @@ TEST(DaeScene, TransformsWithoutMeaningAreRefused) {
   EXPECT_THAT(error("<translate>1 2 3 4</translate>"), HasSubstr("3 finite numbers"));
   EXPECT_THAT(error("<scale>1 inf 3</scale>"), HasSubstr("3 finite numbers"));
   EXPECT_EQ(error("<rotate>0 0 1 147,423584</rotate>"),
-            "FILE:15: \"147,423584\" is not a number (the decimal mark is a point)");
+            "FILE:15: \"147,423584\" is not a number (use a point as the decimal mark)");
   EXPECT_EQ(error("<rotate>0 0 0 90</rotate>"),
             "FILE:15: <rotate> has no direction: a length of 0");
   EXPECT_THAT(error("<matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2</matrix>"),

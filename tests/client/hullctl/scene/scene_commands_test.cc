@@ -118,7 +118,7 @@ TEST_F(HullctlScene, PlacementsMoveAndTheFirstContactIsFound) {
             "a\tb\tOVERLAPPING\tcontact at 0.5\na\tc\tOVERLAPPING\tcontact at 0.8\n"
             "b\tc\tOVERLAPPING\tcontact at 0.8\n# touching 0 overlapping 3 failed 0\n");
   ran = Ask({"scene", moving.path(), "--first"});
-  EXPECT_EQ(ran.out, "a\tb\tOVERLAPPING\tcontact at 0.5\n# touching 0 overlapping 3 failed 0\n");
+  EXPECT_EQ(ran.out, "a\tb\tOVERLAPPING\tcontact at 0.5\n# touching 0 overlapping 1 failed 0\n");
   ran = Ask({"scene", "check", cell_.path(), "--first"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("no placement has an end_pose"));

@@ -134,15 +134,17 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
     ++relations[static_cast<size_t>(found->contact.relation)];
 
     // A search that ends early.
-    options.latest = 0.25;
-    const absl::StatusOr<BodyContact> early = FindFirstContact(a.moving(), b.moving(), options);
-    ASSERT_TRUE(early.ok()) << early.status();
-    EXPECT_EQ(FaultOf(a, b, *early), "");
-    if (until <= options.latest) {
-      EXPECT_EQ(early->contact.separated_until, until);
-    } else {
-      EXPECT_GT(early->contact.separated_until, options.latest);
-      ended_early += early->contact.separated_until < until;
+    for (const double latest : {0.125, 0.25, 0.5}) {
+      options.latest = latest;
+      const absl::StatusOr<BodyContact> early = FindFirstContact(a.moving(), b.moving(), options);
+      ASSERT_TRUE(early.ok()) << early.status();
+      EXPECT_EQ(FaultOf(a, b, *early), "");
+      if (until <= latest) {
+        EXPECT_EQ(early->contact.separated_until, until);
+      } else {
+        EXPECT_GT(early->contact.separated_until, latest);
+        ended_early += early->contact.separated_until < until;
+      }
     }
 
     const absl::StatusOr<BodyContact> swapped = FindFirstContact(b.moving(), a.moving());
