@@ -24,7 +24,7 @@ struct MigrationCounts {
 
 // Copies the contents of a store: hulls with their revisions, counts and vertices, their writers'
 // sequences, and bodies; then compares. Keeps all records of hulls and bodies, without vertices, in
-// memory: some 200 bytes per hull.
+// memory: about 200 bytes per hull.
 class Migration {
  public:
   // Receives the number of hulls and bodies done, and the total.

@@ -21,7 +21,7 @@ namespace hulld::server {
 
 // Options of a lookup of hulls and bodies for queries.
 struct PlacedLookup {
-  // True for answers that name vertices (QueryOptions::WantsCanonical).
+  // True if the answers name vertices (QueryOptions::WantsCanonical).
   bool canonical = false;
   // Required prefix of all IDs, including hulls of pieces; owned by the caller.
   std::string prefix;
@@ -42,7 +42,7 @@ class KnownPlaced {
     return known;
   }
 
-  // Bytes held for bodies. Hulls hold KnownHulls::kBytesEach per ID.
+  // Bytes used for bodies. Hulls use KnownHulls::kBytesEach per ID.
   size_t BodyBytes() const;
 
  private:
@@ -59,9 +59,9 @@ class KnownPlaced {
   bool has_bodies() const { return !bodies_.empty(); }
   void AddHull(const std::string& id);
 
-  // Parallel to the IDs; null for a hull's ID; empty if all IDs are of hulls.
+  // Parallel to the IDs; null for the ID of a hull; empty if all IDs belong to hulls.
   Bodies bodies_;
-  // If there are bodies: IDs of hulls, then IDs of their pieces' hulls, without duplicates.
+  // If there are bodies: IDs of hulls, then IDs of the hulls of their pieces, without duplicates.
   std::vector<std::string> hull_ids_;
   std::unordered_map<std::string, size_t> index_of_;
   KnownHulls hulls_;
@@ -70,10 +70,10 @@ class KnownPlaced {
 };
 
 // Resolves hulls and bodies by ID, all at one revision of the store, and builds the hulls of inline
-// shapes. A body without a hull for some
-// piece has an error: NOT_FOUND (PIECE_NOT_FOUND), PERMISSION_DENIED or DATA_LOSS names body and
-// piece; RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies, equivalent
-// to Registry::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread. CANCELLED:
+// shapes. If a body has no hull for some piece, its result is an error: NOT_FOUND
+// (PIECE_NOT_FOUND), PERMISSION_DENIED, or DATA_LOSS, which names body and piece;
+// RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies, equivalent to
+// HullReader::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread. CANCELLED:
 // should_stop returned true.
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
@@ -86,8 +86,8 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
 
-// As ResolvePlaced, but returns nullopt without blocking if it would have to read, prepare or
-// build, or if an ID is a body's.
+// As ResolvePlaced, but returns nullopt without blocking if it would have to read, prepare, or
+// build, or if an ID belongs to a body.
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup);
 

@@ -39,9 +39,9 @@ class InlineShapes {
 };
 
 // Builds the hull of each shape, ready for all queries. Its record has no ID and no revision. It is
-// charged to the readers' share of --memory-limit while a view holds it. CANCELLED: should_stop
-// returned true. RESOURCE_EXHAUSTED: readers exceed their share, and the hulls need more than some
-// hundred KiB. Cost: building the hulls.
+// charged to the readers' share of --memory-limit while a view references it. CANCELLED:
+// should_stop returned true. RESOURCE_EXHAUSTED: readers exceed their share, and the hulls need
+// more than a few hundred KiB. Cost: building the hulls.
 absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
                                                         const InlineShapes& shapes,
                                                         const std::function<bool()>& should_stop);

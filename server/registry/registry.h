@@ -40,8 +40,8 @@ namespace hulld::server {
 //   RegistryState  the state that the parts share, and the only functions that apply a committed
 //                  change to it
 //   Committer      commits changes to the store in batches, in the order of submission
-//   ReadBarrier    blocks a call until the catalog satisfies its freshness; PeerSync, which takes
-//                  its place if peer servers commit to the same store, applies their changes
+//   ReadBarrier    blocks a call until the catalog satisfies its freshness; PeerSync replaces it if
+//                  peer servers commit to the same store, and applies their changes
 //   RecordReader   loads and lists records if the store finds records
 //   HullChanges    creates, deletes, replaces, and grows hulls
 //   BodyRegistry   puts, deletes, and finds bodies
@@ -49,26 +49,27 @@ namespace hulld::server {
 //   ChangeFeed     sends the initial state and then every change to watches
 //
 // A change has two steps. It is validated or built, then submitted to the committer. After the
-// store has committed it, RegistryState applies it: it becomes visible atomically and in the order
-// of submission, and its caller is answered. Several chunks of a hull may be in flight, each built
-// on its predecessors. Creation, deletion, replacement, and chunks with a condition on the revision
-// wait until their hull has no change in flight, because they depend on its committed state. If a
-// peer server committed a conflicting change first, the change is retried on the new state,
-// transparently to the caller.
+// store commits it, RegistryState applies it: the change becomes visible atomically, in the order
+// of submission, and its caller receives the reply. Several chunks of a hull may be in flight, each
+// built on its predecessors. Creation, deletion, replacement, and chunks with a condition on the
+// revision wait until their hull has no change in flight, because they depend on its committed
+// state. If a peer server committed a conflicting change first, the change is retried on the new
+// state, transparently to the caller.
 //
 // Readers and writers never wait for each other. A writer appends to a LiveHull without holding the
 // mutex; a mark records the committed prefix, and readers get the version at the mark. Evicted data
 // is read back from the store at first use. If the store finds records, a starting server does not
-// load them: a call that depends on an ID loads its record first, and looks again after each wait.
+// load them: a call that depends on an ID loads its record first, and looks the ID up again after
+// each wait.
 //
 // One mutex (RegistryState::mutex) guards the state of all parts and is held only briefly
 // (kMostLookupsPerHold). Passing a Locked proves that it is held.
 //
 // Lock order: this mutex first; then the mutex of the committer's queue, of the budget, of a pool,
-// or of a LiveHull. No other lock is taken while one of the latter is held. Callbacks run without
-// locks. The committer completes each batch under the mutex (its header explains the reason). The
-// budget evicts under it, because the evicted data belongs to hulls. A MemoryCharge takes only the
-// budget's mutex. Thread-safe.
+// or of a LiveHull. No other lock is acquired while one of the latter is held. Callbacks run
+// without locks. The committer completes each batch under the mutex (its header explains the
+// reason). The budget evicts under it, because the evicted data belongs to hulls. A MemoryCharge
+// acquires only the budget's mutex. Thread-safe.
 class Registry {
  public:
   // Chunks are applied on `writers`. Store and pool must outlive this. Requires at destruction: no
@@ -82,11 +83,11 @@ class Registry {
   ~Registry();
 
   // Loads the records of all hulls and bodies, unless the store finds records. Must precede all
-  // other calls. Damaged records are logged; later calls on them get DATA_LOSS.
+  // other calls. Damaged records are logged; later calls on them return DATA_LOSS.
   absl::Status Load();
-  // Maximum number of unused hull records, and of small body records, kept in memory over a store
-  // that finds records. Replaces the default derived from --memory-limit. Call before Load; for
-  // tests.
+  // Sets the maximum number of unused hull records, and of small body records, kept in memory if
+  // the store finds records. Replaces the default derived from --memory-limit. Call before Load;
+  // for tests.
   void KeepRecords(size_t most) {
     state_.catalog.hulls().KeepAtMost(most);
     state_.catalog.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
@@ -94,7 +95,7 @@ class Registry {
 
   const Store& store() const { return state_.store; }
   const Limits& limits() const { return state_.limits; }
-  // Budget for memory that calls hold for long (MemoryCharge).
+  // Budget for memory that calls hold for a long time (MemoryCharge).
   MemoryBudget& memory() { return state_.memory; }
 
   // Creates, deletes, replaces, and grows hulls.
@@ -103,7 +104,7 @@ class Registry {
   BodyRegistry& bodies() { return bodies_; }
   // Serves hulls that are resolved repeatedly or without blocking, and their snapshots.
   HullReader& reader() { return reader_; }
-  // Waits for freshness. Required before functions without a freshness of their own: List, and
+  // Waits for freshness. Required before functions without a freshness parameter: List and
   // BodyRegistry::Find.
   ReadBarrier& barrier() { return *barrier_; }
   // True if peer servers commit to the same store, so that reads may wait for their changes.
@@ -112,9 +113,9 @@ class Registry {
   bool has_bodies() const { return state_.catalog.BodyCount() > 0; }
 
   // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
-  // follow `after` in byte order; a page of bodies may hold fewer although more follow. Queries the
-  // store if it finds records, so it must not run on a gRPC thread then. UNAVAILABLE: the store
-  // cannot be read. CANCELLED: should_stop returned true.
+  // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
+  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
+  // store cannot be read. CANCELLED: should_stop returned true.
   absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
                                   const std::function<bool()>& should_stop = {},
                                   RecordKinds kinds = {.hulls = true}) {
@@ -125,8 +126,8 @@ class Registry {
                          should_stop);
   }
 
-  // Puts small hulls to rest that no call named since the previous call of this (HullTable). Call
-  // every few seconds. Cost: some 0.2 us per hull.
+  // Puts small hulls to rest that have not been looked up since the previous call of this function
+  // (HullTable). Call every few seconds. Cost: about 0.2 us per hull.
   void RestIdleHulls();
 
   RegistrySizes Sizes() const;
@@ -139,15 +140,15 @@ class Registry {
     reader_.SetMetrics(metrics.snapshot_seconds);
     committer_.SetMetrics(metrics);
   }
-  // RESOURCE_EXHAUSTED: this use holds more than its share of --memory-limit.
+  // RESOURCE_EXHAUSTED: this use exceeds its share of --memory-limit.
   absl::Status CheckMemory(MemoryUse use);
 
   // Returns the hulls, ready to be served, all at one revision of the store that satisfies the
   // plan's freshness. May read the store and prepare hulls, so it must not run on a gRPC thread.
   // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
-  // RESOURCE_EXHAUSTED: hulls must be read from the store, or number more than kMostLookupsPerHold,
-  // while readers exceed their share of --memory-limit; without a retry delay if these hulls
-  // account for most of it.
+  // RESOURCE_EXHAUSTED: hulls must be read from the store, or there are more than
+  // kMostLookupsPerHold, while readers exceed their share of --memory-limit; without a retry delay
+  // if these hulls account for most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});

@@ -34,9 +34,9 @@ class WaitingCalls {
 
     Wait(WaitingCalls& calls, std::function<bool()> should_stop, Done done)
         : calls_(calls), should_stop_(std::move(should_stop)), done_(std::move(done)) {}
-    // Returns `done` and ends the wait; empty if it was over.
+    // Ends the wait and returns `done`; empty if the wait was already over.
     Done Take();
-    // Ends the wait if should_stop says so. Returns true if the next poll must look at it again.
+    // Ends the wait if should_stop returns true. Returns true if the next poll must check it again.
     bool EndIfStopped();
 
     WaitingCalls& calls_;
@@ -53,12 +53,12 @@ class WaitingCalls {
   ~WaitingCalls();
 
   // Calls `done` exactly once: with the status passed to Finish, or with CANCELLED on the polling
-  // thread after should_stop returns true. Cost: some 100 ns.
+  // thread after should_stop returns true. Cost: about 100 ns.
   std::shared_ptr<Wait> Add(std::function<bool()> should_stop,
                             std::function<void(const absl::Status&)> done);
 
   // Calls `done` as above when the registry satisfies `freshness`. Returns false and does nothing
-  // if it already does. Cost: as Registry::StartFresh.
+  // if it already does. Cost: as ReadBarrier::StartFresh.
   bool AwaitFresh(Registry& registry, const Freshness& freshness, std::function<bool()> should_stop,
                   std::function<void(const absl::Status&)> done);
 

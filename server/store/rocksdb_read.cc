@@ -124,7 +124,7 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
 }
 
 // Most hulls are one value: a base of one part, or a single delta. Other hulls and damaged values
-// are read one by one, which gives the precise error.
+// are read one by one, which yields the precise error.
 std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
     std::span<const StoredHull* const> hulls) {
   std::vector<std::string> keys;

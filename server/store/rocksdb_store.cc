@@ -207,7 +207,7 @@ absl::Status RocksDbStore::Recover() {
 absl::Status RocksDbStore::Probe() {
   const std::string scratch = ScratchDirectory(options_.data_dir);
   const std::string path = scratch + "/probe";
-  // A failure shows in the next call.
+  // The next call reports a failure.
   env_->CreateDirIfMissing(scratch).PermitUncheckedError();
   std::unique_ptr<rocksdb::WritableFile> file;
   rocksdb::Status status = env_->NewWritableFile(path, &file, rocksdb::EnvOptions());

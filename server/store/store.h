@@ -39,7 +39,7 @@ enum class VertexChange {
   kNone,
   // Appends Change::vertices as a delta.
   kAdded,
-  // Replaces all stored vertices by Change::vertices, the new base.
+  // Replaces all stored vertices with Change::vertices, the new base.
   kReplaced,
 };
 
@@ -151,7 +151,7 @@ class Store {
   // Returns points with the convex hull `hull`. DATA_LOSS naming the hull: values are missing or
   // damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
-  // Returns LoadVertices of each hull, in order. Holds all results until it returns.
+  // Returns LoadVertices of each hull, in order. Keeps all results in memory until it returns.
   virtual std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
       std::span<const StoredHull* const> hulls) {
     std::vector<absl::StatusOr<std::vector<Vector>>> loaded;
@@ -172,7 +172,7 @@ class Store {
     return absl::UnimplementedError("this store does not support record lookups");
   }
   // Returns up to `most` records of these kinds in byte order, with IDs that start with `prefix`
-  // and follow `after`. Returns fewer, but at least one, if they take more than kMostListedBytes.
+  // and follow `after`. Returns fewer, but at least one, if they exceed kMostListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {

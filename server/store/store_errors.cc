@@ -12,8 +12,7 @@ namespace hulld::server {
 
 namespace {
 
-// Returns true if the disk is full, even if that is known only from the text of the system's
-// error.
+// Returns true if the disk is full, even if only the text of the system's error reports it.
 bool SaysDiskFull(const rocksdb::Status& status) {
   const std::string cause = status.ToString();
   return status.IsNoSpace() || absl::StrContains(cause, std::strerror(ENOSPC)) ||

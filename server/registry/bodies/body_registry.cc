@@ -17,7 +17,7 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), state_.memory, MemoryUse::kWriting);
   barrier_.WhenFresh(done, [=, this](Locked& locked) {
-    // The body is counted by now. A retry after a wait does not count it twice.
+    // The body is already counted. A retry after a wait does not count it twice.
     if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) {
       return Answer(locked, done, s);
     }
@@ -25,7 +25,7 @@ void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
   });
 }
 
-// OK if the body may be put, also as a replacement.
+// Returns OK if the body may be put, including as a replacement.
 absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
   if (state_.catalog.hulls().contains(id)) return IdTaken("hull", id);
   const std::shared_ptr<const Body> body = state_.catalog.FindBody(id);

@@ -22,15 +22,16 @@
 namespace hulld::server {
 
 // Creation, change, deletion, and lookup of bodies. A body is small compared to the hulls of its
-// pieces, so a known body is complete in memory, counted like memory that calls hold for long.
+// pieces, so a known body is entirely in memory, counted like memory that calls hold for a long
+// time.
 //
 // Invariants:
 // - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
 //   the ID wait in the entry and resume in order after it, or, if a peer server committed first,
 //   after its change is applied (ReadBarrier::Defer).
-// - A body becomes visible to all readers atomically after its commit. A refusal leaves the former
-//   state.
-// - A hull and a body never share an ID: a put is refused if a hull has it, and waits if the
+// - A body becomes visible to all readers atomically after its commit. A refused change leaves the
+//   previous state unchanged.
+// - A hull and a body never share an ID: a put is refused if a hull has the ID, and waits while the
 //   creation or end of a hull is in flight.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.

@@ -23,7 +23,7 @@ namespace hulld::server {
 // first query and rebuilt after a hull of a piece changed. Thread-safe.
 class Body {
  public:
-  // use: the use to which it is charged.
+  // use: the memory use to which the body is charged.
   Body(StoredBody stored, MemoryBudget& budget, MemoryUse use)
       : stored_(std::make_shared<StoredBody>(std::move(stored))),
         charge_(budget, use, stored_->MemoryBytes()),
@@ -38,13 +38,14 @@ class Body {
   const BodyRecord& record() const { return stored_->record; }
   const std::vector<std::string>& hull_ids() const { return stored_->hull_ids; }
   const std::vector<StoredPiece>& pieces() const { return stored_->pieces; }
-  // OK unless the store cannot read it back.
+  // OK unless the store cannot read the body back.
   const absl::Status& damage() const { return damage_; }
   // Describes the body for watches.
   HullChange Describe() const { return Describe(*stored_, damage_); }
   static HullChange Describe(const StoredBody& stored, const absl::Status& damage);
 
-  // Returns boxes of the pieces. Requires: `pieces` are this body's, of hulls at `hull_revisions`.
+  // Returns boxes of the pieces. Requires: `pieces` belong to this body, and their hulls are at
+  // `hull_revisions`.
   std::shared_ptr<const PieceBoxes> BoxesOf(std::span<const BodyPiece> pieces,
                                             std::vector<uint64_t> hull_revisions) const;
 
@@ -64,7 +65,7 @@ class Body {
   mutable std::shared_ptr<const PieceBoxes> boxes_;
 };
 
-// A body as seen by one call. Holds the hulls of its pieces; charged to --memory-limit.
+// A body as seen by one call. References the hulls of its pieces; charged to --memory-limit.
 struct ServedBody {
   std::shared_ptr<const Body> body;
   // In the order of Body::hull_ids().
@@ -75,8 +76,8 @@ struct ServedBody {
   const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
 };
 
-// ALREADY_EXISTS: a body has the ID that a hull requests, or a hull the ID that a body requests.
-// kind: of the present one, "hull" or "body".
+// ALREADY_EXISTS: the ID requested for a hull belongs to a body, or the reverse. kind: that of the
+// existing object, "hull" or "body".
 absl::Status IdTaken(const std::string& kind, const std::string& id);
 absl::Status BodyNotFound(const std::string& id);
 std::string QuotedBody(const std::string& id);

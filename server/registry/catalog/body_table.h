@@ -16,7 +16,7 @@
 
 namespace hulld::server {
 
-// Bodies of a registry by ID, complete with their pieces.
+// Bodies of a registry by ID, including their pieces.
 //
 // If the store finds records, this is a cache: an ID without an entry is unknown, unless the hull
 // table knows its hull or its absence. Bodies range from a few hundred bytes to
@@ -26,14 +26,14 @@ namespace hulld::server {
 // Guarded by the registry's mutex.
 class BodyTable {
  public:
-  // State of an ID that is, or is about to become, a body's.
+  // State of an ID that belongs, or is about to belong, to a body.
   struct Entry {
     // Null until the first commit.
     const std::shared_ptr<const Body>& committed() const { return body_; }
-    // True if the store can restore everything that the entry holds.
+    // True if the store can restore everything that the entry contains.
     bool IsUnused() const { return !in_flight && waiting.empty() && body_.use_count() == 1; }
 
-    // A change is submitted, but neither committed nor refused; `waiting` runs after it.
+    // True if a change is submitted, but neither committed nor refused; `waiting` runs after it.
     bool in_flight = false;
     std::deque<std::function<void(Locked&)>> waiting;
 

@@ -15,12 +15,13 @@
 namespace hulld::server {
 namespace {
 
-// A sixteenth of the limit, in addition to the memory held for points.
+// Returns the number of records that fill a sixteenth of the limit, in addition to the memory held
+// for points.
 size_t MostRecords(uint64_t memory_limit) {
   return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
 }
 
-// Unused bodies may take up to 1/kBodiesShare of the limit.
+// Unused bodies may use up to 1/kBodiesShare of the limit.
 constexpr uint64_t kBodiesShare = 16;
 
 }  // namespace

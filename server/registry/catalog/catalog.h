@@ -29,10 +29,11 @@ namespace hulld::server {
 //
 // Invariants:
 // - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither is
-//   unknown (IsKnown). Known absence of both hull and body is an entry of the hull table.
-// - The tables hold the last committed version of each known entry, of revision() or earlier. They
-//   also hold entries being created: a hull in kCreating, a body without a committed version.
-// - Every change of what readers see of a hull is in recent_changes(), whatever caused it.
+//   unknown (IsKnown). The known absence of both a hull and a body is an entry of the hull table.
+// - The tables contain the last committed version of each known entry, of revision() or earlier.
+//   They also contain entries being created: a hull in kCreating, a body without a committed
+//   version.
+// - Every reader-visible change of a hull is in recent_changes(), regardless of its cause.
 //
 // Guarded by the registry's mutex, which every function requires unless its comment says that it
 // takes no lock.
@@ -70,27 +71,27 @@ class Catalog {
   // Returns the entry of a body with a change in flight, or null. A caller that depends on the ID
   // must wait until that change is committed or refused.
   BodyTable::Entry* BodyInFlight(const std::string& id);
-  // NOT_FOUND; its message says so if the ID is a body's.
+  // NOT_FOUND; if the ID belongs to a body, the message says so.
   absl::Status NoSuchHull(const std::string& id) const;
 
-  // Adds a stored hull, at rest or as damaged. Requires: the ID has no hull here.
+  // Adds a stored hull, at rest or as damaged. Requires: the catalog has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
   // Marks a hull as damaged. Idempotent, because several threads may find the same damage.
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
-  // Records that what readers see of the hull changed.
+  // Records a reader-visible change of the hull.
   void NoteChange(const RegisteredHull& hull);
   // Removes a hull that is gone, discards its memory, and ends its sessions with `reason`.
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   // Replaces the known state of the body with the stored one.
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  // Logs that the store holds a body under the ID of a hull, which the server never writes. The
-  // hull wins: its vertices cannot be restored.
+  // Logs that the store contains a body with the ID of a hull, which the server never writes. The
+  // hull takes precedence, because its vertices could not be restored.
   static void LogBodyUnderHull(const std::string& id);
-  // Removes a body. Requires that it is here.
+  // Removes a body. Requires: the catalog has it.
   void EraseBody(Locked& locked, const std::string& id);
 
-  // Counts of hulls and bodies. Creations count from submission on, so that --max-hulls holds.
-  // These functions take no lock.
+  // Counts of hulls and bodies. Creations count from submission on, to enforce --max-hulls. These
+  // functions take no lock.
   uint64_t HullCount() const {
     return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
                            creating_hulls_.load(std::memory_order_relaxed)
@@ -102,7 +103,7 @@ class Catalog {
   }
   // RESOURCE_EXHAUSTED: --max-hulls is reached.
   absl::Status CheckHullCount() const;
-  // Returns the counts without creations in flight.
+  // Returns the counts, excluding creations in flight.
   RegistrySizes Sizes() const;
 
   // Count a creation at its submission, and at its commit or refusal. A refused hull is forgotten.

@@ -20,7 +20,7 @@ namespace hulld::server {
 //   kScheduled, kBuilding, kReverting --EndWork--> kIdle
 //
 // Changes committed by peer servers: Supersede moves a present hull to another version, and Vanish
-// makes it gone; work of a thread on it is then reverted.
+// moves it to kGone; work in progress on its builder is then reverted.
 //
 // The state also counts the changes in flight (submitted to the store, neither committed nor
 // refused) and records damage. Readers never touch the builder and see the committed state at any
@@ -38,7 +38,7 @@ class HullState {
     kPresent,
     // A deletion or a replacement is in flight; readers still see the hull.
     kEnding,
-    // Lookups no longer find the hull; open sessions and readers may still hold it.
+    // Lookups no longer find the hull; open sessions and readers may still reference it.
     kGone,
   };
   enum class Work {
@@ -47,11 +47,12 @@ class HullState {
     kScheduled,
     // A chunk is being built; its thread owns the builder.
     kBuilding,
-    // A chunk is being built on one that was refused since; its result must be dropped.
+    // A chunk is being built on a state that has been reverted since; its result must be dropped.
     kReverting,
   };
 
-  // Enough chunks of a hull to keep a builder busy during the slowest sync.
+  // Maximum number of chunks of a hull in flight: enough to keep a builder busy during the slowest
+  // sync.
   static constexpr int kMaxInFlight = 64;
 
   // State of a committed hull.
@@ -79,12 +80,12 @@ class HullState {
 
   // Requests a thread for the next chunk.
   void Schedule();
-  // Gives the builder to the scheduled thread.
+  // Transfers the builder to the scheduled thread.
   void StartBuilding();
   // Counts the chunk being built as in flight.
   void Submit();
   // Ends the work of the scheduled or building thread, which has returned the builder if it owned
-  // it. Returns false after kReverting: the builder then holds refused points.
+  // it. Returns false after kReverting: the builder then contains refused points.
   bool EndWork();
 
   // Submits a deletion or a replacement.

@@ -88,7 +88,7 @@ void HullTable::Wake(const std::string& id, Entry& entry) {
 }
 
 // Sets the points of a hull at rest, counts them, and returns the former ones. Under memory
-// pressure they go first: the hulls of the other accounts were used since.
+// pressure they are evicted first: the hulls of the other accounts were used since.
 std::unique_ptr<CompactHull> HullTable::ExchangeCompact(Entry& entry,
                                                         std::unique_ptr<CompactHull> compact) {
   std::unique_ptr<CompactHull>& kept = entry.resting_.compact;
@@ -165,13 +165,13 @@ HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
   return resting;
 }
 
-// Puts a hull to rest with its points if it is small and unused. Returns false if not.
+// Puts a hull to rest with its points if it is small and unused. Otherwise returns false.
 bool HullTable::RestCompact(Locked& locked, Entry& entry) {
   std::unique_ptr<CompactHull> compact =
       entry.awake_.use_count() > 1 ? nullptr : entry.awake_->Compact();
   if (compact == nullptr) return false;
   // The points of an unchanged hull stay in place: copies would be scattered over the pages that
-  // its other structures leave.
+  // its other structures vacate.
   const RestingHull& former = entry.resting_;
   const HullRecord& record = entry.awake_->committed().record;
   const bool is_unchanged = former.compact != nullptr && former.revision == record.revision &&
@@ -202,7 +202,7 @@ void HullTable::RestSoon(Locked& locked, const RegisteredHull& hull) {
 }
 
 bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
-  // Takes longer than a lookup: the points are copied.
+  // Fewer than lookups, because putting a hull to rest copies its points.
   constexpr uint64_t kMostRested = kMostLookupsPerHold / 4;
   uint64_t rested = 0;
   if (cursor.empty() && passes_since_use_++ >= 2) return false;
@@ -217,7 +217,7 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
     if (RestCompact(locked, entry)) {
       ++rested;
     } else if (entry.awake_->is_small()) {
-      // In use, perhaps not at the next pass.
+      // In use now, but perhaps not at the next pass.
       passes_since_use_ = 0;
     }
   }

@@ -24,12 +24,12 @@
 
 namespace hulld::server {
 
-// Everything in memory that a small hull at rest needs besides its record. The structures for
-// queries and growth are rebuilt at the next use, in some microseconds.
+// All data in memory of a small hull at rest, besides its record. The structures for queries and
+// growth are rebuilt at the next use, within a few microseconds.
 struct CompactHull {
-  // At least the vertices, and no point outside the hull.
+  // Includes all vertices, and no point outside the hull.
   std::vector<Vector> points;
-  // Last sequence of each writer; empty if the store holds them.
+  // Last sequence of each writer; empty if the store has them.
   std::vector<std::pair<std::string, uint64_t>> writers;
 
   size_t MemoryBytes() const {
@@ -42,19 +42,20 @@ struct CompactHull {
 
 // Hulls of a registry by ID.
 //
-// A store may hold millions of hulls with few in use. A hull at rest, unused since its load or for
-// some time, takes only a record: 240 bytes of heap including its ID instead of 1120; with a
-// 32-byte ID 289 instead of 1271 (**observed**: mallinfo2 of glibc 2.36 over 200 000 hulls; IDs of
-// up to 15 bytes cost nothing more), and some 20 bytes in the index. A lookup turns the record into
-// a RegisteredHull. A clock hand turns it back into a record when it finds the hull unused. Each
-// operation advances the hand by a few hulls, so no pass over all of them is needed.
+// A store may contain millions of hulls, of which few are in use. A hull at rest, unused since it
+// was loaded or for some time, needs only a record: 240 bytes of heap including its ID instead of
+// 1120; with a 32-byte ID, 289 instead of 1271 (**observed**: mallinfo2 of glibc 2.36 over 200 000
+// hulls; IDs of up to 15 bytes need no extra memory), and about 20 bytes in the index. A lookup
+// turns the record into a RegisteredHull. A clock hand turns it back into a record when it finds
+// the hull unused. Each operation advances the hand by a few hulls, so no pass over all of them is
+// needed.
 //
-// A small hull that is in memory and was not looked up for some time (RestIdle) takes its record
-// and its points (CompactHull). If the store can read it back, the points are evicted before any
-// hull in use.
+// A small hull that is in memory and has not been looked up for some time (RestIdle) keeps only its
+// record and its points (CompactHull). If the store can read it back, the points are evicted before
+// any hull in use.
 //
-// If the store finds records, this is a cache of records and of known absences of both hull and
-// body: an ID without an entry is unknown. When the cache exceeds its limit, the hand evicts
+// If the store finds records, this is a cache of records, and of IDs known to have neither a hull
+// nor a body: an ID without an entry is unknown. When the cache exceeds its limit, the hand evicts
 // entries that are at rest and were not looked up since its last visit.
 //
 // Guarded by the registry's mutex.
@@ -83,10 +84,10 @@ class HullTable {
     PointCounts counts;
     uint64_t writer_count = 0;
     VertexLayout layout;
-    // Empty if it is not known.
+    // Empty if unknown.
     Box box = Box::Empty();
     int8_t dimension = -1;
-    // Null if the store holds the points, or there are none.
+    // Null if the store has the points, or there are none.
     std::unique_ptr<CompactHull> compact;
   };
 
@@ -98,10 +99,10 @@ class HullTable {
     uint64_t revision() const;
     // Null for a hull at rest.
     const HullPointer& awake() const { return awake_; }
-    // Points of a hull at rest, if they are in memory. They stay while the hull is awake, and are
-    // valid until it changes.
+    // Points of a hull at rest, if they are in memory. They are kept while the hull is awake, and
+    // are valid until it changes.
     const CompactHull* compact() const { return resting_.compact.get(); }
-    // Describes the committed hull for watches and lists. id: the hull's own.
+    // Describes the committed hull for watches and lists. id: the ID of the hull.
     HullChange Describe(const std::string& id) const;
 
    private:
@@ -118,7 +119,7 @@ class HullTable {
   };
   using Entries = std::map<std::string, Entry>;
 
-  // Number of hulls in memory; any thread.
+  // Number of hulls in memory. Any thread may call this.
   size_t size() const { return size_.load(std::memory_order_relaxed); }
   bool contains(const std::string& id) const;
   // Returns true if the ID's state is known, including absence. Unless this is a cache, an ID
@@ -128,9 +129,9 @@ class HullTable {
   const Entries& entries() const { return entries_; }
 
   // Returns the hull and wakes it if it is at rest; null if it is absent; nullopt if it is unknown.
-  // Cost: O(1), and restoring a small hull's points.
+  // Cost: O(1), plus restoring the points of a small hull.
   std::optional<HullPointer> Ask(const std::string& id);
-  // Loads the place of an ID that Ask or Find will look up into the processor's caches.
+  // Prefetches the index entry of an ID that Ask or Find will look up.
   void Prefetch(const std::string& id) const { index_.prefetch(id); }
   // As Ask, but returns null for an unknown ID.
   HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
@@ -150,14 +151,15 @@ class HullTable {
   // its limit. Cost: O(log n).
   void RestSome();
   static constexpr int kHullsPerStep = 4;
-  // Visits the hulls after `cursor`, which starts empty, for one hold of the mutex. Puts small
-  // hulls to rest that are in memory, unused, and were not looked up since the last visit. Returns
-  // false if no hull is left to visit, and at once if the last two passes found no hull in use
-  // and none was looked up since. Cost: some 50 us.
+  // Visits the hulls after `cursor`, initially empty, within one hold of the mutex. Puts small
+  // hulls to rest that are in memory, unused, and have not been looked up since the last visit.
+  // Returns false if no hull is left to visit; returns false immediately if the last two passes
+  // found no hull in use and none has been looked up since. Cost: about 50 us.
   bool RestIdle(Locked& locked, std::string& cursor);
-  // Call after a change of the hull that no session follows. A small hull is put to rest, unless it
-  // is looked up first, after kMostJustChanged later ones: a server that is filled with small hulls
-  // holds few of them in their large form. Cost: some 1 us.
+  // Call after a change of the hull if no session is expected to change it further. Puts a small
+  // hull to rest after kMostJustChanged later calls for small hulls, unless it is looked up before
+  // then. A server that is being filled with small hulls therefore keeps few of them in their large
+  // form. Cost: about 1 us.
   void RestSoon(Locked& locked, const RegisteredHull& hull);
   static constexpr size_t kMostJustChanged = 1024;
   // Bytes of the points and writers of hulls at rest, which count against the budget.
@@ -194,7 +196,7 @@ class HullTable {
   const bool readable_;
   MemoryBudget& budget_;
   Entries entries_;
-  // All entries, for lookups. A search of the ordered map takes some 2 us if it holds a million.
+  // All entries, for lookups. A search of the ordered map takes about 2 us with a million entries.
   absl::flat_hash_set<Place, HashOfId, EqualIds> index_;
   // Number of entries that are hulls.
   std::atomic<size_t> size_ = 0;
@@ -203,11 +205,11 @@ class HullTable {
   // ID of the last hull that RestSome visited, and of the last one that DropCompact visited.
   std::string hand_;
   std::string compact_hand_;
-  // IDs of the hulls of RestSoon that it has not visited, oldest first.
+  // IDs of the hulls passed to RestSoon and not visited by it yet, oldest first.
   std::deque<std::string> just_changed_;
-  // Sum over all entries, and its account.
+  // Sum over all entries, and the account that counts it.
   uint64_t compact_bytes_ = 0;
-  // Passes of RestIdle that started since a small hull was known to be in use.
+  // Passes of RestIdle started since a small hull was last found in use.
   uint64_t passes_since_use_ = 0;
   MemoryBudget::Account compact_account_;
 };

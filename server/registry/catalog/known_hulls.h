@@ -21,14 +21,14 @@
 
 namespace hulld::server {
 
-// Recent changes of what readers see of hulls, in order, each stored as a hash of the hull's ID.
-// Not thread-safe.
+// Recent reader-visible changes of hulls, in order, each stored as a hash of the ID. Not
+// thread-safe.
 class RecentChanges {
  public:
-  // Half a megabyte when full.
+  // Maximum number of changes: half a megabyte when full.
   static constexpr uint64_t kMost = 1 << 16;
 
-  // Differs between processes, so that no request can be made of IDs with equal hashes.
+  // Differs between processes, so that no client can craft a request of IDs with equal hashes.
   static uint64_t HashOf(std::string_view id) { return absl::HashOf(id); }
 
   void Note(std::string_view id) {
@@ -50,13 +50,13 @@ class RecentChanges {
   uint64_t end_ = 0;
 };
 
-// A reader's knowledge of the hulls that it requests: each hull once, however often it is named,
-// and the hulls that must be looked up because they changed. A reader that repeats its request
-// keeps this between calls (Registry::Refresh). Not thread-safe.
+// State that a reader keeps about the hulls that it requests: each hull once, regardless of how
+// often it is named, and the hulls that must be looked up because they changed. A reader that
+// repeats its request keeps this between calls (HullReader::Refresh). Not thread-safe.
 class KnownHulls {
  public:
   KnownHulls() = default;
-  // For a single lookup: its result takes the views instead of copying them.
+  // For a single lookup, which moves the views into its result instead of copying them.
   static KnownHulls ForOneLookup() {
     KnownHulls known;
     known.is_for_one_lookup_ = true;
@@ -67,7 +67,7 @@ class KnownHulls {
   // same. Cost: O(n).
   void Begin(std::span<const std::string> ids);
 
-  // Hulls by index, each ID once.
+  // Number of hulls, each ID counted once.
   size_t size() const { return hulls_.size(); }
 
  private:
@@ -87,9 +87,9 @@ class KnownHulls {
     bool is_ahead = false;
     // Hull found when the read began; null if it must be looked up.
     HullPointer found;
-    // Approximate bytes of the hull that this holds.
+    // Approximate bytes of the hull that this entry keeps in memory.
     uint64_t bytes = 0;
-    // Unknown without a message, which costs no allocation, until it was looked up.
+    // UNKNOWN until the hull is looked up; without a message, to avoid an allocation.
     absl::StatusOr<HullView> view = absl::Status(absl::StatusCode::kUnknown, "");
   };
 
@@ -103,19 +103,19 @@ class KnownHulls {
   };
 
  public:
-  // Approximate bytes held per ID, excluding the ID itself and the hull.
+  // Approximate bytes per ID, excluding the ID itself and the hull.
   static constexpr size_t kBytesEach =
       sizeof(Known) + 2 * sizeof(uint32_t) + 2 * sizeof(std::pair<uint64_t, uint32_t>);
 
  private:
   // Marks every hull for lookup.
   void ForgetAll();
-  // Marks for lookup all hulls that a change with this hash may concern. Cost: O(1).
+  // Marks for lookup all hulls that a change with this hash may affect. Cost: O(1).
   void NoteChange(uint64_t hash);
   void MakeDue(uint32_t hull);
   // Marks hulls with failed reads for lookup, and all hulls as unprepared.
   void BeginLookup();
-  // Approximate bytes held of all hulls.
+  // Approximate bytes of the hulls that all entries keep in memory.
   uint64_t HullBytes() const;
   // Returns the views in the order of the request.
   std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids);

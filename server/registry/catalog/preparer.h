@@ -13,12 +13,12 @@
 
 namespace hulld::server {
 
-// Prepares hulls: after queries have paid for it (LiveHull::WantsPreparing), or before a hull holds
-// too many points that are no longer vertices. Runs on its own thread, for which no call waits, or
+// Prepares a hull after queries have paid for it (LiveHull::WantsPreparing), or before it contains
+// too many points that are no longer vertices. Runs on its own thread, which no call waits for, or
 // on the thread of a reader that expects enough queries.
 //
-// Invariant: at most one thread prepares a hull, or is about to: RegisteredHull::preparing. Guarded
-// by the registry's mutex, which is released during preparation.
+// Invariant: at most one thread prepares a hull, or is about to (RegisteredHull::is_preparing).
+// Guarded by the registry's mutex, which is released during preparation.
 class Preparer {
  public:
   // All must outlive this. metrics: metrics of the queue of hulls to prepare.

@@ -90,8 +90,8 @@ bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
   committed_.stored = in_flight_.head = stored;
   in_flight_.writers.clear();
   ++committed_.supersessions;
-  // No local caller requested the points of a peer server: they are no reason to keep the hull in
-  // memory, unless it is also appended to here.
+  // No local caller requested the points of a peer server, so they do not justify keeping the hull
+  // in memory, unless local writers append to it, too.
   if (grows && !is_built_here) {
     CountParts();
   } else {
@@ -332,7 +332,7 @@ std::unique_ptr<CompactHull> RegisteredHull::Compact() const {
   if (live() != nullptr) {
     if (!is_small()) return nullptr;
     compact->points = live()->PointsAt(committed_.mark);
-    // Points that are vertices no longer are dropped by preparing.
+    // Preparing drops points that are no longer vertices.
     if (compact->points.size() > 2 * kMostOfSmall) return nullptr;
     compact->points.shrink_to_fit();
   }

@@ -53,21 +53,21 @@ struct LentBuilder {
   LiveHull::Mark committed;
 };
 
-// One incarnation of a hull, guarded by the registry's mutex. The thread that HullState makes its
-// owner uses the builder without the mutex, and appends to the thread-safe LiveHull while other
+// One incarnation of a hull, guarded by the registry's mutex. The thread that owns the builder
+// (HullState) uses it without the mutex, and appends to the thread-safe LiveHull while other
 // threads prepare it.
 //
-// Its data is in three groups. *Committed*: the stored state, changed only by SetStored, Commit,
+// Its data forms three groups. *Committed*: the stored state, changed only by SetStored, Commit,
 // and Supersede. *In flight*: the state with all changes in flight, and the builder; Revert returns
 // it to the committed state. *Served*: the vertices, shared with readers; in memory while needed,
 // and otherwise read from the store. Without vertices there is no builder and no change in flight.
 class RegisteredHull {
  public:
-  // Maximum number of a peer server's points that are added to a hull in memory: some 100 us. With
-  // more, the hull is reloaded at its next use, and its builder is rebuilt.
+  // Maximum number of a peer server's points that are added to a hull in memory; takes about 100
+  // us. With more, the hull is reloaded at its next use, and its builder is rebuilt.
   static constexpr uint64_t kMostGrowth = 1 << 12;
-  // Maximum number of vertices of a small hull. Its builder takes more memory than the rest of it
-  // and is rebuilt in some 20 us.
+  // Maximum number of vertices of a small hull. Its builder uses more memory than the rest of the
+  // hull, and is rebuilt in about 20 us.
   static constexpr uint64_t kMostOfSmall = 64;
   bool is_small() const { return committed().record.vertex_count <= kMostOfSmall; }
 
@@ -89,8 +89,8 @@ class RegisteredHull {
   void SetStored(const StoredHull& stored);
   // Restores the bounding box of a hull that was at rest.
   void SetBox(const Box& box) { committed_.box = box; }
-  // Commits the oldest chunk in flight, of `points` new vertices. mark: the prefix of live() with
-  // it.
+  // Commits the oldest chunk in flight, with `points` new vertices. mark: the prefix of live() that
+  // includes it.
   void Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
               const WriterSequence& writer, uint64_t points);
   // True if a peer server's `stored` is the committed hull plus a few points, all of them in
@@ -100,7 +100,7 @@ class RegisteredHull {
   // GrewInto is true; they are added to live() if it exists. Without growth, changed vertices are
   // dropped from memory. Requires: nothing is in flight. Returns true if the points were added.
   bool Supersede(Locked& locked, const StoredHull& stored, const std::vector<Vector>* growth);
-  // A peer server ended the hull. Requires: nothing is in flight.
+  // Records that a peer server ended the hull. Requires: nothing is in flight.
   void Vanish();
 
   // ---- In flight ----
@@ -135,9 +135,9 @@ class RegisteredHull {
   void DiscardUnneededBuilder(Locked& locked);
   // Adds a built chunk to the head, and completes its change. added: counts of its points.
   void AddToHead(const PointCounts& added, const WriterSequence& writer, Change* change);
-  // Returns to the committed state after a chunk in flight, and with it all later ones, was
-  // refused. The first refusal reverts; the later ones find it done. A thread building on refused
-  // chunks drops the builder itself (kReverting).
+  // Returns to the committed state after a chunk in flight and all later ones were refused. The
+  // first refusal reverts; the later ones have no effect. A thread building on refused chunks drops
+  // the builder itself (kReverting).
   void Revert(Locked& locked);
 
   // ---- Served ----
@@ -159,16 +159,16 @@ class RegisteredHull {
   void PrefetchParts() const;
   // Approximate bytes that the current version shares with readers, as last counted.
   uint64_t shared_bytes() const { return served_.shared_bytes; }
-  // A reader reads the points from the store. EndLoading notifies `changed`.
+  // True while a reader reads the points from the store. EndLoading notifies `changed`.
   bool is_loading() const { return served_.is_loading; }
   void StartLoading() { served_.is_loading = true; }
   void EndLoading();
-  // A thread prepares live(), or is about to.
+  // True if a thread prepares live(), or is about to.
   bool is_preparing() const { return served_.is_preparing; }
   void SetPreparing(bool prepares) { served_.is_preparing = prepares; }
   // Call when preparation starts; it covers all points committed so far.
   void ResetWear() { served_.points_since_prepared = 0; }
-  // live() was prepared: the next reader gets a new version.
+  // Records that live() was prepared; the next reader gets a new version.
   void NotePrepared(Locked& locked);
   // True if most points of live() are no longer vertices. Preparing drops them, which bounds memory
   // while new points replace old vertices and no reader queries the hull. It costs a fraction of
@@ -187,13 +187,13 @@ class RegisteredHull {
   // Returns the points and sequences that restore the hull together with its record; null unless it
   // is small and unused. Cost: O(points).
   std::unique_ptr<CompactHull> Compact() const;
-  // Restores a hull that was compact. Requires: nothing was set before but the box.
+  // Restores a hull that was compact. Requires: nothing but the box has been set.
   void Restore(const CompactHull& compact);
   // Drops all memory of a hull that is gone.
   void DiscardAll(Locked& locked);
   // Returns a chunk to the queue, before all later chunks.
   void Requeue(PendingChunk chunk);
-  // True if an earlier chunk than this one, which is not queued, is queued.
+  // True if an earlier chunk than this one is queued. Requires: this one is not queued.
   bool IsQueuedBefore(const PendingChunk& chunk) const {
     return !chunks.empty() && chunks.front().place < chunk.place;
   }
@@ -226,7 +226,7 @@ class RegisteredHull {
   struct Committed {
     StoredHull stored;
     LiveHull::Mark mark;
-    // Empty if it is not known.
+    // Empty if unknown.
     Box box = Box::Empty();
     uint64_t supersessions = 0;
   };
@@ -235,7 +235,7 @@ class RegisteredHull {
     // Revisions of the committed hull while chunks are in flight; each chunk builds on them after
     // its predecessors commit. Written only by the completions of the chunks.
     std::shared_ptr<HullRevisions> revisions;
-    // Writers in use; the store holds the rest.
+    // Writers in use; the store has the rest.
     std::unordered_map<std::string, Sequences> writers;
     int sequence_readers = 0;
     // Hull including the changes in flight; null if it must be rebuilt from the points of `live`,
@@ -246,14 +246,14 @@ class RegisteredHull {
     // Committed points of peer servers that are missing from `builder`; the next chunk adds them
     // first. Empty without `builder`.
     std::vector<Vector> backlog;
-    // `live` may hold uncommitted points.
+    // True if `live` may contain uncommitted points.
     bool live_is_ahead = false;
   };
   struct Served {
     std::shared_ptr<LiveHull> live;
     bool is_loading = false;
     bool is_preparing = false;
-    // Points committed since the last preparation, or since `live` was made.
+    // Points committed since the last preparation, or since `live` was created.
     uint64_t points_since_prepared = 0;
     // Version of `live` at the committed mark; null until the first read after a change.
     std::shared_ptr<const ServedHull> version;
@@ -300,14 +300,14 @@ void Answer(Locked& locked, const Reply<T>& done, std::type_identity_t<absl::Sta
 }
 
 std::string QuotedHull(const std::string& id);
-// FAILED_PRECONDITION: the hull of a session ended. how: "deleted".
+// FAILED_PRECONDITION: the hull of a session ended. how: for example, "deleted".
 absl::Status Gone(const std::string& id, const char* how);
 absl::Status HullNotFound(const std::string& id);
 
 // UNAVAILABLE: a shared store lacks an expected record, and no peer server removed it.
 absl::Status StoreDisagrees(const HullRecord& record);
 // ABORTED: the hull or body is not at the required revision. kind: "hull" or "body". revision: the
-// present one; 0: it does not exist, or its record is damaged.
+// current one; 0: it does not exist, or its record is damaged.
 absl::Status RevisionMismatch(const std::string& kind, const std::string& id, uint64_t revision,
                               uint64_t if_revision);
 

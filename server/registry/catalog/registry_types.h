@@ -29,7 +29,7 @@ namespace hulld::server {
 struct ServedBody;
 
 // A hull as seen by one reader; `served` belongs to the record's revision. In lookups that allow
-// bodies (ResolvePlaced), possibly a body: then `record` holds only its ID and revisions, and
+// bodies (ResolvePlaced), possibly a body: then `record` contains only its ID and revisions, and
 // `served` is null. The record of an inline shape is empty.
 struct HullView {
   HullRecord record;
@@ -40,8 +40,8 @@ struct HullView {
 // Required freshness of a read when peer servers commit to the same store; see
 // proto/hulld/v1/freshness.proto. All conditions must hold. Default: a linearizable read.
 struct Freshness {
-  // Accepts any staleness without a store query: for readers notified of a change by the registry,
-  // which has applied it.
+  // Accepts any staleness without a store query: for readers notified of a change that the registry
+  // has already applied.
   static Freshness AnyStaleness() { return {0, std::nullopt, std::nullopt}; }
 
   uint64_t at_least_revision = 0;
@@ -92,9 +92,10 @@ struct Replacement {
   std::optional<uint64_t> if_revision;
   bool create_if_absent = false;
   std::shared_ptr<HullBuilder> builder;
-  // Sums over the points given to the builder.
+  // Sums over the points passed to the builder.
   PointCounts counts;
-  // Vertices and live hull of the builder, for the store and for readers; set by Registry::Replace.
+  // Vertices and live hull of the builder, for the store and for readers; set by
+  // HullChanges::Replace.
   std::vector<Vector> vertices = {};
   std::shared_ptr<LiveHull> live = nullptr;
 };
@@ -115,7 +116,7 @@ struct PutBodyResult {
 struct FoundBodies {
   uint64_t store_revision = 0;
   std::vector<std::shared_ptr<const Body>> bodies;
-  // Error of the lookups that failed, whose bodies are null, too.
+  // Error of the failed lookups; their bodies are null, too.
   absl::Status status;
 };
 
@@ -126,9 +127,9 @@ struct RegistrySizes {
   uint64_t body_count = 0;
 };
 
-// Memory held for hulls, and its effect on reads so far. Memory: builders, points and their
+// Memory used for hulls, and its effect on reads so far. It includes builders, points and their
 // prepared form, canonical snapshots, points pending to be built, vertices pending to be stored,
-// and memory that calls hold for long (MemoryCharge).
+// and memory that calls hold for a long time (MemoryCharge).
 struct CacheStatistics : MemoryStatistics {
   // Requested hulls found in memory.
   uint64_t hits = 0;
@@ -191,9 +192,10 @@ struct HullChange {
   bool is_body = false;
   // For a body.
   uint64_t piece_count = 0;
-  // The store cannot read it.
+  // True if the store cannot read it.
   bool damaged = false;
-  // The bounding box. Empty for a hull without vertices, or not in memory since the server started.
+  // The bounding box. Empty if the hull has no vertices, or has not been in memory since the server
+  // started.
   Box box = Box::Empty();
 };
 

@@ -131,7 +131,8 @@ void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>&
   if (hull == nullptr) {
     if (!request->create_if_absent)
       return refuse(locked, state_.catalog.NoSuchHull(request->hull_id));
-    // The session opens in the completion of the creation: the hull may be gone right after.
+    // The session opens in the completion of the creation, because the hull may be gone immediately
+    // afterwards.
     return CreateNew(
         locked, request->hull_id,
         [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
@@ -144,7 +145,7 @@ void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>&
   if (hull->state.damaged()) return refuse(locked, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
   if (!last.ok()) return refuse(locked, last.status());
-  // The end of a hull removes its sequences from the store before the registry learns of it.
+  // The end of a hull removes its sequences from the store before the registry applies it.
   if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
   if (*last == 0 && hull->head().writer_count >= state_.limits.max_writers_per_hull) {
     return refuse(locked, TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
@@ -243,8 +244,8 @@ void HullChanges::RefuseChunks(const HullPointer& hull) {
   }
 }
 
-// Answers a chunk, or submits its change, the completion of which answers it. Releases the mutex
-// while building.
+// Answers a chunk, or submits its change, whose completion answers it. Releases the mutex while
+// building.
 void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);

@@ -39,12 +39,13 @@ struct PendingChunk;
 // is retried on the new state, and a chunk returns to its place in the queue.
 //
 // Invariants:
-//   - Advance follows each transition of a hull's HullState, so no runnable task is left waiting:
-//     first tasks that need the hull to be quiet (RegisteredHull::exclusive), then its chunks.
+//   - Advance follows each transition of a hull's HullState, so no runnable task keeps waiting. It
+//     runs tasks that need the hull to be quiet (RegisteredHull::exclusive) first, then chunks.
 //   - Per hull and writer, chunks commit in the order of their sequences, each exactly once; `head`
-//     and the writer's `head` include every chunk in flight, `committed` only what the store has
-//     committed. Queued chunks occupy no thread.
-//   - A change is invisible until the store commits it; a refusal leaves the former state.
+//     and the writer's `head` include every chunk in flight, `committed` only committed chunks.
+//     Queued chunks occupy no thread.
+//   - A change is invisible until the store commits it; a refused change leaves the previous state
+//     unchanged.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
 class HullChanges : public PeerChangeListener {
@@ -61,7 +62,7 @@ class HullChanges : public PeerChangeListener {
   HullChanges& operator=(const HullChanges&) = delete;
 
   // Registers an empty hull. Calls `done`, on this or another thread, after it is committed or
-  // refused. Requires: a valid ID (not checked here; CheckHullId runs on arrival of the call).
+  // refused. Requires: a valid ID (not checked here; CheckHullId runs when the call arrives).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
   void Create(const std::string& id, bool if_absent, Reply<PutHullResult> done);

@@ -101,13 +101,13 @@ void Committer::Run() {
 }
 
 void Committer::CommitRound(Round round) {
-  // Taken before anything is sent, because a commit queries peer changes as well.
+  // Measured before anything is sent, because a commit queries peer changes as well.
   const SteadyClock::time_point asked = round.asked.has_value() ? *round.asked : SteadyClock::now();
   absl::Status status;
   if (!round.batch.empty()) status = Write(round.batch);
   if (!status.ok()) {
-    // Refused before the query for peer changes: if the outcome is unknown, the store may contain
-    // this very batch at that point.
+    // Refused before the query for peer changes: if the outcome is unknown, the store may already
+    // contain this batch at that point.
     Round barriers;
     barriers.barriers = std::exchange(round.barriers, {});
     Settle(round, status, absl::OkStatus(), asked);

@@ -22,7 +22,7 @@ struct CommitStatistics {
   uint64_t batches = 0;
   uint64_t changes = 0;
   uint64_t failed_batches = 0;
-  // The last batch failed.
+  // True if the last batch failed.
   bool failing = false;
 };
 
@@ -33,14 +33,14 @@ struct CommitStatistics {
 // refuses everything submitted so far, and the submitters undo it. The store recovers before the
 // next batch.
 //
-// Two locks. `order` belongs to the submitters. They hold it while they submit, so the queue has
-// the order of their records. The completions of a refused batch run within one hold of it, which
-// makes a refusal safe: between the emptying of the queue and the last completion, no change that
-// builds on a refused one can be submitted. The completions of a committed batch release it after
-// every kMostPerHold: each of them leaves a consistent state, and a submission in between is like
-// one during the commit. The queue has its own mutex, so that the committer's thread takes the next
-// batch without waiting for the records. That mutex is taken after `order`, and no callback runs
-// under it. No lock is held during store calls.
+// Two locks are used. `order` belongs to the submitters. They hold it while they submit, so the
+// queue has the order of their records. The completions of a refused batch run within one hold of
+// it, which makes a refusal safe: between the emptying of the queue and the last completion, no
+// change that builds on a refused one can be submitted. The completions of a committed batch
+// release it after every kMostPerHold completions: each completion leaves a consistent state, and a
+// submission in between is equivalent to one during the commit. The queue has its own mutex, so
+// that the committer's thread takes the next batch without waiting for the records. That mutex is
+// acquired after `order`, and no callback runs under it. No lock is held during store calls.
 class Committer {
  public:
   // Completion of a change: OK if it is committed, else the reason for the refusal; and the change,
@@ -68,8 +68,8 @@ class Committer {
     // and before the committed changes of the same batch complete, which have later revisions. No
     // change of these IDs is in flight.
     virtual void Apply(Locked& order, const PeerChanges& changes) = 0;
-    // All commits of peer servers before this time are applied: a query for them was sent then, and
-    // answered.
+    // Records that all commits of peer servers before `asked` are applied: a query for them was
+    // sent at that time, and has been answered.
     virtual void NoteSynced(SteadyClock::time_point asked) = 0;
   };
 
@@ -98,7 +98,7 @@ class Committer {
   // As AddBarrier for a blocking thread: if the committer is idle, the query is sent on this thread
   // when `order` is released, without waiting for the committer's thread to wake up.
   void StartBarrier(Locked& locked, Barrier barrier);
-  // Schedules a query for peer changes. Takes only the queue's lock.
+  // Schedules a query for peer changes. Acquires only the lock of the queue.
   void FetchSoon();
 
   CommitStatistics Statistics() const;
@@ -111,7 +111,7 @@ class Committer {
     Completion done;
   };
 
-  // Work of a round: each member may be empty; all are empty at the end.
+  // Work of a round. Each member may be empty; all are empty when the thread must end.
   struct Round {
     std::vector<Pending> batch;
     std::vector<Barrier> barriers;
@@ -145,14 +145,14 @@ class Committer {
   std::vector<Pending> queue_;
   std::vector<Barrier> barriers_;
   CommitStatistics statistics_;
-  // The committer's thread waits for work.
+  // True while the committer's thread waits for work.
   bool is_idle_ = false;
-  // StartFetch is due or running, with exclusive use of the store.
+  // True if StartFetch is due or running, with exclusive use of the store.
   bool is_starting_ = false;
   // Result of StartFetch.
   Round started_;
   bool ending_ = false;
-  // The thread takes no more work.
+  // True if the thread accepts no more work.
   bool has_ended_ = false;
   Thread thread_;
 };

@@ -15,7 +15,7 @@
 namespace hulld::server {
 namespace {
 
-// Returns true if a few of the points span space. May return false for points that do.
+// Returns true if a few of the points span space. May return false even if all points together do.
 bool SpanSpace(std::span<const Vector> points) {
   const size_t third = points.size() / 3;
   return third > 0 && std::ranges::any_of(points, [&](const Vector& point) {
@@ -23,10 +23,11 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-// Maximum points, not counting the last hull, and hulls that a thread takes per step: some 50 us.
+// Maximum numbers of points, excluding the last hull, and of hulls that a thread loads per step,
+// which takes about 50 us.
 constexpr uint64_t kPointsAtOnce = 1024;
 constexpr size_t kHullsAtOnce = 16;
-// Small parts of a job, so that all threads finish together.
+// Minimum number of parts of a large job: small parts let all threads finish together.
 constexpr size_t kLeastParts = 8;
 
 uint64_t PointCount(const StoredHull& stored) {

@@ -19,19 +19,19 @@
 namespace hulld::server {
 
 // Loads a committed hull from its stored points, ready for queries and growth. The points include
-// at least its vertices, and none outside it. The result is never null. Checks the number and
-// dimension of the points; that they form the hull described by the record is checked by later
-// builds. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost:
-// O(n); building the hull if it is flat.
+// all of its vertices, and none outside it. The result is never null. Checks the number and
+// dimension of the points; later builds check that they form the hull described by the record.
+// DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost: O(n);
+// building the hull if it is flat.
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored);
 
-// A batch of hulls loaded together, by free threads of a pool and by the thread that asks for the
-// results; each takes a few hulls per step.
+// A batch of hulls loaded together, by idle threads of a pool and by the thread that requests the
+// results; each loads a few hulls per step.
 class LoadJob {
  public:
   using Loaded = absl::StatusOr<std::shared_ptr<LiveHull>>;
 
-  // Starts loading on the threads of the pool, without blocking. Requires that Finish is called.
+  // Starts loading on the threads of the pool, without blocking. Finish must be called.
   LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helpers);
   LoadJob(const LoadJob&) = delete;
   LoadJob& operator=(const LoadJob&) = delete;

@@ -16,10 +16,11 @@
 
 namespace hulld::server {
 
-// Maximum number of hulls and bodies looked up within one hold of the registry's mutex: some 50 us.
+// Maximum number of hulls and bodies looked up within one hold of the registry's mutex; takes about
+// 50 us.
 inline constexpr uint64_t kMostLookupsPerHold = 128;
 
-// Longest hold of a mutex, and the most work within one.
+// Longest hold of a mutex, and the maximum work within one hold.
 struct HoldStatistics {
   // Longest hold within this minute and the one before. Waiting on a condition is not a hold.
   std::chrono::nanoseconds longest{0};
@@ -54,7 +55,7 @@ class FairMutex {
   // True if a thread is next in line.
   bool is_wanted() const { return is_wanted_; }
 
-  // Requires that it is held (not checked: it does not know its holder).
+  // Requires: the mutex is held (not checked, because it does not know its holder).
   HoldStatistics Statistics() const {
     const int64_t age = MinuteOf(Clock::now()) - minute_;
     const auto longest = age == 0   ? std::max(longest_, longest_before_)

@@ -22,13 +22,14 @@ enum class MemoryUse {
   // Queries: versions of hulls that they hold, placements and pairs of streams, pending changes of
   // watches.
   kReading,
-  // Hulls being changed, points on their way to them, replacements; and every hull that no store
+  // Hulls being changed, points pending for them, and replacements; also every hull that no store
   // keeps.
   kWriting,
 };
 
 struct MemoryStatistics {
-  // All memory counted now, and its parts held for readers and writers; the rest can be evicted.
+  // All memory currently counted, and its parts held for readers and writers; the rest can be
+  // evicted.
   uint64_t bytes = 0;
   uint64_t reading_bytes = 0;
   uint64_t writing_bytes = 0;
@@ -43,13 +44,13 @@ using MemoryParts = std::vector<std::shared_ptr<MemoryPart>>;
 // Counts the memory of each use and chooses evictions when the limit is exceeded.
 //
 // Memory is of three kinds. Memory held for readers and for writers stays until they are done; each
-// of the two has a share of the limit, and Check refuses more to a use that exceeds its share,
-// independent of the other. The rest is hulls at rest, which can be reloaded; they fill the
-// remaining memory, and the least recently used is evicted first.
+// of the two has a share of the limit, and Check refuses more memory to a use that exceeds its
+// share, independently of the other use. The rest is hulls at rest, which can be reloaded; they
+// fill the remaining memory, and the least recently used is evicted first.
 //
 // An Account counts the memory of a hull, which is of the third kind unless a writer needs it.
 // Memory that readers may hold longer than the hull is a separate MemoryPart: it is held for
-// readers while a MemoryPin is on it, and counts until its last holder is gone. A MemoryCharge
+// readers while a MemoryPin on it exists, and counts until its last holder is gone. A MemoryCharge
 // counts any other memory of a call.
 //
 // Thread-safe. Its mutex is the innermost one: it is acquired while other locks are held, and no
@@ -58,7 +59,7 @@ using MemoryParts = std::vector<std::shared_ptr<MemoryPart>>;
 class MemoryBudget {
  private:
   enum Kind : size_t { kForReading, kForWriting, kAtRest };
-  // Outlives the budget as long as parts do.
+  // Outlives the budget while parts exist.
   struct Usage {
     Mutex mutex;
     std::array<uint64_t, 3> bytes{};
@@ -85,7 +86,7 @@ class MemoryBudget {
     // Sets the memory excluding parts; is_for_writing: a writer needs it and the parts. Marks the
     // account as just used. Cost: O(1).
     void Set(uint64_t bytes, bool is_for_writing);
-    // Marks the account as just used, or as the first to evict from. Cost: O(1).
+    // Touch marks the account as just used, Age as the first to evict from. Cost: O(1).
     void Touch();
     void Age();
     // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
@@ -100,8 +101,8 @@ class MemoryBudget {
     friend class MemoryBudget;
     friend class MemoryPart;
 
-    // Adds the account's memory to the budget, or, with the sign -1, removes it. Requires the
-    // budget's mutex.
+    // Adds the account's memory to the budget, or removes it if `sign` is -1. Requires the budget's
+    // mutex.
     void Count(int sign);
     static const std::shared_ptr<const MemoryParts>& NoParts();
 
@@ -121,7 +122,7 @@ class MemoryBudget {
   // Maximum number of accounts that one eviction visits; takes about 10 us.
   static constexpr size_t kMostVisited = 64;
 
-  // limit_bytes: --memory-limit. reading_bytes: the readers' share; writers have the rest. owners:
+  // limit_bytes: --memory-limit. reading_bytes: the readers' share; writers get the rest. owners:
   // the mutex that guards the accounts; it may not be constructed yet.
   MemoryBudget(uint64_t limit_bytes, uint64_t reading_bytes, const FairMutex& owners)
       : limit_bytes_(limit_bytes),
@@ -155,8 +156,8 @@ class MemoryBudget {
   uint64_t evictions_ = 0;
 };
 
-// Memory of a hull that readers may hold longer than the hull: counted once, however many holders
-// it has, until the last one is gone. Thread-safe; may outlive the budget.
+// Memory of a hull that readers may hold longer than the hull: counted once, regardless of the
+// number of holders, until the last one is gone. Thread-safe; may outlive the budget.
 class MemoryPart {
  public:
   // what: identifies the part within its account; never dereferenced.
@@ -199,8 +200,8 @@ class MemoryPin {
   const std::shared_ptr<const MemoryParts> parts_;
 };
 
-// Memory that stays until its owner is done, counted during the lifetime of this. Not thread-safe;
-// the budget must outlive it.
+// Memory in use until its owner is done, counted during the lifetime of this object. Not
+// thread-safe; the budget must outlive it.
 class MemoryCharge {
  public:
   MemoryCharge(MemoryBudget& budget, MemoryUse use, uint64_t bytes = 0)

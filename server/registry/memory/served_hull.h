@@ -67,7 +67,7 @@ class CanonicalHull {
   const std::shared_ptr<MemoryPart> part_;
   Mutex mutex_;
   ConditionVariable changed_;
-  // A thread is building the snapshot or the query structure. Guarded by the mutex.
+  // True while a thread builds the snapshot or the query structure. Guarded by the mutex.
   bool making_ = false;
   // Written once, before hull_bytes_ becomes positive.
   std::unique_ptr<const Hull> hull_;
@@ -87,8 +87,8 @@ class ServedHull {
   ServedHull(std::shared_ptr<const QueryHull> version, const Box& box,
              std::shared_ptr<CanonicalHull> canonical);
 
-  // For queries that name no vertex: relation, tolerance and clearance. The result lives as long as
-  // this. Later calls may return another.
+  // Query structure for queries that name no vertices: relation, tolerance, and clearance. It lives
+  // as long as this object. Later calls may return a different one.
   const QueryHull& query_hull() const {
     return canonical_->has_query_hull() ? canonical_->query_hull() : *version_;
   }
@@ -104,7 +104,7 @@ class ServedHull {
                              const std::function<bool()>& should_stop) const {
     return canonical_->Make(*version_, record, should_stop);
   }
-  // For all queries. Built by the first call. Requires canonical() != nullptr.
+  // Query structure for all queries, built by the first call. Requires canonical() != nullptr.
   const QueryHull& canonical_query_hull() const { return canonical_->query_hull(); }
   // Builds it if needed (CanonicalHull::MakeQueryHull). Not for gRPC threads.
   absl::Status MakeCanonicalQueryHull(const std::function<bool()>& should_stop) const {

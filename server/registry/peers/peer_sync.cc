@@ -100,7 +100,7 @@ void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
     state_.feed.NoteOther(locked, changes.revision);
   }
   state_.memory.Evict(locked);
-  // Tasks that these defer wait for the next changes.
+  // Tasks deferred by these tasks wait for the next changes.
   for (const LockedTask& task : std::exchange(deferred_, {})) task(locked);
 }
 

@@ -19,13 +19,13 @@ namespace hulld::server {
 // is the read barrier. Exists only if the store has a PeerFeed.
 //
 // Changes are applied on the committer's thread, after the superseded local changes were refused,
-// so nothing that they touch is being committed. A thread may still build a chunk on such a hull,
-// or read its record; the state of the hull, or of the reading, shows that it was superseded. Tasks
-// that depend on a changed ID run after all changes of the same fetch are applied (Defer).
+// so no local change to the same IDs is being committed. A thread may still build a chunk on such a
+// hull, or read its record; the state of the hull, or of the reading, shows that it was superseded.
+// Tasks that depend on a changed ID run after all changes of the same fetch are applied (Defer).
 class PeerSync : public ReadBarrier, public Committer::Peers {
  public:
   // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
-  // their points in total: some milliseconds.
+  // their points in total; takes a few milliseconds.
   static constexpr size_t kMostGrownHulls = 1 << 10;
   static constexpr uint64_t kMostGrowth = 1 << 16;
 
@@ -62,8 +62,8 @@ class PeerSync : public ReadBarrier, public Committer::Peers {
   std::vector<PeerChangeListener*> listeners_;
   // The registry's mutex guards the members below.
   std::vector<LockedTask> deferred_;
-  // All commits of peer servers before this time are applied: when the last answered query was
-  // sent. nullopt before the first one.
+  // Time at which the last answered query was sent; all commits of peer servers before it are
+  // applied. nullopt before the first query.
   std::optional<SteadyClock::time_point> synced_at_;
   bool is_fetching_ahead_ = false;
 };

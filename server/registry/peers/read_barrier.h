@@ -56,9 +56,8 @@ class ReadBarrier {
   absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
 
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
-  // Required before functions without a freshness of their own (Registry::List,
-  // BodyRegistry::Find). Not for gRPC threads. Errors and cost as AwaitCommits; no effect without
-  // peer servers.
+  // Required before functions without a freshness parameter (Registry::List, BodyRegistry::Find).
+  // Not for gRPC threads. Errors and cost as AwaitCommits; no effect without peer servers.
   absl::Status AwaitPeers(const std::function<bool()>& should_stop);
   virtual absl::Status AwaitPeers(Locked& /*locked*/,
                                   const std::function<bool()>& /*should_stop*/) {
@@ -78,14 +77,14 @@ class ReadBarrier {
                                                       const std::function<bool()>& should_stop);
   // If the catalog is too stale for `freshness`, requests the changes committed by peer servers so
   // far and calls `done` exactly once after they are applied, on this or another thread, without
-  // any lock. Otherwise returns false and does nothing. Errors and cost as AwaitPeers, without
-  // blocking.
+  // holding a lock. Otherwise returns false and does nothing. Errors and cost as AwaitPeers,
+  // without blocking.
   virtual bool StartFresh(const Freshness& /*freshness*/,
                           std::function<void(const absl::Status&)> /*done*/) {
     return false;
   }
-  // Runs `next`, on which the answer to a call depends, after the changes committed by peer servers
-  // so far are applied; or refuses, without any lock.
+  // Runs `next`, which determines the answer to a call, after the changes committed by peer servers
+  // so far are applied; or calls `refuse` with the error, without holding a lock.
   virtual void WhenFresh(Refusal refuse, LockedTask next);
 
   // Defers a task, which depends on an ID that a peer server changed, until that change is applied.

@@ -16,7 +16,7 @@ namespace hulld::server {
 
 namespace {
 
-// Status of a lookup that would have to wait, but may not. Without a message, which would cost an
+// Status of a lookup that would have to wait, but may not. It has no message, to avoid an
 // allocation.
 absl::Status WouldWait() { return absl::Status(absl::StatusCode::kUnavailable, ""); }
 
@@ -47,8 +47,8 @@ absl::Status HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
 }
 
 // Finds the hulls due next and loads them into the processor's caches, so that their cache misses
-// overlap: a lookup reads some twenty lines that depend on each other. Returns the number of due
-// hulls that remain after them.
+// overlap: a lookup reads about twenty cache lines, each found through another. Returns the number
+// of due hulls that remain after them.
 size_t HullReader::FindAhead(const HullsRead& read) {
   constexpr size_t kFoundAhead = 16;
   KnownHulls& known = read.known;
@@ -109,7 +109,7 @@ absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
 absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   if (!state_.memory.IsOver(MemoryUse::kReading)) return absl::OkStatus();
   const uint64_t share = state_.memory.share(MemoryUse::kReading);
-  // A retry does not help a read that holds most of the memory itself.
+  // A retry does not help a read that itself holds most of the memory.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
     return LimitExceeded(absl::StrCat("the hulls named by the call use ", bytes,
                                       " bytes of memory so far, which, together with other calls, "
@@ -146,7 +146,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
     }
     if (!hull->IsReady()) {
       // The hull was looked up, prepared, and evicted since. Loading and preparing it again could
-      // evict another hull of the same read, and so on without end.
+      // evict another hull of the same read, and so on indefinitely.
       if (IsHeld(known, *hull)) {
         ++state_.catalog.statistics().hits;
         return absl::OkStatus();
@@ -172,7 +172,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
 }
 
 // Loads the records of this hull and of some hulls due next. Returns false if the caller must look
-// again, true if the read failed, which is recorded. Releases the mutex.
+// the hull up again, true if the read failed, which is recorded. Releases the mutex.
 absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   if (!hulls.ahead_.empty()) {
@@ -192,7 +192,7 @@ absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& re
 }
 
 // Loads the points of this hull, and at first of the hulls due next. Returns false if the caller
-// must look again, true if the read failed, which is recorded. Releases the mutex.
+// must look the hull up again, true if the read failed, which is recorded. Releases the mutex.
 absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
                                              RegisteredHull& hull, bool& was_missing) {
   KnownHulls& hulls = read.known;
@@ -224,7 +224,7 @@ absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, Reg
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
-// True if this reader already holds the committed state of the hull.
+// Returns true if this reader already has the committed state of the hull.
 bool HullReader::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
   return known.view.ok() && known.view->record == hull.committed().record;
 }
@@ -261,8 +261,8 @@ void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
 // Starts a load if enough hulls are missing. Returns false if not.
 bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
-  // At some 200 bytes per point, a twentieth of the memory limit: the readers' share is not checked
-  // until each hull is looked up.
+  // At about 200 bytes per point, a twentieth of the memory limit: the readers' share is not
+  // checked until each hull is looked up.
   uint64_t most_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
   // Two jobs, so that the second loads while the hulls of the first are looked up.
   const uint64_t enough_points = most_points / 2;
@@ -363,7 +363,7 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
     const auto staleness = barrier_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.as_of.staleness = *staleness;
-    // Refresh reports an error, which may be gone later.
+    // Refresh reports the error, unless it no longer occurs by then.
     if (!LookUpDue(locked, {ids, known, should_stop, plan, false}).ok()) return std::nullopt;
     resolved.as_of.revision = state_.catalog.revision();
   }
@@ -427,11 +427,11 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
     }
-    // A writer was faster. The points read, or missing, belong to a state that is no longer
+    // If a writer was faster, the points read, or missing, belong to a state that is no longer
     // current.
     const bool is_current = hull.committed().record.revision == stored.record.revision;
     if (hull.live() != nullptr || hull.state.gone() || !is_current) {
-      // Writers may be faster repeatedly.
+      // This may repeat, so should_stop is checked.
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
@@ -441,8 +441,8 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
       hull.NoteUse();
       return absl::OkStatus();
     }
-    // A pending end of the hull first removes its points from the store; its outcome shows if they
-    // are damaged.
+    // A pending end of the hull first removes its points from the store; its outcome shows whether
+    // they are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
     if (absl::IsDataLoss(loaded.status())) state_.catalog.MarkDamaged(hull, loaded.status());

@@ -25,16 +25,16 @@ namespace hulld::server {
 // Returns hulls ready to be served, all at one revision.
 //
 // A read looks up kMostLookupsPerHold hulls per hold of the mutex and releases it in between. At
-// the end it looks up the hulls that changed since, until one hold covers all that are left: then
+// the end it looks up the hulls that changed since, until one hold covers all remaining ones: then
 // all are at one revision. This terminates, because a commit takes longer than a lookup. Readers
-// and writers never wait for each other: a reader takes the version of the committed state, made in
-// O(1), and never touches a builder.
+// and writers never wait for each other: a reader gets the version of the committed state, created
+// in O(1), and never uses a builder.
 //
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it
-// (RegisteredHull::loading). A read of many hulls has threads load the next ones while the first
-// are looked up. It finishes all such loads of its own before it waits for another read, which may
-// wait for them.
+// (RegisteredHull::is_loading). For a read of many hulls, other threads load the next hulls while
+// the first are looked up. A read finishes all of its own loads before it waits for another read,
+// because that one may be waiting for them.
 //
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {

@@ -149,7 +149,7 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
 
 void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
                                const absl::StatusOr<FoundRecords>& found) {
-  // Evicts first, so that the new records are still there when their callers resume.
+  // Evicts first, so that the new records are still in the catalog when their callers resume.
   for (size_t i = 0; i < readings.size(); ++i) state_.catalog.hulls().RestSome();
   state_.catalog.bodies().DropSome(locked);
   Readings open;
@@ -203,7 +203,7 @@ void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
                                absl::StatusOr<FoundRecords> found, FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
   if (!found.ok() || !IsBehind(*found, nullptr)) return take(locked, found);
-  // After this round of the committer, the catalog includes everything that the store held.
+  // After this round of the committer, the catalog includes everything that the store contained.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
       locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
@@ -227,7 +227,7 @@ absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
   return found;
 }
 
-// True if the store holds a later state of the hull than the catalog under the same revision:
+// Returns true if the store has a later state of the hull than the catalog, at the same revision:
 // points that change no vertex do not create a revision.
 bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
   if (!stored.ok()) return false;
@@ -237,8 +237,8 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
   return known->second.Describe(id).record.counts.received < stored->record.counts.received;
 }
 
-// True if the records are newer than the catalog: committed, perhaps by a peer server, but not yet
-// applied. An answer from them would be followed by an older one from the catalog.
+// Returns true if the records are newer than the catalog: committed, perhaps by a peer server, but
+// not yet applied. An answer from them would be followed by an older one from the catalog.
 bool RecordReader::IsBehind(const FoundRecords& found, Locked* yields) const {
   if (found.revision > state_.catalog.revision()) return true;
   return std::ranges::any_of(found.hulls, [&](const auto& hull) {

@@ -30,7 +30,7 @@ namespace hulld::server {
 inline constexpr ClientId kRecordReader = {1};
 inline constexpr ClientId kWatchReader = {2};
 
-// Reads records from a store that finds them, of which the catalog holds only a part: loads the
+// Reads records from a store that finds records, only some of which are in the catalog: loads the
 // record of an ID into the catalog (of the hull or of the body, or the absence of both), and lists
 // records page by page without adding them to the catalog.
 //
@@ -38,7 +38,8 @@ inline constexpr ClientId kWatchReader = {2};
 //   - At most one thread reads the record of an ID, however many callers wait for it.
 //   - Only unknown IDs are read, so no local change interferes: local changes require known IDs.
 //     A change by a peer server replaces the read in progress (OnPeerChange).
-//   - When the waiting callers resume, the record is in the catalog, or was and is evicted again.
+//   - When the waiting callers resume, the record is in the catalog, or was there and has been
+//     evicted again.
 //     A caller therefore looks the ID up again, and may find it unknown once more.
 //   - Records are used only after the catalog has reached their revision. The store may be at a
 //     later one; the changes in between, of peer servers or local ones, are then applied first. An
@@ -62,8 +63,8 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
   // end of a hull in flight. kQuiet: known, with nothing in flight.
   enum class For { kLife, kQuiet };
-  // Returns true if the ID is not in that state; then `next` runs when it may be, and must check
-  // again. Otherwise does nothing. refuse: as WhenKnown.
+  // Returns true if the ID is not in that state; then `next` runs when it may have reached that
+  // state, and must check again. Otherwise does nothing. refuse: as WhenKnown.
   bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
                 LockedTask next);
 

@@ -14,7 +14,7 @@ Limits WithMemoryLimit(Limits limits) {
   return limits;
 }
 
-// The rest is reserved for writers: without a store that keeps hulls, their hulls stay in memory.
+// The rest is reserved for writers: if the store does not keep hulls, all hulls stay in memory.
 uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
 }
@@ -175,7 +175,7 @@ void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const P
   }
 }
 
-// Notes the change in the feed. Requires: the catalog holds it.
+// Notes the change in the feed. Requires: the catalog contains it.
 void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange& change,
                          const std::optional<Incarnation>& former) {
   const std::shared_ptr<const Body> body = catalog.FindBody(id);

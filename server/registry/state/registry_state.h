@@ -40,12 +40,12 @@ struct RegistryState {
 
   // Apply a committed change of a hull. Requires: its HullState no longer counts the change as in
   // flight.
-  // former: null if `hull` is in the catalog already; otherwise the hull whose place it takes.
+  // former: null if `hull` is in the catalog already; otherwise the hull that it replaces there.
   void ApplyCreation(Locked& locked, const HullPointer& former, const HullPointer& hull,
                      const StoredHull& stored);
   void ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision);
   void ApplyChunk(Locked& locked, const HullPointer& hull, const CommittedChunk& chunk);
-  // body: null after a deletion. Requires an entry of the ID.
+  // body: null after a deletion. Requires an entry for the ID.
   void ApplyBody(Locked& locked, const std::string& id, const std::shared_ptr<const Body>& body,
                  uint64_t revision);
   // Applies a peer server's change. since: all earlier changes up to this revision were applied.

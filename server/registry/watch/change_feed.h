@@ -85,7 +85,7 @@ class ChangeFeed {
   void NoteOther(const Locked& locked, uint64_t revision);
 
   // Starts a watch. Calls `on_ready` on the feed's thread, once after each batch that waits. A
-  // watch that cannot resume starts over. RESOURCE_EXHAUSTED: --memory-limit.
+  // watch that cannot resume starts over. RESOURCE_EXHAUSTED: --memory-limit is reached.
   absl::StatusOr<std::shared_ptr<Watch>> Open(const WatchTarget& target,
                                               const WatchPosition& position,
                                               std::function<void()> on_ready);
@@ -97,7 +97,7 @@ class ChangeFeed {
   // false; `added` must be new to it, and `removed` included. Cost: one hash per ID.
   void ChangeIds(Watch& watch, std::span<const std::string> added,
                  std::span<const std::string> removed);
-  // Calls on_ready of a waiting watch although nothing changed.
+  // Calls on_ready of a waiting watch even though nothing changed.
   void Nudge(const std::shared_ptr<Watch>& watch);
   // Closes a watch. An on_ready that is already due is still called.
   void Close(const std::shared_ptr<Watch>& watch);
@@ -122,8 +122,8 @@ class ChangeFeed {
     // Both null for a deletion.
     HullPointer hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
-    // If the change replaced a hull by a body or a body by a hull: create_revision of the former.
-    // Otherwise 0.
+    // If the change replaced a hull with a body or a body with a hull: create_revision of the
+    // former. Otherwise 0.
     uint64_t other_kind_began = 0;
   };
   friend struct WatchGroup;
@@ -153,7 +153,7 @@ class ChangeFeed {
   void Wait(Watch& watch, WatchBatch* batch);
   void Wake(Locked& locked, const std::shared_ptr<Watch>& watch);
   void MakeReady(const std::shared_ptr<Watch>& watch);
-  // The feed's thread.
+  // Run on the feed's thread.
   void Run();
   void NudgeForMarks();
 

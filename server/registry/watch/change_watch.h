@@ -55,7 +55,7 @@ struct WatchBatch {
 
 struct WatchGroup;
 
-// A cursor in the changes of its target. Only the ChangeFeed, whose mutex guards it, looks inside.
+// A cursor in the changes of its target. Accessed only by the ChangeFeed, whose mutex guards it.
 class Watch {
  public:
   // The order of opening, which does not depend on addresses.
@@ -73,7 +73,7 @@ class Watch {
     // Reports deletions since it was last synced, if it resumes, then the existing hulls by ID.
     kCatchingUp,
     // The pending changes fill several batches. The state at the cursor is not that of any
-    // revision, so hulls are PRESENT or DELETED.
+    // revision, so hulls are reported as PRESENT or DELETED.
     kBehind,
     // Has reported exactly the state at the cursor.
     kSynced,
@@ -94,7 +94,7 @@ class Watch {
     PendingPage page;
   };
 
-  // Greater than that of every watch that is open when this one opens.
+  // Greater than the number of every watch that was open when this one was opened.
   uint64_t number_ = 0;
   std::shared_ptr<WatchGroup> group_;
   // Called on the feed's thread without locks.
@@ -107,11 +107,11 @@ class Watch {
   uint64_t reported_ = 0;
   // The listing ended at this revision, and `synced` is due there.
   std::optional<uint64_t> synced_at_;
-  // The next batch says that the watch started over.
+  // True if the next batch must report that the watch started over.
   bool restarted_ = false;
-  // on_ready is due at the next change.
+  // True if on_ready is due at the next change.
   bool is_waiting_ = false;
-  // The next batch does not wait.
+  // True if the next batch does not wait.
   bool is_nudged_ = false;
 };
 

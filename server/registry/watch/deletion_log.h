@@ -14,8 +14,7 @@ namespace hulld::server {
 // resume: a deletion leaves no trace in the store. Not thread-safe.
 class DeletionLog {
  public:
-  // Maximum number of deletions: 25 MiB with IDs of the greatest length, outside of the memory
-  // budget.
+  // Maximum number of deletions: 25 MiB with IDs of maximum length, outside the memory budget.
   static constexpr size_t kCapacity = 1 << 16;
 
   struct Deletion {
@@ -31,13 +30,13 @@ class DeletionLog {
   // Notes that a hull or body was created.
   void NoteCreation(const std::string& id, bool is_body);
 
-  // Returns true if the log holds every deletion after this revision.
+  // Returns true if the log contains every deletion after this revision.
   bool IsCompleteAfter(uint64_t revision) const { return revision >= begin_; }
   // Returns the first deletion after this revision, or end().
   std::deque<Deletion>::const_iterator After(uint64_t revision) const;
   std::deque<Deletion>::const_iterator end() const { return log_.end(); }
-  // Returns true if the ID is unused since this deletion, or since later ones that a watch of hulls
-  // does not report. bodies: bodies count, too. Requires a deletion in the log.
+  // Returns true if the ID has been unused since this deletion, or since later ones that a watch of
+  // hulls does not report. bodies: bodies count, too. Requires a deletion in the log.
   bool IsFinal(const Deletion& deletion, bool bodies) const;
 
  private:

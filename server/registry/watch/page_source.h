@@ -31,17 +31,17 @@ struct PageRequest {
 struct RecordPage {
   uint64_t store_revision = 0;
   std::vector<HullChange> entries = {};
-  // Further hulls or bodies follow.
+  // True if more hulls or bodies follow.
   bool more = false;
 };
 
 // Reads the committed hulls and bodies page by page. Guarded by the registry's mutex.
 class PageSource {
  public:
-  // Calls `done` exactly once with the mutex held: before ReadPage returns if the catalog holds all
-  // records, otherwise later, on another thread. The page contains every change up to the feed's
-  // revision at the time of the call of `done`, or a later one. UNAVAILABLE: the store cannot be
-  // read.
+  // Calls `done` exactly once with the mutex held: before ReadPage returns if the catalog contains
+  // all records, otherwise later, on another thread. The page includes every change up to the
+  // feed's revision at the time `done` is called, or up to a later one. UNAVAILABLE: the store
+  // cannot be read.
   virtual void ReadPage(Locked& locked, PageRequest request,
                         std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) = 0;
 

@@ -33,8 +33,8 @@ constexpr std::chrono::milliseconds kLongestTurnPause{250};
 //
 // hulld.migration exists while a migration fills the store, and names its source.
 //
-// hulld.epochs holds the state at the start of each epoch. The other tables hold the values of
-// store_keys.h, keyed first by the ID of the hull or body; an incarnation is a create_revision.
+// hulld.epochs contains the state at the start of each epoch. The other tables contain the values
+// of store_keys.h, keyed first by the ID of the hull or body; an incarnation is a create_revision.
 // record, body, sequence and vertices are sealed values. Coordinates do not compress, hence
 // EXTERNAL.
 //
@@ -104,7 +104,7 @@ constexpr char kAddTotals[] = R"(
 // Hulls or bodies counted per statement, which takes about 70 ms.
 constexpr uint64_t kCountedAtOnce = 100'000;
 constexpr uint64_t kFormatThatCountsHulls = 3;
-// A record holds 8-byte little-endian numbers; the fourth is the number of vertices.
+// A record consists of 8-byte little-endian numbers; the fourth is the number of vertices.
 constexpr char kPrepareCount[] = R"(
     PREPARE hulld_count_bodies_after(text, bigint) AS
       SELECT count(*), 0::bigint, coalesce(max(body_id), '')
@@ -472,7 +472,7 @@ absl::Status PostgresStore::RenewWriter() {
   return absl::OkStatus();
 }
 
-// Takes the state of the store from the row of a claim, whose columns begin with those read here.
+// Reads the state of the store from the row of a claim, whose columns begin with those read here.
 absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
   absl::StatusOr<Rows> rows = writer_->Ask(std::move(claim));
   if (!rows.ok()) return rows;

@@ -66,7 +66,8 @@ struct PostgresOptions {
 };
 
 // Stores hulls in the schema "hulld" of a PostgreSQL database (14 or later); see postgres_open.cc
-// for its tables. Their rows hold the same values, sealed with the same keys, as the RocksDB store.
+// for its tables. Their rows contain the same values as the RocksDB store, sealed with the same
+// keys.
 //
 // Unless shared, any number of servers may be started over one database; one is active, the rest
 // wait in Open. The active server holds an advisory lock in a dedicated session, which ends with
