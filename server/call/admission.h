@@ -33,38 +33,39 @@ namespace hulld::server {
 
 class Authenticator;
 
-// True if a call waits for the writers' pool; false: for the readers' and the answers' pools.
+// Returns true if a call waits for the writer pool; false if it waits for the reader and answer
+// pools.
 bool UsesWriters(Rpc rpc);
 
 // Admits calls within the limits until the server drains, counts running calls, ends calls with a
 // revoked token, and cancels overdue calls that neither end nor poll, for example because the
 // client stopped reading.
 //
-// Each client has a share of calls, streams and batches. A part of all calls, and of each client's
-// share, is reserved for single calls, so that long calls never crowd them out. Calls without a
-// token have a share of their own, so that they never crowd out calls with a token, and they do not
-// protect their connection from eviction. The first health watch of a connection counts toward no
-// share, because clients open one by themselves.
+// Each client has a share of the calls, streams, and batches. A part of all calls, and of each
+// client's share, is reserved for single calls, so that long calls never crowd them out. Calls
+// without a token have a separate share, so that they never crowd out calls with a token; they do
+// not protect their connection from eviction. The first health watch of a connection counts toward
+// no share, because clients open one automatically.
 class Admission {
  public:
-  // Sets the authenticator. Call before the first call; it must outlive this. Without one, all
-  // callers have all permissions.
+  // Sets the authenticator, which must outlive this object. Without one, all callers have all
+  // permissions. Requires: no call has arrived yet.
   void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
   const Authenticator* authenticator() const { return authenticator_; }
-  // Sets the table that records connections with calls. Call before the first call; it must outlive
-  // this.
+  // Sets the table that records connections with calls. The table must outlive this object.
+  // Requires: no call has arrived yet.
   void SetConnections(ConnectionTable& connections) { connections_ = &connections; }
 
-  // An admitted call; ends with its ticket.
+  // An admitted call. The call ends when its ticket is destroyed.
   class Ticket {
    public:
     Ticket(Ticket&& other) noexcept;
     Ticket& operator=(Ticket&&) = delete;
     ~Ticket();
 
-    // Client and connection charged in fair scheduling of the threads.
+    // Client and connection charged for the call in fair scheduling of the threads.
     ClientId client() const;
-    // True if the client had more than kFewCalls calls running when this one was admitted.
+    // True if the client had more than kFewCalls running calls when this one was admitted.
     bool is_one_of_many() const { return is_one_of_many_; }
 
    private:
@@ -74,7 +75,8 @@ class Admission {
       uint64_t number = 0;
       // All running calls.
       uint64_t running = 0;
-      // By share: --max-calls-per-client, and the client's part of --max-anonymous-calls.
+      // Running calls by share: --max-calls-per-client, and the client's part of
+      // --max-anonymous-calls.
       uint64_t calls = 0;
       uint64_t anonymous = 0;
       uint64_t batches = 0;
@@ -82,15 +84,15 @@ class Admission {
     };
     // Nodes of an unordered_map have stable addresses.
     using Clients = std::unordered_map<std::string, Client>;
-    // A call that is ended when its token is revoked, or when it is overdue.
+    // A call to end when its token is revoked or when it is overdue.
     struct Watched {
       // As in Arrival.
       Caller caller;
       CallLifetime* lifetime;
       std::function<void()> on_revoked;
-      // May be null; otherwise holds a reference.
+      // May be null; otherwise owns a reference.
       grpc_call* call;
-      // Time of its cancellation.
+      // Time at which the call is cancelled.
       std::chrono::steady_clock::time_point end;
     };
     Ticket(Admission* admission, Rpc rpc);
@@ -103,22 +105,22 @@ class Admission {
     Clients::value_type* client_ = nullptr;
     Share share_ = Share::kCalls;
     bool is_one_of_many_ = false;
-    // The caller's connection in the ConnectionTable; 0: unknown.
+    // The caller's connection in the ConnectionTable; 0 if unknown.
     uint64_t connection_ = 0;
     // Set for calls with a token, and for downloads and batches while --max-request-time limits
     // them.
     std::optional<std::list<Watched>::iterator> watched_;
   };
 
-  // The metrics must outlive this.
+  // The metrics must outlive this object.
   Admission(const Limits& limits, Metrics& metrics);
   Admission(const Admission&) = delete;
   Admission& operator=(const Admission&) = delete;
-  // Requires that no call runs.
+  // Requires that no call is running.
   ~Admission();
 
-  // A client with more running calls than this gets no answer on arrival: its calls, and those of
-  // each of its connections, take turns in the pools.
+  // Calls of a client with more running calls than this are not answered on arrival. They take
+  // turns in the pools, by client and by connection.
   static constexpr uint64_t kFewCalls = 16;
 
   const Limits& limits() const { return limits_; }
@@ -127,51 +129,51 @@ class Admission {
   // Memory of the admitted requests.
   RequestMemory& request_memory() { return request_memory_; }
 
-  // Sets the function that returns the length of the queue that a call would join;
-  // --max-waiting-calls bounds it. Call before the first call.
+  // Sets the function that returns the length of the queue that a call would join, which
+  // --max-waiting-calls bounds. Requires: no call has arrived yet.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
-  // Properties of a call that admission depends on.
+  // Properties of a call that determine its admission.
   struct Arrival {
     Rpc rpc;
     // Client charged for the call.
     std::string client;
-    // Address of the peer, unless it is a unix socket.
+    // Address of the peer; unset for a unix socket.
     std::optional<PeerAddress> peer = {};
-    // gRPC's object of the call.
+    // gRPC's object for the call.
     grpc_call* call = nullptr;
-    // Owner of the call's token, if any, and then the lifetime that ends when the token is revoked;
-    // it must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after
-    // the ticket is destroyed. It ends a call that waits without polling.
+    // Owner of the call's token, if any. In that case, `lifetime` ends when the token is revoked
+    // and must outlive the ticket. on_revoked, if set, is then called on any thread, possibly after
+    // the ticket is destroyed, to end a call that waits without polling.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
     std::function<void()> on_revoked = {};
   };
 
-  // Admits a call. UNAVAILABLE: the server drains. RESOURCE_EXHAUSTED naming the limit, with a
-  // retry delay.
+  // Admits a call. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED, with a retry delay: the
+  // named limit is reached.
   absl::StatusOr<Ticket> Admit(const Arrival& arrival);
 
-  // Ends every call with a token that `is_valid` rejects: UNAUTHENTICATED. A call that does not end
-  // by itself within two seconds, for example because its client does not read, is cancelled,
-  // without error details. Returns their number.
+  // Ends every call with a token that `is_valid` rejects, with UNAUTHENTICATED. Returns the number
+  // of these calls. A call that does not end by itself within two seconds, for example because its
+  // client does not read, is cancelled without error details.
   size_t EndRevoked(const std::function<bool(const Caller&)>& is_valid);
 
   void BeginDrain();
 
-  // Waits until no call runs. Returns false if calls still run at `deadline`.
+  // Blocks until no call is running. Returns false if calls are still running at `deadline`.
   bool WaitIdle(std::chrono::steady_clock::time_point deadline);
 
   // Number of running calls.
   size_t running() const { return running_.load(std::memory_order_relaxed); }
 
  private:
-  // Require the mutex (not checked: a std::mutex does not know its holder).
+  // Require the mutex (not checked, because a std::mutex does not record its owner).
   absl::Status CheckRoom(Rpc rpc, const Ticket::Client& client);
   absl::Status CheckAnonymousRoom(const Ticket::Client& client) const;
   // Returns the share of a call, given its connection.
   Ticket::Share ShareOf(const Arrival& arrival, uint64_t connection) const;
-  // Counts a call, or with `by` = -1 (modulo 2^64) its end.
+  // Adds a call to the counts or, with `by` = -1 (modulo 2^64), removes it.
   void Count(const Ticket& ticket, uint64_t by);
   void Watch(const Arrival& arrival, Ticket* ticket);
 
@@ -202,13 +204,13 @@ class Admission {
   size_t anonymous_ = 0;
   // Running calls that count toward --max-calls.
   size_t calls_ = 0;
-  // Connections with a free watch of health.
+  // Connections with a health watch that counts toward no share.
   std::unordered_set<uint64_t> watching_health_;
   // Only clients with running calls.
   Ticket::Clients clients_;
   uint64_t last_client_ = 0;
   std::list<Ticket::Watched> watched_;
-  // Time of the watchdog's next look, unless notified.
+  // Time of the watchdog's next check, unless notified earlier.
   std::chrono::steady_clock::time_point next_look_ = kNever;
   std::condition_variable watched_changed_;
   bool ending_ = false;

@@ -23,13 +23,14 @@
 
 namespace hulld::server {
 
-// Common part of all running calls, unary or stream: a member of each reactor with its lifetime.
+// Common part of all running calls, unary or streaming: a member of each reactor, with the same
+// lifetime.
 //
 // Begin must be called first and End last, each exactly once. All functions may be called on any
 // thread.
 class Call {
  public:
-  // Context and admission must outlive this.
+  // Context and admission must outlive this object.
   Call(CallContext& context, Admission& admission, Rpc rpc)
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
@@ -39,22 +40,24 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return caller_;
   }
-  // Request ID: the client's (metadata x-request-id), or one generated at first use, because most
-  // calls succeed without a log line. Every log line about the call carries it. The reply carries
-  // it if the call is logged or fails, or if the client supplied it.
+  // Request ID, supplied by the client (metadata x-request-id) or generated at first use, because
+  // most calls succeed without a log line. Every log line about the call includes it. The reply
+  // includes it if the call is logged or fails, or if the client supplied it.
   const std::string& request_id() const;
-  // Client and connection charged in fair scheduling of the threads. Requires that Begin succeeded.
+  // Client and connection charged for the call in fair scheduling of the threads. Requires that
+  // Begin succeeded.
   ClientId client() const {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // True if its client had many calls running when it arrived (Admission::kFewCalls). Requires that
-  // Begin succeeded.
+  // True if the client had many running calls when this one arrived (Admission::kFewCalls).
+  // Requires that Begin succeeded.
   bool is_one_of_many() const {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->is_one_of_many();
   }
-  // Arrival of the call; and, in a stream that calls BeginMessage, of the message being processed.
+  // Arrival time of the call or, in a stream that calls BeginMessage, of the message being
+  // processed.
   std::chrono::steady_clock::time_point arrival() const { return arrival_; }
   std::chrono::steady_clock::time_point message_arrival() const { return message_arrival_; }
   Metrics& metrics() const { return admission_.metrics(); }
@@ -67,9 +70,10 @@ class Call {
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 
-  // Authenticates and admits the call. The caller must end it with the error, if any. on_revoked:
-  // as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate.
-  // UNAVAILABLE: the server drains. RESOURCE_EXHAUSTED: a limit on calls.
+  // Authenticates and admits the call. After an error, the caller must end the call with it.
+  // on_revoked: as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: as
+  // Authenticator::Authenticate. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED: a limit
+  // on calls is reached.
   absl::Status Begin(std::function<void()> on_revoked = {});
 
   // Count the work requested by the call.
@@ -80,21 +84,21 @@ class Call {
   // are timed individually, because the client determines the duration of the stream.
   void BeginMessage();
   void EndMessage() { EndMessage(message_arrival_); }
-  // For streams with several messages in flight. `arrival`: the time at which the message arrived.
+  // For streams with several messages in flight. arrival: the time at which the message arrived.
   void EndMessage(std::chrono::steady_clock::time_point arrival);
 
-  // Counts a limit that was hit without ending the call, for example by one pair of a batch.
+  // Counts a limit that was reached without ending the call, for example by one pair of a batch.
   void CountLimit(const absl::Status& status) const;
 
   // Logs one line about this call, with its trace.
   void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
-  // Logs a change of a hull or a body, as {"hull", ID}, with its author: the token's name and the
-  // peer.
+  // Logs a change of a hull or a body with its author: the token's name and the peer. changed: as
+  // in {"hull", ID}.
   void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 
-  // Returns the status with which the reactor must finish. The reason why the call stopped takes
-  // the place of CANCELLED from the work.
+  // Returns the status with which the reactor must finish. If the call stopped, the reason replaces
+  // CANCELLED from the work.
   grpc::Status End(absl::Status status);
 
  private:
@@ -102,8 +106,8 @@ class Call {
 
   // Sets caller_.
   absl::Status Authenticate();
-  // Client charged for the call: the token's name; without tokens the peer's network, or gRPC's
-  // name of a unix socket's peer.
+  // Returns the client charged for the call: the token's name or, without tokens, the peer's
+  // network or gRPC's name for the peer of a unix socket.
   std::string Client(const std::optional<PeerAddress>& peer) const;
   void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
 
@@ -113,9 +117,9 @@ class Call {
   const Clock::time_point arrival_ = Clock::now();
   mutable std::string request_id_;
   mutable std::once_flag request_id_made_;
-  // The reply must carry the ID: the client supplied it, or a log line or error names it.
+  // True if the reply must include the ID: the client supplied it, or a log line or error names it.
   mutable std::atomic<bool> request_id_exposed_ = false;
-  // Saved at the start: a closed connection has no peer.
+  // Saved at the start, because a closed connection has no peer.
   const std::string peer_ = context_.peer();
   std::optional<TraceContext> trace_;
   CallLifetime lifetime_;

@@ -12,8 +12,8 @@
 
 namespace hulld::server {
 
-// Deadline, cancellation and revocation of a call. Polled by any thread. Uses the monotonic clock,
-// so setting the time of day neither ends nor extends a call.
+// Deadline, cancellation, and revocation of a call. Any thread may poll it. Uses the monotonic
+// clock, so setting the time of day neither ends nor extends a call.
 class CallLifetime {
  public:
   using Clock = std::chrono::steady_clock;
@@ -47,8 +47,8 @@ class CallLifetime {
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
-  // Reason why the call stopped. Requires ShouldStop() (not checked, because EndMessage may have
-  // lifted the limit since).
+  // Returns the reason why the call stopped. Requires ShouldStop() (not checked, because EndMessage
+  // may have lifted the limit since).
   absl::Status StopStatus() const {
     if (is_revoked()) {
       return WithReason(absl::UnauthenticatedError(kRevoked), v1::ERROR_REASON_TOKEN_UNKNOWN);
@@ -73,7 +73,7 @@ class CallLifetime {
   static Clock::time_point Monotonic(WallClock::time_point deadline, WallClock::time_point wall_now,
                                      Clock::time_point now) {
     if (deadline == WallClock::time_point::max()) return Clock::time_point::max();
-    // Treats a distant deadline as none, to avoid overflow.
+    // Treats a distant deadline as no deadline, to avoid overflow.
     constexpr auto kFar = std::chrono::hours(24 * 365);
     if (deadline - kFar > wall_now) return Clock::time_point::max();
     return now + std::chrono::duration_cast<Clock::duration>(deadline - wall_now);

@@ -19,9 +19,9 @@
 namespace hulld::server {
 
 // Base class of streaming calls. A call owns itself until gRPC releases it. It is admitted before
-// it does anything else, and finishes exactly once. Reactor: a reactor of message_bytes.h.
+// it does anything else, and finishes exactly once. Reactor: a reactor from message_bytes.h.
 //
-// Derived classes: PulledStream makes replies one by one; QueuedStream queues them.
+// Derived classes: PulledStream creates replies one at a time; QueuedStream queues them.
 template <typename Reactor>
 class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
  public:
@@ -38,7 +38,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
       return stream.get();
     }
     stream->Open();
-    // A concurrent revocation sees opened_, or is seen here.
+    // A concurrent revocation either sees opened_ or is detected here.
     stream->opened_ = true;
     if (stream->call_.is_revoked()) stream->OnRevoked();
     return stream.get();
@@ -47,7 +47,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
  protected:
   CallStream(CallContext& context, Admission& admission, Rpc rpc)
       : call_(context, admission, rpc) {}
-  // No reaction or task is in flight: each holds a reference.
+  // No reaction or task is in flight, because each holds a reference.
   ~CallStream() override { HULLD_CHECK(finished_); }
 
   Call& call() { return call_; }
@@ -55,28 +55,28 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
 
   // Parses the request if it arrives with the call.
   virtual absl::Status Receive() { return absl::OkStatus(); }
-  // Starts the first step, on gRPC's thread: neither blocks nor computes for long.
+  // Starts the first step on a gRPC thread. Must neither block nor compute for long.
   virtual void Open() = 0;
   // Ends the call after its token was revoked, if it waits for an event that may never come. Steps
   // that compute or write notice the revocation themselves. Called on any thread, possibly twice,
   // and possibly after the call has finished.
   virtual void OnRevoked() {}
 
-  // Runs `step` on a pool or lane, which keeps this alive until then.
+  // Runs `step` on a pool or lane, and keeps this object alive until it returns.
   template <typename Pool, typename Step>
   void RunOn(Pool& pool, Step step) {
     pool.Submit([self = this->shared_from_this(), step = std::move(step)]() mutable { step(); },
                 call_.client());
   }
 
-  // Runs a reaction of gRPC's, which keeps this alive until it returns.
+  // Runs a gRPC reaction, and keeps this object alive until it returns.
   template <typename Step>
   void React(Step&& step) {
     const auto self = this->shared_from_this();
     step();
   }
 
-  // Returns the reason why the call stopped, if it did; otherwise `status`.
+  // Returns the reason why the call stopped, if it stopped; otherwise `status`.
   absl::Status OrStopped(const absl::Status& status) const {
     return call_.ShouldStop() ? call_.StopStatus() : status;
   }
@@ -95,11 +95,11 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   static constexpr bool kIsLocked = false;
 
  private:
-  // Destroyed last: its ticket keeps the server alive.
+  // Destroyed last, because its ticket keeps the server alive.
   Call call_;
   std::atomic<bool> opened_ = false;
   bool finished_ = false;
-  // Keeps this alive until gRPC is done with it.
+  // Keeps this object alive until gRPC releases it.
   std::shared_ptr<CallStream> self_;
 };
 
@@ -107,15 +107,15 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
 template <typename Stream, typename Request>
 class RequestStream : public Stream {
  protected:
-  // bytes: the request, moved out of the buffer that gRPC holds until the call ends. args: for
-  // Stream.
+  // bytes: the request, moved out of the buffer that gRPC holds until the call ends. args: passed
+  // to the constructor of Stream.
   template <typename... Args>
   explicit RequestStream(const Bytes& bytes, Args&&... args)
       : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
 
   // Requires that the call was admitted.
   const Request& request() const { return request_; }
-  // For moving out a part, which stays counted until the call ends.
+  // The request, for moving out a part of it. That part remains counted until the call ends.
   Request& own_request() { return request_; }
 
  private:
@@ -128,8 +128,8 @@ class RequestStream : public Stream {
   Request request_;
 };
 
-// Reads messages into one request, one after the other. Stream: a CallStream with a reading
-// reactor.
+// Reads messages into the same request object, one after the other. Stream: a CallStream with a
+// reading reactor.
 template <typename Stream, typename Request>
 class ReadingStream : public Stream {
  protected:
@@ -154,11 +154,11 @@ class ReadingStream : public Stream {
   // Called after a successful read, within Stream::React.
   virtual void OnMessage() = 0;
   // Called after the last message. OK: the client half-closed, disconnected, or was revoked.
-  // Otherwise the error of ParseRequest for its last message.
+  // Otherwise, the error of ParseRequest for the last message.
   virtual void OnNoMessage(const absl::Status& why) = 0;
 
  private:
-  // Uncounted bytes that a request may retain while the next one is awaited.
+  // Maximum memory, in bytes, that a request may retain uncounted while the next one is awaited.
   static constexpr uint64_t kKeptBytes = 64 << 10;
 
   bool BeginRead() {

@@ -21,8 +21,8 @@ using WriteReactor = grpc::ServerWriteReactor<Bytes>;
 using BidiReactor = grpc::ServerBidiReactor<Bytes, Bytes>;
 
 // Parses a request of an admitted caller and frees its bytes. `share` then covers the message and
-// must live as long. INVALID_ARGUMENT: the bytes are not such a message. RESOURCE_EXHAUSTED: as
-// RequestMemory::Take; the message is not parsed then.
+// must live as long. INVALID_ARGUMENT: the bytes are not a message of this type.
+// RESOURCE_EXHAUSTED: as RequestMemory::Take, without parsing the message.
 absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
                           RequestMemory::Share& share);
 

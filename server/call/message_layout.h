@@ -11,15 +11,17 @@
 namespace hulld::server {
 
 // Memory layout of each field of a message type, for computing a message's parsed size from its
-// bytes before parsing. An empty submessage of two bytes on the wire takes a hundred in memory.
+// bytes before parsing. An empty submessage takes two bytes on the wire but about a hundred in
+// memory.
 class MessageLayout {
  public:
   // Returns the layout of a compiled-in type, cached after the first call. Thread-safe.
   static const MessageLayout& Of(const google::protobuf::Descriptor& type);
 
-  // Returns an upper bound on the bytes of the message in `input` after parsing; stops counting
-  // above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
-  // the point where parsing fails. Cost: O(fields), some ns each; packed numbers at memory speed.
+  // Returns an upper bound on the memory, in bytes, of the message in `input` after parsing. Stops
+  // counting above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message
+  // up to the point where parsing fails. Cost: O(fields), a few ns each; packed numbers at memory
+  // speed.
   uint64_t ParsedBytes(google::protobuf::io::CodedInputStream& input, uint64_t most) const;
 
  private:

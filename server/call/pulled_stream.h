@@ -10,15 +10,16 @@
 
 namespace hulld::server {
 
-// A stream with pulled replies: each is made after the previous one was written, so a slow client
-// costs one message of memory. One operation is in flight: a read, a task or a write. Only it
-// touches the state, so no mutex is needed. A revocation replaces a read in flight.
+// A stream with pulled replies: each is created after the previous one was written, so a slow
+// client costs the memory of one message. Only one operation is in flight at a time: a read, a
+// task, or a write. Only this operation accesses the state, so no mutex is needed. A revocation
+// replaces a read in flight.
 template <typename Reactor, typename Reply>
 class PulledStream : public CallStream<Reactor> {
  protected:
   using CallStream<Reactor>::CallStream;
 
-  // The reply being made or sent.
+  // The reply being created or sent.
   Reply& reply() { return reply_; }
 
   // Sends the reply. Requires that nothing else is in flight.
@@ -28,8 +29,8 @@ class PulledStream : public CallStream<Reactor> {
     this->StartWrite(&bytes_);
   }
 
-  // Called after the reply was written: clears it, which retains its memory for reuse, and makes
-  // the next one, reads on, or ends.
+  // Called after the reply was written. Clears it, which retains its memory for reuse, and then
+  // creates the next reply, reads the next message, or ends the call.
   virtual void OnSent() = 0;
 
  private:

@@ -17,12 +17,12 @@
 
 namespace hulld::server {
 
-// A stream with queued replies: any thread adds them, and they are written one by one in queue
-// order. One mutex guards the state. Reads, writes, and the end are started under it; gRPC calls
-// back without it.
+// A stream with queued replies. Any thread adds replies, and they are written one at a time in
+// queue order. One mutex guards the state. Reads, writes, and the end are started under it; gRPC
+// calls back without it.
 //
 // The stream ends after an end is set, the earlier replies are written, and no work is in flight.
-// If the client disconnects or is revoked, it ends without the queued replies.
+// If the client disconnects or is revoked, the stream ends without sending the queued replies.
 template <typename Reactor, typename Reply>
 class QueuedStream : public CallStream<Reactor> {
  protected:
@@ -51,13 +51,13 @@ class QueuedStream : public CallStream<Reactor> {
 
   // The functions below require the mutex: call them in steps of Locked.
 
-  // Starts work, reads or tasks, as the state permits; called after each Locked step until an end
+  // Starts work (reads or tasks) as the state permits. Called after each Locked step until an end
   // is set. May queue replies and set the end.
   virtual void StartWork() = 0;
-  // True if work is in flight that must be over before the stream ends.
+  // Returns true if work is in flight that must finish before the stream ends.
   virtual bool IsWorking() const = 0;
-  // True if the only queued reply must wait to be merged with later ones, which saves writes. If it
-  // returns true, a Locked step must follow soon.
+  // Returns true if the only queued reply must wait to be merged with later ones, which saves
+  // writes. In that case, a Locked step must follow soon.
   virtual bool KeepsWaiting() const { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
@@ -75,7 +75,7 @@ class QueuedStream : public CallStream<Reactor> {
     waiting_.back().bytes += bytes;
     unsent_bytes_ += bytes;
   }
-  // Time since it was queued.
+  // Time since the last queued reply was queued.
   std::chrono::steady_clock::duration LastWaitingTime() const {
     return std::chrono::steady_clock::now() - waiting_.back().since;
   }
@@ -92,7 +92,7 @@ class QueuedStream : public CallStream<Reactor> {
     CheckLocked();
     if (!end_.has_value()) end_ = status;
   }
-  // Replaces the end by a more specific one.
+  // Replaces the end with a more specific one.
   void OverrideEnd(const absl::Status& status) {
     CheckLocked();
     end_ = status;

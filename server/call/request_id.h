@@ -9,7 +9,7 @@ namespace hulld::server {
 // and metadata without escaping.
 bool IsRequestId(const std::string& text);
 
-// Returns a unique request ID: random per process, then counted. Cost: ~100 ns.
+// Returns a unique request ID: a random part for the process, followed by a counter. Cost: ~100 ns.
 std::string NextRequestId();
 
 }  // namespace hulld::server

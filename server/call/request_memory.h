@@ -9,8 +9,8 @@
 
 namespace hulld::server {
 
-// Memory of all parsed requests without an answer yet, bounded by --request-memory, so that many
-// callers together cannot exhaust the machine. Thread-safe.
+// Memory of all parsed requests that are not answered yet, bounded by --request-memory, so that
+// many callers together cannot exhaust the machine's memory. Thread-safe.
 class RequestMemory {
  public:
   // Share of a request, released on destruction. The RequestMemory must outlive it. Not
@@ -44,8 +44,8 @@ class RequestMemory {
   RequestMemory(const RequestMemory&) = delete;
   RequestMemory& operator=(const RequestMemory&) = delete;
 
-  // Sets `share` to this many bytes, releasing its former bytes. RESOURCE_EXHAUSTED: a single
-  // request of this size exceeds the limit; with a retry delay: other requests leave no room.
+  // Sets `share` to this many bytes, releasing its previous bytes. RESOURCE_EXHAUSTED: the request
+  // alone exceeds the limit or, with a retry delay, other requests leave no room for it.
   absl::Status Take(uint64_t bytes, Share& share);
 
   uint64_t limit_bytes() const { return limit_bytes_; }

@@ -19,7 +19,7 @@ class TraceContext {
   std::string trace_id() const { return text_.substr(kTraceId, 32); }
   // ID of the client's span.
   std::string parent_id() const { return text_.substr(kParentId, 16); }
-  // As a traceparent of version 00.
+  // The trace, as a traceparent of version 00.
   const std::string& text() const { return text_; }
 
  private:

@@ -19,7 +19,7 @@ struct UnaryBytes {
   Bytes* response;
 };
 
-// A unary call, answered on any thread; owns itself until gRPC is done with it.
+// A unary call, answered on any thread. Owns itself until gRPC releases it.
 template <typename Request, typename Response>
 class UnaryCall : public UnaryReactor {
  public:
@@ -68,7 +68,7 @@ class UnaryCall : public UnaryReactor {
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
   // Both reactions are trivial, so gRPC need not wake an executor thread for each call's OnDone.
-  // Not part of gRPC's public API; without it calls only take longer
+  // This function is not part of gRPC's public API; without it, calls only take longer
   // (tests/bench/service/remote_benchmark.cc).
   bool InternalInlineable() override { return true; }
 
