@@ -17,15 +17,15 @@
 
 namespace hulld::server {
 
-// A range of pairs, and the search of the next one, if it began.
+// A range of pairs, and the search of the next one, if it was started.
 struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
   std::optional<PairSearch> search;
 
   size_t held_bytes() const { return search.has_value() ? search->MemoryBytes() : 0; }
 };
 
-// A BatchCheckCollisions call: resolves each hull a single time, on a reader thread, then answers
-// ranges of pairs on all threads of the pool.
+// A BatchCheckCollisions call: resolves each hull once, on a reader thread, then answers ranges of
+// pairs on all threads of the pool.
 class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
@@ -35,7 +35,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status Validate() override;
   absl::Status Prepare() override;
   // Answers the next pair of the piece, or works on it until `end`. CANCELLED. RESOURCE_EXHAUSTED:
-  // PairSearch::CheckMemory.
+  // as PairSearch::CheckMemory.
   absl::Status Step(PairsPiece& piece, Clock::time_point end) override;
   uint64_t StepsPerLook() const override;
   // The functions below require the mutex.
@@ -44,13 +44,13 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   bool Join(const v1::BatchCheckCollisionsResponse& reply,
             v1::BatchCheckCollisionsResponse* waiting) override;
 
-  // Without the mutex.
+  // Called without the mutex.
   absl::Status AnswerRelation(uint32_t a, uint32_t b, PairsPiece& piece);
   // Ends the row of the next pair.
   void EndPair(PairsPiece& piece, size_t bytes);
 
-  // Written before the first piece: all pairs are of hulls at rest, and only relations are wanted
-  // (AnswerRelation).
+  // True if all pairs are of hulls at rest and only relations are wanted (AnswerRelation). Written
+  // before the first piece.
   bool is_plain_ = false;
 };
 

@@ -9,10 +9,10 @@
 
 namespace hulld::server {
 
-// A range of work, [0, count), that several threads claim block by block, from its end. Unlike in
-// SharedLoop, no thread waits: the thread that returns the last block continues with the next step,
-// and a thread that arrives after all blocks are claimed finds nothing. This also holds after the
-// next range has begun or the owner has ended its work. Any thread may claim at any time.
+// A range of work, [0, count), that several threads claim block by block, starting from its end.
+// Unlike in SharedLoop, no thread waits: the thread that returns the last block continues with the
+// next step, and a thread that arrives after all blocks are claimed finds nothing. This also holds
+// after the next range has begun or the owner has ended its work. Any thread may claim at any time.
 class ClaimedRange {
  public:
   struct Block {
@@ -30,7 +30,8 @@ class ClaimedRange {
     unclaimed_.store(count, std::memory_order_release);
   }
 
-  // Claims the next block, of at most `most`; empty if all is claimed. Requires most > 0.
+  // Claims the next block, of length at most `most`; empty if everything is claimed. Requires most
+  // > 0.
   Block Claim(uint32_t most) {
     HULLD_CHECK(most > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);
@@ -46,8 +47,8 @@ class ClaimedRange {
     return {};
   }
 
-  // Returns a claimed block after its work is done. Returns true for exactly one caller, the last,
-  // who sees the writes of all threads.
+  // Accepts a claimed block after its work is done. Returns true for exactly one caller, the last,
+  // which sees the writes of all threads.
   bool GiveBack(const Block& block) {
     const uint32_t done = block.end - block.begin;
     return left_.fetch_sub(done, std::memory_order_acq_rel) == done;
@@ -55,7 +56,7 @@ class ClaimedRange {
 
  private:
   std::atomic<uint32_t> unclaimed_ = 0;
-  // Not returned yet.
+  // Part of the range that is not returned yet.
   std::atomic<uint32_t> left_ = 0;
 };
 

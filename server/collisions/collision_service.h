@@ -16,7 +16,7 @@
 
 namespace hulld::server {
 
-// The generated service, with methods on bytes (message_bytes.h).
+// The generated service, with methods that exchange bytes (message_bytes.h).
 using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_CheckCollision<
     v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<
         v1::CollisionService::WithRawCallbackMethod_StreamCollisions<
@@ -24,19 +24,20 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
                 v1::CollisionService::WithRawCallbackMethod_WatchCollisions<
                     v1::CollisionService::Service>>>>>;
 
-// hulld.v1.CollisionService: implements the contract in collision.proto on core's queries. A single
-// pair is answered on arrival, on gRPC's thread, if only its relation is wanted and its hulls are
-// of moderate size and ready (PairQuestion). Everything else runs on `pool`: single pairs and short
-// steps of streams before slices of batches, scenes and long steps. Work that may wait for the
-// store, or that builds canonical snapshots, runs on `readers` (hulls of a pair) or `long_readers`
-// (hulls of many). Pairs for TEXTBOOK_SAT are answered in slices that alternate with other calls.
+// hulld.v1.CollisionService: implements the contract in collision.proto with the queries of core. A
+// single pair is answered on arrival, on gRPC's thread, if only its relation is wanted and its
+// hulls are ready and of moderate size (PairQuestion). Everything else runs on `pool`: single pairs
+// and short steps of streams before slices of batches, scenes, and long steps. Work that may wait
+// for the store, or that builds canonical snapshots, runs on `readers` (for the hulls of one pair)
+// or `long_readers` (for many hulls). TEXTBOOK_SAT pairs are answered in slices that alternate with
+// other calls.
 class CollisionService : public CollisionServiceOfBytes {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
                    WorkerPool& long_readers, TaskPool& pool)
       : parts_{registry, admission, readers, long_readers, pool, waiting_} {}
 
-  // Calls that wait for the store without a thread.
+  // Number of calls that wait for the store without occupying a thread.
   size_t waiting() const { return waiting_.count(); }
 
   UnaryReactor* CheckCollision(CallContext* context, const Bytes* request,

@@ -25,11 +25,11 @@
 namespace hulld::server {
 
 // A StreamCollisions call: reads a message, answers it, sends the answer, and only then reads the
-// next, so that a fast client fills gRPC's window and not the server's memory. A quick message is
-// answered on arrival, one that resolves hulls on a reader thread, the rest on the pool. Long
-// answers are computed in slices, which alternate with other calls, and sent in pieces. If only
-// relations of hulls are wanted, other threads of the pool help with a step: they run slices, so
-// they yield to other calls.
+// next message, so that a fast client fills gRPC's window rather than the server's memory. A quick
+// message is answered on arrival, a message that resolves hulls on a reader thread, and any other
+// on the pool. Long answers are computed in slices, which alternate with other calls, and sent in
+// pieces. If only relations of hulls are wanted, other threads of the pool help with a step. They
+// run slices, so they yield to other calls.
 class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
@@ -46,7 +46,7 @@ class CollisionStream
     // A v1::Relation; unspecified if a placement has a problem, which is reported elsewhere.
     uint8_t relation = 0;
     Rung rung = Rung::kBounds;
-    // True if the last answer differed.
+    // True if the previous answer differed.
     bool is_changed = false;
   };
 
@@ -84,7 +84,7 @@ class CollisionStream
   size_t reply_bytes_ = 0;
   uint64_t messages_ = 0;
 
-  // From `open`.
+  // Set by `open`.
   bool open_ = false;
   bool only_changes_ = false;
   Freshness freshness_;
@@ -95,15 +95,15 @@ class CollisionStream
   PlacementTable table_;
   // Next row of the table to send; table_rows() if none is left.
   size_t next_row_ = 0;
-  // The selected pairs are queried by the current message, in ascending order.
+  // The current message queries the selected pairs, in ascending order.
   LivePairs pairs_;
   // Index of the next selected pair to answer.
   size_t next_asked_ = 0;
   RungCounts rungs_;
 
-  // Of a plain answer, parallel to the selected pairs once it is decided, by several threads.
+  // Results of a plain answer, decided by several threads; then parallel to the selected pairs.
   std::vector<Decided> decided_;
-  // Selected pairs that no thread decides yet.
+  // Selected pairs that no thread has claimed yet.
   ClaimedRange unclaimed_;
   // Queued slices of helpers.
   std::atomic<size_t> helpers_waiting_ = 0;

@@ -19,8 +19,8 @@ namespace hulld::server {
 
 using CheckCall = UnaryCall<v1::CheckCollisionRequest, v1::CheckCollisionResponse>;
 
-// A CheckCollision call about two placements, answered in slices (PairSearch). Used by one thread
-// at any time.
+// A CheckCollision call for two placements, answered in slices (PairSearch). Used by one thread at
+// a time.
 class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
  public:
   // Answers the call, which must be admitted.
@@ -32,14 +32,14 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 
   // Reads everything except the hulls.
   absl::Status ReadRequest();
-  // Resolves the hulls on a reader's thread, which may wait for the store and build canonical
+  // Resolves the hulls on a reader thread, which may wait for the store and build canonical
   // snapshots and boxes of pieces, then answers.
   void AnswerLater();
-  // As AnswerLater on this thread, but returns false without blocking if it would have to wait or
-  // to build.
+  // As AnswerLater, but on this thread. Returns false without blocking if it would have to wait or
+  // build.
   bool TryAnswer();
-  // Ends the call. An answer that takes some microseconds is computed immediately; any other on the
-  // pool, with its first slice before those of batches.
+  // Ends the call. Computes an answer immediately if that takes a few microseconds; otherwise on
+  // the pool, with the first slice ahead of those of batches.
   void AnswerResolved();
   absl::Status Begin();
   bool IsQuick() const;
@@ -51,14 +51,14 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   const CollisionParts& parts_;
   CheckCall* const call_;
   QueryOptions options_;
-  // If a placement moves.
+  // Used if a placement moves.
   MotionOptions motion_options_;
   ReadPlan plan_;
   PlacementTable table_;
   std::optional<PairSearch> search_;
   // Covers the state between slices.
   MemoryCharge charge_;
-  // For all slices but the first.
+  // Used by all slices except the first.
   std::optional<TaskPool::Lane> lane_;
 };
 

@@ -34,8 +34,8 @@
 
 namespace hulld::server {
 
-// A piece of a call's work: a range of units (pairs, or placements of a scene), and its answers,
-// which wait for earlier pieces.
+// A piece of a call's work: a range of units (pairs, or placements of a scene) and its answers,
+// which wait for those of earlier pieces.
 template <typename Reply>
 struct Piece {
   // The remaining range.
@@ -48,11 +48,11 @@ struct Piece {
   // Rows of the next reply, and an upper estimate of their bytes.
   Reply rows = {};
   size_t row_bytes = 0;
-  // Counts since they were last taken.
+  // Counts of rungs since they were last taken.
   RungCounts rungs = {};
 
-  // For PiecedReplies: a slice is queued or running; bytes held before the slice; time of the
-  // slices so far.
+  // For PiecedReplies: true if a slice is queued or running; bytes held before the slice; total
+  // time of the slices so far.
   bool is_running = false;
   size_t noted_bytes = 0;
   uint64_t units = 0;
@@ -71,41 +71,41 @@ struct Piece {
   }
 };
 
-// A stream with answers computed in pieces by all threads of a pool and sent in order. A piece is
-// computed in slices of about TaskPool::kSliceTime, one after another, so that other calls get
-// their turn. A bounded number of pieces is in flight, each with a bounded number of bytes; while
-// too many bytes are unsent, no slice starts, and no more of the head is queued. So memory is
-// bounded, and a client that does not read delays no other client. The call's memory, HeldBytes and
-// answers in flight, counts against --memory-limit.
+// A stream whose answers are computed in pieces by all threads of a pool and sent in order. A piece
+// is computed in slices of about TaskPool::kSliceTime, one after another, so that other calls get
+// their turn. The number of pieces in flight and the bytes of each are bounded. While too many
+// bytes are unsent, no slice starts, and no more of the head is queued. Memory is therefore
+// bounded, and a client that does not read delays no other client. The call's memory (HeldBytes and
+// the answers in flight) counts toward --memory-limit.
 //
-// Work: state of a piece between slices, derived from Piece<Reply>; its held_bytes() are the bytes
-// that it holds besides replies.
+// Work: the state of a piece between slices, derived from Piece<Reply>. Its held_bytes() returns
+// its memory in bytes, excluding replies.
 template <typename Request, typename Reply, typename Work>
 class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Request> {
  protected:
   using Base = RequestStream<QueuedStream<WriteReactor, Reply>, Request>;
   using Clock = std::chrono::steady_clock;
 
-  // Unsent bytes above which no slice starts. A choice: some messages, so that the threads need not
-  // wait for gRPC's threads.
+  // Unsent bytes above which no slice starts. A choice: several messages, so that the threads need
+  // not wait for gRPC's threads.
   static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
-  // Maximum bytes held by a piece behind another one.
+  // Maximum bytes held by a piece that waits for an earlier one.
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
-  // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
+  // Memory of several hundred placements. --max-concurrent-batches such calls take several MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
   // A reply of at most kSmallReplyBytes is merged with the last queued one, because a write costs
-  // both sides as much as a hundred pairs. While slices run, a queued reply of that size waits to
-  // be merged, for about kMostWait.
+  // each side as much as a hundred pairs. While slices run, a queued reply of at most that size
+  // waits about kMostWait to be merged.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
   static constexpr std::chrono::milliseconds kMostWait{2};
 
   struct Shape {
-    // Growth of pieces.
+    // Sizes of the first piece and of the largest.
     uint64_t first_units;
     uint64_t most_units;
-    // Preparing this many placements takes about a slice, waits excluded.
+    // Preparing this many placements takes about a slice, excluding waits.
     int most_short_placements;
-    // The first answers may join the last message of the head.
+    // True if the first answers may join the last message of the head.
     bool joins_head;
   };
 
@@ -122,15 +122,15 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         holds_head_(shape.joins_head),
         piece_units_(shape.first_units) {}
 
-  // The call is prepared step by step, without the mutex, on one thread; the hulls are resolved
-  // between these steps.
+  // Steps that prepare the call, in this order, without the mutex, on one thread. The hulls are
+  // resolved between them.
   virtual absl::Status Validate() = 0;
   virtual absl::Status Prepare() { return absl::OkStatus(); }
   // Bytes held until the call ends, excluding pieces. Called without the mutex after each of these
   // steps.
   virtual size_t HeldBytes() const { return table_.MemoryBytes(); }
 
-  // For Validate: decodes the query, its freshness, and the placements. what: "the batch".
+  // For Validate: decodes the query, its freshness, and the placements. what: as in "the batch".
   absl::Status DecodePlacements(v1::Method method, const char* what) {
     const Request& request = this->request();
     absl::StatusOr<QueryOptions> query = MakeQueryOptions(
@@ -154,21 +154,21 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   Registry& registry() { return registry_; }
 
-  // Runs `work` on disjoint ranges that cover [0, count); for a long call, on several threads
-  // concurrently. For the steps above.
+  // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
+  // long call. Used by the steps above.
   void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
     SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
   }
 
-  // Makes a step with the next unit of the piece, which takes some microseconds, or until `end` at
-  // most: adds rows, counts rungs, and advances `next` after the unit. Called without the mutex, on
-  // any thread, but never concurrently for the same piece.
+  // Performs a step on the next unit of the piece, which takes a few microseconds, or until `end`
+  // at most: adds rows, counts rungs, and advances `next` when the unit is done. Called without the
+  // mutex, on any thread, but never concurrently for the same piece.
   virtual absl::Status Step(Work& piece, Clock::time_point end) = 0;
   // Steps between two reads of the clock.
   virtual uint64_t StepsPerLook() const = 0;
 
-  // Ends a row of the piece. bytes: as AddAnswer returns.
+  // Ends a row of the piece. bytes: as returned by AddAnswer.
   void EndRow(Work& piece, size_t bytes) {
     piece.row_bytes += bytes;
     if (piece.row_bytes >= FullMessageBytes(this->request().wanted())) piece.EndReply();
@@ -178,9 +178,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
-  // True if a slice of a piece may start while earlier pieces are in flight.
+  // Returns true if a slice of a piece may start while earlier pieces are in flight.
   virtual bool MayRunAhead() const { return true; }
-  // Queues the replies of the front piece, in order; called one last time when it is done.
+  // Queues the replies of the front piece, in order. Called one last time when the piece is done.
   virtual void Deliver(Work& piece) {
     for (size_t i = 0; i < piece.replies.size(); ++i) {
       QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
@@ -192,10 +192,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
   // Merges a small reply into the queued one; returns false if they do not fit.
   virtual bool Join(const Reply& reply, Reply* waiting) = 0;
-  // Called after every piece was delivered. Returns the number of further units that only then
-  // exist, if any.
+  // Called after all pieces are delivered. Returns the number of further units, which exist only
+  // from then on; 0 if there are none.
   virtual uint64_t CountFollowingUnits() { return 0; }
-  // Called after that, to queue a final message; the end is set afterwards.
+  // Called when no units are left, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
   void QueueOrJoin(Reply reply, size_t bytes) {
@@ -211,21 +211,22 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Written before the first piece.
   QueryOptions query_;
-  // If a placement moves.
+  // Used if a placement moves.
   MotionOptions motion_options_;
   PlacementTable table_;
-  // Pairs that the call asks about at least.
+  // Minimum number of pairs that the call queries.
   uint64_t expected_pairs_ = 0;
 
  private:
-  // True if preparation takes about a slice, waits excluded.
+  // Returns true if preparation takes at most about a slice, excluding waits.
   bool IsShort() const {
     const int listed = this->request().placements_size();
     return listed + this->request().packed_placements().hulls_size() <=
            shape_.most_short_placements;
   }
 
-  // A short call with ready hulls need not wait for another thread.
+  // Runs a short call on the pool first: if its hulls are ready, it need not wait for another
+  // thread.
   void Open() final {
     if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
     this->RunOn(readers_, [this] {
@@ -235,8 +236,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // Returns true if the call waits, without a thread, for the store and will be opened after its
-  // answer.
+  // Returns true if the call waits for the store without occupying a thread. It is then opened
+  // after the store answers.
   bool AwaitsFresh() {
     const auto should_stop = [this] { return this->call().ShouldStop(); };
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
@@ -269,7 +270,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // Resolves the hulls. Returns false if that may block and `may_wait` is false.
+  // Resolves the hulls. Returns false if that could block and `may_wait` is false.
   absl::StatusOr<bool> Resolve(bool may_wait) {
     const ReadPlan plan = {2 * expected_pairs_ / std::max<uint64_t>(1, table_.hull_count()), true,
                            freshness_};
@@ -278,8 +279,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     return true;
   }
 
-  // RESOURCE_EXHAUSTED: no room for the call's memory. A small call is admitted regardless, so that
-  // calls about a few hulls in memory are always served.
+  // Charges the call's memory. RESOURCE_EXHAUSTED: no room for it. A small call is admitted
+  // regardless, so that calls for a few hulls in memory are always served.
   absl::Status Charge() {
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
@@ -325,8 +326,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
            this->LastWaitingTime() < kMostWait;
   }
 
-  // Queues a message of the table of hulls, which precedes all answers, as the client reads.
-  // Returns true if more of it follows.
+  // Queues the next message of the table of hulls, which precedes all answers. Returns true if more
+  // of the table follows.
   bool QueueHead() {
     Reply head;
     if (next_row_ == 0) table_.EncodeHeader(registry_.store(), head.mutable_header());
@@ -398,17 +399,17 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   const size_t most_pieces_;
   const Shape shape_;
 
-  // Owned by the opening thread while the call is opened.
+  // Owned by the opening thread while the call is being opened.
   Freshness freshness_;
   MemoryCharge charge_;
   size_t fixed_bytes_ = 0;
 
   // The mutex guards the members below; a running piece belongs to its slice.
   bool opening_ = true;
-  // Part of the head is still to be queued, from this row of the table of hulls on.
+  // True if a part of the head is not queued yet: the table of hulls from row next_row_ on.
   bool is_head_left_ = false;
   size_t next_row_ = 0;
-  // The last message of the head waits for the first answers.
+  // True if the last message of the head waits for the first answers.
   bool holds_head_;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;

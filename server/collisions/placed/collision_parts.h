@@ -13,11 +13,11 @@ namespace hulld::server {
 struct CollisionParts {
   Registry& registry;
   Admission& admission;
-  // For steps that may block: about the hulls of a pair, and about the hulls of many.
+  // For steps that may block: for the hulls of one pair, and for many hulls.
   WorkerPool& readers;
   WorkerPool& long_readers;
   TaskPool& pool;
-  // Waits for freshness without a thread.
+  // Waits for freshness without occupying a thread.
   WaitingCalls& waiting;
 };
 

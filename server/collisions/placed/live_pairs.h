@@ -24,38 +24,38 @@ struct LivePair {
   uint32_t a = 0;
   uint32_t b = 0;
   PairCache cache = {};
-  // As reported last.
+  // As last reported.
   v1::Relation relation = v1::RELATION_UNSPECIFIED;
   bool is_within_clearance = false;
   bool is_selected = false;
 
-  // Returns true if the pair was last reported as touching, overlapping or within the clearance.
+  // Returns true if the pair was last reported as touching, overlapping, or within the clearance.
   bool is_reported() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
 // The pairs of a collision stream or watch, indexed by placement, and the selection of the current
-// round. Holds all named pairs; of a scene, only reported pairs and pairs whose bounding
-// boxes, grown by the clearance, meet: all other pairs are farther apart than the clearance. Not
-// thread-safe.
+// round. Contains all named pairs or, for a scene, only the reported pairs and the pairs whose
+// bounding boxes, grown by the clearance, meet: all other pairs are farther apart than the
+// clearance. Not thread-safe.
 class LivePairs {
  public:
   LivePairs() = default;
-  // Named pairs. Requires valid pairs for this many placements. relation: of a pair that was never
-  // reported.
+  // Creates named pairs. Requires valid pairs for this many placements. relation: initial relation,
+  // for pairs that were never reported.
   LivePairs(const google::protobuf::RepeatedField<uint32_t>& pairs, size_t placements,
             v1::Relation relation);
-  // Requires valid pairs, groups and movers for this many placements. max_pairs: maximum number of
-  // held pairs of a scene (--max-pairs-per-batch).
+  // Creates the pairs of a scene or named pairs. Requires valid pairs, groups, and movers for this
+  // many placements. max_pairs: maximum number of pairs of a scene to keep (--max-pairs-per-batch).
   LivePairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
-  // Select all held pairs, or the held pairs of a placement.
+  // Select all pairs, or all pairs of a placement, that this object contains.
   void SelectAll();
   void SelectPairsOf(uint32_t placement);
-  // Selects all pairs of the moved or changed placements, including new ones; each placement once.
-  // RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n) in total,
-  // plus the number of selected pairs.
+  // Selects all pairs of the moved or changed placements, including new pairs. Each placement
+  // occurs once. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n)
+  // in total, plus the number of selected pairs.
   absl::Status Select(std::span<const uint32_t> changed, const PlacementTable& table);
-  // Clears the cached points of the placement's pairs, which refer to a former hull.
+  // Clears the cached points of the placement's pairs, which refer to a previous hull.
   void ForgetPoints(uint32_t placement);
 
   // Numbers of the selected pairs.
@@ -65,7 +65,7 @@ class LivePairs {
   LivePair& pair(uint32_t number) { return pairs_[number]; }
   const LivePair& pair(uint32_t number) const { return pairs_[number]; }
   std::span<const uint32_t> pairs_of(uint32_t placement) const { return pairs_of_[placement]; }
-  // Clears the selection and drops pairs that need not be held.
+  // Clears the selection and drops pairs that need not be kept.
   void EndRound();
 
   // Memory of this many named pairs and placements.

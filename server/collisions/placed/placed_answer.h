@@ -26,40 +26,42 @@
 
 namespace hulld::server {
 
-// The answer for two placements, or its error, and the deciding pair of pieces if one is a body. An
-// error of a limit names its flag.
+// The answer for two placements, or an error, and the deciding pair of pieces if either is a body.
+// An error caused by a limit names the limit's flag.
 struct PlacedAnswer {
   absl::StatusOr<Answer> answer;
   PiecesAnswer of_body = {};
-  // In a call with motions; the answer is then its relation.
+  // Set in a call with motions; the answer is then its relation.
   std::optional<FirstContact> contact = {};
 };
 
 // The query of a pair of placements: of hulls or bodies, at rest or in motion, by any method. It is
-// computed in slices, so that other calls get their turn. A query of two hulls takes one slice, of
-// some milliseconds at most; the textbook's test and searches of bodies take as many as they need.
+// computed in slices, so that other calls get their turn. A query of two hulls takes one slice of
+// at most a few milliseconds; the textbook test and searches of bodies take as many as they need.
 class PairSearch {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // options: valid; for a table with motions, `motion` applies. All arguments must outlive this.
-  // Requires that both placements are answerable, and placed in advance for the textbook.
+  // options: valid. `motion` applies if the table has motions. All arguments must outlive this
+  // object. Requires that both placements are answerable and, for the textbook test, placed in
+  // advance.
   PairSearch(const PlacementTable& table, uint32_t a, uint32_t b, const QueryOptions& options,
              const MotionOptions& motion)
       : table_(table), a_(a), b_(b), options_(options), motion_(motion) {}
   PairSearch(const PairSearch&) = delete;
   PairSearch& operator=(const PairSearch&) = delete;
 
-  // RESOURCE_EXHAUSTED: the search holds much memory between slices, and readers exceed their share
+  // RESOURCE_EXHAUSTED: the search keeps much memory between slices, and readers exceed their share
   // of --memory-limit. Call before the first Advance.
   absl::Status CheckMemory(Registry& registry) const;
 
-  // Works until the answer is known, then returns true, or until `end`, but makes some progress.
+  // Works until the answer is known, or until `end`, but always makes some progress. Returns true
+  // if the answer is known.
   bool Advance(Clock::time_point end);
 
   // Requires that Advance returned true. CANCELLED: options.should_stop returned true. A pair with
-  // a body gets an error for queries restricted to hulls, or if it needs more certificates than a
-  // reply holds.
+  // a body has an error for queries restricted to hulls, or if it needs more certificates than fit
+  // in a reply.
   PlacedAnswer& answer() { return answer_; }
 
   // Memory held between slices.
@@ -89,21 +91,21 @@ class PairSearch {
   PlacedAnswer answer_;
 };
 
-// Runs a whole search.
+// Runs a complete search.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, const MotionOptions& motion);
 
-// As AskPlaced for a call without motions. cache: of a pair of hulls; may be null.
+// As AskPlaced, for a call without motions. cache: for a pair of hulls; may be null.
 PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns their bytes.
+// Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns the bytes added.
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
                        const std::vector<PieceCertificate>& certificates, size_t most,
                        google::protobuf::RepeatedPtrField<v1::PieceCertificate>* messages);
 
-// Adds the row of such an answer as AddAnswer does, or a row without an answer if the pieces'
-// certificates exceed Config::kMaxRowProofBytes.
+// Adds the row of such an answer as AddAnswer does, or a row without an answer if the certificates
+// of the pieces exceed Config::kMaxRowProofBytes.
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns);
