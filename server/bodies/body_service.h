@@ -15,14 +15,14 @@
 
 namespace hulld::server {
 
-// The generated service, with methods on bytes (message_bytes.h).
+// The generated service, with methods that exchange bytes (message_bytes.h).
 using BodyServiceOfBytes =
     v1::BodyService::WithRawCallbackMethod_PutBody<v1::BodyService::WithRawCallbackMethod_GetBody<
         v1::BodyService::WithRawCallbackMethod_ListBodies<
             v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
 
 // hulld.v1.BodyService: implements the contract in body.proto on the registry. Calls that only read
-// records are answered on arrival; calls with pieces, which may be many, on `readers`.
+// records are answered on arrival. Calls that involve pieces, possibly many, run on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
   BodyService(Registry& registry, Admission& admission, WorkerPool& readers)

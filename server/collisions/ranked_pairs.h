@@ -16,10 +16,10 @@
 
 namespace hulld::server {
 
-// Two placements, in the order of a scene that ranks its pairs. A pair without an answer is the
-// last: its rank is infinite, which those of found pairs are not.
+// Two placements, in the order of a scene that ranks its pairs. A pair without an answer comes
+// last: its rank is infinite, while the ranks of found pairs are finite.
 struct RankedPair {
-  // As reported: the separation or, in motion, separated_until.
+  // The reported separation or, in motion, the reported separated_until.
   double rank;
   uint32_t a;
   uint32_t b;
@@ -29,27 +29,27 @@ struct RankedPair {
 };
 
 // The pairs that a scene with a limit or first_only answers at the end, and the pairs without an
-// answer. The result does not depend on the order of additions. Pairs that are separated up to a
+// answer. The result does not depend on the order of additions. Pairs that are separated until a
 // time after earliest() need not be added. Thread-safe.
 class RankedPairs {
  public:
-  // Keeps the `limit` pairs of least separation, and the first `limit` pairs without an answer.
-  // boxes: one for each placement. max_error: the requested one, or 0.
+  // Keeps the `limit` pairs with the smallest separation, and the first `limit` pairs without an
+  // answer. boxes: one per placement. max_error: the requested value, or 0.
   RankedPairs(size_t limit, std::vector<Box> boxes, double max_error);
-  // Keeps the pairs in motion that may be the first to touch: all with a rank of at most the
-  // least contact time; none if no contact is proven. Charges its memory to `charge`.
+  // Keeps the pairs in motion that may be the first to touch: all pairs with a rank of at most the
+  // smallest contact time; none if no contact is proven. Charges its memory to `charge`.
   explicit RankedPairs(MemoryCharge charge);
 
-  // Without a limit: the least contact time so far.
+  // Without a limit: the smallest contact time so far.
   double earliest() const { return earliest_.load(std::memory_order_relaxed); }
-  // With a limit: any pair whose exact separation exceeds this has `limit` nearer ones. Never
-  // increases.
+  // With a limit: if the exact separation of a pair exceeds this bound, `limit` pairs are nearer.
+  // Never increases.
   double bound() const { return bound_.load(std::memory_order_relaxed); }
-  // With a limit: false if the boxes prove that `limit` pairs are nearer than these placements,
-  // which do not overlap. Cost: some ten operations.
+  // With a limit: returns false if the boxes prove that `limit` pairs are nearer than these
+  // placements. Requires that the placements do not overlap. Cost: about ten operations.
   bool MayBeNear(uint32_t a, uint32_t b) const;
 
-  // contact_time: infinite if no contact is proven, and with a limit. Return true if the charge
+  // contact_time: infinite with a limit, or if no contact is proven. Return true if the charge
   // grew.
   bool Add(const RankedPair& pair, double contact_time = kNever);
   bool AddUnanswered(uint32_t a, uint32_t b);
@@ -57,7 +57,7 @@ class RankedPairs {
   // Removes and returns the kept pairs in ascending order, then those without an answer.
   std::vector<RankedPair> Take();
 
-  // With a limit: upper bound of the memory, in a scene with this many pairs.
+  // With a limit: upper bound on the memory, in a scene with this many pairs.
   size_t MaxMemoryBytes(uint64_t pairs) const;
 
   static constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -68,9 +68,9 @@ class RankedPairs {
 
   const size_t limit_;
   const std::vector<Box> boxes_;
-  // Upper bound of the error of a reported separation near 0.
+  // Upper bound on the error of a reported separation near 0.
   double max_error_ = 0;
-  // Written with the mutex.
+  // Written under the mutex.
   std::atomic<double> bound_ = kNever;
   std::atomic<double> earliest_ = kNever;
   std::mutex mutex_;

@@ -52,11 +52,11 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
   }
 };
 
-// A FindCollisions call: resolves each hull a single time and builds the tree of boxes, on a reader
-// thread, then searches ranges of placements on all threads of the pool. Both gathering and
-// querying the candidates of a placement are split into slices. With a limit or first_only, this
-// search only ranks the pairs; the units that follow are the nearest or the first pairs, which are
-// then answered.
+// A FindCollisions call: resolves each hull once and builds the tree of boxes, on a reader thread,
+// then searches ranges of placements on all threads of the pool. Both gathering and querying the
+// candidates of a placement are split into slices. With a limit or first_only, this search only
+// ranks the pairs. The units that follow are the nearest or the first pairs, which are then
+// answered.
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
@@ -75,20 +75,20 @@ class SceneStream
   bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
 
-  // Without the mutex.
+  // Called without the mutex.
   absl::Status ValidateChoice() const;
   absl::Status ValidateLimit() const;
-  // Answers the next of the ranked pairs. CANCELLED.
+  // Answers the next ranked pair. CANCELLED.
   absl::Status AnswerRanked(ScenePiece& piece);
-  // Starts on the pairs of pieces of a candidate.
+  // Starts to answer the pairs of pieces of a candidate.
   void OpenBodies(uint32_t a, uint32_t b, ScenePiece& piece) const;
-  // Answers one of them. CANCELLED.
+  // Answers one of these pairs. CANCELLED.
   absl::Status AdvanceBodies(uint32_t a, ScenePiece& piece);
-  // Answers a candidate, in a scene with a limit by its relation and clearance alone, and counts
-  // it. CANCELLED.
+  // Answers a candidate and counts it. In a scene with a limit, answers only its relation and
+  // clearance. CANCELLED.
   absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece);
-  // Answers a pair of a scene with first_only. It counts as separated if it is so up to the
-  // earliest contact that is known.
+  // Answers a pair of a scene with first_only. The pair counts as separated if it is separated
+  // until the earliest known contact.
   PlacedAnswer AskFirst(uint32_t a, uint32_t b, MotionOptions motion) const;
   // Ranks a found pair by its separation or, in motion, its first contact. CANCELLED.
   // RESOURCE_EXHAUSTED: --memory-limit.

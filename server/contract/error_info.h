@@ -29,7 +29,7 @@ struct MetadataEntry {
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
                         std::initializer_list<MetadataEntry> metadata = {});
 
-// UNAVAILABLE: the server drains, so no call starts and no watch continues.
+// UNAVAILABLE: the server is draining, so no call starts and no watch continues.
 absl::Status Draining();
 
 // Returns the reason of an error; without one, the reason implied by its code, if any.

@@ -41,7 +41,7 @@ enum class CallKind {
   kBatch,
   // One request, an answer of many messages.
   kDownload,
-  // Duration depends on the client or the size of the store: --max-streams-per-client.
+  // Lasts as long as the client or the size of the store requires: --max-streams-per-client.
   kStream,
 };
 

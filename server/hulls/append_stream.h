@@ -17,11 +17,11 @@
 
 namespace hulld::server {
 
-// An AppendPoints call. Reads a chunk, queues it at the registry, and reads at most one chunk ahead
+// An AppendPoints call. Reads a chunk, queues it in the registry, and reads at most one chunk ahead
 // of the one being built, so a fast client fills gRPC's window rather than the server's memory.
 // Built chunks drop their points before they wait for their commit. An ack that must wait for the
-// previous one is merged with the next. Reading does not wait for writing, so a client that sends
-// everything before it reads an ack works too.
+// previous one is merged with the next. Reading does not wait for writing, so a client may send
+// everything before it reads an ack.
 class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPointsResponse>,
                                           v1::AppendPointsRequest> {
  public:
@@ -58,7 +58,7 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   uint64_t applied_points_ = 0;
   uint64_t last_revision_ = 0;
   bool opening_ = false;
-  // Chunks that still hold their points, and chunks neither committed nor refused.
+  // Number of chunks that still have their points, and of chunks neither committed nor refused.
   int unbuilt_ = 0;
   int uncommitted_ = 0;
   // Acks are cumulative, and the error of the earliest refused chunk is the most specific.

@@ -13,7 +13,7 @@
 
 namespace hulld::server {
 
-// The generated service, with methods on bytes (message_bytes.h).
+// The generated service, with methods that exchange bytes (message_bytes.h).
 using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
     v1::HullService::WithRawCallbackMethod_AppendPoints<
         v1::HullService::WithRawCallbackMethod_ReplaceHull<
@@ -26,8 +26,8 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
 
 // hulld.v1.HullService: implements the contract in hull.proto on the registry. Calls that only read
 // records are answered on arrival. Calls that need a snapshot run on `readers`; meshes, audits, and
-// properties, which may take long, on `long_readers`. Replacements are built on `writers`, as are
-// chunks. Watches read records on notification, and boxes from the store on `readers`.
+// properties, which may take long, on `long_readers`. Replacements and chunks are built on
+// `writers`. Watches read records on notification, and boxes from the store on `readers`.
 class HullService : public HullServiceOfBytes {
  public:
   HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,

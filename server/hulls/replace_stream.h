@@ -16,11 +16,11 @@
 namespace hulld::server {
 
 // A ReplaceHull call: builds a separate hull, message by message on a writer thread, and passes it
-// to the registry when the client has sent everything. One operation is in flight, a read or a
-// build, so the state needs no mutex.
+// to the registry when the client has sent everything. Only one operation, a read or a build, is in
+// flight at a time, so the state needs no mutex.
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
-  // writers: the threads that build. response: owned by gRPC until the call ends.
+  // writers: the threads that build the hull. response: owned by gRPC until the call ends.
   ReplaceStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& writers,
                 Bytes* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
@@ -42,7 +42,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   Registry& registry_;
   WorkerPool& writers_;
   Bytes* const response_;
-  // Memory charged for the builder until the registry takes over.
+  // Memory charged for the builder until the registry takes ownership.
   MemoryCharge charge_;
   Replacement replacement_;
   uint64_t messages_ = 0;

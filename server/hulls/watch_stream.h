@@ -17,7 +17,7 @@
 
 namespace hulld::server {
 
-// One WatchHulls call. Sends one batch of changes after another; while none is pending, the feed
+// A WatchHulls call. Sends one batch of changes after another. If no change is pending, the feed
 // calls back later, so no thread blocks.
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {

@@ -34,11 +34,11 @@ size_t AddFirstContact(const FirstContact& contact, const QueryHull& a, const Qu
 // Adds the times of the last row if it has no answer.
 size_t AddNoTimes(v1::AnswerColumns* columns);
 
-// True if an entry refers to a row by index, so that the columns cannot be appended to other
-// columns.
+// Returns true if an entry refers to a row by index, so that the columns cannot be appended to
+// other columns.
 bool NamesRows(const v1::AnswerColumns& columns);
 
-// Adds a row without an answer; the reply gives the reason elsewhere, with the placement.
+// Adds a row without an answer. The reply gives the reason elsewhere, with the placement.
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 }  // namespace hulld::server

@@ -51,12 +51,12 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
 // As DecodePose without validation.
 Pose ReadPose(const v1::Pose& message);
 
-// True for a radius of a placement or of a piece: finite and at least 0.
+// Returns true if a radius of a placement or of a piece is valid: finite and at least 0.
 inline bool IsValidRadius(double radius) { return radius >= 0 && radius < kInfinity; }
 // Returns OK, or INVALID_ARGUMENT " is NaN; it must be ...", to follow the name of the field.
 absl::Status ValidateRadius(double radius);
-// OK, or INVALID_ARGUMENT about the end of a motion with a valid start, naming the coordinate: it
-// is malformed, or the rotation vanishes on the way.
+// Returns OK, or INVALID_ARGUMENT about the end of a motion with a valid start, naming the
+// coordinate: it is malformed, or the rotation vanishes along the way.
 absl::Status ValidateEnd(const Motion& motion);
 // Packed poses have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
@@ -74,7 +74,7 @@ inline void WritePose(const Pose& pose, size_t i, google::protobuf::RepeatedFiel
 
 // Returns the freshness required by a read of this store that started at `began`. An empty or
 // absent message means linearizable. INVALID_ARGUMENT: a negative or malformed duration, or a
-// revision without a store ID. FAILED_PRECONDITION: the revision is of another store.
+// revision without a store ID. FAILED_PRECONDITION: the revision belongs to another store.
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
                                           SteadyClock::time_point began);
 

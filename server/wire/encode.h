@@ -35,8 +35,8 @@ v1::Rung EncodeRung(Rung rung);
 v1::AxisKind EncodeAxisKind(AxisKind kind);
 v1::Durability EncodeDurability(Durability durability);
 
-// a, b: the hulls separated by the axis. RESOURCE_EXHAUSTED: a feature has more vertices than one
-// message can carry.
+// a, b: the hulls separated by the axis. RESOURCE_EXHAUSTED: a feature has more vertices than fit
+// in one message.
 absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
                         v1::Axis* message);
 void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::Analysis* message);

@@ -52,8 +52,8 @@ class LivePairs {
   void SelectAll();
   void SelectPairsOf(uint32_t placement);
   // Selects all pairs of the moved or changed placements, including new pairs. Each placement
-  // occurs once. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or O(n log n)
-  // in total, plus the number of selected pairs.
+  // occurs once in `changed`. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) per placement, or
+  // O(n log n) in total, plus the number of selected pairs.
   absl::Status Select(std::span<const uint32_t> changed, const PlacementTable& table);
   // Clears the cached points of the placement's pairs, which refer to a previous hull.
   void ForgetPoints(uint32_t placement);

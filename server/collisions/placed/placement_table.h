@@ -35,41 +35,42 @@
 
 namespace hulld::server {
 
-// Placements of a call, by index: each ready for queries, or with the reason why it cannot be
-// answered and an empty hull as its stand-in.
+// Placements of a call, by index. Each is ready for queries, or has the reason why it cannot be
+// answered, with an empty hull as a stand-in.
 class PlacementTable {
  public:
   PlacementTable() = default;
   // Reads a request in one of the two forms, and moves the poses of packed placements out of it.
-  // Records malformed placements and IDs outside the caller's prefix; no hull is known before
-  // Resolve, which also builds the hulls of inline shapes. INVALID_ARGUMENT: both forms, or packed
-  // lists that do not match. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
-  // `what`: container of the placements, as in "the batch".
+  // Records malformed placements and IDs outside the caller's prefix. No hull is known before
+  // Resolve, which also builds the hulls of inline shapes. INVALID_ARGUMENT: both forms are used,
+  // or packed lists do not match. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
+  // what: container of the placements, as in "the batch".
   static absl::StatusOr<PlacementTable> Make(
       const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
       v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
-  // As Make, for the placements "a" and "b" of a pair. The first malformed one is the error.
+  // As Make, for the placements "a" and "b" of a pair. Returns the error of the first malformed
+  // one.
   static absl::StatusOr<PlacementTable> MakePair(const v1::Placement& a, const v1::Placement& b,
                                                  const Caller& caller);
 
-  // Places placements at each use instead of in advance: for a call that uses each about once. Call
-  // before Resolve.
+  // Computes placed hulls at each use instead of in advance, for a call that uses each about once.
+  // Call before Resolve.
   void PlaceOnDemand() { places_on_demand_ = true; }
 
   // Resolves every hull and body once, all at one revision of the store, for queries with
   // `options`. Not for gRPC threads. CANCELLED: options.should_stop returned true.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // As Resolve for repeated calls: only hulls changed since are looked up.
+  // As Resolve, for repeated calls: looks up only hulls that changed since the last one.
   absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // As Resolve, but returns false without blocking if it would have to wait or to build.
+  // As Resolve, but returns false without blocking if it would have to wait or build.
   bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return hull_of_.size(); }
-  // Number of distinct hulls: of hull_ids(), then of the inline shapes.
+  // Number of distinct hulls: those of hull_ids(), followed by those of the inline shapes.
   size_t hull_count() const { return ids_.size() + shape_count_; }
   // Approximate bytes held after resolution, excluding hulls.
   size_t MemoryBytes() const;
@@ -82,26 +83,26 @@ class PlacementTable {
   const PlacedHull& PlacedAt(size_t i, std::optional<PlacedHull>* made) const {
     return places_on_demand_ ? made->emplace(Place(i)) : placed_[i];
   }
-  // True if a placement is, or was, a body; then bodies() holds every placement, including hulls.
-  // Otherwise it is empty.
+  // True if a placement is, or was, a body. In that case, bodies() contains every placement,
+  // including hulls; otherwise it is empty.
   bool has_bodies() const { return !bodies_.empty(); }
   std::span<const PlacedBody> bodies() const { return bodies_; }
   bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
-  // True if the request gives an end pose to a placement, which may equal its pose.
+  // True if the request sets an end pose for a placement, even if it equals the placement's pose.
   bool has_motions() const { return !end_poses_.empty(); }
-  // A placement of such a request in motion; an empty hull for a body.
+  // The placement in motion, for a request with motions; an empty hull for a body.
   MovingHull MovingAt(size_t i) const { return {HullAt(i), MotionAt(i), RadiusAt(i)}; }
   // As MovingAt, for a hull or body. Requires has_bodies().
   MovingBody MovingBodyAt(size_t i) const { return {bodies_[i].body(), MotionAt(i), RadiusAt(i)}; }
-  // Bounding box of a placement at rest, world frame.
+  // Bounding box of a placement at rest, in the world frame.
   Box BoxOf(size_t i) const {
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
-  // Box of a placement in motion; empty if it is not answerable.
+  // Bounding box of a placement in motion; empty if it is not answerable.
   MovingBox MovingBoxAt(size_t i) const;
   // The hull of a placement; empty for a body, or if it is not answerable.
   const QueryHull& HullAt(size_t i) const;
-  // As HullAt, but for a body the hull of a piece.
+  // As HullAt; for a body, the hull of the piece.
   const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
     if (!has_bodies()) return HullAt(i);
     const auto pieces = bodies_[i].body().pieces();
@@ -110,13 +111,13 @@ class PlacementTable {
   bool is_answerable(size_t i) const {
     return is_all_answerable_ || (!IsMalformed(i) && hulls_[hull_of_[i]].ok());
   }
-  // Reason why the placement is not answerable, or OK. Requires that the hulls were resolved.
+  // Reason why the placement is not answerable; OK if it is. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
-  // True if the last Resolve changed, removed or added this placement's hull; for a body, also if
-  // it changed the hull of a piece.
+  // True if the last Resolve changed, removed, or added this placement's hull or, for a body,
+  // changed the hull of a piece.
   bool hull_changed(size_t i) const;
-  // True if it changed this placement's QueryHull, perhaps for the same hull; earlier results refer
-  // to points of the former one.
+  // True if the last Resolve replaced this placement's QueryHull, perhaps for the same hull.
+  // Earlier results refer to points of the previous QueryHull.
   bool query_hull_changed(size_t i) const;
 
   // Returns the lookup of hull_ids() for queries with these options.
@@ -125,19 +126,19 @@ class PlacementTable {
   // should_stop returned true. RESOURCE_EXHAUSTED: --memory-limit.
   absl::Status AddShapes(Registry& registry, const std::function<bool()>& should_stop,
                          Resolved* resolved);
-  // Sets all hulls. `resolved` holds hull_ids(), then the inline shapes.
+  // Sets all hulls. resolved: the hulls of hull_ids(), followed by those of the inline shapes.
   void SetHulls(const Store& store, Resolved resolved, const QueryOptions& options);
-  // Sets a few of hull_ids(), given by index, each once; the other hulls stay as they are.
-  // `resolved` is parallel to `hulls`. Requires SortByHull.
+  // Sets some of the hulls of hull_ids(), given by index, each once. All other hulls remain
+  // unchanged. resolved: parallel to `hulls`. Requires SortByHull.
   void SetSomeHulls(std::span<const size_t> hulls, Resolved resolved, const QueryOptions& options);
 
   // Requires a valid pose (ValidatePose).
   void Move(size_t i, const Pose& X_WH);
-  // As Move, to be followed by Refresh.
+  // As Move, for a caller that calls Refresh next.
   void SetPose(size_t i, const Pose& X_WH);
 
-  // IDs of the hulls, without duplicates unless packed placements name it several times; none for
-  // inline shapes.
+  // IDs of the hulls, excluding inline shapes. Contains no duplicates, unless packed placements
+  // name an ID several times.
   std::span<const std::string> hull_ids() const { return ids_; }
   // Hull k, or its error. Requires that it was resolved.
   const absl::StatusOr<HullView>& hull(size_t k) const {
@@ -159,10 +160,10 @@ class PlacementTable {
 
   // Encodes the revision and staleness of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
-  // Encodes a version per placement, or per hull named by packed placements, and the problems;
-  // then, if certificates are wanted, the hulls of pieces: rows of a table, from row `first` on, as
-  // many as fill a message. Returns the first row of the next message, or table_rows() after the
-  // last.
+  // Encodes rows of a table, starting with row `first`, as many as fill a message: a version per
+  // placement, or per hull named by packed placements, and the problems; then, if certificates are
+  // wanted, the hulls of pieces. Returns the first row of the next message, or table_rows() after
+  // the last row.
   template <typename Message>
   size_t EncodeHulls(size_t first, Message* message) const {
     return EncodeRows(first, {message->mutable_hulls(), message->mutable_placement_problems(),
@@ -170,8 +171,8 @@ class PlacementTable {
   }
   size_t table_rows() const { return named_.size() + listed_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
-  // Encodes the deciding pieces of a pair of placements into piece_a and piece_b of the message; a
-  // hull has none.
+  // Encodes the deciding pieces of a pair of placements into piece_a and piece_b of the message.
+  // Omits the piece of a hull.
   template <typename Message>
   void EncodeDecidingPieces(size_t a, size_t b, const PiecePair& pieces, Message* message) const {
     if (is_body(a)) EncodeDecidingPiece(a, pieces.a, message->mutable_piece_a());
@@ -221,9 +222,9 @@ class PlacementTable {
   // its pose, packed.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
-  // In the form of poses_; empty if no placement moves.
+  // End poses, in the same form as poses_; empty if no placement moves.
   google::protobuf::RepeatedField<double> end_poses_;
-  // The radius of each placement; empty if all are 0.
+  // Radius of each placement; empty if all are 0.
   google::protobuf::RepeatedField<double> radii_;
   // Errors of malformed IDs, inline shapes, radii, and poses, by placement.
   std::unordered_map<size_t, absl::Status> malformed_;
@@ -236,7 +237,7 @@ class PlacementTable {
   size_t shape_count_ = 0;
   // Hulls of ids_, then of the inline shapes.
   std::vector<absl::StatusOr<HullView>> hulls_;
-  // For Refresh.
+  // Used by Refresh.
   KnownPlaced known_;
   // Query structure of each hull, or NoHull's.
   std::vector<const QueryHull*> query_hulls_;
@@ -267,13 +268,13 @@ class PlacementTable {
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
-// INVALID_ARGUMENT, naming the first field with an end pose: the call takes no motions. `what`: its
-// subject, as in "a stream".
+// Returns INVALID_ARGUMENT, naming the first field with an end pose, because the call does not
+// accept motions. what: the subject of the error, as in "a stream".
 absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                            const v1::PackedPlacements& packed, const char* what);
 
-// Checks that `open` is the first message of a stream, and only the first. INVALID_ARGUMENT;
-// `twice`: the error of a second one.
+// Checks that the first message of a stream, and no other, is `open`. Otherwise returns
+// INVALID_ARGUMENT. twice: the error for a second `open`.
 template <typename Request>
 absl::Status CheckOrder(const Request& request, bool is_open, const char* twice) {
   if (!request.has_open() && !request.has_update()) {
@@ -290,12 +291,12 @@ absl::Status CheckOrder(const Request& request, bool is_open, const char* twice)
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
                            const google::protobuf::RepeatedField<double>& poses, size_t count);
 
-// Text of errors that states the number of placements, for both forms, so that it names no field
-// that the caller did not send.
+// Returns an error text that states the number of placements. It fits both forms of a request,
+// because it names no field that the caller may not have sent.
 std::string ThereArePlacements(size_t count);
 
-// INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
-// max_pairs (--max-pairs-per-batch).
+// INVALID_ARGUMENT: an odd number of indices, or an index out of range. RESOURCE_EXHAUSTED: more
+// than max_pairs (--max-pairs-per-batch).
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what);
 

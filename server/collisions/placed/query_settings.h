@@ -12,37 +12,37 @@
 
 namespace hulld::server {
 
-// Returns core's options for a request; the query ends with `lifetime`, which must outlive it.
-// INVALID_ARGUMENT, naming the field: an unknown method, a negative or NaN length, or options that
-// exclude each other.
+// Returns core's options for a request. The query stops when `lifetime` ends, which must outlive
+// it. INVALID_ARGUMENT, naming the field: an unknown method, a negative or NaN length, or mutually
+// exclusive options.
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
-// INVALID_ARGUMENT, naming the field: an option restricted to pairs of hulls.
+// INVALID_ARGUMENT, naming the field: an option that is restricted to pairs of hulls.
 absl::Status ValidateForBodies(const QueryOptions& options);
 
-// Returns core's options for motions of a request with these valid options.
+// Returns core's motion options for a request with these valid query options.
 MotionOptions MakeMotionOptions(const v1::Wanted& wanted, const QueryOptions& options);
 
-// INVALID_ARGUMENT, naming the field: an option that motions exclude.
+// INVALID_ARGUMENT, naming the field: an option that cannot be combined with motions.
 absl::Status ValidateForMotions(const QueryOptions& options);
 
-// True if only relations are wanted and all placements are hulls at rest: the most frequent call,
-// which has a separate path.
+// Returns true if only relations are wanted and all placements are hulls at rest: the most frequent
+// kind of call, which has a separate path.
 inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
   return options.WantsRelationOnly() && !table.has_bodies() && !table.has_motions();
 }
 
-// True if the relation of two such hulls takes no longer than moving the bytes of request and
-// response, so that a gRPC thread may compute it.
+// Returns true if computing the relation of two such hulls takes no longer than moving the bytes of
+// the request and response, so that a gRPC thread may compute it.
 bool IsQuickToRelate(const QueryHull& hull);
 
-// Returns the server's error for an error of a query with these options: RESOURCE_EXHAUSTED names
+// Converts an error of a query with these options to the server's error. RESOURCE_EXHAUSTED names
 // the limit, and its flag or, if bodies need too many certificates, its reason.
 absl::Status NameLimit(const absl::Status& status, const QueryOptions& options);
 
-// RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces take more than `limit` bytes.
+// RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces need more than `limit` bytes.
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
 
 }  // namespace hulld::server

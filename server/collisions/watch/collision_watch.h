@@ -21,11 +21,11 @@
 
 namespace hulld::server {
 
-// One WatchCollisions call. Works in rounds: a round takes one message of the client, or the
-// pending changes of hulls and bodies, answers the affected pairs again, and sends an event for
-// each pair that differs. A round starts after the replies of the previous one are written. Until
-// then, messages wait in gRPC's window and changes coalesce in the feed, so a slow client costs the
-// memory of one message.
+// A WatchCollisions call, which works in rounds. A round processes one message of the client, or
+// the pending changes of hulls and bodies, answers the affected pairs again, and sends an event for
+// each pair whose answer differs. A round starts after the replies of the previous one are written.
+// Until then, messages wait in gRPC's window and changes coalesce in the feed, so a slow client
+// costs the memory of one message.
 //
 // The mutex guards which task is running. The data of a round belongs to that task alone.
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
@@ -71,10 +71,10 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
 
   // Guarded by the mutex.
   bool is_working_ = false;
-  // A message was read and waits for its round.
+  // True if a message was read and waits for its round.
   bool has_message_ = false;
   bool has_half_closed_ = false;
-  // The feed may have changes.
+  // True if the feed may have changes.
   bool has_changes_ = false;
 
   // The following belong to the task.

@@ -29,7 +29,7 @@ class WatchedHulls {
  public:
   // The hulls and bodies resolved together, at one revision of the store.
   struct Round {
-    // No change is pending; on_ready will be called once when one is.
+    // True if no change is pending. on_ready will then be called once, when a change is.
     bool waits = false;
     // Every change up to this revision is included.
     uint64_t revision = 0;
@@ -43,7 +43,7 @@ class WatchedHulls {
     std::vector<HullRecord> piece_hulls = {};
   };
 
-  // The registry must outlive this.
+  // The registry must outlive this object.
   explicit WatchedHulls(Registry& registry) : registry_(registry) {}
   WatchedHulls(const WatchedHulls&) = delete;
   WatchedHulls& operator=(const WatchedHulls&) = delete;
