@@ -17,7 +17,7 @@ namespace {
 // Retry delays: a unary call takes well under a millisecond, a batch about a second.
 constexpr std::chrono::milliseconds kRetryCall(100);
 constexpr std::chrono::milliseconds kRetryBatch(1000);
-// A polling call notices its deadline itself and reports it better than a cancellation.
+// A call that polls notices its deadline itself and reports it better than a cancellation does.
 constexpr std::chrono::seconds kGrace(2);
 
 bool IsAnonymous(Rpc rpc) { return PermissionFor(rpc) == Permission::kNone; }
@@ -62,7 +62,7 @@ Admission::Ticket::Share Admission::ShareOf(const Arrival& arrival, uint64_t con
   using Share = Ticket::Share;
   if (!IsAnonymous(arrival.rpc)) return Share::kCalls;
   if (arrival.rpc != Rpc::kHealthWatch || connections_ == nullptr) return Share::kAnonymous;
-  // The peer of a unix socket is a program of this machine, such as a proxy for many clients.
+  // The peer of a unix socket is a program on this machine, such as a proxy for many clients.
   const bool is_first = connection != 0 && !watching_health_.contains(connection);
   return is_first || !arrival.peer.has_value() ? Share::kFree : Share::kAnonymous;
 }
@@ -81,7 +81,7 @@ absl::Status Admission::CheckAnonymousRoom(const Ticket::Client& client) const {
 
 absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
   const CallKind kind = KindOf(rpc);
-  // Long calls leave a part to single calls.
+  // Long calls leave a part of each limit to single calls.
   const auto room = [kind](uint64_t limit) {
     return kind == CallKind::kUnary ? limit : limit - limit / Limits::kKeptForSingleCalls;
   };
@@ -95,8 +95,8 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
                       limits_.max_calls, "max-calls", kRetryCall);
   }
   size_t waiting = backlog_ ? backlog_(rpc) : 0;
-  // Tasks queued by streams, such as thousands of watches opened or notified together, must not
-  // crowd out single calls: clients take turns.
+  // Tasks queued by streams, such as thousands of watches opened or notified at once, must not
+  // crowd out single calls, because clients take turns.
   if (kind == CallKind::kUnary) waiting = std::min(waiting, single_calls_);
   if (waiting >= limits_.max_waiting_calls) {
     return Overloaded(absl::StrCat(waiting, " calls wait for a thread"), limits_.max_waiting_calls,
@@ -136,7 +136,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   ticket.share_ = ShareOf(arrival, ticket.connection_);
   absl::Status room;
   if (ticket.share_ == Ticket::Share::kAnonymous) room = CheckAnonymousRoom(before);
-  // Operators' status calls must work even if the server is full.
+  // Operators' status calls must succeed even if the server is full.
   if (ticket.share_ == Ticket::Share::kCalls && arrival.rpc != Rpc::kGetStatus) {
     room = CheckRoom(arrival.rpc, before);
   }
@@ -194,7 +194,7 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
     }
     watched_changed_.notify_all();
   }
-  // The calls may end before this returns.
+  // The calls may end before end_call returns.
   for (const std::function<void()>& end_call : waiting) end_call();
   return count;
 }
@@ -213,7 +213,8 @@ void Admission::Watch(const Arrival& arrival, Ticket* ticket) {
   if (end < next_look_) watched_changed_.notify_all();
 }
 
-// Searches all watched calls at each look. Looks are rare: most calls end before they are overdue.
+// Searches all watched calls at each check. Checks are rare, because most calls end before they are
+// overdue.
 void Admission::CancelOverdue() {
   std::unique_lock lock(mutex_);
   while (!ending_) {
@@ -227,13 +228,13 @@ void Admission::CancelOverdue() {
       watched_changed_.wait_until(lock, next_look_);
       continue;
     }
-    // No second cancellation.
+    // Prevents a second cancellation.
     first->end = kNever;
     if (first->call == nullptr) continue;
     grpc_call* const call = first->call;
     const bool is_revoked = !first->caller.name.empty() && first->lifetime->is_revoked();
     grpc_call_ref(call);
-    // gRPC may call back, and the calls may end, before this returns.
+    // gRPC may call back, and the calls may end, before the cancellation returns.
     lock.unlock();
     if (is_revoked) {
       grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,
@@ -259,7 +260,8 @@ bool Admission::WaitIdle(std::chrono::steady_clock::time_point deadline) {
 void Admission::Leave(Ticket& ticket) {
   grpc_call* watched = nullptr;
   {
-    // Notifies under the lock, because the waiting thread may destroy this after its release.
+    // Notifies under the lock, because the waiting thread may destroy this object after its
+    // release.
     const std::lock_guard lock(mutex_);
     if (ticket.watched_.has_value()) {
       watched = (*ticket.watched_)->call;

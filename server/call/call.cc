@@ -24,12 +24,12 @@ double Milliseconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
-// True if --max-request-time limits each message of the client rather than the call.
+// Returns true if --max-request-time limits each message of the client rather than the call.
 bool IsTimedByMessage(Rpc rpc) {
   return rpc == Rpc::kStreamCollisions || rpc == Rpc::kWatchCollisions;
 }
 
-// True if the error is a fault of the server.
+// Returns true if the error is a fault of the server.
 bool IsFault(absl::StatusCode code) {
   return code == absl::StatusCode::kInternal || code == absl::StatusCode::kUnknown ||
          code == absl::StatusCode::kDataLoss;
@@ -38,7 +38,7 @@ bool IsFault(absl::StatusCode code) {
 }  // namespace
 
 absl::Status Call::Begin(std::function<void()> on_revoked) {
-  // Skips work for cancelled calls, because many may be cancelled together.
+  // Skips work for cancelled calls, because many may be cancelled at once.
   if (context_.IsCancelled()) return absl::CancelledError("the call was cancelled");
   const auto& metadata = context_.client_metadata();
   const auto given = metadata.find(kRequestIdKey);

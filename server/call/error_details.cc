@@ -11,7 +11,7 @@
 namespace hulld::server {
 namespace {
 
-// bytes: a serialized message of Google's `type`.
+// bytes: a serialized message of the Google type `type`.
 void AddDetail(const std::string& type, const std::string& bytes, rpc::Status* message) {
   google::protobuf::Any* const detail = message->add_details();
   detail->set_type_url("type.googleapis.com/google.rpc." + type);

@@ -42,7 +42,7 @@ Bytes SerializeReply(const google::protobuf::Message& message) {
   bool is_owned = false;
   const grpc::Status serialized =
       grpc::SerializationTraits<google::protobuf::Message>::Serialize(message, &bytes, &is_owned);
-  // Fails only for messages of 2 GiB and more.
+  // Fails only for messages of 2 GiB or more.
   HULLD_CHECK(serialized.ok());
   return bytes;
 }

@@ -32,7 +32,7 @@ constexpr uint64_t kUnknown = 2 * 16 + kText;
 constexpr uint64_t kUnknownSet = 48;
 // Protobuf's depth limit.
 constexpr int kDeepest = 100;
-// Field numbers of the contract are small; a larger one counts as unknown, which takes more.
+// Field numbers of the contract are small. A larger one counts as unknown, which needs more memory.
 constexpr int kLargestNumber = 255;
 
 bool IsVarint(FieldDescriptor::Type type) {
@@ -68,7 +68,7 @@ uint64_t VarintsEndingIn(const uint8_t* bytes, const uint8_t* end) {
 
 }  // namespace
 
-// A message in several pieces of memory.
+// A message in several blocks of memory.
 class MessageLayout::PiecedInput {
  public:
   explicit PiecedInput(CodedInputStream& input) : input_(input) {}
@@ -78,8 +78,7 @@ class MessageLayout::PiecedInput {
   bool ReadVarint(uint64_t* value) { return input_.ReadVarint64(value); }
   bool Skip(uint32_t length) { return input_.Skip(static_cast<int>(length)); }
 
-  // Skips `length` bytes and counts the ones that end a varint. Returns false if there are fewer
-  // bytes.
+  // Skips `length` bytes and counts those that end a varint. Returns false if fewer bytes are left.
   bool CountVarints(uint32_t length, uint64_t& count) {
     while (length > 0) {
       const void* data = nullptr;
@@ -94,7 +93,7 @@ class MessageLayout::PiecedInput {
     return true;
   }
 
-  // Counts a message of the next `length` bytes. Returns false if it is malformed.
+  // Counts a message that consists of the next `length` bytes. Returns false if it is malformed.
   bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
                     uint64_t& bytes);
 
@@ -102,7 +101,7 @@ class MessageLayout::PiecedInput {
   CodedInputStream& input_;
 };
 
-// A message in a single piece, as most small ones are.
+// A message in a single block of memory, as are most small messages.
 class MessageLayout::FlatInput {
  public:
   FlatInput(const uint8_t* begin, const uint8_t* end) : next_(begin), end_(end) {}
@@ -274,7 +273,7 @@ void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& byte
   }
 }
 
-// Counts a length-delimited field. Returns false if it is malformed or nested too deep.
+// Counts a length-delimited field. Returns false if it is malformed or nested too deeply.
 template <typename Input>
 bool MessageLayout::CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
                                    uint64_t& bytes) {

@@ -14,7 +14,7 @@ namespace hulld::server {
 namespace {
 
 constexpr size_t kMostCharacters = 128;
-// The random part holds 64 bits.
+// The random part has 64 bits.
 constexpr size_t kRandomCharacters = 16;
 
 }  // namespace

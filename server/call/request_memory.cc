@@ -10,7 +10,7 @@ namespace hulld::server {
 namespace {
 
 constexpr char kFlag[] = "request-memory";
-// Large requests take about as long as a batch.
+// A large request takes about as long as a batch.
 constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace

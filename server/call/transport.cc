@@ -8,7 +8,7 @@
 namespace hulld::server {
 namespace {
 
-// The transport can always hold this many messages of maximum size.
+// The transport can always buffer this many messages of maximum size.
 constexpr uint64_t kLargestMessages = 4;
 // Keepalive interval and timeout.
 constexpr int kKeepaliveTimeMs = 60'000;
@@ -17,14 +17,14 @@ constexpr int kKeepaliveTimeoutMs = 20'000;
 }  // namespace
 
 void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
-  // Otherwise a second server would silently share the port.
+  // Without this, a second server would silently share the port.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  // A few compressed bytes expand to gigabytes before any size check.
+  // A few compressed bytes could expand to gigabytes before any size check.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.limits.max_message_bytes));
-  // gRPC buffers a message before authentication; many incomplete messages must not exhaust memory.
-  // Above this quota gRPC slows down or ends their calls.
+  // gRPC buffers a message before authentication, and many incomplete messages must not exhaust
+  // memory. Above this quota, gRPC slows down or ends their calls.
   grpc::ResourceQuota quota("hulld");
   quota.Resize(
       std::max(config.limits.request_memory, kLargestMessages * config.limits.max_message_bytes));
@@ -32,7 +32,7 @@ void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, Config::kCallsPerConnection);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,
                              static_cast<int>(Config::kHandshakeTimeout.count()));
-  // Frees the streams of a silently vanished peer after a minute or two instead of hours.
+  // Frees the streams of a silently vanished peer within a minute or two instead of hours.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
 }

@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace {
 
-// The first pieces are small, because the cost of a pair is unknown; the largest bounds the damage
+// The first pieces are small because the cost of a pair is unknown. The maximum bounds the damage
 // of a wrong estimate.
 constexpr uint64_t kFirstPairs = 128;
 constexpr uint64_t kMostPairs = 1 << 14;
@@ -30,8 +30,8 @@ BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, cons
 absl::Status BatchStream::Validate() {
   if (absl::Status s = DecodePlacements(request().method(), "the batch"); !s.ok()) return s;
   expected_pairs_ = CountUnits();
-  // Each placement is used at most twice on average: placing it again costs less than the memory
-  // for all of them.
+  // Each placement is used at most twice on average, so placing it again costs less than memory for
+  // all of them.
   const bool is_textbook = query_.method == Method::kTextbookSat;
   if (!is_textbook && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(expected_pairs_);
@@ -44,7 +44,7 @@ absl::Status BatchStream::Prepare() {
   return absl::OkStatus();
 }
 
-// A started textbook pair holds memory, so a batch starts only one.
+// A textbook pair holds memory once started, so a batch starts only one.
 bool BatchStream::MayRunAhead() const { return query_.method != Method::kTextbookSat; }
 
 uint64_t BatchStream::StepsPerLook() const {
@@ -85,11 +85,11 @@ absl::Status BatchStream::Step(PairsPiece& piece, Clock::time_point end) {
   return absl::OkStatus();
 }
 
-// Fast path of PairSearch and AddPlacedAnswer, which take 10 to 12 % more of the server's processor
+// Fast path of PairSearch and AddPlacedAnswer, which need 10 to 12 % more of the server's processor
 // time if each pair has its own packed placements, and 2 % more if pairs share 128 placements.
 // **Observed**: close pairs of UR5 links over unix sockets, both variants alternating in either
 // order, medians of 9 and 7 rounds of remote_benchmark (0.74 us per pair instead of 0.82, and 0.65
-// instead of 0.73). Only this function exploits that most pairs need no more.
+// instead of 0.73). Only this function exploits the fact that most pairs need no more.
 absl::Status BatchStream::AnswerRelation(uint32_t a, uint32_t b, PairsPiece& piece) {
   std::optional<PlacedHull> made_a;
   std::optional<PlacedHull> made_b;

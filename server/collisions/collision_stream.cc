@@ -25,15 +25,15 @@ constexpr size_t kPairsPerClaim = 16;
 constexpr int kMostShortUpdate = 4096;
 // An update that affects at most this many pairs is answered on arrival.
 constexpr int kMostQuickPairs = 8;
-// A stream is opened for many updates; the number is a guess.
+// A stream is opened for many updates. The number is a guess.
 constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
 // A relation and a rung.
 constexpr size_t kRelationBytes = 2;
-// Decided pairs that are encoded between two reads of the clock, in some 20 us.
+// Decided pairs to encode between two reads of the clock; they take about 20 us.
 constexpr size_t kPairsPerClockRead = 4096;
-// Pairs per helper thread: they take at least 20 us, and a thread about as long to arrive.
+// Pairs per helper thread. They take at least 20 us, about as long as a thread needs to arrive.
 // **Observed**: close pairs of UR5 links.
 constexpr size_t kPairsPerHelper = 192;
 
@@ -48,7 +48,7 @@ void CollisionStream::OnMessage() {
   // Resolving hulls may wait for the store; the first message resolves all of them.
   if (!open_) return RunOn(parts_.long_readers, [this] { Handle(); });
   if (request().update().refresh_hulls()) return RunOn(parts_.readers, [this] { Handle(); });
-  // Only the first slice of a step precedes batches.
+  // Only the first slice of a step runs ahead of batches.
   const bool is_short = request().update().placements_size() <= kMostShortUpdate;
   if (is_short) return RunOn(parts_.pool, [this] { Handle(); });
   RunOn(lane_, [this] { Handle(); });
@@ -62,7 +62,7 @@ void CollisionStream::OnSent() {
   RunOn(lane_, [this] { AnswerSlice(); });
 }
 
-// True if the message can be answered immediately on gRPC's thread.
+// Returns true if the message can be answered immediately on gRPC's thread.
 bool CollisionStream::IsQuick() const {
   if (!open_ || !request().has_update() || !options_.WantsRelationOnly()) return false;
   const v1::CollisionStreamUpdate& update = request().update();
@@ -89,7 +89,7 @@ void CollisionStream::Handle() {
   refresh_.reset();
   const absl::Status status = HandleMessage();
   if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
-  // No thread waits during a store query: an unresponsive store would block all of them.
+  // No thread waits for a store query, because an unresponsive store would block all threads.
   WorkerPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
   const bool awaits = parts_.waiting.AwaitFresh(
       parts_.registry, refresh_->freshness, [this] { return call().ShouldStop(); },
@@ -112,7 +112,7 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   AnswerSlice();
 }
 
-// Returns the client's status for the result of an update.
+// Returns the client's status for this result of an update.
 absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
   if (messages_ == 0) return status;
   return Prefixed(absl::StrCat("update ", messages_, ": "), status);
@@ -156,14 +156,14 @@ absl::Status CollisionStream::HandleOpen() {
   pairs_ = LivePairs(open.pairs(), table_.size(), v1::RELATION_UNSPECIFIED);
   open_ = true;
   pairs_.SelectAll();
-  // Preparation is worth the wait: the hulls are used until the client refreshes them.
+  // Preparation pays off, because the hulls are used until the client refreshes them.
   const uint64_t pairs_per_hull = 2 * pairs_.size() / std::max<size_t>(1, table_.hull_count());
   refresh_ = {kExpectedUpdates * pairs_per_hull, true, freshness_};
   return absl::OkStatus();
 }
 
 // Charges the stream's memory to --memory-limit before allocating it. RESOURCE_EXHAUSTED: there is
-// no room.
+// no room for it.
 absl::Status CollisionStream::ChargeFor(size_t pairs) {
   charge_.Set(table_.MemoryBytes() + LivePairs::BytesOf(pairs, table_.size()) +
               pairs * sizeof(Decided));
@@ -178,7 +178,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   for (int i = 0; i < update.placements_size(); ++i) {
     const uint32_t placement = update.placements(i);
     const Pose pose = ReadPose(update.poses(), static_cast<size_t>(i));
-    // Refreshing places all placements.
+    // A refresh places all placements.
     update.refresh_hulls() ? table_.SetPose(placement, pose) : table_.Move(placement, pose);
     pairs_.SelectPairsOf(placement);
   }
@@ -224,8 +224,8 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
-// Decides the requested pairs, together with any helper threads that arrive in time. Helpers run
-// slices in this call's turns, so they yield to other calls.
+// Decides the requested pairs, with the help of any threads that arrive in time. Helpers run slices
+// in this call's turns, so they yield to other calls.
 void CollisionStream::DecideTogether() {
   decided_.resize(pairs_.selected().size());
   unclaimed_.Begin(static_cast<uint32_t>(decided_.size()));
@@ -243,14 +243,15 @@ void CollisionStream::DecideTogether() {
 }
 
 // Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
-// several concurrently; the thread that returns the last block continues. Nothing of this stream
-// may be used after returning the last block, or if no block was available.
+// several concurrently. The thread that returns the last block continues. A thread must not access
+// this stream after it returned the last block, or if it found no block.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
     const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
     if (block.empty()) return;
-    // If the call must stop, blocks are returned undone, so that exactly one thread is the last.
+    // If the call must stop, blocks are returned undone, so that exactly one thread is still the
+    // last.
     if (!call().ShouldStop()) {
       for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
     }
@@ -267,7 +268,7 @@ void CollisionStream::Decide(uint32_t i) {
     const std::span<const PlacedHull> placed = table_.placed();
     const absl::StatusOr<Answer> answer =
         CheckCollision(placed[pair.a], placed[pair.b], options_, &pair.cache);
-    // No other error is possible for the relation of valid hulls at valid poses.
+    // The relation of valid hulls at valid poses has no other error.
     HULLD_CHECK(answer.ok() || absl::IsCancelled(answer.status()));
     if (!answer.ok()) return;
     relation = EncodeRelation(answer->relation);
@@ -297,7 +298,7 @@ void CollisionStream::SendPart(bool last) {
 }
 
 // Computes until the answer is complete, the message is full, or other calls are due. A plain
-// answer is decided as a whole first.
+// answer is first decided as a whole.
 void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
     next_row_ = table_.EncodeHulls(next_row_, &reply());

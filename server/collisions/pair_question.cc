@@ -22,8 +22,8 @@ namespace {
 // The placements of a pair, as indices into its table.
 constexpr uint32_t kA = 0;
 constexpr uint32_t kB = 1;
-// Maximum number of waiting calls that the committing thread answers itself after a store query, in
-// place of dispatching them: 32 queries of some 10 us delay its commits by about a round trip.
+// Maximum number of waiting calls that the committing thread answers itself after a store query,
+// instead of dispatching them. 32 queries of about 10 us delay its commits by about a round trip.
 constexpr size_t kMostAnsweredInTurn = 32;
 
 // a, b: the deciding hulls; canonical if the answer names vertices.
@@ -51,7 +51,7 @@ void PairQuestion::Start(const CollisionParts& parts, CheckCall* call) {
   const std::shared_ptr<PairQuestion> question(new PairQuestion(parts, call));
   if (absl::Status s = question->ReadRequest(); !s.ok()) return call->End(s);
   if (question->TryAnswer()) return;
-  // A store with peer servers is queried first; no thread waits for its answer.
+  // A store with peer servers is queried first. No thread waits for its reply.
   const auto answer = [question](const absl::Status& status) {
     if (!status.ok()) return question->call_->End(status);
     const bool may_answer = question->parts_.waiting.count() < kMostAnsweredInTurn;
@@ -113,8 +113,8 @@ bool PairQuestion::TryAnswer() {
 
 void PairQuestion::AnswerResolved() {
   if (absl::Status s = Begin(); !s.ok()) return call_->End(s);
-  // Answers of a client with many calls take turns in the pool, because gRPC's threads take calls
-  // in the order of arrival.
+  // Answers to a client with many calls take turns in the pool, because gRPC's threads process
+  // calls in the order of arrival.
   if (IsQuick() && !call_->call().is_one_of_many()) return RunSlice();
   parts_.pool.Submit([self = shared_from_this()] { self->RunSlice(); }, call_->call().client());
 }
@@ -131,7 +131,7 @@ absl::Status PairQuestion::Begin() {
   return search_->CheckMemory(parts_.registry);
 }
 
-// True if the answer may be found on a thread of gRPC.
+// Returns true if the answer may be computed on a gRPC thread.
 bool PairQuestion::IsQuick() const {
   return AsksRelationsOfHulls(options_, table_) && IsQuickToRelate(table_.HullAt(kA)) &&
          IsQuickToRelate(table_.HullAt(kB));
@@ -173,8 +173,8 @@ absl::Status PairQuestion::Encode() {
 }
 
 // Encodes the proof of the relation of bodies: the hulls of all pieces, without duplicates, and the
-// certificates. For a hull, itself; none for an inline shape. RESOURCE_EXHAUSTED: it is too large
-// for a reply.
+// certificates. A hull counts as its own piece, except for an inline shape, which has none.
+// RESOURCE_EXHAUSTED: the proof is too large for a reply.
 absl::Status PairQuestion::EncodeProof() {
   v1::CheckCollisionResponse& response = call_->response();
   std::set<std::string_view> known;

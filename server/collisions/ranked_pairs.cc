@@ -16,7 +16,7 @@ void DropGreatest(std::vector<RankedPair>* heap) {
   heap->pop_back();
 }
 
-// Adds the pair to a heap of at most `limit` pairs; drops the greatest if the heap is full.
+// Adds the pair to a heap of at most `limit` pairs. Drops the greatest pair if the heap is full.
 void AddBounded(const RankedPair& pair, size_t limit, std::vector<RankedPair>* heap) {
   if (heap->size() == limit) {
     if (!(pair < heap->front())) return;
@@ -87,7 +87,7 @@ std::vector<RankedPair> RankedPairs::Take() {
 }
 
 size_t RankedPairs::MaxMemoryBytes(uint64_t pairs) const {
-  // Vectors double their capacity. A pair is in one of the heaps.
+  // Vectors double their capacity. Each pair is in only one of the heaps.
   return boxes_.capacity() * sizeof(Box) +
          2 * sizeof(RankedPair) * std::min<uint64_t>(2 * uint64_t{limit_}, pairs);
 }

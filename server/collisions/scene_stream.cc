@@ -14,22 +14,22 @@
 namespace hulld::server {
 namespace {
 
-// The first pieces are small, because the number of candidates is unknown; the largest bounds the
+// The first pieces are small because the number of candidates is unknown. The maximum bounds the
 // damage of a wrong estimate.
 constexpr uint64_t kFirstPlacements = 4;
 constexpr uint64_t kMostPlacements = 1024;
 // Building the tree of this many placements takes about a slice.
 constexpr int kMostBoxesPerSlice = 512;
-// Candidates, placements or gathering steps between two reads of the clock, and nodes per gathering
-// step, which takes about as long as a candidate.
+// Candidates, placements, or gathering steps between two reads of the clock; also the nodes per
+// gathering step, which takes about as long as a candidate.
 constexpr uint64_t kStepsPerPoll = 16;
 constexpr uint64_t kNodesPerStep = 16;
-// Placements per step of computing boxes: some 100 us.
+// Placements per step of computing boxes, which takes about 100 us.
 constexpr size_t kBoxesPerStep = 256;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
-// Returns the query for relation and clearance alone.
+// Returns the query for only relation and clearance.
 QueryOptions WithoutDetails(QueryOptions options) {
   options.want_axis = false;
   options.want_analysis = false;
@@ -56,7 +56,7 @@ absl::Status SceneStream::Validate() {
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
-  // The box and at least one pair of each placement.
+  // The box, and at least one pair, of each placement.
   expected_pairs_ = table_.size();
   return ValidateChoice();
 }
@@ -176,9 +176,9 @@ absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
                                  : AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   ++piece.next;
-  // It was ranked, or failed, before the first contact was known.
+  // The pair was ranked, or failed, before the first contact was known.
   if (found.answer.ok() && !search_->IsFound(*found.answer)) return absl::OkStatus();
-  // Details such as a certificate may be refused. Counts are modulo 2^64, like their sums.
+  // Details such as a certificate may be refused. Counts are modulo 2^64, and so are their sums.
   if (request().has_limit()) --piece.counts.found[pair.relation];
   ++piece.counts.found[AddFound(pair.a, pair.b, found, piece)];
   return absl::OkStatus();
@@ -301,7 +301,7 @@ void SceneStream::Deliver(ScenePiece& piece) {
   PiecedReplies::Deliver(piece);
 }
 
-// Messages of the head hold no answers.
+// Messages of the head contain no answers.
 bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
                        v1::FindCollisionsResponse* waiting) {
   if (waiting->pairs_size() == 0 || NamesRows(reply.columns())) return false;

@@ -20,7 +20,7 @@ absl::Status ValidateWriterId(const std::string& writer_id) {
       "open.writer_id has ", writer_id.size(), " bytes; the limit is ", Config::kMaxIdCharacters));
 }
 
-// One chunk being built and one being decoded.
+// One chunk is being built and one is being decoded.
 constexpr int kMaxUnbuilt = 2;
 constexpr int kMaxUncommitted = 64;
 

@@ -51,7 +51,7 @@ ReadReactor* HullService::ReplaceHull(CallContext* context, Bytes* response) {
 UnaryReactor* HullService::GetHull(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
-        // The cost of an audit, or of sums over the surface, grows with the hull.
+        // The cost of an audit, or of sums over the surface, increases with the hull's size.
         const bool is_long = call->request().audit() || call->request().properties();
         WorkerPool& readers = is_long ? long_readers_ : readers_;
         call->EndOn(readers,

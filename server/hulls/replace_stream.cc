@@ -16,7 +16,7 @@ void ReplaceStream::OnNoMessage(const absl::Status& why) {
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!why.ok()) return FinishCall(why);
   const bool opened = replacement_.builder != nullptr;
-  // Only the empty block distinguishes a complete request from a disconnected client.
+  // Only the empty block distinguishes a complete request from a client that disconnected.
   if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
   FinishCall(absl::InvalidArgumentError(opened
                                             ? "the stream ended without the empty block of points "
@@ -37,7 +37,7 @@ void ReplaceStream::OnMessage() {
   });
 }
 
-// Handles a message, but does not build.
+// Handles a message, except for building.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
   switch (request().message_case()) {
@@ -98,7 +98,7 @@ void ReplaceStream::Commit() {
   // The registry answers on another thread after the commit.
   const Store& store = registry_.store();
   const auto done = [this, &store](const absl::StatusOr<PutHullResult>& result) {
-    // The memory was counted twice after the registry took ownership; at worst, that evicted a
+    // The memory was counted twice after the registry took ownership, which at worst evicted a
     // snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());

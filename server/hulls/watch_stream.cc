@@ -62,7 +62,7 @@ void WatchStream::Open() {
   RunOn(readers_, [this, target = *target, position = *position] { Begin(target, position); });
 }
 
-// The watch includes everything that this server or a peer server acknowledged before the call.
+// The watch includes all changes that this server or a peer server acknowledged before the call.
 void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position) {
   const auto should_stop = [this] { return call().ShouldStop(); };
   const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
@@ -100,8 +100,8 @@ absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
   return WatchPosition{request().after_revision(), request().store_id()};
 }
 
-// Sends the next batch, or waits for on_ready, which calls this again. At most one such call is
-// running or pending.
+// Sends the next batch, or waits for on_ready, which calls this function again. At most one such
+// call is running or pending.
 void WatchStream::SendNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());

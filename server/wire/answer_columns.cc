@@ -20,7 +20,7 @@ constexpr size_t kElementOverhead = 5;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kWitnessNumbers = 6;
 
-// Adds the reason that the last row has no answer.
+// Adds the reason why the last row has no answer.
 size_t AddProblem(const absl::Status& status, v1::AnswerColumns* columns) {
   v1::PairProblem* const problem = columns->add_pair_problems();
   problem->set_row(static_cast<uint64_t>(columns->relations_size()) - 1);

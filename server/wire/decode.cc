@@ -62,7 +62,7 @@ absl::Status OtherStore(const Store& store) {
 absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
     const google::protobuf::Duration& message) {
   constexpr int64_t kNanosPerSecond = 1'000'000'000;
-  // Far longer than any server runs, yet far from overflow.
+  // Far longer than any server runs, yet far below an overflow.
   constexpr int64_t kMostSeconds = kNanosPerSecond;
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
     return absl::InvalidArgumentError(

@@ -28,7 +28,7 @@ absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature
   return absl::OkStatus();
 }
 
-// (Integer::str() triggers a false warning of GCC 12.)
+// Integer::str() triggers a false warning in GCC 12.
 std::string Decimal(const Integer& number) {
   if (number.is_zero()) return "0";
   const Integer base = 1'000'000'000'000'000'000;
@@ -51,7 +51,8 @@ void EncodeSize(const Hull& hull, v1::HullSize* message) {
   message->set_facets(hull.facet_count());
 }
 
-// Direction: a variant that may hold a Vector or IntegerVector. Message: with an exact_direction.
+// Direction: a variant that may contain a Vector or an IntegerVector. Message: a message with an
+// exact_direction.
 template <typename Direction, typename Message>
 void EncodeDirection(const Direction& direction, Message* message) {
   if (const Vector* n = std::get_if<Vector>(&direction)) {

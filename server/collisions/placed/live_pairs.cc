@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Up to this many placements are compared with all others; beyond it, a tree costs less.
+// Up to this many placements are compared with all others; for more, a tree costs less.
 constexpr size_t kMostCompared = 16;
 
 uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }

@@ -12,14 +12,14 @@ namespace {
 
 // Two indices as varints.
 constexpr size_t kPiecesBytes = 10;
-// Tag and length of a proof within its message, and its row.
+// Tag and length of a proof within its message, and its row index.
 constexpr size_t kProofBytes = 10;
-// Steps of a search of bodies between two reads of the clock. One of moving bodies takes some
-// microseconds at least.
+// Steps of a search of bodies between two reads of the clock. A step for moving bodies takes at
+// least a few microseconds.
 constexpr uint64_t kStepsAtRest = 64;
 constexpr uint64_t kStepsInMotion = 1;
 
-// True if a placement is a body. The query then takes about as long as many pairs of hulls.
+// Returns true if a placement is a body. The query then takes about as long as many pairs of hulls.
 bool HasBody(const PlacementTable& table, uint32_t a, uint32_t b) {
   return table.is_body(a) || table.is_body(b);
 }
@@ -56,8 +56,8 @@ size_t AddRow(const PlacementTable& table, uint32_t a, uint32_t b, const PlacedA
   return table.has_motions() ? bytes + AddNoTimes(columns) : bytes;
 }
 
-// Adds the row of a pair with a body and its certificates. The proof is encoded aside, because it
-// may turn out too large.
+// Adds the row of a pair with a body and its certificates. Encodes the proof separately, because it
+// may turn out to be too large.
 size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
@@ -89,7 +89,7 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 }  // namespace
 
 absl::Status PairSearch::CheckMemory(Registry& registry) const {
-  // Some 400 bytes each.
+  // About 400 bytes each.
   constexpr size_t kMostVertices = 4096;
   if (options_.method != Method::kTextbookSat || HasBody(table_, a_, b_)) return absl::OkStatus();
   const size_t vertices =
@@ -209,7 +209,7 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   const bool is_proven = wanted.certificate() && answer.answer.ok() && HasBody(table, a, b);
   if (is_proven) return AddProvenAnswer(table, a, b, answer, wanted, columns);
   const size_t bytes = AddRow(table, a, b, answer, wanted, columns);
-  // Without an answer no pieces decided, although the relation alone may have been found.
+  // Without an answer, no pieces decided, although the relation alone may have been found.
   return bytes +
          AddPieces(table, a, b, answer.answer.ok() ? answer.of_body.pieces : std::nullopt, columns);
 }

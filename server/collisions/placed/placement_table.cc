@@ -102,8 +102,8 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   return absl::OkStatus();
 }
 
-// Checks the ID of a placement, or adds its inline shape. INVALID_ARGUMENT: it names a hull and
-// carries points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
+// Checks the ID of a placement, or adds its inline shape. INVALID_ARGUMENT: the placement has both
+// a hull ID and points; DecodeShape. Otherwise as CheckHullId, naming `hull_id`.
 absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
                           InlineShapes* shapes) {
   if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
@@ -221,7 +221,7 @@ PlacementTable::PlacementTable(v1::PackedPlacements& packed, std::span<const Vec
   }
 }
 
-// field: returns the text of errors before a field of a placement.
+// field: returns the text that precedes a placement's field in errors.
 PlacementTable::PlacementTable(std::span<const v1::Placement* const> placements,
                                std::string (*field)(size_t i), const Caller& caller)
     : prefix_(caller.prefix) {
@@ -270,7 +270,7 @@ PlacementTable::PlacementTable(std::span<const v1::Placement* const> placements,
   }
 }
 
-// field: returns the text of errors before a coordinate of "pose" or "end_pose".
+// field: returns the text that precedes a coordinate of "pose" or "end_pose" in errors.
 template <typename Field>
 void PlacementTable::CheckPoses(size_t i, const Field& field) {
   if (const Pose pose = PoseAt(i); !IsValidPose(pose)) {
@@ -310,7 +310,7 @@ size_t PlacementTable::MemoryBytes() const {
          of_errors + BodyBytes();
 }
 
-// Valid after resolution.
+// Requires resolved hulls.
 size_t PlacementTable::BodyBytes() const {
   size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes() +
                  hulls_of_pieces_.capacity() * sizeof(const HullRecord*);
@@ -364,7 +364,7 @@ void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolv
   is_all_answerable_ = false;
   for (size_t n = 0; n < hulls.size(); ++n) {
     const size_t k = hulls[n];
-    // The former hull lives until no placement uses it.
+    // Keeps the previous hull alive until no placement uses it.
     const absl::StatusOr<HullView> before = std::exchange(hulls_[k], std::move(resolved.hulls[n]));
     const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
     changed_[k] = !IsSame(before, hulls_[k]);
@@ -387,7 +387,7 @@ bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
   return true;
 }
 
-// If the options need canonical snapshots, every resolved hull has one, and queries use it.
+// If the options need canonical snapshots, every resolved hull has one and queries use it.
 void PlacementTable::SetHulls(const Store& store, Resolved resolved, const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(hull_count());
@@ -400,7 +400,8 @@ void PlacementTable::SetHulls(const Store& store, Resolved resolved, const Query
     changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
     query_hull_changed_[i] = query_hulls_[i] != query_hulls[i];
   }
-  // Keeps the former hulls alive until now: their addresses distinguish them from the new ones.
+  // Keeps the previous hulls alive until now, because their addresses distinguish them from the new
+  // ones.
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
@@ -423,7 +424,7 @@ void PlacementTable::NoteProblems() {
   listed_placements_ = is_packed_ && is_all_answerable_ ? 0 : size();
 }
 
-// If there are bodies, hulls are queried as bodies with a single piece.
+// If any hull is a body, the others are queried as bodies with a single piece.
 void PlacementTable::TakeBodies() {
   bodies_.clear();
   bodies_of_hulls_.clear();

@@ -94,7 +94,7 @@ absl::Status ValidateForMotions(const QueryOptions& options) {
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {
-  // **Observed**: exact contact of hulls of 10000 vertices takes 60 us
+  // **Observed**: exact contact of hulls with 10000 vertices takes 60 us
   // (tests/bench/results/query_relation_*.csv). The first few queries of an unprepared hull scan
   // all of its points.
   constexpr size_t kMostPoints = 10000;

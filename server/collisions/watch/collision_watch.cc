@@ -17,9 +17,9 @@
 namespace hulld::server {
 namespace {
 
-// Number of pairs between two reads of the clock.
+// Pairs between two reads of the clock.
 constexpr size_t kPairsPerPoll = 16;
-// Rounds per watch over which preparation pays off. A guess.
+// Rounds per watch, over which preparation pays off; a guess.
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
 constexpr size_t kEntryHeaderBytes = 4;
@@ -110,7 +110,7 @@ absl::Status CollisionWatch::HandleMessage() {
 }
 
 absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
-  // Also refuses NaN.
+  // Also rejects NaN.
   if (open.has_clearance() && !(open.clearance() >= 0)) {
     return absl::InvalidArgumentError(
         absl::StrCat("clearance is ", open.clearance(), "; it must be a length of at least 0"));
@@ -193,7 +193,7 @@ void CollisionWatch::TakeChanges() {
       hulls_.TakeChanges([this] { return call().ShouldStop(); });
   if (!round.ok()) return EndWork(round.status());
   if (round->waits) return EndWork(absl::OkStatus());
-  // There may be more.
+  // More changes may be pending.
   Locked([this] { has_changes_ = true; });
   const absl::Status status = HandleChanges(*std::move(round));
   if (!status.ok()) return EndWork(status);
@@ -273,7 +273,8 @@ void CollisionWatch::SendRound() {
   });
 }
 
-// Adds new hulls and problems to the reply. Returns false if the message is full before the last.
+// Adds new hulls and problems to the reply. Returns false if the message is full before all are
+// added.
 bool CollisionWatch::AddHulls() {
   while (next_hull_ < new_hulls_.size() || next_piece_hull_ < new_piece_hulls_.size() ||
          next_problem_ < new_problems_.size()) {

@@ -27,7 +27,8 @@ void ForEachRecord(const Resolved& resolved, const Visit& visit) {
 
 }  // namespace
 
-// Watches before it resolves, so that it misses no change. A change in between is resolved twice.
+// Starts the watch before resolving, so that it misses no change. A change in between is resolved
+// twice.
 absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::string> ids,
                                                        std::function<void()> on_ready,
                                                        const PlacedLookup& lookup,
@@ -45,7 +46,7 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
     hulls_[ids_[place]].places.insert(place);
     all.insert(all.end(), place);
   }
-  // No hull has the empty ID. Without placements, the watch waits until the server drains.
+  // No hull has the empty ID, so without placements the watch waits until the server drains.
   if (target.ids.empty()) target.ids.emplace();
   absl::StatusOr<std::shared_ptr<Watch>> watch =
       registry_.feed().Open(target, {}, std::move(on_ready));
@@ -78,7 +79,7 @@ void WatchedHulls::Close() {
   if (watch_ != nullptr) registry_.feed().Close(std::exchange(watch_, nullptr));
 }
 
-// Returns the places that the changes affect; all of them if the changes are unknown.
+// Returns the places affected by the changes; all places if the changes are unknown.
 std::set<size_t> WatchedHulls::PlacesOf(const WatchBatch& batch) const {
   std::set<size_t> places;
   for (size_t place = 0; batch.restarted && place < ids_.size(); ++place) {
@@ -92,8 +93,8 @@ std::set<size_t> WatchedHulls::PlacesOf(const WatchBatch& batch) const {
 }
 
 // Resolves all places that use a changed hull at one revision. If a resolved hull is newer than the
-// version that another place uses, adds that place and repeats. Also repeats after a concurrent
-// change of a body whose new pieces are not watched yet.
+// version that another place uses, adds that place and repeats. Also repeats if a body changed
+// concurrently and its new pieces are not watched yet.
 absl::Status WatchedHulls::Resolve(std::set<size_t> places,
                                    const std::function<bool()>& should_stop, Round* round) {
   while (true) {
