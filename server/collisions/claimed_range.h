@@ -30,8 +30,7 @@ class ClaimedRange {
     unclaimed_.store(count, std::memory_order_release);
   }
 
-  // Claims the next block, of length at most `most`; empty if everything is claimed. Requires most
-  // > 0.
+  // Claims the next block, of at most `most`; empty if everything is claimed. Requires most > 0.
   Block Claim(uint32_t most) {
     HULLD_CHECK(most > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);

@@ -100,7 +100,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr std::chrono::milliseconds kMostWait{2};
 
   struct Shape {
-    // Sizes of the first piece and of the largest.
+    // Numbers of units in the first piece and in the largest.
     uint64_t first_units;
     uint64_t most_units;
     // Preparing this many placements takes about a slice, excluding waits.

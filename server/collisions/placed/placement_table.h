@@ -268,8 +268,8 @@ class PlacementTable {
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
-// Returns INVALID_ARGUMENT, naming the first field with an end pose, because the call does not
-// accept motions. what: the subject of the error, as in "a stream".
+// Returns OK if no placement has an end pose. INVALID_ARGUMENT, naming the first field with one:
+// the call does not accept motions. what: the subject of the error, as in "a stream".
 absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                            const v1::PackedPlacements& packed, const char* what);
 

@@ -12,9 +12,9 @@
 
 namespace hulld::server {
 
-// Returns core's options for a request. The query stops when `lifetime` ends, which must outlive
-// it. INVALID_ARGUMENT, naming the field: an unknown method, a negative or NaN length, or mutually
-// exclusive options.
+// Returns core's options for a request. The query stops when the call of `lifetime` does;
+// `lifetime` must outlive the query. INVALID_ARGUMENT, naming the field: an unknown method, a
+// negative or NaN length, or mutually exclusive options.
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);

@@ -29,7 +29,7 @@ class WatchedHulls {
  public:
   // The hulls and bodies resolved together, at one revision of the store.
   struct Round {
-    // True if no change is pending. on_ready will then be called once, when a change is.
+    // True if no change is pending; on_ready will then be called once, when a change arrives.
     bool waits = false;
     // Every change up to this revision is included.
     uint64_t revision = 0;
