@@ -95,7 +95,7 @@ absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
                       limits_.max_calls, "max-calls", kRetryCall);
   }
   size_t waiting = backlog_ ? backlog_(rpc) : 0;
-  // Tasks queued by streams, such as thousands of watches opened or notified at once, must not
+  // Tasks queued by streams, such as thousands of watches opened or notified together, must not
   // crowd out single calls, because clients take turns.
   if (kind == CallKind::kUnary) waiting = std::min(waiting, single_calls_);
   if (waiting >= limits_.max_waiting_calls) {

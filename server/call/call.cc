@@ -38,7 +38,7 @@ bool IsFault(absl::StatusCode code) {
 }  // namespace
 
 absl::Status Call::Begin(std::function<void()> on_revoked) {
-  // Skips work for cancelled calls, because many may be cancelled at once.
+  // Skips work for cancelled calls, because many may be cancelled together.
   if (context_.IsCancelled()) return absl::CancelledError("the call was cancelled");
   const auto& metadata = context_.client_metadata();
   const auto given = metadata.find(kRequestIdKey);
